@@ -135,7 +135,7 @@ _OPTIONS = (
         "--camera", type=CameraType(), callback=_named,
         help="See the whole scene from there: degrees to the right of its front, degrees above "
         "the ground, and how far, where 1 frames it. Or one of the cameras of a glTF or .xml "
-        "file, by its number or name.",
+        "file, by its number or name; of `render` all: each, to {scene}.{camera}.exr.",
     ),
     click.option(
         "--crop", type=CropType(),

@@ -72,7 +72,8 @@ class Period(Duration):
 @click.option(
     "-o", "--output", "paths", multiple=True, type=click.Path(path_type=Path, allow_dash=True),
     help="Where to write: .exr .png .hdr .pfm .npy, or - for the standard output; may be given "
-    "several times; {scene} is the scene's name.  [default: {scene}.exr and {scene}.png]",
+    "several times; {scene} is the scene's name, {camera} that of --camera all.  "
+    "[default: {scene}.exr and {scene}.png]",
 )  # fmt: skip
 @click.option(
     "--format", "form", type=click.Choice(FORMATS), help="Of the picture of -o -.  [default: png]"

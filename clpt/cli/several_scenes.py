@@ -1,29 +1,39 @@
-"""Several scenes in one command, one after the other: what fails for one does not stop the rest."""
+"""Several scenes or cameras in one command, one after the other: what fails for one does not stop
+the rest.
+"""
 
 from __future__ import annotations
 
 import functools
+import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import click
 
 from ..errors import SceneError
+from ..formats import load
 from . import failures, outputs
 from .standard_output import STANDARD, standard_output
 
 NAME = "{scene}"  # in the name of an output, the scene's
+CAMERA = "{camera}"  # the camera's, or its number
+ALL = "all"  # the name of no camera: each of them
 
 
 @dataclass(frozen=True)
 class _Job:
-    """A scene, the files of its picture, none for the default ones, and its video."""
+    """A scene, the files of its picture, none for the default ones, and its video.
+
+    changed: options that differ from the command's.
+    """
 
     scene: Path
     paths: tuple[Path, ...]
     video: Path | None
+    changed: dict[str, Any] = field(default_factory=dict)
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -33,14 +43,14 @@ class _Job:
 
     def done(self, run: Callable[..., int]) -> int:
         """Return the status of a command for this scene."""
-        return run(scene=self.scene, paths=self.paths, video=self.video)
+        return run(scene=self.scene, paths=self.paths, video=self.video, **self.changed)
 
 
 def one_by_one(command: Callable[..., int]) -> Callable[..., int]:
     """Let a command of one `scene` and its `paths` take `scenes`, and a `form` of -o -.
 
-    Returns what the command does for one scene; for several 0, or the largest status, and at a
-    signal its status at once.
+    Of the camera `all` it renders each. Returns what the command does for one scene; for several
+    0, or the largest status, and at a signal its status at once.
     """
 
     @functools.wraps(command)
@@ -62,6 +72,10 @@ def one_by_one(command: Callable[..., int]) -> Callable[..., int]:
                 _Job(scene, _of(scene, named), None if video is None else _of(scene, (video,))[0])
                 for scene in scenes
             ]
+            if options["variables"].get("camera") == ALL:
+                if STANDARD in paths:
+                    raise click.UsageError("-o - is for one picture")
+                jobs = [one for job in jobs for one in _of_cameras(job, options)]
             run = functools.partial(command, quiet=quiet, **options)
             return _all(run, jobs, quiet) if len(jobs) > 1 else jobs[0].done(run)
 
@@ -74,15 +88,43 @@ def _of(scene: Path, paths: tuple[Path, ...]) -> tuple[Path, ...]:
     return tuple(Path(str(path).replace(NAME, name)) for path in paths)
 
 
+def _of_cameras(job: _Job, options: dict[str, Any]) -> list[_Job]:
+    """Return a job for each of a scene's cameras; the job itself where these cannot be told."""
+    variables = {key: value for key, value in options["variables"].items() if key != "camera"}
+    try:
+        scene = load(job.scene, missing_textures=options["missing_textures"], **variables)
+    except SceneError:
+        return [job]  # it fails by itself, and says why
+    names = [one.partition(" ")[2] for one in scene.extra.get("cameras", ())]
+    if ALL in names:
+        return [job]
+    if not names:
+        return [replace(job, changed={"variables": variables})]
+    if len({*names}) < len(names) or not all(names):
+        names = [str(number) for number in range(len(names))]
+    usual = tuple(path.with_stem(f"{path.stem}.{CAMERA}") for path in outputs.default(job.scene))
+    made = []
+    for number, name in enumerate(names):
+        label = re.sub(r"[^\w.-]", "_", name)
+        paths = tuple(Path(str(path).replace(CAMERA, label)) for path in job.paths or usual)
+        video = None if job.video is None else Path(str(job.video).replace(CAMERA, label))
+        own = {"variables": {**variables, "camera": str(number)}}
+        made.append(replace(job, paths=paths, video=video, changed=own))
+    return made
+
+
 def _check_distinct(jobs: list[_Job]) -> None:
-    """Raise SceneError where two scenes would be written to one file."""
-    owners: dict[Path, Path] = {}
+    """Raise SceneError where two scenes or cameras would be written to one file."""
+    owners: dict[Path, _Job] = {}
     for job in jobs:
         for path in job.files:
-            other = owners.setdefault(path.absolute(), job.scene)
-            if other is not job.scene:
-                message = f"{other} and {job.scene} would both be written there"
+            other = owners.setdefault(path.absolute(), job)
+            if other.scene is not job.scene:
+                message = f"{other.scene} and {job.scene} would both be written there"
                 raise SceneError(f"{message}; -o '{NAME}.exr' names them by the scene", file=path)
+            if other is not job:
+                message = "several cameras would be written there"
+                raise SceneError(f"{message}; -o '{CAMERA}.exr' names them", file=path)
 
 
 def _all(run: Callable[..., int], jobs: list[_Job], quiet: bool) -> int:
@@ -93,7 +135,9 @@ def _all(run: Callable[..., int], jobs: list[_Job], quiet: bool) -> int:
     statuses: list[int] = []
     for number, job in enumerate(jobs, start=1):
         if not quiet:
-            click.echo(f"{job.scene} ({number} of {len(jobs)})", err=True)
+            seen = job.changed.get("variables", {}).get("camera")
+            which = "" if seen is None else f", camera {seen}"
+            click.echo(f"{job.scene}{which} ({number} of {len(jobs)})", err=True)
         status = _one(run, job)
         if status > failures.BAD_INPUT:
             return status  # a signal

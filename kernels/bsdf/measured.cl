@@ -21,7 +21,8 @@ inline MeasuredView measured_view(Measurement data, vec3 wo)
 
 inline Spectrum measured_light(Measurement data, MeasuredView v, vec2 u, vec2 m)
 {
-    real density = measurement_at(v.parts.ndf, m) / (4.0f * measurement_at(v.parts.sigma, v.square));
+    real density = measurement_at(data.values, v.parts.ndf, m);
+    density /= 4.0f * measurement_at(data.values, v.parts.sigma, v.square);
     Spectrum s = measurement_spectrum(data, v.parts, v.viewers, u);
     return spectrum_scale(s, sel(v.parts.over_density, density, (real)(1.0f)));
 }

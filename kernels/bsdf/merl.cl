@@ -57,5 +57,5 @@ real merl_pdf(Merl m, vec3 wo, vec3 wi)
 Spectrum merl_albedo(Merl m)
 {
     integer at = m.data.first + 6;
-    return merl_spectrum(m.data, merl_read(m.data, at));
+    return merl_spectrum(m.data, gather3(m.data.values, at));
 }

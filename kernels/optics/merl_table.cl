@@ -1,9 +1,10 @@
 /* Isotropic reflection over the halfway and the difference angles (Rusinkiewicz 1998), as MERL measured it. `values`
  * has from `first` on the numbers of MERL_HEAD, the slices of a warp for viewers at even angles to the normal, and f
- * [1/sr]: of every halfway angle, difference angle and azimuth its red, green and blue (clpt/measured/merl.py). */
+ * [1/sr]: of every halfway angle, difference angle and azimuth its red, green and blue as halves in two words; after
+ * the last azimuth the first again (clpt/render/lowering/materials/measurements.py). */
 #include "optics/halfway_square.cl"
 #include "optics/warp_table.cl"
-#define MERL_HEAD 10
+#define MERL_HEAD 12
 #ifndef MERL_COUNT /* where all tables of a scene have the same, these are constants */
 #define MERL_COUNT(t, i) warp_count((t).values, (t).first, i)
 #endif
@@ -29,12 +30,14 @@ inline MerlParts merl_parts(MerlTable t)
     p.per_angle = gather(t.values, t.first + 9);
     p.warp.values = t.values;
     p.warp.first = t.first + MERL_HEAD;
+    p.warp.slices = p.viewers;
+    p.warp.unit = gather(t.values, t.first + 10);
     p.warp.rows = MERL_COUNT(t, 1);
     p.warp.columns = MERL_COUNT(t, 2);
     p.halfway = MERL_COUNT(t, 3);
     p.difference = MERL_COUNT(t, 4);
     p.azimuth = MERL_COUNT(t, 5);
-    p.f = p.warp.first + p.viewers * warp_stride(p.warp);
+    p.f = p.warp.first + warp_stride(p.warp);
     return p;
 }
 
@@ -43,13 +46,11 @@ inline WarpSlices merl_viewers(MerlParts p, real theta)
 {
     WarpSlices s;
     real at = clamp_r(theta * p.per_angle, (real)(0.0f), to_real(p.viewers - 1));
-    s.index[0] = min_i(to_integer(at), p.viewers - 2);
-    real along = at - to_real(s.index[0]);
-    s.index[1] = min_i(s.index[0] + 1, p.viewers - 1);
-    s.index[2] = s.index[3] = (integer)(0);
-    s.share[0] = 1.0f - along;
-    s.share[1] = along;
-    s.share[2] = s.share[3] = (real)(0.0f);
+    s.slice = min_i(to_integer(at), p.viewers - 2);
+    s.near = s.far = (integer)(0);
+    s.share.y = at - to_real(s.slice);
+    s.share.x = 1.0f - s.share.y;
+    s.beyond.x = s.beyond.y = (real)(0.0f);
     s.wide = mask_of(0);
     return s;
 }
@@ -64,9 +65,14 @@ inline integer merl_step(real at, integer n, real *along)
 }
 
 inline vec3 merl_mixed(vec3 a, vec3 b, real along) { return madd3(sub3(b, a), along, a); }
-inline vec3 merl_read(MerlTable t, integer at)
+
+/* Between two neighbouring azimuths. */
+inline vec3 merl_read(MerlTable t, integer at, real along)
 {
-    return v3(gather(t.values, at), gather(t.values, at + 1), gather(t.values, at + 2));
+    vec4 words = gather4(t.values, at);
+    vec2 rg = warp_mixed(warp_halves(words.x), warp_halves(words.z), along);
+    vec2 b = warp_mixed(warp_halves(words.y), warp_halves(words.w), along);
+    return v3(rg.x, rg.y, b.x);
 }
 
 /* f of a pair of directions whose halfway direction is h. */
@@ -83,14 +89,11 @@ inline vec3 merl_f(MerlTable t, MerlParts p, vec3 h, vec3 wo, vec3 wi)
     integer j = merl_step(difference * (2.0f * INV_PI), p.difference, &j_along);
     real k_along = x - floor(x);
     integer k = to_integer(floor(x)), near = sel_i(k < 0, p.azimuth - 1, k);
-    near = clamp_i(near, p.azimuth - 1);
-    integer far = sel_i(near + 1 >= p.azimuth, (integer)(0), near + 1), width = p.azimuth * 3;
-    integer at = p.f + (i * p.difference + j) * width, below = at + p.difference * width;
-#define BETWEEN(row) merl_mixed(merl_read(t, (row) + 3 * near), merl_read(t, (row) + 3 * far), k_along)
-    vec3 a = merl_mixed(BETWEEN(at), BETWEEN(at + width), j_along);
-    vec3 b = merl_mixed(BETWEEN(below), BETWEEN(below + width), j_along);
-#undef BETWEEN
-    return merl_mixed(a, b, i_along);
+    integer width = (p.azimuth + 1) * 2, at = p.f + (i * p.difference + j) * width + 2 * clamp_i(near, p.azimuth - 1);
+    integer below = at + p.difference * width;
+    vec3 a = merl_mixed(merl_read(t, at, k_along), merl_read(t, at + width, k_along), j_along);
+    vec3 b = merl_mixed(merl_read(t, below, k_along), merl_read(t, below + width, k_along), j_along);
+    return scale3(merl_mixed(a, b, i_along), gather(t.values, t.first + 11));
 }
 
 inline Spectrum merl_spectrum(MerlTable t, vec3 rgb)

@@ -1,16 +1,22 @@
 /* The unit square to itself, so that even points follow a density that is a bilinear table (Dupuy and Jakob 2018,
- * section 4.2). Of every slice `values` has from `first` on its rows of densities per cell, then for every row its
- * integrals up to each column, then the integrals of all rows above each row, which end at 1: of integral 1 each
- * (clpt/measured/warp.py). Density and integrals are linear between slices. */
+ * section 4.2), of which there are slices in rows; densities and integrals are linear between slices. From `first` on
+ * stand for every row of slices, those that are neighbours next to each other: of every two rows of the table and
+ * every column the densities, two halves in a word; the integrals along both rows up to there, two words; of cells of
+ * even shares of these integrals, at which part of the columns they begin and end, two 16383ths in a word; then of
+ * every row the integral of all above, which ends at 1; and of cells of even shares of that where they begin and end
+ * (clpt/render/lowering/materials/warp_tables.py). What is read together stands together. */
+#include "core/rows.cl"
+
 typedef struct {
     global const float *values;
-    integer first, rows, columns;
+    integer first, slices, rows, columns; /* slices: of a row, two at least */
+    real unit;                            /* of the halves: the mass of a cell where all four are 1 */
 } WarpTable;
 
-/* Up to four slices, and their shares: two neighbours, and where `wide` two of the next row of slices. */
+/* Two neighbouring slices of a row, and where `wide` the same two of another row; their shares. */
 typedef struct {
-    integer index[4];
-    real share[4];
+    integer slice, near, far;
+    vec2 share, beyond;
     mask wide;
 } WarpSlices;
 
@@ -19,18 +25,6 @@ typedef struct {
 inline integer warp_count(global const float *values, integer first, int i)
 {
     return sel_i(first > 0, to_integer(gather(values, first + i)), (integer)(2));
-}
-
-/* A number of every slice, which are `stride` apart. */
-inline real warp_read(global const float *values, WarpSlices s, integer at, integer stride)
-{
-    real r = s.share[0] * gather(values, at + s.index[0] * stride);
-    r += s.share[1] * gather(values, at + s.index[1] * stride);
-    if (any(s.wide)) {
-        r += s.share[2] * gather(values, at + s.index[2] * stride);
-        r += s.share[3] * gather(values, at + s.index[3] * stride);
-    }
-    return r;
 }
 
 /* The last of n - 1 numbers that ascend from `first` + `cells` on which is not above x, and how far x is to the next,
@@ -49,7 +43,9 @@ inline integer warp_node(global const float *values, integer first, integer cell
     return i;
 }
 
-inline integer warp_stride(WarpTable t) { return t.rows * (2 * t.columns + 1); }
+/* Words of the pairs of rows, of one kind; of a row of slices. */
+inline integer warp_nodes(WarpTable t) { return (t.rows - 1) * t.columns * t.slices; }
+inline integer warp_stride(WarpTable t) { return 4 * warp_nodes(t) + 2 * t.rows * t.slices; }
 
 /* The cell of a table of n nodes in which x lies, and how far along it. */
 inline integer warp_cell(real x, integer n, real *along)
@@ -67,17 +63,107 @@ inline real warp_linear(real u, real a, real b)
     return min_r(sel(sum > 0.0f, u * (a + b) / max_r(sum, (real)(1e-37f)), u), (real)(1.0f));
 }
 
-/* The four densities around a cell: of its row, then of the next one. */
-inline vec4 warp_corners(WarpTable t, WarpSlices s, integer row, integer column)
+inline vec2 warp_mixed(vec2 a, vec2 b, real along)
 {
-    integer stride = warp_stride(t), at = t.first + row * t.columns + column;
-    return v4(warp_read(t.values, s, at, stride), warp_read(t.values, s, at + 1, stride),
-              warp_read(t.values, s, at + t.columns, stride), warp_read(t.values, s, at + t.columns + 1, stride));
+    vec2 r = {a.x + along * (b.x - a.x), a.y + along * (b.y - a.y)};
+    return r;
 }
-inline real warp_between(vec4 c, real x, real y)
+
+inline real warp_at(vec2 rows, real y) { return rows.x + y * (rows.y - rows.x); }
+
+/* A pair of halves, which are not negative, times 2^-112. */
+inline vec2 warp_halves(real word)
 {
-    real a = c.x + y * (c.z - c.x), b = c.y + y * (c.w - c.y);
-    return a + x * (b - a);
+    natural bits = as_natural(word);
+    vec2 r = {as_real((bits & 0x7fffu) << 13), as_real((bits >> 16 & 0x7fffu) << 13)};
+    return r;
+}
+
+/* Of two slices and their shares: of halves in a word each, of pairs, of numbers. */
+inline vec2 warp_sum_halves(vec2 share, vec2 words)
+{
+    vec2 a = warp_halves(words.x), b = warp_halves(words.y);
+    vec2 r = {share.x * a.x + share.y * b.x, share.x * a.y + share.y * b.y};
+    return r;
+}
+inline vec2 warp_sum_pairs(vec2 share, vec4 v)
+{
+    vec2 r = {share.x * v.x + share.y * v.z, share.x * v.y + share.y * v.w};
+    return r;
+}
+inline real warp_sum(vec2 share, vec2 v) { return share.x * v.x + share.y * v.y; }
+inline vec2 warp_added(vec2 a, vec2 b)
+{
+    vec2 r = {a.x + b.x, a.y + b.y};
+    return r;
+}
+
+/* The same of all slices; at: where the numbers of the first slice of the first row stand, stride: from row to row. */
+inline real warp_read(global const float *values, WarpSlices s, integer at, integer stride)
+{
+    real r = warp_sum(s.share, gather2(values, at + s.near * stride + s.slice));
+    if (any(s.wide)) r += warp_sum(s.beyond, gather2(values, at + s.far * stride + s.slice));
+    return r;
+}
+inline vec2 warp_read_pair(global const float *values, WarpSlices s, integer at, integer stride)
+{
+    vec2 r = warp_sum_pairs(s.share, gather4(values, at + s.near * stride + 2 * s.slice));
+    if (any(s.wide))
+        r = warp_added(r, warp_sum_pairs(s.beyond, gather4(values, at + s.far * stride + 2 * s.slice)));
+    return r;
+}
+inline vec2 warp_read_halves(global const float *values, WarpSlices s, integer at, integer stride)
+{
+    vec2 r = warp_sum_halves(s.share, gather2(values, at + s.near * stride + s.slice));
+    if (any(s.wide))
+        r = warp_added(r, warp_sum_halves(s.beyond, gather2(values, at + s.far * stride + s.slice)));
+    return r;
+}
+
+/* Where a share of an integral ends, as a part of it: begin and end of the cell it is in, and how far along. */
+inline vec2 warp_ends(real word)
+{
+    natural bits = as_natural(word);
+    vec2 r = {to_real(as_integer(bits & 0xffffu)), to_real(as_integer(bits >> 16))};
+    return r;
+}
+inline real warp_part(vec2 share, vec2 words, real along)
+{
+    return share.x * warp_at(warp_ends(words.x), along) + share.y * warp_at(warp_ends(words.y), along);
+}
+
+/* The node, of n, near which a share of the slices' integral ends: the mean of where it ends in each of them, which is
+ * the node itself nineteen times in twenty. at: the cells of the first slice. */
+inline integer warp_guess(global const float *values, WarpSlices s, integer at, integer slices, integer stride, real x,
+                          integer n)
+{
+    real cells = x * to_real(n);
+    integer cell = clamp_i(to_integer(cells), n - 1), i = at + cell * slices + s.slice;
+    real along = cells - to_real(cell);
+    real part = warp_part(s.share, gather2(values, i + s.near * stride), along);
+    if (any(s.wide)) part += warp_part(s.beyond, gather2(values, i + s.far * stride), along);
+    return clamp_i(to_integer(part * (1.0f / 16383.0f) * to_real(n - 1)), n - 2);
+}
+
+/* Which way to walk from a node whose integral is `below` and that of the next one `above`, to that which x is in. */
+inline integer warp_way(real x, real below, real above, integer node, integer most)
+{
+    integer forth = sel_i((above <= x) & (node < most), (integer)(1), (integer)(0));
+    return sel_i((below > x) & (node > 0), (integer)(-1), forth);
+}
+
+/* Densities of a row and the next one at a column, and at the column beside it; integrals of both rows up to there. */
+inline vec2 warp_densities(WarpTable t, WarpSlices s, integer node)
+{
+    return warp_read_halves(t.values, s, t.first + node * t.slices, warp_stride(t));
+}
+inline vec2 warp_across(WarpTable t, WarpSlices s, integer node)
+{
+    return warp_read_pair(t.values, s, t.first + warp_nodes(t) + 2 * node * t.slices, warp_stride(t));
+}
+inline real warp_down(WarpTable t, WarpSlices s, integer row)
+{
+    return warp_read(t.values, s, t.first + 4 * warp_nodes(t) + row * t.slices, warp_stride(t));
 }
 inline real warp_cells(WarpTable t) { return to_real(t.rows - 1) * to_real(t.columns - 1); }
 
@@ -85,42 +171,49 @@ inline real warp_cells(WarpTable t) { return to_real(t.rows - 1) * to_real(t.col
 inline real warp_density(WarpTable t, WarpSlices s, vec2 p)
 {
     real x, y;
-    integer column = warp_cell(p.x, t.columns, &x), row = warp_cell(p.y, t.rows, &y);
-    return warp_between(warp_corners(t, s, row, column), x, y) * warp_cells(t);
+    integer column = warp_cell(p.x, t.columns, &x), node = warp_cell(p.y, t.rows, &y) * t.columns + column;
+    vec2 c = warp_mixed(warp_densities(t, s, node), warp_densities(t, s, node + 1), x);
+    return warp_at(c, y) * t.unit * warp_cells(t);
 }
 
 /* Where an even point goes, and the density there. */
 inline vec2 warp_sample(WarpTable t, WarpSlices s, vec2 u, real *density)
 {
-    integer stride = warp_stride(t), across = t.first + t.rows * t.columns, down = across + t.rows * t.columns;
+    integer stride = warp_stride(t), nodes = warp_nodes(t), guide = t.first + 4 * nodes + t.rows * t.slices;
     u.x = clamp_r(u.x, (real)(1e-7f), (real)(0.9999999f));
     u.y = clamp_r(u.y, (real)(1e-7f), (real)(0.9999999f));
-    integer row = 0, high = t.rows - 2;
-    while (any(row < high)) {
-        integer middle = (row + high + 1) >> 1;
-        mask above = warp_read(t.values, s, down + middle, stride) > u.y, open = row < high;
-        row = sel_i(open & !above, middle, row);
-        high = sel_i(open & above, middle - 1, high);
+    integer row = warp_guess(t.values, s, guide, t.slices, stride, u.y, t.rows);
+    real below = warp_down(t, s, row), above = warp_down(t, s, row + 1);
+    integer way = warp_way(u.y, below, above, row, t.rows - 2);
+    while (any(way != 0)) {
+        row += way;
+        real next = warp_down(t, s, sel_i(way > 0, row + 1, row)), old = above;
+        above = sel(way < 0, below, sel(way > 0, next, above));
+        below = sel(way < 0, next, sel(way > 0, old, below));
+        way = warp_way(u.y, below, above, row, t.rows - 2);
     }
-    integer near = across + row * t.columns, far = near + t.columns;
-    real r0 = warp_read(t.values, s, far - 1, stride), r1 = warp_read(t.values, s, far + t.columns - 1, stride);
-    real left = u.y - warp_read(t.values, s, down + row, stride);
-    real y = warp_linear(clamp_r(left / max_r(0.5f * (r0 + r1), (real)(1e-30f)), (real)(0.0f), (real)(1.0f)), r0, r1);
+    integer begin = row * t.columns;
+    vec2 whole = warp_across(t, s, begin + t.columns - 1);
+    real left = clamp_r((u.y - below) / max_r(0.5f * (whole.x + whole.y), (real)(1e-30f)), (real)(0.0f), (real)(1.0f));
+    real y = warp_linear(left, whole.x, whole.y);
 
-    real along = u.x * (r0 + y * (r1 - r0));
-    integer column = 0;
-    high = t.columns - 2;
-    while (any(column < high)) {
-        integer middle = (column + high + 1) >> 1;
-        real a = warp_read(t.values, s, near + middle, stride), b = warp_read(t.values, s, far + middle, stride);
-        mask above = a + y * (b - a) > along, open = column < high;
-        column = sel_i(open & !above, middle, column);
-        high = sel_i(open & above, middle - 1, high);
+    real along = u.x * warp_at(whole, y);
+    guide = t.first + 3 * nodes + begin * t.slices;
+    integer column = warp_guess(t.values, s, guide, t.slices, stride, u.x, t.columns);
+    below = warp_at(warp_across(t, s, begin + column), y);
+    above = warp_at(warp_across(t, s, begin + column + 1), y);
+    way = warp_way(along, below, above, column, t.columns - 2);
+    while (any(way != 0)) {
+        column += way;
+        real next = warp_at(warp_across(t, s, begin + sel_i(way > 0, column + 1, column)), y), old = above;
+        above = sel(way < 0, below, sel(way > 0, next, above));
+        below = sel(way < 0, next, sel(way > 0, old, below));
+        way = warp_way(along, below, above, column, t.columns - 2);
     }
-    real a = warp_read(t.values, s, near + column, stride), b = warp_read(t.values, s, far + column, stride);
-    along -= a + y * (b - a);
-    vec4 c = warp_corners(t, s, row, column);
-    real c0 = c.x + y * (c.z - c.x), c1 = c.y + y * (c.w - c.y);
+    integer node = begin + column;
+    along -= below;
+    real c0 = warp_at(warp_densities(t, s, node), y) * t.unit;
+    real c1 = warp_at(warp_densities(t, s, node + 1), y) * t.unit;
     real x = warp_linear(clamp_r(along / max_r(0.5f * (c0 + c1), (real)(1e-30f)), (real)(0.0f), (real)(1.0f)), c0, c1);
     *density = (c0 + x * (c1 - c0)) * warp_cells(t);
     vec2 p = {(to_real(column) + x) / to_real(t.columns - 1), (to_real(row) + y) / to_real(t.rows - 1)};
@@ -130,17 +223,15 @@ inline vec2 warp_sample(WarpTable t, WarpSlices s, vec2 u, real *density)
 /* The even point that goes to p, and the density there. */
 inline vec2 warp_invert(WarpTable t, WarpSlices s, vec2 p, real *density)
 {
-    integer stride = warp_stride(t), across = t.first + t.rows * t.columns, down = across + t.rows * t.columns;
     real x, y;
-    integer column = warp_cell(p.x, t.columns, &x), row = warp_cell(p.y, t.rows, &y);
-    vec4 c = warp_corners(t, s, row, column);
-    real c0 = c.x + y * (c.z - c.x), c1 = c.y + y * (c.w - c.y);
+    integer column = warp_cell(p.x, t.columns, &x), row = warp_cell(p.y, t.rows, &y), begin = row * t.columns;
+    integer node = begin + column;
+    real c0 = warp_at(warp_densities(t, s, node), y) * t.unit;
+    real c1 = warp_at(warp_densities(t, s, node + 1), y) * t.unit;
     *density = (c0 + x * (c1 - c0)) * warp_cells(t);
-    integer near = across + row * t.columns, far = near + t.columns;
-    real a = warp_read(t.values, s, near + column, stride), b = warp_read(t.values, s, far + column, stride);
-    real r0 = warp_read(t.values, s, far - 1, stride), r1 = warp_read(t.values, s, far + t.columns - 1, stride);
+    vec2 before = warp_across(t, s, node), whole = warp_across(t, s, begin + t.columns - 1);
     vec2 u;
-    u.x = (a + y * (b - a) + x * (c0 + 0.5f * x * (c1 - c0))) / max_r(r0 + y * (r1 - r0), (real)(1e-30f));
-    u.y = warp_read(t.values, s, down + row, stride) + y * (r0 + 0.5f * y * (r1 - r0));
+    u.x = (warp_at(before, y) + x * (c0 + 0.5f * x * (c1 - c0))) / max_r(warp_at(whole, y), (real)(1e-30f));
+    u.y = warp_down(t, s, row) + y * (whole.x + 0.5f * y * (whole.y - whole.x));
     return u;
 }

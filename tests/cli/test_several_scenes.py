@@ -90,3 +90,30 @@ def test_outputs_are_tried_before_the_first_scene(meshes, capsys):
     assert error.startswith("clpt: error: no/a.png: its folder does not exist")
     assert run(["render"]) == 2
     assert "Missing argument 'SCENE...'" in capsys.readouterr().err
+
+
+CAMERA = (
+    '<sensor type="perspective" id="{}"><transform name="to_world"><lookat origin="{},0,4"'
+    ' target="{},0,0" up="0,1,0"/></transform></sensor>'
+)
+ROW = (
+    '<scene version="3.0.0"><sensor type="batch">{}<film type="hdrfilm"><integer name="width"'
+    ' value="16"/><integer name="height" value="6"/></film></sensor><emitter type="constant"/>'
+    '<shape type="sphere"><float name="radius" value="0.5"/></shape></scene>'
+)
+
+
+def test_all_cameras_have_files_of_their_own(meshes, capsys):
+    """Of a row of sensors too; the ball is in the middle of the first picture alone."""
+    row = CAMERA.format("the left", 0, 0) + CAMERA.format("b", 9, 9)
+    Path("row.xml").write_text(ROW.format(row))
+    common = ["--spp", "1", "--mode", "rgb", "--camera", "all"]
+    assert run(["render", "row.xml", *common]) == 0
+    written = ["row.b.exr", "row.b.png", "row.the_left.exr", "row.the_left.png"]
+    assert sorted(path.name for path in meshes.glob("row.*.*")) == written
+    left, right = images.read("row.the_left.exr"), images.read("row.b.exr")
+    assert left.shape == right.shape == (6, 8, 3)
+    assert left[2:4, 3:5].mean() < 0.9 < right.min()
+    assert run(["render", "row.xml", *common, "-o", "one.npy", "--quiet"]) == 2
+    assert "-o '{camera}.exr' names them" in capsys.readouterr().err
+    assert run(["render", "a.obj", *COMMON, "--camera", "all", "-o", "a.npy", "--quiet"]) == 0

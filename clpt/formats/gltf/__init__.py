@@ -20,6 +20,7 @@ from clpt.formats.gltf import (
     meshopt,
     motion,
     nodes,
+    pointers,
     variants,
 )  # fmt: skip
 from clpt.formats.gltf.document import Document
@@ -35,6 +36,7 @@ VARIABLES = (
 SUPPORTED = (
     draco.NAME, *meshopt.EXTENSIONS, "KHR_mesh_quantization", "KHR_texture_transform",
     "EXT_texture_webp", lights.NAME, meshes.INSTANCING, *materials.EXTENSIONS,
+    pointers.NAME,
     "FB_ngon_encoding",  # says which triangles make a polygon: the picture is the same
 )  # fmt: skip
 VARIANTS = variants.NAME
@@ -46,7 +48,8 @@ def load(path: Path, missing: Missing = "error", /, **variables: Any) -> Scene:
     """Read a glTF file; a camera or light that it lacks is added, as for a bare mesh.
 
     variables: `time` [s] of an animation (the first, or the `animation` of that number or name);
-    without it nodes have their own transforms. `camera` and `scene` choose by number or name.
+    without it nodes have their own transforms, and materials, lights
+    and cameras their own numbers. `camera` and `scene` choose by number or name.
     `shutter` [s] is how long light comes to the film from `time` on, while nodes move.
     `variant` chooses among material variants. `lumens`: of a watt, by which punctual lights are
     divided. `multiple_scattering`: 1 keeps what facets reflect to each other.

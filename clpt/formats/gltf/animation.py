@@ -1,4 +1,7 @@
-"""Animations: what nodes' transforms and morph weights are at a given time (glTF 3.11, app. C)."""
+"""Animations: what nodes' transforms, morph weights and, by pointers, other numbers are at a time.
+
+glTF 3.11 and its appendix C; KHR_animation_pointer.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.errors import SceneError
+from clpt.formats.gltf import pointers
 from clpt.formats.gltf.accessors import floats
 from clpt.formats.gltf.document import Document, Element
 
@@ -17,6 +21,7 @@ PATHS = {
     "rotation": ("VEC4",),
     "scale": ("VEC3",),
     "weights": ("SCALAR",),
+    "pointer": ("SCALAR", "VEC2", "VEC3", "VEC4"),
 }
 INTERPOLATIONS = ("LINEAR", "STEP", "CUBICSPLINE")
 
@@ -24,13 +29,22 @@ INTERPOLATIONS = ("LINEAR", "STEP", "CUBICSPLINE")
 def pose(document: Document, chosen: str | None, time: float) -> dict[tuple[int, str], Values]:
     """Return the values by (node, "rotation" or the like) that an animation sets at a time [s].
 
-    chosen: its number or name; the first one if None. Raises SceneError if there is no such one.
+    chosen: its number or name; the first one if None. What pointers point to elsewhere is written
+    into the document. Raises SceneError if there is no such animation.
     """
     found: dict[tuple[int, str], Values] = {}
     for channel in _chosen(document, chosen).children("channels"):
         target = channel.needed("target")
         node = target.index("node", "nodes", None)
         path = target.text("path")
+        if path == "pointer":
+            names = pointers.parts(channel)
+            on_node = pointers.node_path(names)
+            if on_node is not None and on_node[0] < document.root.count("nodes"):
+                found[on_node] = _sampled(channel, on_node[1], time)
+            elif not pointers.put(document.root, names, _sampled(channel, path, time)):
+                channel.warn(f"left out: nothing is known to move at '/{'/'.join(names)}'")
+            continue
         if node is None or path not in PATHS:
             channel.warn(f"left out: {path!r} of no node that is known")
             continue

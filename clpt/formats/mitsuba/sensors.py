@@ -89,7 +89,11 @@ def batch(element: Element, context: Context) -> list[Sensor]:
     if not inner or film.width % len(inner) or film.crop is not None:
         raise element.error("needs a film whose width is a multiple of its sensors, without a crop")
     width = film.width // len(inner)
-    context.warn(element, f"its {len(inner)} pictures of {width} pixels are no row: one is shown")
+    context.warn(
+        element,
+        f"its {len(inner)} pictures of {width} pixels are no row: one is shown;"
+        " `clpt render --camera all` writes each",
+    )
     part = replace(film, width=width)
     made = [sensor(one, context) for one in inner]
     if any(not math.isclose(one.film.width / one.film.height, width / film.height) for one in made):

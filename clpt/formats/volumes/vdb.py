@@ -91,16 +91,6 @@ def read(path: Path, grid: str = "") -> Volume:
         raise SceneError("is damaged: it ends too soon, or points beyond its end") from None
 
 
-def names(path: Path) -> tuple[str, ...]:
-    """Return the names of the grids of a file. Raises SceneError, OSError."""
-    try:
-        return tuple(entry.name for entry in _entries(path.read_bytes()))
-    except SceneError:
-        raise
-    except (struct.error, IndexError, ValueError):
-        raise SceneError("is damaged: it ends too soon") from None
-
-
 def _entries(data: bytes) -> Iterator[_Entry]:
     if data[: len(MAGIC)] != MAGIC:
         raise SceneError("is no .vdb file: it does not begin with OpenVDB's number")

@@ -185,6 +185,63 @@ def test_rotations_take_the_shorter_way(read, build):
         read(made, time="soon")
 
 
+def pointed(build, *targets, **top):
+    """A document whose numbers at JSON pointers go through values from 0 to 1 s."""
+    made = build(extensionsUsed=["KHR_animation_pointer", "KHR_lights_punctual"], **top)
+    times, channels, samplers = made.accessor([0.0, 1.0]), [], []
+    for pointer, values in targets:
+        extension = {"KHR_animation_pointer": {"pointer": pointer}}
+        channels.append({
+            "sampler": len(samplers), "target": {"path": "pointer", "extensions": extension}
+        })  # fmt: skip
+        samplers.append({"input": times, "output": made.accessor(values)})
+    made.json["animations"] = [{"channels": channels, "samplers": samplers}]
+    return made.mesh(material=0)
+
+
+def test_pointers_animate_materials_lights_and_nodes(read, build):
+    made = pointed(
+        build,
+        ("/materials/0/pbrMetallicRoughness/roughnessFactor", [0.0, 1.0]),
+        ("/materials/0/emissiveFactor", [[0.0, 0.0, 0.0], [1.0, 0.5, 0.0]]),
+        ("/extensions/KHR_lights_punctual/lights/0/intensity", [2.0, 6.0]),
+        ("/nodes/0/translation", [[0, 0, 0], [4, 0, 0]]),
+        materials=[{"pbrMetallicRoughness": {}}],
+        extensions={"KHR_lights_punctual": {"lights": [{"type": "point"}]}},
+        nodes=[{"mesh": 0}, {"extensions": {"KHR_lights_punctual": {"light": 0}}}],
+        scenes=[{"nodes": [0, 1]}],
+    )
+    scene = read(made, time=0.25)
+    assert not scene.warnings
+    assert np.isclose(scene.shapes[0].material.front.roughness, 0.25)
+    assert np.allclose(corners(scene.shapes[0])[0, 0], [1, 0, 0])
+    brighter = read(made, time=1.0)
+    then, now = (one.lights[0].intensity.sample(np.array([550.0])) for one in (scene, brighter))
+    assert np.allclose(now, 2.0 * then)
+    assert np.allclose(corners(read(made).shapes[0])[0, 0], 0.0)
+
+
+@pytest.mark.parametrize(
+    ("pointer", "message"),
+    [
+        ("/nodes/7/translation", "nothing is known to move"),
+        ("/materials/9/emissiveFactor", "nothing is known to move"),
+        ("/nodes/0/children", "nothing is known to move"),
+        ("/accessors/0/count", "nothing is known to move"),
+        ("/materials", "nothing is known to move"),
+        ("/materials/0/name", "nothing is known to move"),
+        ("materials/0/emissiveFactor", "is no JSON pointer"),
+    ],
+)
+def test_pointers_to_nothing_are_told(read, build, pointer, message):
+    made = pointed(build, (pointer, [[0, 0, 0], [1, 1, 1]]), materials=[{"name": "a"}])
+    if pointer.startswith("/"):
+        assert message in " ".join(read(made, time=0.5).warnings)
+    else:
+        with pytest.raises(SceneError, match=message):
+            read(made, time=0.5)
+
+
 def test_morph_targets(read, build):
     made = build()
     targets = [

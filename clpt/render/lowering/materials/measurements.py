@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 from clpt import measured
 from clpt.measured import Measurement, MerlTable, merl
 from clpt.measured.fit import hemispherical
-from clpt.measured.warp import warp
+from clpt.render.lowering.materials.warp_tables import halves, scaled, warp_words
 from clpt.spectra import cie
 from clpt.spectra.spectrum import d65, primaries
 
 Values = NDArray[np.float32]
-LARGEST = 4096.0  # of the halves that stand for spectra
 
 
 @dataclass(frozen=True)
@@ -40,19 +39,22 @@ def rows(value: Measurement | None, film: tuple[float, float] | None) -> Rows:
     """Return what stands in `distributions`; film: its range [nm], None in RGB mode."""
     given = measured.grey() if value is None else value
     shown = _in_rgb(given) if film is None else _in_range(given, *film)
-    counts = [len(shown.phi_i), len(shown.theta_i)]
-    for table in (shown.ndf, shown.sigma, shown.vndf, shown.luminance):
+    theta = shown.theta_i
+    vndf, luminance, spectra = shown.vndf, shown.luminance, shown.spectra
+    if len(theta) == 1:  # kernels read two neighbours
+        theta = np.append(theta, theta + 1.0)
+        vndf, luminance, spectra = (np.repeat(x, 2, axis=1) for x in (vndf, luminance, spectra))
+    counts = [len(shown.phi_i), len(theta)]
+    for table in (shown.ndf, shown.sigma, vndf, luminance):
         counts += table.shape[-2:]
-    angles = [_guided(nodes) for nodes in (shown.phi_i, shown.theta_i)]
-    counts += [shown.spectra.shape[2], int(shown.jacobian) + 2 * shown.reduction]
-    counts += [
-        len(one) - len(nodes)
-        for one, nodes in zip(angles, (shown.phi_i, shown.theta_i), strict=True)
-    ]
-    scale = max(float(shown.spectra.max()), 1e-30) / LARGEST
+    angles = [_guided(nodes) for nodes in (shown.phi_i, theta)]
+    counts += [spectra.shape[2], int(shown.jacobian) + 2 * shown.reduction]
+    counts += [len(angles[0]) - len(shown.phi_i), len(angles[1]) - len(theta)]
+    (normals, of_normals), (bright, of_bright) = warp_words(vndf), warp_words(luminance)
+    light, scale = scaled(spectra)
     parts = [
-        [*counts, scale], *angles, hemispherical(shown), shown.ndf, shown.sigma,
-        _warped(shown.vndf), _warped(shown.luminance), _halves(shown.spectra / scale),
+        [*counts, scale, of_normals, of_bright], *angles, hemispherical(shown), shown.ndf,
+        shown.sigma, normals, bright, _pairs(light),
     ]  # fmt: skip
     return Rows(_joined(*parts), tuple(counts), np.asarray(shown.wavelengths, np.float64))
 
@@ -72,12 +74,12 @@ def _guided(nodes: Values) -> Values:
     return np.concatenate([first, nodes]).astype(np.float32)
 
 
-def _halves(spectra: NDArray[Any]) -> Values:
-    """Pairs of neighbouring colours of each node, two halves in a word."""
-    last = np.moveaxis(spectra, 2, -1).astype("<f2")
-    if last.shape[-1] == 1:
-        last = np.repeat(last, 2, axis=-1)
-    return np.ascontiguousarray(np.stack([last[..., :-1], last[..., 1:]], -1)).view(np.float32)
+def _pairs(spectra: NDArray[Any]) -> Values:
+    """Pairs of neighbouring colours (phi, pairs, rows, columns, theta), two halves in a word."""
+    if spectra.shape[2] == 1:
+        spectra = np.repeat(spectra, 2, axis=2)
+    last = np.moveaxis(spectra, 1, -1)
+    return halves(np.stack([last[:, :-1], last[:, 1:]], axis=-1))
 
 
 def merl_rows(value: MerlTable | None) -> Rows:
@@ -88,15 +90,11 @@ def merl_rows(value: MerlTable | None) -> Rows:
     f = np.full((2, 2, 2, 3), 0.5 / np.pi) if value is None else merl.filled(value)
     angles, density, share = merl.densities(f)
     counts = (len(angles), *density.shape[1:], *f.shape[:3])
-    head = [*counts, *share, 1.0 / angles[1]]
-    return Rows(_joined(head, _warped(density), f), counts)
-
-
-def _warped(density: NDArray[Any]) -> Values:
-    """The slices of a warp: densities, sums along rows, sums over rows."""
-    made, slices = warp(density), density.shape[:-2]
-    flat = [part.reshape(*slices, -1) for part in (made.values, made.across, made.down)]
-    return np.concatenate(flat, axis=-1).astype(np.float32)
+    words, unit = warp_words(density[None])
+    around, scale = scaled(np.concatenate([f, f[:, :, :1]], axis=2))
+    colours = halves(np.pad(around, [(0, 0)] * 3 + [(0, 1)]).reshape(*around.shape[:3], 2, 2))
+    head = [*counts, *share, 1.0 / angles[1], unit, scale * 2.0**112]
+    return Rows(_joined(head, words, colours), counts)
 
 
 def _in_rgb(given: Measurement) -> Measurement:
