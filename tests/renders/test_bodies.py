@@ -99,7 +99,8 @@ MITSUBA = """<scene version="3.0.0">
 <float name="int_ior" value="1.5"/><float name="ext_ior" value="1"/></bsdf></shape>
 <shape type="sphere"><float name="radius" value="0.8"/><bsdf type="dielectric">
 <float name="int_ior" value="1.33"/><float name="ext_ior" value="1.5"/></bsdf>
-<medium name="interior" type="homogeneous"><rgb name="sigma_t" value="0.31"/><float name="scale" value="10"/>
+<medium name="interior" type="homogeneous"><float name="scale" value="10"/>
+<rgb name="sigma_t" value="0.31"/>
 <rgb name="albedo" value="0.96774194"/></medium></shape></scene>"""
 
 
