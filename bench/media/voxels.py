@@ -37,7 +37,7 @@ def main(file: Path | None, path: str | None) -> None:
             "dense": int((density > 0.0).sum()),
         }
         row = {
-            "bits": bits,
+            "figure": f"{bits} bits",
             "used": round(kept / len(most), 3),
             **{name: round(size / number, 2) for name, number in counts.items()},
         }
