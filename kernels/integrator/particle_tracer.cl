@@ -41,7 +41,12 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
 #if WEIGHS_LIGHT_PATHS
     carries *= 1.0f / (1.0f + rival_of_joint(rival, s, c, rival_pdf(m, to, wo), rival_pdf(m, wo, to)));
     mask hidden = mask_of(settings->hide_lights != 0) & (s.light >= 0);
-    shine = shine & !rival.first & !hidden & !rival_ends(scene, v);
+#if BSDF_IS_PHASE
+    shine = shine & (!rival.first | !rival.met);
+#else
+    shine = shine & !rival.first;
+#endif
+    shine = shine & !hidden & !rival_ends(scene, v);
 #endif
     Spectrum value = spectrum_scale(spectrum_mul(beta, f), carries);
     value = vertex_beyond(scene, v, neg3(c.d), c.t, v.lambdas, value);

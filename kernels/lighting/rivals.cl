@@ -25,8 +25,9 @@
  *
  * Light that comes to x_1 from the light itself is left to the camera's path, which chooses a light there: a light
  * path is joined from its second vertex on, and for k = 2 the third density is 0. (Splats of light that next-event
- * estimation finds without noise are noise only, see bench/NOTES.md.) Null surfaces change nothing. Where a material
- * ends light paths (`rival_ends`) the camera's rival is 0.
+ * estimation finds without noise are noise only, see bench/NOTES.md.) But where x_1 is a collision, which the camera's
+ * path comes to by chance, and no ray meets the light, a light path is joined there too. Null surfaces change nothing.
+ * Where a material ends light paths (`rival_ends`) the camera's rival is 0.
  *
  * A vertex may be a collision in a medium. Either side flies to it with a density of transmittance times extinction, to
  * a surface with one of transmittance. On the way between two vertices the transmittance is the same both ways, and at
@@ -128,15 +129,26 @@ inline Rival rival_of_camera(Scene scene, Slab path, uint at, Vertex v, Sampler 
     return r;
 }
 
+/* Whether a ray may meet a row of `lights`. */
+inline mask rival_light_met(Scene scene, integer row)
+{
+    return (row < scene.settings->infinite_count) | (light_at(scene, row).shape >= 0);
+}
+
 /* Over the density of next-event estimation, that of a light path along wi, where the material has densities p and
  * p_back. */
 inline real rival_of_light_sample(Scene scene, Rival r, Surface s, LightSample ls, real p, real p_back)
 {
     real chosen = sel(ls.pdf < 0.0f, ls.chance, ls.pdf);
     real emission = light_path_pdf(scene, ls.row, s.p, ls.wi, ls.t, ls.n) / max_r(chosen, (real)(1e-30f));
-    real arrives = rival_arrives(r, mask_of(0), p, p_back);
-    real third = rival_limited(arrives * p_back * VERTEX_COSINE(s.n, ls.wi) * emission);
-    return sel(r.first, (real)(0.0f), third);
+    real arrives = rival_arrives(r, mask_of(0), p, p_back) * VERTEX_COSINE(s.n, ls.wi) * emission;
+    real third = rival_limited(arrives * p_back);
+#if BSDF_IS_PHASE
+    real joined = sel(rival_light_met(scene, ls.row), (real)(0.0f), rival_limited(arrives));
+#else
+    real joined = 0.0f;
+#endif
+    return sel(r.first, joined, third);
 }
 
 /* Along a camera's path that goes on along d, with density p; delta: by a delta lobe. */
@@ -171,7 +183,7 @@ inline Rival rival_of_emission(Scene scene, Slab path, uint at, Vertex v, vec3 h
         real emission = light_emit_pdf(scene, row, wi, t);
         r.arrives = r.arrives / sel(r.first, max_r(emission, (real)(1e-30f)), (real)(1.0f));
         r.found = light_found_pdf(scene, row, v.s.p, hemisphere, wi, t, n);
-        r.met = !r.first | (row < scene.settings->infinite_count) | (light_at(scene, row).shape >= 0);
+        r.met = !r.first | rival_light_met(scene, row);
     }
 #if MERGES
     r.pending = load_path_pending(path, at) / max_r(VERTEX_COSINE(v.s.n, v.d), (real)(1e-7f));

@@ -14,6 +14,7 @@ import pytest
 from clpt.errors import SceneError
 from clpt.formats import load, save, volumes
 from clpt.formats.volumes import nvdb, vol
+from clpt.scene import media
 
 VERSION = (32 << 21) | (3 << 10) | 3
 SHARED = Path(__file__).resolve().parents[3] / "shared"
@@ -338,6 +339,41 @@ def test_mitsuba(written) -> None:
     written("a.vol", vol_bytes(np.random.default_rng(3).random((2, 2, 2, 3))))
     with pytest.raises(SceneError, match="give one channel"):
         load(path)
+
+
+OURS = """<scene version="3.0.0"><shape type="cube"><bsdf type="null"/>
+<medium name="interior" type="%s">%s</medium></shape></scene>"""
+VOLUME = """<volume name="%s" type="gridvolume"><string name="filename" value="a.vol"/></volume>"""
+
+
+def test_mitsuba_light(written) -> None:
+    """Words of our own: light, its temperatures, soot, and 8 bits a number."""
+
+    def made(kind: str, *words: str) -> media.Grid:
+        return load(written("a.xml", (OURS % (kind, "".join(words))).encode())).shapes[0].interior
+
+    written("a.vol", vol_bytes(100.0 * VALUES[..., None]))
+    glow = '<rgb name="emission" value="1, 2, 3"/>'
+    emission = made("homogeneous", glow).emission
+    assert (emission.r, emission.g, emission.b) == (1.0, 2.0, 3.0)
+    bits = '<integer name="bits" value="8"/>'
+    lit = made("heterogeneous", VOLUME % "sigma_t", VOLUME % "emission_grid", glow, bits)
+    assert (lit.kind, lit.bits) == ("grid", 8)
+    assert np.array_equal(lit.emission_grid, lit.density)
+    warm = made("heterogeneous", VOLUME % "temperature", '<float name="brightness" value="2"/>')
+    assert np.array_equal(warm.temperature, 100.0 * VALUES)
+    assert (warm.density.min(), warm.brightness, warm.normalised) == (1.0, 2.0, False)
+    flame = made("soot", VOLUME % "density", VOLUME % "temperature")
+    assert (flame.kind, flame.share, flame.density.shape) == ("soot", 1e-6, VALUES.shape)
+    for wrong, message in (
+        (bits.replace("8", "7"), "must be 16 or 8"),
+        ('<float name="brightness" value="2"/>', "brightness"),  # of no temperature
+    ):
+        with pytest.raises(SceneError, match=message):
+            made("heterogeneous", VOLUME % "sigma_t", wrong)
+    written("a.vol", vol_bytes(np.ones((2, 2, 2, 3))))
+    with pytest.raises(SceneError, match="3 channels; read is 1"):
+        made("heterogeneous", VOLUME % "temperature")
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the volumes of others are not there")

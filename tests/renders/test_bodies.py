@@ -6,6 +6,7 @@ Significance as in tests/renders/support.py.
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,11 +17,19 @@ from clpt.errors import SceneError
 from clpt.render.lowering.scene import lower
 from clpt.scene import Film, Scene, media
 from clpt.scene.cameras import Perspective
-from clpt.scene.integrators import Box, Path
+from clpt.scene.integrators import Box
+from clpt.scene.integrators import Path as PathIntegrator
 from clpt.scene.lights import Area, Constant, Point
 from clpt.scene.materials import Dielectric, Diffuse, Layer, Null, RoughDielectric
 from clpt.scene.shapes import Disk, Group, Instance, Rectangle, Shape, Sphere
-from tests.renders.support import SIGNIFICANCE, agreement, assert_mean, blocks, exposures
+from tests.renders.support import (
+    SIGNIFICANCE,
+    agreement,
+    assert_agree,
+    assert_mean,
+    blocks,
+    exposures,
+)
 
 MILK = media.Homogeneous(sigma_s=3.0, sigma_a=(0.1, 0.3, 1.0), name="milk")
 CLEAR = media.Homogeneous(sigma_s=2.0)
@@ -39,7 +48,7 @@ def scene(*shapes: Shape, mode: str = "rgb", at: float = 5.0, lamp: bool = True)
         shapes=[*shapes, LAMP] if lamp else [*shapes],
         lights=[Constant(radiance=0.3 if lamp else 1.0)],
         film=Film(width=8, height=8, filter=Box(), mode=mode),
-        integrator=Path(max_depth=-1, rr_depth=1000, light_paths=0),
+        integrator=PathIntegrator(max_depth=-1, rr_depth=1000, light_paths=0),
     )
 
 
@@ -74,6 +83,40 @@ def test_as_three_boundaries_by_hand() -> None:
         else:
             means = (blocks(one).mean(axis=(1, 2)) for one in (found, reference))
             assert agreement(*means) > SIGNIFICANCE, name
+
+
+MITSUBA = """<scene version="3.0.0">
+<integrator type="volpath"><integer name="rr_depth" value="1000000"/></integrator>
+<sensor type="perspective"><float name="fov" value="26"/><transform name="to_world">
+<lookat origin="0, 0, 5" target="0, 0, 0" up="0, 1, 0"/></transform><film type="hdrfilm">
+<integer name="width" value="8"/><integer name="height" value="8"/><rfilter type="box"/>
+<string name="pixel_format" value="rgb"/></film></sensor>
+<emitter type="constant"><rgb name="radiance" value="0.3"/></emitter>
+<shape type="rectangle"><transform name="to_world"><scale value="3"/><translate z="-4"/></transform>
+<bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf>
+<emitter type="area"><rgb name="radiance" value="1"/></emitter></shape>
+<shape type="sphere"><bsdf type="dielectric">
+<float name="int_ior" value="1.5"/><float name="ext_ior" value="1"/></bsdf></shape>
+<shape type="sphere"><float name="radius" value="0.8"/><bsdf type="dielectric">
+<float name="int_ior" value="1.33"/><float name="ext_ior" value="1.5"/></bsdf>
+<medium name="interior" type="homogeneous"><float name="scale" value="10"/>
+<rgb name="sigma_t" value="0.31"/>
+<rgb name="albedo" value="0.96774194"/></medium></shape></scene>"""
+
+
+@pytest.mark.peers
+def test_as_mitsuba_has_it_by_hand(tmp_path: Path) -> None:
+    """Grey milk that its glass displaces, beside Mitsuba's boundary between the two."""
+    mi = pytest.importorskip("mitsuba", reason="the renderer that we compare with")
+    mi.set_variant("scalar_rgb")
+    file = tmp_path / "milk.xml"
+    file.write_text(MITSUBA)
+    loaded = mi.load_file(str(file))
+    theirs = np.array([np.array(mi.render(loaded, spp=48, seed=i))[:, :, :3] for i in range(12)])
+    milk = media.Homogeneous(sigma_s=3.0, sigma_a=0.1)
+    glass, shell, liquid = SAME["glass displaces milk"]
+    ours = exposures(scene(glass, shell, dataclasses.replace(liquid, interior=milk)), 12, 128)
+    assert_agree(blocks(ours), blocks(theirs.astype(np.float64)), "milk in a glass")
 
 
 @pytest.mark.parametrize(

@@ -79,6 +79,11 @@ def test_fog() -> None:
     both(room(FOGS["chromatic"], SPOT), 32, "chromatic fog", max_depth=6)
 
 
+def test_light_scattered_once() -> None:
+    """First collisions of light paths are joined to the camera too, and weighed."""
+    both(room(FOGS["chromatic"], SPOT), 32, "scattered once", max_depth=2)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("mode", ["rgb", "spectral"])
 @pytest.mark.parametrize("inside", [False, True], ids=["without", "within"])

@@ -66,6 +66,7 @@ def _homogeneous(props: Properties) -> Homogeneous:
         scale=props.number("scale", 1.0),
         phase=media.Isotropic() if child is None else phase(child, props.context),
         name=props.element.attributes.get("id", ""),
+        **({"emission": spectra.emission(props, "emission")} if "emission" in props.named else {}),
     )
 
 
@@ -100,50 +101,84 @@ def _sggx(props: Properties) -> Phase:
 
 
 def _heterogeneous(props: Properties) -> Homogeneous:
-    albedo = _albedo(props)
-    if albedo is not None:
-        return _tinted(props, albedo)
-    child = props.named.get("sigma_t")
-    volume = None if child is None else props.context.resolve(child)
-    even = volume is None or volume.tag != "volume" or volume.type != "gridvolume"
-    if even or volume is None:  # constvolume, or a number
-        return _homogeneous(props)
-    props.take("sigma_t")
-    given = props.context.once(volume, lambda one: _grid_volume(one, props.context))
+    """A medium of numbers on grids; where none is, one that is the same everywhere.
+
+    A grid of an albedo, or of light, may stand in a density that is one number everywhere.
+    """
+    more = _more(props)
+    volume = _grid(props, "sigma_t")
+    given: dict[str, Any] = {}
+    if volume is not None:
+        given = props.context.once(volume, lambda one: _grid_volume(one, props.context))
     medium = _homogeneous(props)
+    boxes = [one for one in more.values() if isinstance(one, Volume)]
+    if volume is None and not boxes:  # constvolume, or a number
+        return medium
+    if volume is None:
+        box = boxes[0]
+        even = Volume(np.ones(box.values.shape[:3], np.float32), box.to_world)
+        given = {"sigma_t": medium.sigma_t, "density": even}
     return Grid(
         **given,
-        albedo=medium.albedo,
+        **{"albedo": medium.albedo, **more},
         scale=medium.scale,
         phase=medium.phase,
+        emission=medium.emission,
         name=medium.name,
     )
 
 
-def _albedo(props: Properties) -> Volume | None:
-    """Take an albedo of colours on a grid."""
-    child = props.named.get("albedo")
+def _soot(props: Properties) -> media.Soot:
+    """The soot of a flame, a plugin of our own."""
+    more = _more(props)
+    volume = _grid(props, "density")
+    if volume is not None:
+        more["density"] = _one_channel(volume, props.context)
+    return media.Soot(
+        share=props.number("share", 1e-6),
+        scale=props.number("scale", 1.0),
+        name=props.element.attributes.get("id", ""),
+        **more,
+    )
+
+
+def _more(props: Properties) -> dict[str, Any]:
+    """Take what a grid has beside its density: `bits`, an albedo, and light (ours) on grids."""
+    found: dict[str, Any] = {}
+    albedo = _grid(props, "albedo")
+    if albedo is not None:
+        values, to_world = props.context.once(albedo, lambda one: _grid_values(one, props.context))
+        if values.max() > 1.0:
+            raise albedo.error("an albedo cannot exceed 1")
+        colours = np.repeat(values, 3 // values.shape[3], axis=3)
+        found |= {"albedo": 1.0, "albedo_grid": Volume(colours, to_world)}
+    for name in ("emission_grid", "temperature"):
+        if (volume := _grid(props, name)) is not None:
+            found[name] = _one_channel(volume, props.context)
+    if "temperature" in found:
+        found["brightness"] = props.number("brightness", 1.0)
+        found["normalised"] = props.flag("normalised", False)
+    if "bits" in props.named:
+        found["bits"] = props.integer("bits", 16)
+    return found
+
+
+def _grid(props: Properties, name: str) -> Element | None:
+    """Take a <volume> of the type `gridvolume`, if that is what a parameter is."""
+    child = props.named.get(name)
     volume = None if child is None else props.context.resolve(child)
     if volume is None or volume.tag != "volume" or volume.type != "gridvolume":
         return None
-    props.take("albedo")
-    values, to_world = props.context.once(volume, lambda one: _grid_values(one, props.context))
-    if values.max() > 1.0:
-        raise volume.error("an albedo cannot exceed 1")
-    return Volume(np.repeat(values, 3 // values.shape[3], axis=3), to_world)
+    props.take(name)
+    return volume
 
 
-def _tinted(props: Properties, albedo: Volume) -> Grid:
-    """A medium whose albedo is on a grid; its density may be one number everywhere."""
-    even = Volume(np.ones(albedo.values.shape[:3], np.float32), albedo.to_world)
-    made, density, colours = _heterogeneous(props), even, None
-    if isinstance(made, Grid):
-        density, colours = Volume(made.density, made.to_world), made.colour_grid
-    return Grid(
-        sigma_t=made.sigma_t, albedo=1.0, albedo_grid=albedo, density=density, scale=made.scale,
-        colour_grid=None if colours is None else Volume(colours, density.to_world),
-        phase=made.phase, name=made.name,
-    )  # fmt: skip
+def _one_channel(element: Element, context: Context) -> Volume:
+    """The numbers of a <volume type="gridvolume">."""
+    values, to_world = context.once(element, lambda one: _grid_values(one, context))
+    if values.shape[3] != 1:
+        raise element.error(f"its file has {values.shape[3]} channels; read is 1")
+    return Volume(values[..., 0], to_world)
 
 
 def _grid_volume(element: Element, context: Context) -> dict[str, Any]:
@@ -178,6 +213,7 @@ def _grid_values(element: Element, context: Context) -> tuple[Any, Any]:
 MEDIA: dict[str, Callable[[Properties], Medium]] = {
     "homogeneous": _homogeneous,
     "heterogeneous": _heterogeneous,
+    "soot": _soot,
 }
 PHASES: dict[str, Callable[[Properties], Phase]] = {
     "isotropic": lambda props: media.Isotropic(),

@@ -1,10 +1,9 @@
 """The air over a round earth: what scatters and absorbs in it, how deep it is along a ray.
 
 Lengths are in km. Extinction has three parts: air that scatters after Rayleigh, aerosol, and ozone,
-which absorbs. Optical depths of air: Bodhaine et al. 1999, eq. 30; its depolarisation 0.0279 as
-there; its density by height that of the U.S. Standard Atmosphere 1976. Aerosol: exponential, power
-law of wavelength (Angstrom 1929), Henyey and Greenstein's phase function. Ozone lies in a layer
-after Green 1964. Air does not bend rays here.
+which absorbs. Air: `clpt.spectra.air`; its depolarisation 0.0279 after Bodhaine et al. 1999.
+Aerosol: exponential, power law of wavelength (Angstrom 1929), Henyey and Greenstein's phase
+function. Ozone lies in a layer after Green 1964. Air does not bend rays here.
 """
 
 from __future__ import annotations
@@ -14,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from clpt.spectra import air
 from clpt.spectra.data import table
 
 Floats = NDArray[np.float64]
@@ -32,14 +32,6 @@ def _solar() -> tuple[Floats, Floats, Floats]:
     return rows[:, 0], rows[:, 1], rows[:, 2] * 1e-25
 
 
-def _air() -> tuple[Floats, Floats]:
-    """Heights [km], and the logarithm of the share of the column in a km, linear in between."""
-    height, density = table("air.csv").T
-    fall = np.diff(np.log(density))
-    return height, np.log(density / (np.diff(density) / fall * np.diff(height)).sum())
-
-
-AIR = _air()
 LAMBDAS, SUNLIGHT, OZONE = _solar()  # [nm], [W m^-2 nm^-1] above the air, [m^2] a molecule
 
 
@@ -62,14 +54,7 @@ class Atmosphere:
         nm = np.asarray(lambdas, np.float64)
         molecule = np.interp(nm, LAMBDAS, OZONE)
         aerosol = self.aerosol * (nm / 550.0) ** -self.exponent
-        return np.stack([air_depth(nm), aerosol, molecule * DOBSON * self.ozone])
-
-
-def air_depth(lambdas: ArrayLike) -> Floats:
-    """Optical depth of clear air over the sea at lambdas [nm] (Bodhaine et al. 1999, eq. 30)."""
-    square = (np.asarray(lambdas, np.float64) / 1000.0) ** 2
-    above = 1.0455996 - 341.29061 / square - 0.90230850 * square
-    return 0.0021520 * above / (1.0 + 0.0027059889 / square - 85.968563 * square)
+        return np.stack([air.depth(nm), aerosol, molecule * DOBSON * self.ozone])
 
 
 def densities(height: ArrayLike) -> Floats:
@@ -78,7 +63,7 @@ def densities(height: ArrayLike) -> Floats:
     layer = np.exp(-np.abs(h - OZONE_MIDDLE) / OZONE_WIDTH)  # even in its argument
     return np.stack(
         [
-            np.exp(np.interp(h, *AIR)),
+            air.share(h),
             np.exp(-h / AEROSOL_HEIGHT) / AEROSOL_HEIGHT,
             layer / (OZONE_WIDTH * (1.0 + layer) ** 2),
         ]

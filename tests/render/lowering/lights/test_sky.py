@@ -14,7 +14,7 @@ from clpt.render.lowering.lights.atmosphere import EARTH, LAMBDAS, SUNLIGHT, Atm
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Perspective
 from clpt.scene.lights import Sky
-from clpt.spectra import cie
+from clpt.spectra import air, cie
 from tests.kernels.light_probe import lit
 from tests.kernels.test_lights import SIGMAS, TURNED, irradiance
 from tests.render.lowering.lights import sky_walk
@@ -83,9 +83,7 @@ def test_air_masses_and_depths_are_the_published_ones():
         assert atmosphere.columns(EARTH, np.sin(np.radians(height)))[0] == pytest.approx(
             published, rel=0.02
         )
-    assert atmosphere.air_depth([400.0, 550.0, 700.0]) == pytest.approx(
-        [0.3600, 0.0970, 0.0364], rel=0.01
-    )
+    assert air.depth([400.0, 550.0, 700.0]) == pytest.approx([0.3600, 0.0970, 0.0364], rel=0.01)
     assert CLEAR.depths([600.0])[2] == pytest.approx(0.040, rel=0.08)
 
 
