@@ -5,13 +5,13 @@ from __future__ import annotations
 from clpt.records import SHAPE
 from clpt.render.codegen.dispatch import Case, Function, active, function
 from clpt.render.contract.features import Features
-from clpt.render.contract.shape_records import ANALYTIC, ONE_OF, RECORDS, VALUES
+from clpt.render.contract.shape_records import ANALYTIC, ONE_OF, ROWS, VALUES
 
 
 def virtual_files() -> dict[str, str]:
     """Return what shapes give, and generated/shape/<kind>.cl: struct, loader and functions."""
     files = {f"generated/{record.snake_name}.cl": record.select_text() for record in VALUES}
-    structs = {kind: record.row_text() for kind, record in RECORDS.items()}
+    structs = {kind: record.row_text() for kind, record in ROWS.items()}
     structs |= {kind: f'#include "generated/shape/{one}.cl"\n' for kind, one in ONE_OF.items()}
     for kind, struct in structs.items():
         files[f"generated/shape/{kind}.cl"] = f'{struct}#include "shape/{kind}.cl"\n'
@@ -33,7 +33,8 @@ def hit_text(features: Features) -> str:
         f"{_row_text(kind, 'params')}, o, d, tmin, tmax);"
         for kind in features.analytic
     ]
-    rows = "single" if ONE_OF.keys().isdisjoint(features.analytic) else "many"
+    many = len(ONE_OF.keys() & set(features.analytic))
+    rows = ("single", "many", "mixed")[many]
     signature = (
         "ShapeHit shape_hit(Scene scene, int prim, int row, vec3 o, vec3 d, real tmin, real tmax)"
     )

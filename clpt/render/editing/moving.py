@@ -26,7 +26,7 @@ from clpt.render.lowering.geometry import analytic, shapes, triangles
 from clpt.render.lowering.geometry.tessellate import keeps_its_kind
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene import Scene
-from clpt.scene.shapes import Instance, Mesh, Shape, Spheres
+from clpt.scene.shapes import Curves, Instance, Mesh, Shape, Spheres
 
 _ROOT = "motion/place_vertices.cl"
 _NORMALS = 1  # SHAPE_NORMALS of kernels/path/surface_flags.cl
@@ -193,6 +193,8 @@ class Moving:
     def _plan_analytic(self, ranges: _Ranges, new: Any) -> list[Action]:
         """What moves an analytic shape. Raises CannotMove where that is another kind then."""
         shape = ranges.shape if isinstance(new, Instance) else new
+        if isinstance(shape, Curves):
+            raise CannotMove(f"{_name(new)} is of curves, whose pieces follow from its points")
         matrix = shapes.placement(new) @ ranges.own
         in_world = dataclasses.replace(shape, to_world=matrix)
         if not keeps_its_kind(in_world):

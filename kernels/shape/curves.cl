@@ -1,0 +1,25 @@
+/* Strands of many pieces in one shape: the row at `params` of `geometry` has what they share, and says where in
+ * `spheres` each of them lies. One piece has the functions of kernels/shape/curve.cl. */
+
+/* The piece that is primitive `prim`, where `active`; elsewhere one of them. */
+inline Curve curves_one(Scene scene, integer params, integer prim, mask active)
+{
+    Curve q = curve_row(scene.geometry, params);
+    integer hot = sel_i(active, q.hot + 16 * prim, (integer)(0));
+    vec4 a = gather4(scene.spheres, hot), b = gather4(scene.spheres, hot + 4);
+    vec4 c = gather4(scene.spheres, hot + 8), d = gather4(scene.spheres, hot + 12);
+    q.p0 = v3(a.x, a.y, a.z);
+    q.p1 = v3(b.x, b.y, b.z);
+    q.p2 = v3(c.x, c.y, c.z);
+    q.p3 = v3(d.x, d.y, d.z);
+    q.r0 = a.w;
+    q.r1 = b.w;
+    q.r2 = c.w;
+    q.r3 = d.w;
+    integer cold = sel_i(active, q.cold + 8 * prim, (integer)(0));
+    vec4 e = gather4(scene.spheres, cold);
+    q.axis = v3(e.x, e.y, e.z);
+    q.v = e.w;
+    q.dv = gather(scene.spheres, cold + 4);
+    return q;
+}
