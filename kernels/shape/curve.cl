@@ -9,7 +9,7 @@
  * "Phantom Ray-Hair Intersector".) u is the azimuth over 2 pi, v runs along. */
 #include "tracing/analytic.cl"
 #define CURVE_STEPS 24
-#define CURVE_NEAR 1e-5f    /* of a piece: a step of less is the last */
+#define CURVE_NEAR 2e-4f    /* of a piece: a step of less is the last; what is left of the error is far smaller */
 #define CURVE_OVERLAP 2e-3f /* radians by which the end of a piece is met beyond it, so that no ray passes between two */
 
 typedef struct { real a, b, c, d; } Cubic; /* a + b s + c s^2 + d s^3 */
@@ -44,7 +44,7 @@ inline real most4(real a, real b, real c, real d) { return max_r(max_r(a, b), ma
 
 /* A piece as a ray sees it, and what is known at s. */
 typedef struct { Cubic x, y, z, r; } CurveView;
-typedef struct { real square, half_slope, bend, along, f, speed; } CurveState; /* D, D'/2, -D''/2, -+z', F, |c'| r */
+typedef struct { real square, half_slope, bend, along, f; } CurveState; /* D, D'/2, -D''/2, -+z', F */
 inline CurveState curve_state(CurveView c, real side, real s)
 {
     real x = cubic_at(c.x, s), y = cubic_at(c.y, s), r = cubic_at(c.r, s);
@@ -57,34 +57,46 @@ inline CurveState curve_state(CurveView c, real side, real s)
     n.along = -side * dz;
     n.f = n.along * sqrt_r(n.square) - n.half_slope;
     n.bend = max_r(n.bend, 0.1f * across + 1e-6f * dz * dz + 1e-30f);
-    n.speed = r * sqrt(across + dz * dz);
     return n;
+}
+
+/* F at an end where the centre is (x, y), the slopes are d, and `over`: what it may be beyond, squared. */
+inline real curve_end(real x, real y, real r, real dx, real dy, real dz, real dr, real side, real *over)
+{
+    *over = sqr(CURVE_OVERLAP * r) * (dx * dx + dy * dy + dz * dz);
+    return -side * dz * sqrt_r((r - x) * (r + x) - y * y) - (r * dr - x * dx - y * dy);
 }
 
 /* Where the surface is met, on the near side (-1) or the far one (1), and whether it is. */
 inline mask curve_find(CurveView c, real side, mask closed0, mask closed1, mask active, real *at)
 {
-    CurveState first = curve_state(c, side, (real)(0.0f)), last = curve_state(c, side, (real)(1.0f));
-    mask before = first.f > 0.0f, behind = !before & (last.f < 0.0f);
-    mask here = (!before | closed0 | (first.f <= CURVE_OVERLAP * first.speed)) &
-                (!behind | closed1 | (-last.f <= CURVE_OVERLAP * last.speed));
+    real over0, over1, x1 = c.x.a + c.x.b + c.x.c + c.x.d, y1 = c.y.a + c.y.b + c.y.c + c.y.d;
+    real first = curve_end(c.x.a, c.y.a, c.r.a, c.x.b, c.y.b, c.z.b, c.r.b, side, &over0);
+    real last = curve_end(x1, y1, c.r.a + c.r.b + c.r.c + c.r.d, c.x.b + 2.0f * c.x.c + 3.0f * c.x.d,
+                          c.y.b + 2.0f * c.y.c + 3.0f * c.y.d, c.z.b + 2.0f * c.z.c + 3.0f * c.z.d,
+                          c.r.b + 2.0f * c.r.c + 3.0f * c.r.d, side, &over1);
+    mask before = first > 0.0f, behind = !before & (last < 0.0f);
+    mask here = active & (!before | closed0 | (first * first <= over0)) & (!behind | closed1 | (last * last <= over1));
     real s = sel(before, (real)(0.0f), sel(behind, (real)(1.0f), (real)(0.5f)));
+    *at = s;
+    if (!any(here)) return here;
     real low = 0.0f, high = 1.0f;
-    mask seeks = active & here & !before & !behind;
+    mask seeks = here & !before & !behind;
     for (int i = 0; i < CURVE_STEPS && any(seeks); i++) {
         CurveState n = curve_state(c, side, s);
         low = sel(seeks & (n.f < 0.0f), s, low);
         high = sel(seeks & (n.f >= 0.0f), s, high);
-        real depth = max_r(n.square + n.half_slope * n.half_slope / n.bend, (real)(0.0f));
-        real step = n.half_slope / n.bend - n.along * sqrt(depth / (n.bend * (n.bend + n.along * n.along)));
-        real next = s + step;
+        real depth = max_r(n.square * n.bend + n.half_slope * n.half_slope, (real)(0.0f));
+        real step = n.half_slope - n.along * sqrt(depth / (n.bend + n.along * n.along));
+        real next = s + step / n.bend;
         next = sel((next >= low) & (next <= high), next, 0.5f * (low + high));
         step = fabs(next - s);
         s = sel(seeks, next, s);
         seeks = seeks & (step > CURVE_NEAR);
     }
     *at = s;
-    return active & here & (curve_state(c, side, s).square >= 0.0f);
+    real x = cubic_at(c.x, s), y = cubic_at(c.y, s), r = cubic_at(c.r, s);
+    return here & ((r - x) * (r + x) >= y * y);
 }
 
 real curve_size(Curve q) { return 2.0f * curve_reach(q) + size3(sub3(q.p3, q.p0)); }
@@ -106,12 +118,15 @@ ShapeHit curve_intersect(Curve q, vec3 o, vec3 d, real tmin, real tmax)
     mask alive = (nearest < tmax) & (shift + most4(z0, z1, z2, z3) + reach > tmin);
     vec3 chord = sub3(f3, f0), across = cross3(chord, d);
     real size2 = dot3(across, across);
+    /* Past all control points on one side: an early way out for most pieces whose boxes are met. */
+    real w0 = dot3(f0, across), w1 = dot3(f1, across), w2 = dot3(f2, across), w3 = dot3(f3, across);
+    real beside = max_r(max_r(least4(w0, w1, w2, w3), -most4(w0, w1, w2, w3)), (real)(0.0f));
+    alive = alive & (beside * beside <= reach * reach * size2);
+    if (!any(alive)) return h;
     mask skew = size2 > 1e-10f * dot3(chord, chord);
     vec3 ex = scale3(across, 1.0f / sqrt(sel(skew, size2, (real)(1.0f))));
     if (any(!skew)) ex = sel3(skew, ex, frame_of(d).s);
     real x0 = dot3(f0, ex), x1 = dot3(f1, ex), x2 = dot3(f2, ex), x3 = dot3(f3, ex);
-    alive = alive & (least4(x0, x1, x2, x3) <= reach) & (most4(x0, x1, x2, x3) >= -reach);
-    if (!any(alive)) return h;
     vec3 ey = cross3(d, ex);
     real y0 = dot3(f0, ey), y1 = dot3(f1, ey), y2 = dot3(f2, ey), y3 = dot3(f3, ey);
     alive = alive & (least4(y0, y1, y2, y3) <= reach) & (most4(y0, y1, y2, y3) >= -reach);

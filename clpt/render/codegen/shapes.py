@@ -8,6 +8,9 @@ from clpt.render.contract.features import Features
 from clpt.render.contract.shape_records import ANALYTIC, ONE_OF, ROWS, VALUES
 
 
+_HOT = next(m.word for m in ROWS["curve"].members if m.name == "hot")
+
+
 def virtual_files() -> dict[str, str]:
     """Return what shapes give, and generated/shape/<kind>.cl: struct, loader and functions."""
     files = {f"generated/{record.snake_name}.cl": record.select_text() for record in VALUES}
@@ -28,7 +31,10 @@ def hit_text(features: Features) -> str:
     none = "ShapeHit none = {FAR, {0.0f, 0.0f, 1.0f}, {0.0f, 0.0f}};"
     moved = _at_rest(word["number"], none) if moves else []
     back = _in_motion() if moves else [none]
-    cases = [
+    curves = "curves" in features.analytic
+    hot = f"scene.spheres + (int)gather_i(scene.geometry, params + {_HOT}) + 16 * prim"
+    beside = f"if (kind == {_number('curves')} && curve_beside({hot}, o, d)) return none;"
+    cases = [beside] * curves + [
         f"if (kind == {_number(kind)}) {answer} {ONE_OF.get(kind, kind)}_intersect("
         f"{_row_text(kind, 'params')}, o, d, tmin, tmax);"
         for kind in features.analytic
@@ -42,12 +48,14 @@ def hit_text(features: Features) -> str:
         "global const uint *shape = scene.shapes + row * SHAPE_ROW_WORDS;",
         f"int kind = (int)shape[{word['kind']}];",
         f"integer params = (int)shape[{word['params']}];",
+        *([none] if curves and not moves else []),
         *moved,
         *cases,
-        *back,
+        *back[curves and not moves :],
         "return none;",
     ]
     files = '#include "generated/motion.cl"\n' * moves
+    files += '#include "tracing/curve_beside.cl"\n' * curves
     files += f'#include "tracing/shape_rows_{rows}.cl"\n'
     return _includes(features) + files + function(signature, *body)
 

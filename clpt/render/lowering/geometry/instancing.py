@@ -21,7 +21,7 @@ from clpt.render.contract import shape_records
 from clpt.render.lowering.device_arrays import on_host
 from clpt.render.lowering.geometry import analytic, shapes
 from clpt.render.lowering.geometry.tessellate import keeps_its_kind, tessellate
-from clpt.render.lowering.geometry.tubes import as_tubes
+from clpt.render.lowering.geometry.tubes import Tubes, as_tubes
 from clpt.scene.shapes import Curves, Group, Instance, Shape
 
 Matrices = NDArray[np.floating]
@@ -151,7 +151,7 @@ def _met_as(shape: Shape, to_world: Matrices | None = None) -> Shape:
 
     to_world: of the instances of a group, (k, 4, 4).
     """
-    if not isinstance(shape, Curves):
+    if not isinstance(shape, Curves) or isinstance(shape, Tubes):
         return shape
     placed = np.eye(4)[None] if to_world is None else to_world
     few = len(placed) <= FEW and shape.emission is None

@@ -20,9 +20,10 @@ from clpt.scene.shapes import Curves
 
 HOT, COLD = 16, 8  # words of a piece
 BEND = np.pi / 6.0  # by which the control polygon of a piece may turn
-SLENDER = 24.0  # times as large as the piece a box may be, before the piece is cut
+SLENDER = 20.0  # times as large as the piece a box may be, before the piece is cut
 MOST_CUTS = 64  # of a cubic
 MANY = 1 << 22  # pieces of a shape from which on cubics are cut less, as far as they bend little
+CELL_BITS = 12  # of each axis, in the order of pieces
 KINK = 1e-3  # between pieces, from which on the gap is closed by a half sphere [rad]
 MOST = (1 << 31) // (HOT + COLD) - 1  # pieces: kernels count words by an int
 
@@ -31,8 +32,8 @@ MOST = (1 << 31) // (HOT + COLD) - 1  # pieces: kernels count words by an int
 class Pieces:
     """Pieces of curves in the world.
 
-    hot: (n, 16) float32, four control points of a Bezier cubic: x y z and the radius [m]; where a
-    half sphere closes the piece, the radius at that end is negated. cold: (n, 8) float32, an axis
+    hot: (n, 16) float32, of the four control points of a Bezier cubic the x, then the y, the z, and
+    the radii [m]; where a half sphere closes the piece, the radius at that end is negated. cold: (n, 8) float32, an axis
     (3) across the curve at its beginning, from which u is counted, v there and its growth, and
     three that mean nothing.
     """
@@ -77,17 +78,29 @@ def pieces(shape: Curves) -> Pieces:
     closed_start, closed_end = _closed(control, start, end, first)
     hot[closed_start, 0, 3] *= -1.0
     hot[closed_end, 3, 3] *= -1.0
-    return Pieces(hot.reshape(-1, HOT), cold)
+    order = _near_to_each_other(hot[:, 0, :3])
+    return Pieces(np.ascontiguousarray(hot.swapaxes(1, 2)[order]).reshape(-1, HOT), cold[order])
 
 
 def boxes(placed: Pieces) -> NDArray[np.float32]:
     """Return a box around each piece, (n, 2, 3) float32."""
-    control = placed.hot.reshape(-1, 4, 4)
+    control = placed.hot.reshape(-1, 4, 4).swapaxes(1, 2)
     low, high = control[..., :3].min(axis=1), control[..., :3].max(axis=1)
     radius = np.abs(control[..., 3]).max(axis=1)
     size = np.maximum(np.abs(low), np.abs(high)).max(axis=1, initial=0.0) + 2.0 * radius
     reach = (radius + np.float32(analytic.PADDING) * size)[:, None]
     return np.stack([low - reach, high + reach], axis=1).astype(np.float32)
+
+
+def _near_to_each_other(points: NDArray[np.float32]) -> NDArray[np.intp]:
+    """An order of points (n, 3) along a Z curve: rays that meet one soon meet its neighbours."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    cells = (points - low) / np.where(high > low, high - low, 1.0) * ((1 << CELL_BITS) - 1)
+    keys = np.zeros(len(points), np.uint64)
+    for axis, cell in enumerate(cells.astype(np.uint64).T):
+        for bit in range(CELL_BITS):
+            keys |= (cell >> np.uint64(bit) & np.uint64(1)) << np.uint64(3 * bit + axis)
+    return np.argsort(keys, kind="stable")
 
 
 def _cuts(spans: NDArray[np.float64]) -> NDArray[np.int64]:
