@@ -43,7 +43,8 @@ inline real least4(real a, real b, real c, real d) { return min_r(min_r(a, b), m
 inline real most4(real a, real b, real c, real d) { return max_r(max_r(a, b), max_r(c, d)); }
 
 /* A piece as a ray sees it, and what is known at s. */
-typedef struct { Cubic x, y, z, r; } CurveView;
+typedef struct { real x, y, r, dx, dy, dz, dr; } CurveEnd;
+typedef struct { Cubic x, y, z, r; CurveEnd first, last; } CurveView;
 typedef struct { real square, half_slope, bend, along, f; } CurveState; /* D, D'/2, -D''/2, -+z', F */
 inline CurveState curve_state(CurveView c, real side, real s)
 {
@@ -60,21 +61,17 @@ inline CurveState curve_state(CurveView c, real side, real s)
     return n;
 }
 
-/* F at an end where the centre is (x, y), the slopes are d, and `over`: what it may be beyond, squared. */
-inline real curve_end(real x, real y, real r, real dx, real dy, real dz, real dr, real side, real *over)
+/* F at an end, and by how much it may be beyond, squared. */
+inline real curve_end(CurveEnd e, real side, real *over)
 {
-    *over = sqr(CURVE_OVERLAP * r) * (dx * dx + dy * dy + dz * dz);
-    return -side * dz * sqrt_r((r - x) * (r + x) - y * y) - (r * dr - x * dx - y * dy);
+    *over = sqr(CURVE_OVERLAP * e.r) * (e.dx * e.dx + e.dy * e.dy + e.dz * e.dz);
+    return -side * e.dz * sqrt_r((e.r - e.x) * (e.r + e.x) - e.y * e.y) - (e.r * e.dr - e.x * e.dx - e.y * e.dy);
 }
 
 /* Where the surface is met, on the near side (-1) or the far one (1), and whether it is. */
 inline mask curve_find(CurveView c, real side, mask closed0, mask closed1, mask active, real *at)
 {
-    real over0, over1, x1 = c.x.a + c.x.b + c.x.c + c.x.d, y1 = c.y.a + c.y.b + c.y.c + c.y.d;
-    real first = curve_end(c.x.a, c.y.a, c.r.a, c.x.b, c.y.b, c.z.b, c.r.b, side, &over0);
-    real last = curve_end(x1, y1, c.r.a + c.r.b + c.r.c + c.r.d, c.x.b + 2.0f * c.x.c + 3.0f * c.x.d,
-                          c.y.b + 2.0f * c.y.c + 3.0f * c.y.d, c.z.b + 2.0f * c.z.c + 3.0f * c.z.d,
-                          c.r.b + 2.0f * c.r.c + 3.0f * c.r.d, side, &over1);
+    real over0, over1, first = curve_end(c.first, side, &over0), last = curve_end(c.last, side, &over1);
     mask before = first > 0.0f, behind = !before & (last < 0.0f);
     mask here = active & (!before | closed0 | (first * first <= over0)) & (!behind | closed1 | (last * last <= over1));
     real s = sel(before, (real)(0.0f), sel(behind, (real)(1.0f), (real)(0.5f)));
@@ -131,8 +128,10 @@ ShapeHit curve_intersect(Curve q, vec3 o, vec3 d, real tmin, real tmax)
     real y0 = dot3(f0, ey), y1 = dot3(f1, ey), y2 = dot3(f2, ey), y3 = dot3(f3, ey);
     alive = alive & (least4(y0, y1, y2, y3) <= reach) & (most4(y0, y1, y2, y3) >= -reach);
     if (!any(alive)) return h;
+    real r0 = fabs(q.r0), r3 = fabs(q.r3);
     CurveView c = {cubic_of(x0, x1, x2, x3), cubic_of(y0, y1, y2, y3), cubic_of(z0, z1, z2, z3),
-                   cubic_of(fabs(q.r0), q.r1, q.r2, fabs(q.r3))};
+                   cubic_of(r0, q.r1, q.r2, r3),
+                   {x0, y0, r0, x1 - x0, y1 - y0, z1 - z0, q.r1 - r0}, {x3, y3, r3, x3 - x2, y3 - y2, z3 - z2, r3 - q.r2}};
     mask closed0 = q.r0 < 0.0f, closed1 = q.r3 < 0.0f;
     real s = 0.0f, side = -1.0f, t = FAR, far_s;
     mask met = curve_find(c, side, closed0, closed1, alive, &s);

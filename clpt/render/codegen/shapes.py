@@ -8,7 +8,7 @@ from clpt.render.contract.features import Features
 from clpt.render.contract.shape_records import ANALYTIC, ONE_OF, ROWS, VALUES
 
 
-_HOT = next(m.word for m in ROWS["curve"].members if m.name == "hot")
+_FIRST = next(m.word for m in ROWS["curve"].members if m.name == "first")
 
 
 def virtual_files() -> dict[str, str]:
@@ -32,8 +32,8 @@ def hit_text(features: Features) -> str:
     moved = _at_rest(word["number"], none) if moves else []
     back = _in_motion() if moves else [none]
     curves = "curves" in features.analytic
-    hot = f"scene.spheres + (int)gather_i(scene.geometry, params + {_HOT}) + 16 * prim"
-    beside = f"if (kind == {_number('curves')} && curve_beside({hot}, o, d)) return none;"
+    piece = f"scene.spheres + (int)gather_i(scene.geometry, params + {_FIRST}) + CURVE_WORDS * prim"
+    beside = f"if (kind == {_number('curves')} && curve_beside({piece}, o, d)) return none;"
     cases = [beside] * curves + [
         f"if (kind == {_number(kind)}) {answer} {ONE_OF.get(kind, kind)}_intersect("
         f"{_row_text(kind, 'params')}, o, d, tmin, tmax);"

@@ -206,18 +206,10 @@ class _Builder:
         """Put the pieces of all curves into `spheres`, and where they are into `geometry`."""
         if not self.curves:
             return
-        store, own = self.encoder.store, [found for _, _, found in self.curves]
-        first = int(self.curves[0][0]["prim"])
-        hot = store.append_floats("spheres", np.concatenate([one.hot for one in own]))
-        cold = store.append_floats("spheres", np.concatenate([one.cold for one in own]))
-        for row, shape, _ in self.curves:
-            words = analytic.row(shape)
-            words[analytic.member("curve", "hot")] = np.int32(hot - strands.HOT * first).view(
-                np.uint32
-            )
-            words[analytic.member("curve", "cold")] = np.int32(cold - strands.COLD * first).view(
-                np.uint32
-            )
+        store, member = self.encoder.store, analytic.member("curve", "first")
+        for row, shape, found in self.curves:
+            words, at = analytic.row(shape), store.append_floats("spheres", found)
+            words[member] = np.int32(at - strands.WORDS * int(row["prim"])).view(np.uint32)
             row["params"] = store.append("geometry", words)
 
     def _add_triangles(

@@ -1,14 +1,11 @@
 """Curves on their way to the device: pieces of cubics that rays meet as they are.
 
 A cubic is cut into pieces that bend little and whose boxes are not much larger than they are. A
-piece has PIECE_WORDS words in the table `spheres`: a hot row of 16 that each ray reads, and behind
-all hot rows a cold row of 8 that only a hit reads.
+piece has WORDS words in the table `spheres`: CONTROL that each ray reads, and behind them those that
+only a hit reads. Pieces that are near to each other lie near to each other.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,35 +15,27 @@ from clpt.errors import SceneError
 from clpt.render.lowering.geometry import analytic, shapes, tubes
 from clpt.scene.shapes import Curves
 
-HOT, COLD = 16, 8  # words of a piece
+CONTROL, WORDS = 16, 24  # words of a piece: its control points, and all
 BEND = np.pi / 6.0  # by which the control polygon of a piece may turn
 SLENDER = 20.0  # times as large as the piece a box may be, before the piece is cut
 MOST_CUTS = 64  # of a cubic
+ROUNDS = 4  # of looking at whether pieces turn little, and cutting more
 MANY = 1 << 22  # pieces of a shape from which on cubics are cut less, as far as they bend little
 CELL_BITS = 12  # of each axis, in the order of pieces
 KINK = 1e-3  # between pieces, from which on the gap is closed by a half sphere [rad]
-MOST = (1 << 31) // (HOT + COLD) - 1  # pieces: kernels count words by an int
+MOST = (1 << 31) // WORDS - 1  # pieces: kernels count words by an int
 
 
-@dataclass(frozen=True)
-class Pieces:
-    """Pieces of curves in the world.
-
-    hot: (n, 16) float32, of the four control points of a Bezier cubic the x, then the y, the z, and
-    the radii [m]; where a half sphere closes the piece, the radius at that end is negated. cold: (n, 8) float32, an axis
-    (3) across the curve at its beginning, from which u is counted, v there and its growth, and
-    three that mean nothing.
-    """
-
-    hot: NDArray[np.float32]
-    cold: NDArray[np.float32]
-
-    def __len__(self) -> int:
-        return len(self.hot)
+Pieces = NDArray[np.float32]  # (n, WORDS), see `pieces`
 
 
 def pieces(shape: Curves) -> Pieces:
-    """Return the pieces of all strands.
+    """Return the pieces of all strands in the world, (n, WORDS) float32.
+
+    A row has of the four control points of a Bezier cubic the x, then the y, the z, and the radii
+    [m]; where a half sphere closes the piece, the radius at that end is negated. Then an axis (3)
+    across the curve at its beginning, from which u is counted; v there, and by how much it grows;
+    three words that mean nothing.
 
     Raises SceneError for points that are no curves, or a transform that stretches.
     """
@@ -69,22 +58,23 @@ def pieces(shape: Curves) -> Pieces:
     control = _between(spans[span], begin, begin + 1.0 / cuts[span])
     first = np.append(True, strand[span[1:]] != strand[span[:-1]])
     start, end = _directions(control)
-    cold = np.zeros((len(span), COLD), np.float32)
-    cold[:, :3] = tubes.frames(start, first)[0]
-    cold[:, 3], cold[:, 4] = (span + begin) / len(spans), 1.0 / (cuts[span] * len(spans))
-    hot = control.astype(np.float32)
-    if not np.isfinite(hot).all():
+    made = np.zeros((len(span), WORDS), np.float32)
+    made[:, CONTROL : CONTROL + 3] = tubes.frames(start, first)[0]
+    made[:, CONTROL + 3] = (span + begin) / len(spans)
+    made[:, CONTROL + 4] = 1.0 / (cuts[span] * len(spans))
+    points = control.astype(np.float32)
+    if not np.isfinite(points).all():
         raise SceneError("its transform moves points out of float32", where=name)
     closed_start, closed_end = _closed(control, start, end, first)
-    hot[closed_start, 0, 3] *= -1.0
-    hot[closed_end, 3, 3] *= -1.0
-    order = _near_to_each_other(hot[:, 0, :3])
-    return Pieces(np.ascontiguousarray(hot.swapaxes(1, 2)[order]).reshape(-1, HOT), cold[order])
+    points[closed_start, 0, 3] *= -1.0
+    points[closed_end, 3, 3] *= -1.0
+    made[:, :CONTROL] = points.swapaxes(1, 2).reshape(-1, CONTROL)
+    return made[_near_to_each_other(points[:, 0, :3])]
 
 
 def boxes(placed: Pieces) -> NDArray[np.float32]:
     """Return a box around each piece, (n, 2, 3) float32."""
-    control = placed.hot.reshape(-1, 4, 4).swapaxes(1, 2)
+    control = placed[:, :CONTROL].reshape(-1, 4, 4).swapaxes(1, 2)
     low, high = control[..., :3].min(axis=1), control[..., :3].max(axis=1)
     radius = np.abs(control[..., 3]).max(axis=1)
     size = np.maximum(np.abs(low), np.abs(high)).max(axis=1, initial=0.0) + 2.0 * radius
@@ -105,12 +95,17 @@ def _near_to_each_other(points: NDArray[np.float32]) -> NDArray[np.intp]:
 
 def _cuts(spans: NDArray[np.float64]) -> NDArray[np.int64]:
     """Into how many pieces each cubic is cut."""
-    edges = np.diff(spans[..., :3], axis=1)
-    length = np.linalg.norm(edges, axis=2)
-    unit = edges / np.maximum(length, 1e-300)[..., None]
-    cosine = np.clip(np.einsum("sij,sij->si", unit[:, 1:], unit[:, :-1]), -1.0, 1.0)
-    turn = np.where(np.minimum(length[:, 1:], length[:, :-1]) > 0.0, np.arccos(cosine), 0.0)
-    least = np.ceil(turn.sum(axis=1) / BEND)
+    least = np.maximum(np.ceil(_turn(spans) / BEND), 1.0).astype(np.int64)
+    turning = np.flatnonzero(least > 1)
+    for _ in range(ROUNDS):  # where a cubic turns most within little of its length
+        own = least[turning]
+        span = np.repeat(turning, own)
+        begin = (np.arange(len(span)) - np.repeat(np.cumsum(own) - own, own)) / least[span]
+        turn = _turn(_between(spans[span], begin, begin + 1.0 / least[span]))
+        turning = np.unique(span[turn > 1.5 * BEND])
+        turning = turning[least[turning] < MOST_CUTS]
+        least[turning] *= 2
+    length = np.linalg.norm(np.diff(spans[..., :3], axis=1), axis=2)
     low, high = spans[..., :3].min(axis=1), spans[..., :3].max(axis=1)
     x, y, z = (high - low).T
     own = spans[..., 3].mean(axis=1) * np.maximum(length.sum(axis=1), 1e-300)
@@ -121,6 +116,19 @@ def _cuts(spans: NDArray[np.float64]) -> NDArray[np.int64]:
         if cuts.sum() <= MANY or (wanted <= least).all():
             return cuts
         slender *= 2.0
+
+
+def _turn(spans: NDArray[np.float64]) -> NDArray[np.float64]:
+    """By how much the control polygon of each cubic turns, (n,) [rad]."""
+    edges = np.diff(spans[..., :3], axis=1)
+    for i, others in ((2, (1, 0)), (1, (2,)), (0, (1,))):  # of no length: as the next that has one
+        for other in others:
+            still = ~edges[:, i].any(axis=1)
+            edges[still, i] = edges[still, other]
+    unit = edges / np.maximum(np.linalg.norm(edges, axis=2), 1e-300)[..., None]
+    cosine = np.einsum("sij,sij->si", unit[:, 1:], unit[:, :-1])
+    moves = edges.any(axis=(1, 2))
+    return np.where(moves, np.arccos(np.clip(cosine, -1.0, 1.0)).sum(axis=1), 0.0)
 
 
 def _between(
