@@ -224,11 +224,7 @@ TABLES: dict[str, tuple[str, str]] = {
     "shapes": ("uint", "ShapeRow per shape"),
     "instances": ("uint", "InstanceRow per instance"),
     "geometry": ("uint", "parameters of analytic shapes, and of shapes as lights"),
-    "spheres": (
-        "float",
-        "x y z and radius per sphere of the shapes `spheres` [m]; then the pieces of curves, see "
-        "clpt.render.lowering.geometry.strands",
-    ),
+    "spheres": ("float", "x y z and radius per sphere of the shapes `spheres` [m]"),
     "materials": ("uint", "parameters of the leaf materials, a row each"),
     "media": ("uint", "media inside and outside of each shape, see kernels/optics/medium.cl"),
     "mixtures": ("uint", "rules of masks and blends, see kernels/stage/mix.cl"),

@@ -111,7 +111,7 @@ def rays(curves: Curves, n: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
 def reference(curves: Curves, o, d) -> tuple[np.ndarray, ...]:
     """Nearest t of spheres along a curve (LEFT: none), the normal, and by how much it is hit."""
     radius = np.asarray(curves.points)[:, 3].max()
-    balls = along(curves, 40_000 if radius < 0.01 else 15_000)
+    balls = along(curves, 40_000 if radius < 0.01 else 10_000)
     t, normal, depth = np.full(o.shape[1], LEFT), np.zeros(o.shape), np.zeros(o.shape[1])
     for i in range(o.shape[1]):
         f = balls[:, :3] - o[:, i]
@@ -129,13 +129,13 @@ def reference(curves: Curves, o, d) -> tuple[np.ndarray, ...]:
 @pytest.mark.parametrize("name", CURVES)
 def test_rays_meet_what_spheres_along_the_curve_cover(name):
     curves = CURVES[name]
-    o, d = rays(curves, 800, 1)
+    o, d = rays(curves, 500, 1)
     t, normal, depth = reference(curves, o, d)
     result = met(name, o, d)
     hit, expected = result[0] < 1e29, t < 1e29
     clear = np.abs(depth) > (0.05 if name in ("thin", "tip") else 5e-3)  # not an outline
     assert expected.mean() > 0.15
-    assert (hit != expected)[clear].mean() < 1.5e-3
+    assert (hit != expected)[clear].mean() < 2.5e-3
     both = hit & expected & clear
     radius = np.asarray(curves.points)[:, 3].max()
     cos = np.maximum(-(normal * d).sum(0), 0.05)[both]

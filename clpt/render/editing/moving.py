@@ -22,7 +22,7 @@ from clpt.render.editing.moving_instances import Boxes, Location, MovingInstance
 from clpt.render.editing.moving_spheres import MovingSpheres
 from clpt.render.editing.scene_edit import Replacements
 from clpt.render.lowering.device_arrays import on_device
-from clpt.render.lowering.geometry import analytic, shapes, triangles
+from clpt.render.lowering.geometry import analytic, shapes, strands, triangles
 from clpt.render.lowering.geometry.tessellate import keeps_its_kind
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene import Scene
@@ -193,14 +193,14 @@ class Moving:
     def _plan_analytic(self, ranges: _Ranges, new: Any) -> list[Action]:
         """What moves an analytic shape. Raises CannotMove where that is another kind then."""
         shape = ranges.shape if isinstance(new, Instance) else new
-        if isinstance(shape, Curves):
-            raise CannotMove(f"{_name(new)} is of curves, whose pieces follow from its points")
         matrix = shapes.placement(new) @ ranges.own
         in_world = dataclasses.replace(shape, to_world=matrix)
         if not keeps_its_kind(in_world):
             raise CannotMove(f"the transform of {_name(new)} makes triangles of it")
         if isinstance(shape, Spheres):
             act = self._spheres.plan(ranges.row, shape, matrix)
+        elif isinstance(shape, Curves):
+            act = self._plan_curves(ranges, in_world)
         else:
             act = self._plan_single(ranges, in_world)
 
@@ -224,6 +224,24 @@ class Moving:
             stream.write(self.target.tables["geometry"], words, 4 * first_word)
             boxes[0][number] = box
             stream.write(boxes[1], box, box.nbytes * number)
+
+        return act
+
+    def _plan_curves(self, ranges: _Ranges, shape: Any) -> Callable[[Boxes], None]:
+        """What gives curves other pieces, as many as they were lowered to, and other boxes."""
+        owners = self.target.lowered.owners
+        lowered: Any = next(owner for row, owner, _, _ in owners if row is ranges.row)
+        pieces, prim = strands.pieces(shape, cut_as=lowered), int(ranges.row["prim"])
+        box = strands.boxes(pieces)
+        words = self.target.lowered.tables["geometry"]
+        first = words[int(ranges.row["params"]) + analytic.member("curve", "first")]
+        begin = int(first.view(np.int32)) + strands.WORDS * prim
+
+        def act(boxes: Boxes) -> None:
+            stream = self.target.stream
+            stream.write(self.target.tables["spheres"], pieces, 4 * begin)
+            boxes[0][prim : prim + len(box)] = box
+            stream.write(boxes[1], box, box[0].nbytes * prim)
 
         return act
 

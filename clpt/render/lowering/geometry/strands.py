@@ -29,28 +29,20 @@ MOST = (1 << 31) // WORDS - 1  # pieces: kernels count words by an int
 Pieces = NDArray[np.float32]  # (n, WORDS), see `pieces`
 
 
-def pieces(shape: Curves) -> Pieces:
+def pieces(shape: Curves, cut_as: Curves | None = None) -> Pieces:
     """Return the pieces of all strands in the world, (n, WORDS) float32.
 
     A row has of the four control points of a Bezier cubic the x, then the y, the z, and the radii
     [m]; where a half sphere closes the piece, the radius at that end is negated. Then an axis (3)
     across the curve at its beginning, from which u is counted; v there, and by how much it grows;
-    three words that mean nothing.
+    three words that mean nothing. cut_as: the same curves under another transform, whose cubics are
+    cut into as many pieces.
 
     Raises SceneError for points that are no curves, or a transform that stretches.
     """
-    name, matrix = shapes.where(shape), shapes.placement(shape)
-    scale = float(analytic.row(shape).view(np.float32)[analytic.member("curve", "scale")])
-    spans, strand = tubes.cubics(shape, name)
-    if spans.shape[1] == 2:  # a straight cubic, at an even speed
-        a, b = spans[:, :1], spans[:, 1:]
-        spans = np.concatenate([a, (2.0 * a + b) / 3.0, (a + 2.0 * b) / 3.0, b], axis=1)
-    spans = spans.copy()
-    spans[..., :3] = transforms.transform_points(matrix, spans[..., :3].reshape(-1, 3)).reshape(
-        *spans.shape[:2], 3
-    )
-    spans[..., 3] *= scale
-    cuts = _cuts(spans)
+    name = shapes.where(shape)
+    spans, strand = _in_world(shape)
+    cuts = _cuts(spans if cut_as is None else _in_world(cut_as)[0])
     span = np.repeat(np.arange(len(spans)), cuts)
     if len(span) > MOST:
         raise SceneError(f"its strands are {len(span):,} pieces, at most {MOST:,}", where=name)
@@ -80,6 +72,20 @@ def boxes(placed: Pieces) -> NDArray[np.float32]:
     size = np.maximum(np.abs(low), np.abs(high)).max(axis=1, initial=0.0) + 2.0 * radius
     reach = (radius + np.float32(analytic.PADDING) * size)[:, None]
     return np.stack([low - reach, high + reach], axis=1).astype(np.float32)
+
+
+def _in_world(shape: Curves) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """The cubics of all strands (s, 4, 4) in the world, and the strand of each."""
+    spans, strand = tubes.cubics(shape, shapes.where(shape))
+    if spans.shape[1] == 2:  # a straight cubic, at an even speed
+        a, b = spans[:, :1], spans[:, 1:]
+        spans = np.concatenate([a, (2.0 * a + b) / 3.0, (a + 2.0 * b) / 3.0, b], axis=1)
+    matrix, made = shapes.placement(shape), np.empty(spans.shape)
+    points = transforms.transform_points(matrix, spans[..., :3].reshape(-1, 3))
+    made[..., :3] = points.reshape(*spans.shape[:2], 3)
+    scale = analytic.row(shape).view(np.float32)[analytic.member("curve", "scale")]
+    made[..., 3] = spans[..., 3] * float(scale)
+    return made, strand
 
 
 def _near_to_each_other(points: NDArray[np.float32]) -> NDArray[np.intp]:
