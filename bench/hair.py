@@ -2,15 +2,14 @@
 
     python -m bench.hair
 
-Fur on a ball (short strands, each one cubic), a lock of long curled hair, a lawn of straight blades.
-Both forms of a scene take turns with the same samples; the time is the processor's for a sample of
-all pixels, the memory that of trees and of the tables of geometry. `work` is time times variance:
-what an equal picture takes.
+Fur on a ball (short strands, each one cubic), a lock of long curled hair, a lawn of straight
+blades. Both forms of a scene take turns with the same samples; the time is the processor's for a
+sample of all pixels, the memory that of trees and of the tables of geometry. `work` is time times
+variance: what an equal picture takes.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import statistics
 import time
 from typing import Any
@@ -78,9 +77,10 @@ def lawn(count: int) -> Curves:
 
 def scene(curves: Curves) -> Scene:
     """Curves before a grey wall, under a lamp and a sky."""
+    view = tf.look_at((0, 0.3, 3), (0, 0, 0), (0, 1, 0))
     wall = tf.translate([0.0, 0.0, -1.5]) @ tf.scale(4.0)
     return Scene(
-        camera=cameras.Perspective(fov=42.0, to_world=tf.look_at((0, 0.3, 3), (0, 0, 0), (0, 1, 0))),
+        camera=cameras.Perspective(fov=42.0, to_world=view),
         film=integrators.Film(width=SIZE, height=SIZE, mode="rgb"),
         integrator=integrators.Path(max_depth=12),
         shapes=[curves, Rectangle(to_world=wall)],

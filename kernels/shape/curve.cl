@@ -1,16 +1,16 @@
-/* A piece of a strand: what a sphere touches from inside whose centre c(s) and radius r(s) run along a cubic, s from 0
- * to 1. A ray o + t d meets the sphere at s where t = z -+ sqrt(D), with D = r^2 - x^2 - y^2 and x, y, z the centre
- * across and along the ray. The surface is met at the least (or greatest) t: where
- *     F(s) = -+ z' sqrt(D) - D' / 2 = 0,
+/* A piece of a strand: what spheres cover whose centre c(s) and radius r(s) run along a cubic, s from 0 to 1. A ray
+ * o + t d meets the sphere at s where t = z -+ sqrt(D), with D = r^2 - x^2 - y^2 and x, y, z the centre across and
+ * along the ray. The surface is met at the least (or greatest) t: where
+ *     F(s) = +-z' sqrt(D) - D' / 2 = 0,
  * which also says that the normal leans by r' against the curve. F is below 0 before and above 0 behind, and where the
  * ray passes the spheres it leads to where D is greatest; so the zero is between the ends of the piece, or not on it.
  * Near s the curve is taken as straight and its radius as linear, whose zero is known: exact for straight pieces, else
- * the next guess, and a bisection where it leaves the bounds. (That local cones converge fast: Reshetov and Luebke 2018,
- * "Phantom Ray-Hair Intersector".) u is the azimuth over 2 pi, v runs along. */
+ * the next guess, and a bisection where that leaves the bounds. (That local cones converge fast: Reshetov and Luebke
+ * 2018, "Phantom Ray-Hair Intersector".) u is the azimuth over 2 pi, v runs along. Lengths in metres. */
 #include "tracing/analytic.cl"
 #define CURVE_STEPS 24
-#define CURVE_NEAR 2e-4f    /* of a piece: a step of less is the last; what is left of the error is far smaller */
-#define CURVE_OVERLAP 2e-3f /* radians by which the end of a piece is met beyond it, so that no ray passes between two */
+#define CURVE_NEAR 2e-4f    /* of a piece: a step of less is the last; the error that is left is far smaller */
+#define CURVE_OVERLAP 2e-3f /* [rad] by which a piece is met beyond its end, so that no ray passes between two */
 
 typedef struct { real a, b, c, d; } Cubic; /* a + b s + c s^2 + d s^3 */
 inline Cubic cubic_of(real p0, real p1, real p2, real p3)
@@ -36,6 +36,13 @@ inline vec3 curve_bend(Curve q, real s)
 {
     vec3 a = add3(sub3(q.p0, scale3(q.p1, 2.0f)), q.p2), b = add3(sub3(q.p1, scale3(q.p2, 2.0f)), q.p3);
     return scale3(madd3(a, 1.0f - s, scale3(b, s)), 6.0f);
+}
+
+/* A slope at unit length; where the curve stands still, its chord. */
+inline vec3 curve_tangent(vec3 slope, vec3 chord)
+{
+    vec3 v = sel3(dot3(slope, slope) > 0.0f, slope, chord);
+    return scale3(v, 1.0f / sqrt(max_r(dot3(v, v), (real)(1e-37f))));
 }
 
 inline real curve_reach(Curve q) { return max_r(max_r(fabs(q.r0), q.r1), max_r(q.r2, fabs(q.r3))); }
@@ -131,7 +138,8 @@ ShapeHit curve_intersect(Curve q, vec3 o, vec3 d, real tmin, real tmax)
     real r0 = fabs(q.r0), r3 = fabs(q.r3);
     CurveView c = {cubic_of(x0, x1, x2, x3), cubic_of(y0, y1, y2, y3), cubic_of(z0, z1, z2, z3),
                    cubic_of(r0, q.r1, q.r2, r3),
-                   {x0, y0, r0, x1 - x0, y1 - y0, z1 - z0, q.r1 - r0}, {x3, y3, r3, x3 - x2, y3 - y2, z3 - z2, r3 - q.r2}};
+                   {x0, y0, r0, x1 - x0, y1 - y0, z1 - z0, q.r1 - r0},
+                   {x3, y3, r3, x3 - x2, y3 - y2, z3 - z2, r3 - q.r2}};
     mask closed0 = q.r0 < 0.0f, closed1 = q.r3 < 0.0f;
     real s = 0.0f, side = -1.0f, t = FAR, far_s;
     mask met = curve_find(c, side, closed0, closed1, alive, &s);
@@ -156,10 +164,7 @@ ShapeHit curve_intersect(Curve q, vec3 o, vec3 d, real tmin, real tmax)
     h.n = scale3(out, q.side);
     h.uv.y = q.v + s * q.dv;
 
-    vec3 begin = curve_slope(q, (real)(0.0f)), slope = curve_slope(q, s);
-    real begin2 = dot3(begin, begin), slope2 = dot3(slope, slope), chord2 = dot3(chord, chord);
-    begin = scale3(sel3(begin2 > 0.0f, begin, chord), 1.0f / sqrt(max_r(sel(begin2 > 0.0f, begin2, chord2), (real)(1e-37f))));
-    slope = scale3(sel3(slope2 > 0.0f, slope, chord), 1.0f / sqrt(max_r(sel(slope2 > 0.0f, slope2, chord2), (real)(1e-37f))));
+    vec3 begin = curve_tangent(curve_slope(q, (real)(0.0f)), chord), slope = curve_tangent(curve_slope(q, s), chord);
     /* The axis of the beginning, turned as the tangent is turned. */
     real turn = dot3(q.axis, slope) / max_r(1.0f + dot3(begin, slope), (real)(1e-6f));
     vec3 e = madd3(add3(begin, slope), -turn, q.axis);

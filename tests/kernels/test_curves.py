@@ -1,4 +1,4 @@
-"""Rays and curves: the kernel's pieces beside spheres along the curve in float64, and closed forms."""
+"""Rays and curves: pieces beside spheres along the curve in float64, and closed forms."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ MEET = """
     for (int k = 0; any(count > k); k++) {
         mask there = count > k;
         integer prim = first + sel_i(there, (integer)(k), (integer)(0));
-        ShapeHit one = curve_intersect(curves_one(scene, (integer)(0), prim, there), o, d, x[6], h.t);
+        Curve piece = curves_one(scene, (integer)(0), prim, there);
+        ShapeHit one = curve_intersect(piece, o, d, x[6], h.t);
         mask nearer = there & (one.t < h.t);
         h.t = sel(nearer, one.t, h.t);
         h.n = sel3(nearer, one.n, h.n);
@@ -34,7 +35,8 @@ MEET = """
         best = sel_i(nearer, prim, best);
     }
     Curve q = curves_one(scene, (integer)(0), best, best >= 0);
-    vec3 p = curve_onto(q, madd3(d, h.t, o)), du = curve_dpdu(q, p, h.uv), dv = curve_dpdv(q, p, h.uv);
+    vec3 p = curve_onto(q, madd3(d, h.t, o));
+    vec3 du = curve_dpdu(q, p, h.uv), dv = curve_dpdv(q, p, h.uv);
     r[0] = h.t; r[1] = h.n.x; r[2] = h.n.y; r[3] = h.n.z; r[4] = h.uv.x; r[5] = h.uv.y;
     r[6] = p.x; r[7] = p.y; r[8] = p.z; r[9] = du.x; r[10] = du.y; r[11] = du.z;
     r[12] = dv.x; r[13] = dv.y; r[14] = dv.z; r[15] = curve_size(q);
@@ -42,6 +44,7 @@ MEET = """
 SPLINE = np.random.default_rng(3).uniform(-1.0, 1.0, (7, 4)) * [1, 1, 1, 0.02] + [0, 0, 0, 0.06]
 ARC = np.array([[np.cos(a), np.sin(a), 0.3 * a, 0.05] for a in np.linspace(0.0, 5.0, 14)])
 TIP = np.outer([1, 1, 1, 1, 0, 0, 0], [0, 0, 0, 0.05])
+SWALLOWED = Curves(points=[[0, 0, 0, 0.5], [0.1, 0, 0, 0.05], [0.3, 0, 0, 0.05]], basis="linear")
 CURVES = {
     "spline": Curves(points=SPLINE),
     "thin": Curves(points=SPLINE * [1, 1, 1, 0.02]),
@@ -53,7 +56,7 @@ CURVES = {
     "point": Curves(points=[[0.1, 0.2, 0.3, 0.4]] * 4),
     "still": Curves(points=SPLINE[[0, 0, 0, 1, 1, 2, 3, 3, 3, 3]]),
     "tip": Curves(points=SPLINE * [1, 1, 1, 0] + TIP),
-    "swallowed": Curves(points=[[0, 0, 0, 0.5], [0.1, 0, 0, 0.05], [0.3, 0, 0, 0.05]], basis="linear"),
+    "swallowed": SWALLOWED,
 }
 LEFT = 1e30
 
@@ -143,7 +146,9 @@ def test_rays_meet_what_spheres_along_the_curve_cover(name):
     assert (off < 3e-6 * 4.0 / cos + 2e-3 * radius).mean() > 0.998
     if name not in ("thin", "tip"):  # there float32 knows the radius of a point to some percent
         close = off < 1e-2 * radius
-        assert (np.abs(result[1:4] - normal)[:, both].max(0)[close] < 0.02 / cos[close]).mean() > 0.995
+        assert (
+            np.abs(result[1:4] - normal)[:, both].max(0)[close] < 0.02 / cos[close]
+        ).mean() > 0.995
     np.testing.assert_allclose(np.linalg.norm(result[1:4][:, hit], axis=0), 1.0, atol=1e-5)
     assert np.isfinite(result[:, hit]).all()
     assert (result[4:6, hit] >= -1e-6).all() and (result[4:6, hit] <= 1.0 + 1e-6).all()
@@ -206,7 +211,7 @@ def test_frames_follow_the_curve():
 
 
 def test_a_ray_does_not_meet_the_surface_it_starts_on():
-    """Origins as shading makes them: outward nothing is met of a straight one, inward the far side."""
+    """Origins as shading makes them: outward a straight one is not met, inward its far side."""
     for name in ("line", "cone"):
         curves = CURVES[name]
         o, d = rays(curves, 20_000, 6)

@@ -46,7 +46,8 @@ def mixed(curves: Curves) -> clpt.Scene:
     """Curves alone and in a group that is turned and scaled, beside many spheres."""
     centers = np.random.default_rng(1).uniform(-1.0, 1.0, (30, 3))
     group = Group((curves, Spheres(centers=centers[:5], radii=0.1, material=GREY)))
-    places = [T.translate([x, 0.3, -1.0]) @ T.rotate([0, 0, 1], 70.0) @ T.scale(0.5) for x in (-1, 1)]
+    turned = T.rotate([0, 0, 1], 70.0) @ T.scale(0.5)
+    places = [T.translate([x, 0.3, -1.0]) @ turned for x in (-1, 1)]
     copies = [Instance(group=group, to_world=place) for place in places]
     return scene(curves, Spheres(centers=centers, radii=0.05, material=GREY), *copies)
 

@@ -7,7 +7,6 @@ from clpt.render.codegen.dispatch import Case, Function, active, function
 from clpt.render.contract.features import Features
 from clpt.render.contract.shape_records import ANALYTIC, ONE_OF, ROWS, VALUES
 
-
 _FIRST = next(m.word for m in ROWS["curve"].members if m.name == "first")
 
 

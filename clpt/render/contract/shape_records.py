@@ -48,7 +48,7 @@ RECORDS: dict[str, Record] = {
     ),
 }
 
-# A piece of `curves`. In `geometry` is what the pieces of a shape share; the others are read from `spheres`.
+# A piece of `curves`. `geometry` has what the pieces of a shape share, `spheres` the other members.
 CURVE = Record(
     "Curve",
     "A sphere that runs along a Bezier cubic.",

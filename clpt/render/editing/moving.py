@@ -94,10 +94,10 @@ class Moving:
         scene: as it is; replaced: the shapes that move, and what they become. Returns None, or,
         with nothing done, why the scene must be lowered again.
 
-        Triangles, instances, spheres, disks and cylinders can move. A shape must keep its number of
-        vertices, its orientation and its kind, and must not emit light. A mesh of which a triangle
-        without area was left out keeps its vertices. Where light is traced from lights nothing
-        moves.
+        Triangles, instances, spheres, disks, cylinders and curves can move. A shape must keep its
+        number of vertices, its orientation and its kind, and must not emit light. A mesh of which a
+        triangle without area was left out keeps its vertices. Where light is traced from lights
+        nothing moves.
 
         Raises SceneError for a transform that is singular, and arrays of the wrong shape or type.
         """

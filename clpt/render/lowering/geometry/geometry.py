@@ -23,6 +23,7 @@ from clpt.render.lowering.lights.lights import Emitter
 from clpt.render.lowering.materials.material_words import MaterialWords
 from clpt.render.lowering.motion import Motions
 from clpt.render.lowering.textures.attributes import Owner
+from clpt.scene.shapes import Shape
 
 SWEPT_CELLS = 4  # of the hull of what moves, see `instancing.hull_points`
 SHAPE_NORMALS, SHAPE_UVS, SHAPE_TWO_SIDED, SHAPE_ONE_LIGHT, SHAPE_MANY = 1, 2, 4, 8, 16

@@ -147,15 +147,15 @@ def sort(
 
 
 def _met_as(shape: Shape, to_world: Matrices | None = None) -> Shape:
-    """A shape as rays meet it: curves that shine, are stretched or often instanced are tubes.
+    """A shape as rays meet it: curves that shine, deform, are stretched or often instanced are tubes.
 
     to_world: of the instances of a group, (k, 4, 4).
     """
     if not isinstance(shape, Curves) or isinstance(shape, Tubes):
         return shape
     placed = np.eye(4)[None] if to_world is None else to_world
-    few = len(placed) <= FEW and shape.emission is None
-    if few and all(keeps_its_kind(copy) for copy in _placed(shape, placed)):
+    still = shape.emission is None and shape.deformation is None
+    if still and len(placed) <= FEW and all(keeps_its_kind(copy) for copy in _placed(shape, placed)):
         return shape
     return as_tubes(shape)
 

@@ -1,8 +1,8 @@
 """Curves on their way to the device: pieces of cubics that rays meet as they are.
 
 A cubic is cut into pieces that bend little and whose boxes are not much larger than they are. A
-piece has WORDS words in the table `spheres`: CONTROL that each ray reads, and behind them those that
-only a hit reads. Pieces that are near to each other lie near to each other.
+piece has WORDS words in the table `spheres`: CONTROL that each ray reads, and behind them those
+that only a hit reads. Pieces that are near to each other lie near to each other.
 """
 
 from __future__ import annotations
@@ -165,8 +165,9 @@ def _directions(control: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDAr
         length = np.linalg.norm(tangent, axis=1, keepdims=True)
         tangent = np.where(length > 0.0, tangent / np.where(length > 0.0, length, 1.0), [0, 0, 1])
         found.append(tangent)
-    return found[0], np.where((control[:, :, :3] == control[:, :1, :3]).all((1, 2))[:, None],
-                              found[1], -found[1])
+    return found[0], np.where(
+        (control[:, :, :3] == control[:, :1, :3]).all((1, 2))[:, None], found[1], -found[1]
+    )
 
 
 def _closed(

@@ -1,7 +1,7 @@
 """Curves as triangles: a tube of flat facets with smooth normals around each strand.
 
-Rays meet curves as they are, see `strands`. What has no such form is met as `Tubes`: curves that emit
-light, that a transform stretches, or that many instances share.
+Rays meet curves as they are, see `strands`. What has no such form is met as `Tubes`: curves that
+emit light, that deform, that a transform stretches, or that many instances share.
 """
 
 from __future__ import annotations
