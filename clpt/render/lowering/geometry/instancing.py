@@ -155,7 +155,11 @@ def _met_as(shape: Shape, to_world: Matrices | None = None) -> Shape:
         return shape
     placed = np.eye(4)[None] if to_world is None else to_world
     still = shape.emission is None and shape.deformation is None
-    if still and len(placed) <= FEW and all(keeps_its_kind(copy) for copy in _placed(shape, placed)):
+    if (
+        still
+        and len(placed) <= FEW
+        and all(keeps_its_kind(copy) for copy in _placed(shape, placed))
+    ):
         return shape
     return as_tubes(shape)
 
