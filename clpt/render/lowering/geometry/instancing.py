@@ -147,7 +147,7 @@ def sort(
 
 
 def _met_as(shape: Shape, to_world: Matrices | None = None) -> Shape:
-    """A shape as rays meet it: curves that shine, deform, are stretched or often instanced are tubes.
+    """A shape as rays meet it: tubes for curves that shine, deform, are stretched or often placed.
 
     to_world: of the instances of a group, (k, 4, 4).
     """

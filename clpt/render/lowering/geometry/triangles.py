@@ -21,7 +21,7 @@ from clpt.scene import shapes
 from clpt.scene.motion import Deformation
 from clpt.scene.shapes import Shape
 
-POINTS = {"mesh": "vertices", "curves": "points"}  # what a deformation moves
+POINTS = {"mesh": "vertices", "curves": "points", "tubes": "points"}  # what a deformation moves
 SUMMED = 1 << 20  # triangles whose normals are summed at a time
 
 CHUNK = 1 << 16  # triangles that are looked at at a time: what is made of them stays in the cache
