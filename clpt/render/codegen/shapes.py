@@ -39,7 +39,8 @@ def hit_text(features: Features) -> str:
         for kind in features.analytic
     ]
     many = len(ONE_OF.keys() & set(features.analytic))
-    rows = ("single", "many", "mixed")[many]
+    # What moves by itself needs its own row to be met too.
+    rows = ("single", "many", "mixed")[2 if many and moves else many]
     signature = (
         "ShapeHit shape_hit(Scene scene, int prim, int row, vec3 o, vec3 d, real tmin, real tmax)"
     )
