@@ -42,6 +42,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "lens": (),
     "measured": (),
     "motion": (),
+    "hair": (),
     "viewing": (),
     "sizes": ("--plot", str(report.RESULTS / "sizes.png")),
 }

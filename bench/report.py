@@ -260,6 +260,7 @@ TABLES: dict[str, Callable[[Sequence[Row]], str]] = {
     "lens": plain,
     "measured": plain,
     "motion": plain,
+    "hair": plain,
     "startup": startup,
     "viewing": plain,
     "compiling": plain,

@@ -113,7 +113,7 @@ def _instanced_triangles(
 def _triangles(shape: shapes.Shape) -> int:
     if isinstance(shape, shapes.Mesh):
         return len(shape.faces)
-    if isinstance(shape, shapes.Curves | shapes.SdfGrid):
+    if isinstance(shape, shapes.SdfGrid):
         return len(triangulate(shape)[1])
     return FLAT_TRIANGLES.get(type(shape), 0)
 

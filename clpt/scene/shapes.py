@@ -1,4 +1,4 @@
-"""Shapes: where surfaces are. All but spheres, disks and cylinders are lowered to triangles."""
+"""Shapes: where surfaces are. All but spheres, disks, cylinders and curves become triangles."""
 
 from __future__ import annotations
 
@@ -155,10 +155,12 @@ class Cylinder(Shape):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Curves(Shape):
-    """Strands of a round cross-section, as hair; lowered to tubes of triangles, open at the ends.
+    """Strands of a round cross-section, as hair: what spheres along a line cover.
 
     u runs around, v along, from 0 to 1 over all pieces of all strands, as in Mitsuba. A B-spline is
-    uniform and cubic; a Bezier strand has 4, 7, 10, ... points. `to_world` scales radii too.
+    uniform and cubic; a Bezier strand has 4, 7, 10, ... points. `to_world` scales radii too. Curves
+    that emit light, that deform, that a transform stretches, or that more than 16 instances share
+    become tubes of triangles, which are open at the ends; others end in half spheres.
     """
 
     points: Any = host(None, "(n, 4) of all strands: x y z and the radius", "m", form="rows4")

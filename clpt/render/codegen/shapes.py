@@ -5,13 +5,15 @@ from __future__ import annotations
 from clpt.records import SHAPE
 from clpt.render.codegen.dispatch import Case, Function, active, function
 from clpt.render.contract.features import Features
-from clpt.render.contract.shape_records import ANALYTIC, ONE_OF, RECORDS, VALUES
+from clpt.render.contract.shape_records import ANALYTIC, ONE_OF, ROWS, VALUES
+
+_FIRST = next(m.word for m in ROWS["curve"].members if m.name == "first")
 
 
 def virtual_files() -> dict[str, str]:
     """Return what shapes give, and generated/shape/<kind>.cl: struct, loader and functions."""
     files = {f"generated/{record.snake_name}.cl": record.select_text() for record in VALUES}
-    structs = {kind: record.row_text() for kind, record in RECORDS.items()}
+    structs = {kind: record.row_text() for kind, record in ROWS.items()}
     structs |= {kind: f'#include "generated/shape/{one}.cl"\n' for kind, one in ONE_OF.items()}
     for kind, struct in structs.items():
         files[f"generated/shape/{kind}.cl"] = f'{struct}#include "shape/{kind}.cl"\n'
@@ -28,12 +30,17 @@ def hit_text(features: Features) -> str:
     none = "ShapeHit none = {FAR, {0.0f, 0.0f, 1.0f}, {0.0f, 0.0f}};"
     moved = _at_rest(word["number"], none) if moves else []
     back = _in_motion() if moves else [none]
-    cases = [
+    curves = "curves" in features.analytic
+    piece = f"scene.spheres + (int)gather_i(scene.geometry, params + {_FIRST}) + CURVE_WORDS * prim"
+    beside = f"if (kind == {_number('curves')} && curve_beside({piece}, o, d)) return none;"
+    cases = [beside] * curves + [
         f"if (kind == {_number(kind)}) {answer} {ONE_OF.get(kind, kind)}_intersect("
         f"{_row_text(kind, 'params')}, o, d, tmin, tmax);"
         for kind in features.analytic
     ]
-    rows = "single" if ONE_OF.keys().isdisjoint(features.analytic) else "many"
+    many = len(ONE_OF.keys() & set(features.analytic))
+    # What moves by itself needs its own row to be met too.
+    rows = ("single", "many", "mixed")[2 if many and moves else many]
     signature = (
         "ShapeHit shape_hit(Scene scene, int prim, int row, vec3 o, vec3 d, real tmin, real tmax)"
     )
@@ -41,12 +48,14 @@ def hit_text(features: Features) -> str:
         "global const uint *shape = scene.shapes + row * SHAPE_ROW_WORDS;",
         f"int kind = (int)shape[{word['kind']}];",
         f"integer params = (int)shape[{word['params']}];",
+        *([none] if curves and not moves else []),
         *moved,
         *cases,
-        *back,
+        *back[curves and not moves :],
         "return none;",
     ]
     files = '#include "generated/motion.cl"\n' * moves
+    files += '#include "tracing/curve_beside.cl"\n' * curves
     files += f'#include "tracing/shape_rows_{rows}.cl"\n'
     return _includes(features) + files + function(signature, *body)
 

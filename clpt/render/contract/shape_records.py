@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from clpt.layout import Record
 
-ANALYTIC = ("sphere", "disk", "cylinder", "spheres")  # rays meet these as they are
+ANALYTIC = ("sphere", "disk", "cylinder", "spheres", "curves")  # rays meet these as they are
 
-ONE_OF = {"spheres": "sphere"}  # kinds of many: what each of them is
+ONE_OF = {"spheres": "sphere", "curves": "curve"}  # kinds of many: what each of them is
 
 _FLAT = {
     "center": ("vec3", "[m]"),
@@ -47,6 +47,27 @@ RECORDS: dict[str, Record] = {
         y=("vec3", "unit axis where it is 90 degrees"),
     ),
 }
+
+# A piece of `curves`. `geometry` has what the pieces of a shape share, `spheres` the other members.
+CURVE = Record(
+    "Curve",
+    "A sphere that runs along a Bezier cubic.",
+    side=("real", "1: the front is outside; -1: inside"),
+    scale=("real", "by how much the transform to the world enlarges"),
+    first=("integer", "word in `spheres` where primitive 0 would be"),
+    p0=("vec3", "control points [m]"),
+    p1=("vec3", "control points [m]"),
+    p2=("vec3", "control points [m]"),
+    p3=("vec3", "control points [m]"),
+    r0=("real", "radius at them [m]; negated at an end that a half sphere closes"),
+    r1=("real", "radius at them [m]"),
+    r2=("real", "radius at them [m]"),
+    r3=("real", "as r0 [m]"),
+    axis=("vec3", "across the curve at its beginning, where u is 0"),
+    v=("real", "v at its beginning"),
+    dv=("real", "by how much v grows along it"),
+)
+ROWS = {**RECORDS, "curve": CURVE}  # of all kinds, lights or not
 
 # What the functions of shapes return, see kernels/interface/shape.cl and emission.cl.
 SHAPE_SAMPLE = Record(

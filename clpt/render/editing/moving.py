@@ -22,11 +22,11 @@ from clpt.render.editing.moving_instances import Boxes, Location, MovingInstance
 from clpt.render.editing.moving_spheres import MovingSpheres
 from clpt.render.editing.scene_edit import Replacements
 from clpt.render.lowering.device_arrays import on_device
-from clpt.render.lowering.geometry import analytic, shapes, triangles
+from clpt.render.lowering.geometry import analytic, shapes, strands, triangles
 from clpt.render.lowering.geometry.tessellate import keeps_its_kind
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene import Scene
-from clpt.scene.shapes import Instance, Mesh, Shape, Spheres
+from clpt.scene.shapes import Curves, Instance, Mesh, Shape, Spheres
 
 _ROOT = "motion/place_vertices.cl"
 _NORMALS = 1  # SHAPE_NORMALS of kernels/path/surface_flags.cl
@@ -94,10 +94,10 @@ class Moving:
         scene: as it is; replaced: the shapes that move, and what they become. Returns None, or,
         with nothing done, why the scene must be lowered again.
 
-        Triangles, instances, spheres, disks and cylinders can move. A shape must keep its number of
-        vertices, its orientation and its kind, and must not emit light. A mesh of which a triangle
-        without area was left out keeps its vertices. Where light is traced from lights nothing
-        moves.
+        Triangles, instances, spheres, disks, cylinders and curves can move. A shape must keep its
+        number of vertices, its orientation and its kind, and must not emit light. A mesh of which a
+        triangle without area was left out keeps its vertices. Where light is traced from lights
+        nothing moves.
 
         Raises SceneError for a transform that is singular, and arrays of the wrong shape or type.
         """
@@ -199,6 +199,8 @@ class Moving:
             raise CannotMove(f"the transform of {_name(new)} makes triangles of it")
         if isinstance(shape, Spheres):
             act = self._spheres.plan(ranges.row, shape, matrix)
+        elif isinstance(shape, Curves):
+            act = self._plan_curves(ranges, in_world)
         else:
             act = self._plan_single(ranges, in_world)
 
@@ -222,6 +224,24 @@ class Moving:
             stream.write(self.target.tables["geometry"], words, 4 * first_word)
             boxes[0][number] = box
             stream.write(boxes[1], box, box.nbytes * number)
+
+        return act
+
+    def _plan_curves(self, ranges: _Ranges, shape: Any) -> Callable[[Boxes], None]:
+        """What gives curves other pieces, as many as they were lowered to, and other boxes."""
+        owners = self.target.lowered.owners
+        lowered: Any = next(owner for row, owner, _, _ in owners if row is ranges.row)
+        pieces, prim = strands.pieces(shape, cut_as=lowered), int(ranges.row["prim"])
+        box = strands.boxes(pieces)
+        words = self.target.lowered.tables["geometry"]
+        first = words[int(ranges.row["params"]) + analytic.member("curve", "first")]
+        begin = int(first.view(np.int32)) + strands.WORDS * prim
+
+        def act(boxes: Boxes) -> None:
+            stream = self.target.stream
+            stream.write(self.target.tables["spheres"], pieces, 4 * begin)
+            boxes[0][prim : prim + len(box)] = box
+            stream.write(boxes[1], box, box[0].nbytes * prim)
 
         return act
 

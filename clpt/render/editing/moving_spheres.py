@@ -93,7 +93,7 @@ class MovingSpheres:
         """How many spheres a row of `shapes` stands for."""
         lowered = self.scene.lowered
         rows = lowered.tables["shapes"].view(SHAPE.dtype)
-        behind = rows["prim"][(rows["kind"] == row["kind"]) & (rows["prim"] > row["prim"])]
+        behind = rows["prim"][(rows["kind"] > 0) & (rows["prim"] > row["prim"])]
         end = int(behind.min()) if len(behind) else len(lowered.boxes)
         return end - int(row["prim"])
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt import transforms
 from clpt.errors import SceneError
-from clpt.render.contract.shape_records import ANALYTIC, ONE_OF, RECORDS
+from clpt.render.contract.shape_records import ANALYTIC, ONE_OF, RECORDS, ROWS
 from clpt.render.lowering.geometry.shapes import Points, Words, placement, where
 from clpt.render.lowering.geometry.triangles import triangle_areas, triangulate
 from clpt.scene import shapes
@@ -24,17 +24,21 @@ PADDING = 1e-6  # of the size of an analytic shape, for what float32 rounds in i
 def row(shape: Shape) -> Words:
     """Return the words of a rectangle, sphere, disk or cylinder in `geometry`, placed.
 
-    Of spheres, those of one around the origin with radius 1 before `to_world`.
+    Of spheres, those of one around the origin with radius 1 before `to_world`; of curves, what
+    their pieces share but for where they are.
 
     Raises SceneError for a singular transform, or one after which it is no such shape any more.
     """
     matrix = placement(shape)
-    record = RECORDS[ONE_OF.get(shape.kind, shape.kind)]
+    record = ROWS[ONE_OF.get(shape.kind, shape.kind)]
     if isinstance(shape, shapes.Sphere):
         radius = _positive(shape.radius, "radius", shape)
         values = _sphere(shape, matrix, _three(shape.center, "center", shape), radius)
     elif isinstance(shape, shapes.Spheres):
         values = _sphere(shape, matrix, np.zeros(3), 1.0)
+    elif isinstance(shape, shapes.Curves):
+        nothing = {m.name: np.zeros(3 if m.type == "vec3" else 1) for m in record.members}
+        values = {**nothing, "side": _side(shape), "scale": _even_axes(matrix[:3, :3], shape)[1]}
     elif isinstance(shape, shapes.Cylinder):
         values = _cylinder(shape, matrix)
     else:
@@ -46,7 +50,7 @@ def row(shape: Shape) -> Words:
 
 def member(kind: str, name: str) -> int:
     """Return the place of a member in a kind's row, in words."""
-    return next(m.word for m in RECORDS[kind].members if m.name == name)
+    return next(m.word for m in ROWS[kind].members if m.name == name)
 
 
 def _side(shape: Shape) -> float:
@@ -131,7 +135,7 @@ def area(shape: Shape) -> float:
 
 def bounds(shape: Shape) -> tuple[Points, Points]:
     """Return the corners (3,) float32 of a box around the shape [m]."""
-    if shape.kind not in ANALYTIC:
+    if shape.kind not in ANALYTIC or isinstance(shape, shapes.Curves):
         vertices = triangulate(shape)[0]
         return vertices.min(axis=0), vertices.max(axis=0)
     row_ = members_of(shape)

@@ -16,13 +16,14 @@ from clpt.records import SHAPE
 from clpt.render.contract import shape_records
 from clpt.render.lowering import motion
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.geometry import analytic, instancing, shapes, spheres, triangles
+from clpt.render.lowering.geometry import analytic, instancing, shapes, spheres, strands, triangles
 from clpt.render.lowering.geometry.instancing import Instances, Placed, Prototype
 from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.lights.lights import Emitter
 from clpt.render.lowering.materials.material_words import MaterialWords
 from clpt.render.lowering.motion import Motions
 from clpt.render.lowering.textures.attributes import Owner
+from clpt.scene.shapes import Shape
 
 SWEPT_CELLS = 4  # of the hull of what moves, see `instancing.hull_points`
 SHAPE_NORMALS, SHAPE_UVS, SHAPE_TWO_SIDED, SHAPE_ONE_LIGHT, SHAPE_MANY = 1, 2, 4, 8, 16
@@ -84,7 +85,8 @@ def lower_geometry(index: SceneIndex, encoder: Encoder, materials: MaterialWords
     kinds = shape_records.ANALYTIC
     meshes = [one for one in index.placed if one.shape.kind not in kinds]
     others = [one for one in index.placed if one.shape.kind in kinds]
-    others.sort(key=lambda one: one.shape.kind in shape_records.ONE_OF)
+    many = list(shape_records.ONE_OF)
+    others.sort(key=lambda one: one.shape.kind in many and 1 + many.index(one.shape.kind))
     single = [one for one in others if one.shape.kind not in shape_records.ONE_OF]
     builder = _Builder(encoder, materials, len(single), index.motions)
     for one in meshes:
@@ -95,6 +97,7 @@ def lower_geometry(index: SceneIndex, encoder: Encoder, materials: MaterialWords
     first_analytic = len(builder.rows)
     for one in others:
         builder.add(one)
+    builder.add_pieces()
     boxes = [builder.around(one, np.array([analytic.bounds(one.shape)])) for one in single]
     vertices, faces, tags = builder.concatenated()
     return Geometry(
@@ -108,8 +111,8 @@ def lower_geometry(index: SceneIndex, encoder: Encoder, materials: MaterialWords
                 np.zeros((0, 2, 3), np.float32),
                 *boxes,
                 *(
-                    builder.around(one, spheres.boxes([balls]))
-                    for one, balls in zip(others[len(single) :], builder.balls, strict=True)
+                    builder.around(one, own)
+                    for one, own in zip(others[len(single) :], builder.many, strict=True)
                 ),
             ]
         ),
@@ -140,7 +143,8 @@ class _Builder:
     emitters: list[Emitter] = field(default_factory=list)
     parts: list[tuple[np.ndarray, np.ndarray, int]] = field(default_factory=list)
     flat: list[triangles.Flat] = field(default_factory=list)
-    balls: list[spheres.Balls] = field(default_factory=list)
+    many: list[NDArray[np.float32]] = field(default_factory=list)
+    curves: list[tuple[np.ndarray, Shape, strands.Pieces]] = field(default_factory=list)
     vertex_count: int = 0
     face_count: int = 0
     normals: bool = False
@@ -164,9 +168,13 @@ class _Builder:
             corners = self._add_triangles(shape, row, times)
         else:
             row["kind"] = 1 + shape_records.ANALYTIC.index(shape.kind)
-            row["params"] = self.encoder.store.append("geometry", analytic.row(shape))
-            many = shape.kind in shape_records.ONE_OF
-            corners = self._add_balls(shape, row) if many else (None, None, None)
+            corners = (None, None, None)
+            if shape.kind == "curves":
+                self._add_curves(shape, row)
+            else:
+                row["params"] = self.encoder.store.append("geometry", analytic.row(shape))
+                if shape.kind in shape_records.ONE_OF:
+                    corners = self._add_balls(shape, row)
         if shape.emission is not None:
             self.emitters.append(Emitter(shape, len(self.rows), *corners))
             values = vars(shape.emission).values()
@@ -181,12 +189,29 @@ class _Builder:
 
     def _add_balls(self, shape: Any, row: np.ndarray) -> tuple[Any, Any, Any]:
         """Append many spheres; return them in the place of vertices."""
-        row["prim"] = self.single_count + sum(map(len, self.balls))
+        row["prim"] = self.single_count + sum(map(len, self.many))
         row["flags"] |= SHAPE_MANY
         balls = self.encoder.cache(spheres.balls, shape, by=shapes.geometry(shape))
-        self.balls.append(balls)
+        self.many.append(spheres.boxes([balls]))
         self.encoder.store.append_floats("spheres", balls)
         return balls, None, None
+
+    def _add_curves(self, shape: Any, row: np.ndarray) -> None:
+        """Append the boxes of a shape's pieces; `add_pieces` appends the pieces."""
+        row["prim"] = self.single_count + sum(map(len, self.many))
+        found = self.encoder.cache(strands.pieces, shape, by=shapes.geometry(shape))
+        self.curves.append((row, shape, found))
+        self.many.append(strands.boxes(found))
+
+    def add_pieces(self) -> None:
+        """Put the pieces of all curves into `spheres`, and where they are into `geometry`."""
+        if not self.curves:
+            return
+        store, member = self.encoder.store, analytic.member("curve", "first")
+        for row, shape, found in self.curves:
+            words, at = analytic.row(shape), store.append_floats("spheres", found)
+            words[member] = np.int32(at - strands.WORDS * int(row["prim"])).view(np.uint32)
+            row["params"] = store.append("geometry", words)
 
     def _add_triangles(
         self, shape: Any, row: np.ndarray, times: Sequence[float]

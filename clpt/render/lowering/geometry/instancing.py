@@ -21,10 +21,12 @@ from clpt.render.contract import shape_records
 from clpt.render.lowering.device_arrays import on_host
 from clpt.render.lowering.geometry import analytic, shapes
 from clpt.render.lowering.geometry.tessellate import keeps_its_kind, tessellate
-from clpt.scene.shapes import Group, Instance, Shape
+from clpt.render.lowering.geometry.tubes import Tubes, as_tubes
+from clpt.scene.shapes import Curves, Group, Instance, Shape
 
 Matrices = NDArray[np.floating]
 CELLS = 16  # columns along a side, see `outline`
+FEW = 16  # instances of curves up to which each has its own, as tubes would take more memory
 ROUNDING = 4e-6  # of its coordinates, by which a box is larger than what float32 makes of it
 POINTS = 1 << 20  # that are transformed at once
 
@@ -119,7 +121,8 @@ def sort(
     placed: list[Placed] = []
     prototypes: list[Prototype] = []
     groups: dict[int, tuple[Group, list[int]]] = {}
-    for number, thing in enumerate(things):
+    for number, given in enumerate(things):
+        thing = _met_as(given)
         if isinstance(thing, Instance):
             groups.setdefault(id(thing.group), (thing.group, []))[1].append(number)
         elif number in moving and thing.kind not in shape_records.ANALYTIC:
@@ -129,7 +132,8 @@ def sort(
     for group, numbers in groups.values():
         to_world = matrices([things[number] for number in numbers])
         shared = []
-        for shape in group.shapes:
+        for given in group.shapes:
+            shape = _met_as(given, to_world)
             whole = Prototype((shape,), to_world, np.array(numbers, np.int32))
             if shape.kind in shape_records.ANALYTIC:
                 placed += _analytic(shape, whole, prototypes, warnings, moving)
@@ -140,6 +144,24 @@ def sort(
         if shared:
             prototypes.append(dataclasses.replace(whole, shapes=tuple(shared)))
     return placed, prototypes
+
+
+def _met_as(shape: Shape, to_world: Matrices | None = None) -> Shape:
+    """A shape as rays meet it: tubes for curves that shine, deform, are stretched or often placed.
+
+    to_world: of the instances of a group, (k, 4, 4).
+    """
+    if not isinstance(shape, Curves) or isinstance(shape, Tubes):
+        return shape
+    placed = np.eye(4)[None] if to_world is None else to_world
+    still = shape.emission is None and shape.deformation is None
+    if (
+        still
+        and len(placed) <= FEW
+        and all(keeps_its_kind(copy) for copy in _placed(shape, placed))
+    ):
+        return shape
+    return as_tubes(shape)
 
 
 def matrices(instances: Sequence[Shape]) -> Matrices:
@@ -160,11 +182,14 @@ def matrices(instances: Sequence[Shape]) -> Matrices:
 
 def _copies(shape: Shape, whole: Prototype) -> list[Placed]:
     """The shape once for every instance."""
+    copies = _placed(shape, whole.to_world)
+    return [Placed(copy, int(number)) for copy, number in zip(copies, whole.numbers, strict=True)]
+
+
+def _placed(shape: Shape, to_world: Matrices) -> list[Shape]:
+    """A shape under each of the transforms, which its own goes before."""
     own = shapes.placement(shape)
-    return [
-        Placed(dataclasses.replace(shape, to_world=matrix @ own), int(number))
-        for matrix, number in zip(whole.to_world, whole.numbers, strict=True)
-    ]
+    return [dataclasses.replace(shape, to_world=matrix @ own) for matrix in to_world]
 
 
 def _alone(shape: Shape, number: int) -> Prototype:

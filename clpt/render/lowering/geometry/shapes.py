@@ -19,7 +19,8 @@ Words = NDArray[np.uint32]
 
 def where(shape: Shape) -> str:
     """Return how a message names the shape."""
-    return f"{shape.kind} {shape.name!r}" if shape.name else shape.kind
+    kind = "curves" if shape.kind == "tubes" else shape.kind  # see `tubes`
+    return f"{kind} {shape.name!r}" if shape.name else kind
 
 
 def geometry(shape: Shape) -> tuple[Any, ...]:

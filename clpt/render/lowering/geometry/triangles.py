@@ -1,4 +1,4 @@
-"""Shapes of triangles: rectangles, cubes, meshes and curves in world space."""
+"""Shapes of triangles: rectangles, cubes, meshes and tubes of curves in world space."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from clpt.scene import shapes
 from clpt.scene.motion import Deformation
 from clpt.scene.shapes import Shape
 
-POINTS = {"mesh": "vertices", "curves": "points"}  # what a deformation moves
+POINTS = {"mesh": "vertices", "curves": "points", "tubes": "points"}  # what a deformation moves
 SUMMED = 1 << 20  # triangles whose normals are summed at a time
 
 CHUNK = 1 << 16  # triangles that are looked at at a time: what is made of them stays in the cache
@@ -53,7 +53,7 @@ class Flat:
 def triangulate(
     shape: Shape, flat: list[Flat] | None = None
 ) -> tuple[Points, Faces, Points | None, Points | None]:
-    """Return a rectangle, cube, mesh or curves in world space: vertices, faces, normals and uvs.
+    """Return a rectangle, cube, mesh or tubes in world space: vertices, faces, normals and uvs.
 
     vertices (n, 3) float32 [m], faces (m, 3) uint32 counter-clockwise seen from the front, normals
     (n, 3) float32 or None, uvs (n, 2) float32 or None. Triangles without an area are left out, and

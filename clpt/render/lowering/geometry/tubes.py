@@ -1,8 +1,13 @@
-"""Curves as triangles: a tube of flat facets with smooth normals around each strand."""
+"""Curves as triangles: a tube of flat facets with smooth normals around each strand.
+
+Rays meet curves as they are, see `strands`. What has no such form is met as `Tubes`: curves that
+emit light, that deform, that a transform stretches, or that many instances share.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from itertools import pairwise
 from typing import Any
 
@@ -26,6 +31,16 @@ LEAST = {"linear": 2, "bspline": 4, "bezier": 4}  # points of a strand
 TO_BEZIER = np.array([[1, 4, 1, 0], [0, 4, 2, 0], [0, 2, 4, 0], [0, 1, 4, 1]]) / 6.0
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tubes(Curves):
+    """Curves that rays meet as tubes of triangles, open at the ends."""
+
+
+def as_tubes(shape: Curves) -> Tubes:
+    """Return the same curves as tubes."""
+    return Tubes(**{field.name: getattr(shape, field.name) for field in fields(shape)})
+
+
 def tubes(shape: Curves, name: str, alike: Sequence[Curves] = ()) -> tuple[Any, Any, Any, Any]:
     """Return the tubes as vertices, faces, normals and uvs, before the transform.
 
@@ -36,11 +51,11 @@ def tubes(shape: Curves, name: str, alike: Sequence[Curves] = ()) -> tuple[Any, 
 
     Raises SceneError for points that are no curves.
     """
-    spans, strand = _spans(shape, name)
+    spans, strand = cubics(shape, name)
     linear = shape.basis == "linear"
     parts = np.ones(len(spans), np.int64) if linear else _pieces(spans)
     for other in () if linear else alike:
-        parts = np.maximum(parts, _pieces(_spans(other, name)[0]))
+        parts = np.maximum(parts, _pieces(cubics(other, name)[0]))
     last = np.append(strand[1:] != strand[:-1], True)
     rings = parts + (np.ones_like(last) if linear else last)
     starts = np.cumsum(rings) - rings
@@ -55,11 +70,15 @@ def tubes(shape: Curves, name: str, alike: Sequence[Curves] = ()) -> tuple[Any, 
     sides = int(np.clip(TRIANGLES // (2 * len(lower)), *SIDES))
     first = np.r_[True, strand[span[1:]] != strand[span[:-1]]]
     v = (span + t) / len(spans)
-    return _around(center, slope, tangent, _frames(tangent, first), v, lower, sides)
+    return _around(center, slope, tangent, frames(tangent, first), v, lower, sides)
 
 
-def _spans(shape: Curves, name: str) -> tuple[Floats, Whole]:
-    """Every piece of the curves in Bezier form, (s, 2 or 4, 4) with the radius, and its strand."""
+def cubics(shape: Curves, name: str) -> tuple[Floats, Whole]:
+    """Return every piece of the curves in Bezier form, and its strand (s,).
+
+    The pieces are (s, 2 or 4, 4) float64, with the radius last, before the transform. Raises
+    SceneError for points that are no curves.
+    """
     points, lengths = _checked(shape, name)
     least = LEAST[shape.basis]
     step = 3 if shape.basis == "bezier" else 1
@@ -140,8 +159,10 @@ def _tangents(center: Floats, slope: Floats, strand: Whole) -> Floats:
     return tangent / length[:, None]
 
 
-def _frames(tangent: Floats, first: NDArray[np.bool_]) -> tuple[Floats, Floats]:
-    """Two unit axes across each tangent, which turn along a strand no more than they must.
+def frames(tangent: Floats, first: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+    """Return two unit axes across each tangent, which turn along a strand no more than they must.
+
+    tangent: (n, 3) of unit length, strand after strand; first: (n,), where a strand begins.
 
     Each is the rotation from the tangent before, after all rotations of the strand up to there:
     quaternions, whose products are found in as many passes as a strand's length has bits.

@@ -95,7 +95,8 @@ def sharp_pieces(
         if row["kind"]:
             many = shape.kind in shape_records.ONE_OF
             first = int(row["prim"]) if many else i - geometry.first_analytic
-            own_boxes = boxes[first : first + (len(shape.centers) if many else 1)]
+            behind = own[i + 1][0]["prim"] if i + 1 < len(own) else len(boxes)
+            own_boxes = boxes[first : int(behind) if many else first + 1]
             yield _fewer(_in_boxes(own_boxes, "sphere" in shape.kind))
         elif end > face:
             pieces = _of_triangles(geometry, face, end)

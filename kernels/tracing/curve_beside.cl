@@ -1,0 +1,19 @@
+/* Whether one ray passes beside a piece of a curve: all its control points are farther on one side than its radius.
+ * Most pieces whose boxes a ray enters are left here, four points at a time. `piece`: its words, see
+ * kernels/shape/curves.cl. */
+#if LANES == 1
+inline int curve_beside(global const float *piece, vec3 o, vec3 d)
+{
+    float4 x = vload4(0, piece) - o.x, y = vload4(1, piece) - o.y, z = vload4(2, piece) - o.z;
+    float4 r = fabs(vload4(3, piece));
+    float3 chord = (float3)(x.w - x.x, y.w - y.x, z.w - z.x);
+    float nx = chord.y * d.z - chord.z * d.y, ny = chord.z * d.x - chord.x * d.z, nz = chord.x * d.y - chord.y * d.x;
+    float4 w = x * nx + y * ny + z * nz, away = fabs(x) + fabs(y) + fabs(z);
+    float2 half_reach = fmax(r.lo, r.hi), half_away = fmax(away.lo, away.hi);
+    float reach = fmax(half_reach.x, half_reach.y) + 1e-6f * fmax(half_away.x, half_away.y); /* and what is rounded */
+    float limit = reach * reach * (nx * nx + ny * ny + nz * nz);
+    return all((w * w > limit) & (w > 0.0f)) || all((w * w > limit) & (w < 0.0f));
+}
+#else
+#define curve_beside(piece, o, d) 0
+#endif
