@@ -29,6 +29,7 @@
 #define DIMENSION_BSDF 1     /* a direction */
 #define DIMENSION_CHOICE 2   /* which light, which lobe */
 #define DIMENSION_ROULETTE 3 /* whether to go on; which part of a mixture */
+#define DIMENSION_LIGHT_TIME (DIMENSION_VERTEX + DIMENSION_BSDF) /* of a light path, whose first vertex has no BSDF */
 #define DIMENSION_TEXEL 0x10000 /* which texel stands for those around */
 #define DIMENSION_FLIGHT 0x20000 /* how far a ray flies through a medium */
 #define DIMENSION_AIM 0x30000 /* near which lamp */

@@ -106,14 +106,18 @@ inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_i
     vec2 offset = exposure_begin(scene, path, at, go, sampler);
     vec2 position = film_position(settings, pixel, offset);
     real u = sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH)).x;
+#if USES_MOTION
+    real moment = sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH)).y;
+#if MERGES
+    moment = merging_moment(scene, u, sample);
+#endif
+    scene.time = motion_time(scene, moment);
+    store_path_time(path, at, go, scene.time);
+#endif
 #if MERGES
     u = merging_wavelength(scene, u, sample);
 #endif
     Wavelengths lambdas = wavelengths_sample(scene, u);
-#if USES_MOTION
-    scene.time = motion_time(scene, sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH)).y);
-    store_path_time(path, at, go, scene.time);
-#endif
     vec2 lens = sampler_pair(sampler, (natural)(DIMENSION_LENS));
 #if CAMERA_WEIGHS
     Spectrum weight;

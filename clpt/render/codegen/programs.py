@@ -167,7 +167,11 @@ def _shared(features: Features, layout: str) -> Files:
         "generated/screen.cl": stages.screen_text(features),
         "generated/photon.cl": stages.photon_text(features) if features.merged else "",
         "generated/emission.cl": emission.dispatch_text(
-            features.lights, textured, features.two_sided_lights, features.aimed
+            features.lights,
+            textured,
+            features.two_sided_lights,
+            features.aimed,
+            "lights" in features.moving,
         ),
         "generated/textures.cl": textures.dispatch_text(
             features.textures,

@@ -55,9 +55,19 @@ def connect_text(features: Features) -> str:
         return ""
     kind = features.camera
     record = camera_records.RECORDS[kind]
+    files = f'#include "camera/{kind}_connect.cl"\n'
+    camera = f"(global const {record.name} *)(scene).camera"
+    if "camera" in features.moving:
+        rest = f"{kind}_connect({camera}, (scene).settings, p, away, lens)"
+        return f'{files}#include "camera/moved_connect.cl"\n' + function(
+            "CameraPoint camera_connect(Scene scene, vec3 p, mask away, vec2 lens)",
+            "Motion motion = camera_motion(scene);",
+            "p = camera_point_back(motion, p, away);",
+            f"return camera_point_moved(motion, camera_near(scene, {rest}), away);",
+        )
     return (
-        f'#include "camera/{kind}_connect.cl"\n#define camera_connect(scene, p, away, lens) '
-        f"camera_near(scene, {kind}_connect((global const {record.name} *)(scene).camera, "
+        f"{files}#define camera_connect(scene, p, away, lens) "
+        f"camera_near(scene, {kind}_connect({camera}, "
         "(scene).settings, p, away, lens))\n"
     )
 
@@ -96,7 +106,11 @@ def lights_text(features: Features) -> str:
     densities = ""
     if features.weighed:
         densities = emission.densities_text(
-            features.lights, features.two_sided_lights, features.light_tree, features.aimed
+            features.lights,
+            features.two_sided_lights,
+            features.light_tree,
+            features.aimed,
+            "lights" in features.moving,
         )
     return (
         ('#include "generated/textures.cl"\n' if "texture" in emissions | factors else "")

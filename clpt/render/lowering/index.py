@@ -128,15 +128,15 @@ class SceneIndex:
 
     @property
     def lights_reach(self) -> bool:
-        """Whether paths can start at lights: none moves, and they know their medium."""
-        return not self.motions and (not self.has_media or not self.lit_media)
+        """Whether paths can start at lights: they know the light's medium."""
+        return not self.has_media or not self.lit_media
 
     @property
     def may_have_light_paths(self) -> bool:
         """Whether paths start at lights, if they can."""
         given = self.scene.integrator
         wanted = bool(getattr(given, "light_paths", 0))
-        return not self.motions and (isinstance(given, Auto | ParticleTracer) or wanted)
+        return isinstance(given, Auto | ParticleTracer) or wanted
 
     @property
     def joined(self) -> bool:
@@ -158,7 +158,7 @@ class SceneIndex:
     def guided(self) -> bool:
         """Whether directions of the camera's paths are learned from light paths."""
         wanted: bool = getattr(self.scene.integrator, "guiding", False)
-        return wanted and not self.weighed and not self.has_media and not self.motions
+        return wanted and not self.weighed and not self.has_media
 
     @property
     def shifts(self) -> bool:
