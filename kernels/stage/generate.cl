@@ -26,6 +26,9 @@ inline Spectrum path_radiance(Scene scene, Slab path, uint at, PathEnd end, Wave
     Spectrum radiance = load_path_radiance(path, at);
 #if USES_INFINITE
     mask sky = end.missed & ((end.depth > 0) | mask_of(scene.settings->hide_lights + scene.settings->alpha == 0));
+#if LIT_GHOSTS /* which light paths bring, see stage/flare.cl */
+    sky = sky & !((end.depth == 0) & ((end.state & PATH_GHOST) != 0));
+#endif
     if (any(sky)) {
         real pdf = load_path_pdf(path, at);
         vec3 d = sel3(sky, load_path_d(path, at), v3(0.0f, 0.0f, 1.0f)); /* a slot without a pixel has none */
@@ -159,6 +162,15 @@ inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_i
 #endif
 }
 
+#if LIT_GHOSTS
+/* Whether a sample follows light that surfaces of the lens have reflected, as camera/lens.cl chooses. */
+inline mask begins_ghost(Scene scene, integer pixel_index, integer sample)
+{
+    Sampler sampler = pixel_sampler(scene.settings, pixel_key(scene.settings, pixel_index), sample);
+    return sampler_pair(sampler, (natural)(DIMENSION_LENS)).x < ((global const LensCamera *)scene.camera)->ghosts;
+}
+#endif
+
 STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
 {
     SLABS
@@ -200,6 +212,12 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
 #else
         integer begun = PATH_ALIVE;
 #endif
+#if LIT_GHOSTS
+        integer first = begun | sel_i(begins_ghost(scene, next.pixel_index, next.sample), (integer)(PATH_GHOST),
+                                      (integer)(0));
+        store_path_state(path, at, end.ended, sel_i(next.done, (integer)(PATH_DONE), first));
+#else
         store_path_state(path, at, end.ended, sel_i(next.done, (integer)(PATH_DONE), begun));
+#endif
     }
 }

@@ -160,6 +160,7 @@ BEAM = lights.Spot(
     intensity=40.0,
     motion=slide([0, 0, 0], [-1, 0, 0]),
 )
+RISES = slide([0, 0, 0], [0, 1, 0])
 FLAT = shapes.Rectangle(
     to_world=transforms.translate([0, 1.2, -1])
     @ transforms.rotate([1, 0, 0], 90)
@@ -229,6 +230,22 @@ CASES: dict[str, tuple[Any, Any, dict[str, Any]]] = {
         {
             "kind": cameras.Lens,
             "losses": True,
+            "to_world": np.eye(4),
+            "motion": Keys(
+                [0.0, 1.0], [LOOK, transforms.look_at([0.4, 0.3, -5], [0, 0, 0], [0.1, 1, 0])]
+            ),
+        },
+    ),
+    "ghosts": (
+        (),
+        (
+            lights.Point(
+                position=(1.5, 0.3, -3), intensity=900.0, motion=slide([0, 0, 0], [0, 1, 0])
+            ),
+        ),
+        {
+            "kind": cameras.Lens,
+            "ghosts": 0.5,
             "to_world": np.eye(4),
             "motion": Keys(
                 [0.0, 1.0], [LOOK, transforms.look_at([0.4, 0.3, -5], [0, 0, 0], [0.1, 1, 0])]

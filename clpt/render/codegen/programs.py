@@ -41,6 +41,8 @@ def sources(
     """
     queued = queued and lanes == 1
     texts = _stages(features, layout, lanes, interleaved)
+    if "flare" in texts:
+        return _static(texts)
     texts |= _shading(features, layout, lanes, queued=queued)
     if queued:
         texts |= _alone(features, layout, "append")
@@ -54,6 +56,11 @@ def _stages(
     files, defines = _shared(features, layout), flags.defines(flags.SCENE, features)
     begin, join = bounce.begin_and_join(features)
     trace_lanes = bounce.trace_lanes(layout, lanes)
+    if begin == "flare":
+        return {
+            begin: _source(begin, files, defines, lanes),
+            join: _source(join, files, defines, trace_lanes),
+        }
     rays: Files = {}
     if interleaved and layout != "brute":
         rays["generated/trace.cl"] = ("tracing/trace_interleaved.cl",)

@@ -104,7 +104,7 @@ def lights_text(features: Features) -> str:
     emissions = emission_sources(features)
     factors = features.sources_of("factor").get("value", frozenset())
     densities = ""
-    if features.weighed:
+    if features.balanced:
         densities = emission.densities_text(
             features.lights,
             features.two_sided_lights,

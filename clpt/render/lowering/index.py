@@ -14,12 +14,14 @@ from clpt.render.lowering.geometry.instancing import Placed, Prototype
 from clpt.render.lowering.motion import Motions
 from clpt.scene import Scene
 from clpt.scene import materials as mt
-from clpt.scene.integrators import Auto, ParticleTracer, Vcm
+from clpt.scene.cameras import Lens
+from clpt.scene.integrators import Auto, Direct, ParticleTracer, Path, Vcm
 from clpt.scene.layers import LAYERS
 from clpt.scene.media import PHASE_LEAVES, Lattice, Medium
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.shapes import Shape
 
+GHOSTS = 1.0  # light paths for each sample that are ghosts of a lens
 UNKNOWN = "its medium was not looked for"
 
 
@@ -119,12 +121,25 @@ class SceneIndex:
 
     @property
     def weighed(self) -> float:
-        """Light paths for each camera sample, weighed against it; 0: there are none.
+        """Light paths for each camera sample; 0: there are none.
 
         Where the scene says "auto" nothing may ask before `hard_light.decided` has chosen.
         """
+        return self.balanced or GHOSTS * self.lit_ghosts
+
+    @property
+    def balanced(self) -> float:
+        """Those that are weighed against the sample."""
         wanted: float = getattr(self.scene.integrator, "light_paths", 0)
         return wanted if (self.joined or self.merged) and self.lights_reach else 0
+
+    @property
+    def lit_ghosts(self) -> bool:
+        """Whether light paths are ghosts of the lens, of light straight from lights."""
+        camera, integrator = self.scene.camera, self.scene.integrator
+        ghosts = isinstance(camera, Lens) and camera.ghosts > 0.0
+        alone = isinstance(integrator, (Path, Direct)) and not getattr(integrator, "guiding", False)
+        return ghosts and alone and not self.light_layers and not self.emitting
 
     @property
     def lights_reach(self) -> bool:

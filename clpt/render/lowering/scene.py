@@ -155,7 +155,7 @@ def lower(
     before = former.integrator if former else None
     index, lit = _begin_at_lights(index, geometry, lights, media, bodies, sphere, cache)
     index, why = decided(index, geometry, encoder, lights, sphere, before, lit.scatter)
-    if index.has_media and (index.weighed or index.light_paths):
+    if index.has_media and (index.balanced or index.light_paths):
         encoder.store.append("media", lit.words)
     encoder.store.append("media", sides)
     around: tuple[Any, ...] = ()
@@ -413,7 +413,7 @@ def _left_to_the_camera(index: SceneIndex) -> list[str]:
         warnings.append(f"{kind}.merging: left aside, as {reason}")
     if not index.lights_reach:
         warnings.append(f"{kind}.light_paths: left aside, as {index.lit_media}")
-    if index.weighed:
+    if index.balanced:
         warnings += [
             f"{kind}.light_paths: none start at lights[{i}], whose light does not fall with "
             "distance"

@@ -39,7 +39,7 @@ def aims(index: SceneIndex, geometry: Geometry, scene_radius: float) -> NDArray[
     areas of their disks. None where no path is aimed: one large sphere would gain nothing.
     """
     none = np.zeros((0, 5), np.float32)
-    every = sharp_pieces(geometry, index.motions.shapes) if index.weighed else ()
+    every = sharp_pieces(geometry, index.motions.shapes) if index.balanced else ()
     found = [pieces for pieces in every if len(pieces)]
     if not found:
         return none
