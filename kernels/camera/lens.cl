@@ -78,7 +78,7 @@ inline mask lens_passes(Scene scene, global const LensCamera *camera, LensSurfac
     return passes | (s.stop == 0);
 }
 
-#if LENS_LOSSES
+#if LENS_LOSSES || LENS_GHOSTS
 /* Of the wavelengths that count: where glasses disperse, a ray is the hero's alone. */
 #if CAMERA_DISPERSES
 #define LENS_EACH(F) F(x)

@@ -68,6 +68,17 @@ def test_edits_give_the_picture_of_a_new_start():
     np.testing.assert_array_equal(edited, clpt.render(second, spp=4))
 
 
+@pytest.mark.slow
+def test_edits_take_ghosts_away() -> None:
+    """With what the lens loses by them: the film keeps its place for light paths."""
+    bare = scene(Lens(focus_distance=6.0))
+    with clpt.Renderer(dataclasses.replace(bare, camera=Lens(ghosts=0.5))) as renderer:
+        renderer.update(camera=bare.camera)
+        renderer.run(4)
+        edited = renderer.image()
+    np.testing.assert_allclose(edited, clpt.render(bare, spp=4), rtol=1e-4, atol=1e-5)
+
+
 def test_what_a_scene_needs_of_the_kernels():
     spectral = dataclasses.replace(scene(Lens()), film=Film(width=8, height=8))
     assert lower(spectral).features.glass_lens and lower(spectral).features.dispersion
@@ -139,6 +150,19 @@ def test_ghosts_of_lamps_that_no_ray_meets() -> None:
     assert clpt.render(whole, spp=256)[..., :3].mean() == pytest.approx(
         2.0 * (1.0 - r) ** 2 * r * r, rel=0.02
     )
+    bare = dataclasses.replace(camera, ghosts=0.0)
+    with clpt.Renderer(whole) as renderer:  # ghosts go and come back by edits
+        renderer.run(4)
+        renderer.update(camera=bare)
+        renderer.run(4)
+        assert not renderer.image()[..., :3].any()
+        renderer.update(camera=camera)
+        renderer.run(4)
+        np.testing.assert_array_equal(renderer.image(), clpt.render(whole, spp=4))
+    with clpt.Renderer(dataclasses.replace(whole, camera=bare)) as renderer:
+        renderer.update(camera=camera)
+        renderer.run(4)
+        assert not renderer.image()[..., :3].any()  # its film has no place for light paths
     hidden = dataclasses.replace(whole, integrator=Path(hide_lights=True))
     assert not clpt.render(hidden, spp=1)[..., :3].any()
 

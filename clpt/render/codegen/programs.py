@@ -168,7 +168,10 @@ def _shared(features: Features, layout: str) -> Files:
         **parameters.virtual_files(features),
         **choices.virtual_files(features, layout),
         "generated/camera.cl": stages.camera_text(
-            features.camera, features.glass_lens, features.lens_losses, "camera" in features.moving
+            features.camera,
+            features.glass_lens,
+            features.lens_losses or features.lens_ghosts,
+            "camera" in features.moving,
         ),
         "generated/connect.cl": stages.connect_text(features),
         "generated/screen.cl": stages.screen_text(features),

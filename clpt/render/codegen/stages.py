@@ -18,7 +18,8 @@ from clpt.scene.scatterer import Scatterer
 def camera_text(kind: str, glass: bool, losses: bool = False, moves: bool = False) -> str:
     """Return `camera_ray`, or `camera_weighted_ray`.
 
-    glass: the lens is of one that disperses; losses: its surfaces reflect; moves: the camera does.
+    glass: the lens is of one that disperses; losses: what its surfaces reflect counts; moves: the
+    camera does.
     """
     record = camera_records.RECORDS[kind]
     camera = f"(global const {record.name} *)(scene).camera"

@@ -103,7 +103,7 @@ def features_of(
         dispersion=glass_lens or disperses(index.leaves, sources),
         glass_lens=glass_lens,
         lens_losses=isinstance(scene.camera, Lens) and scene.camera.reflects,
-        lens_ghosts=isinstance(scene.camera, Lens) and scene.camera.ghosts > 0.0,
+        lens_ghosts=index.lit_ghosts or getattr(scene.camera, "ghosts", 0.0) > 0.0,
         lit_ghosts=index.lit_ghosts,
         bands=bool(scene.film.bands),
         alpha=index.alpha,

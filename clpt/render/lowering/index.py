@@ -33,7 +33,8 @@ class SceneIndex:
     as they are; prototypes: shapes that instances share; leaves: classes of leaf materials, in the
     order that material words count; normal_mapped: whether a material has a normal or a bump map;
     warnings: of instances that became triangles; motions: what moves; lit_media: why no paths can
-    start at some light in a medium, "" if they can.
+    start at some light in a medium, "" if they can; lit_before: whether light paths were ghosts of
+    a lens before an edit, whose film has sums for them or none.
     """
 
     scene: Scene
@@ -45,6 +46,7 @@ class SceneIndex:
     warnings: tuple[str, ...]
     motions: Motions
     lit_media: str = UNKNOWN
+    lit_before: bool | None = None
 
     @classmethod
     def of(cls, scene: Scene) -> SceneIndex:
@@ -136,8 +138,9 @@ class SceneIndex:
     @property
     def lit_ghosts(self) -> bool:
         """Whether light paths are ghosts of the lens, of light straight from lights."""
-        camera, integrator = self.scene.camera, self.scene.integrator
-        ghosts = isinstance(camera, Lens) and camera.ghosts > 0.0
+        camera, integrator, before = self.scene.camera, self.scene.integrator, self.lit_before
+        wanted = isinstance(camera, Lens) and camera.ghosts > 0.0
+        ghosts = isinstance(camera, Lens) and (wanted if before is None else before)
         alone = isinstance(integrator, (Path, Direct)) and not getattr(integrator, "guiding", False)
         return ghosts and alone and not self.light_layers and not self.emitting
 

@@ -132,6 +132,8 @@ def lower(
     scene = at_rest(scene)
     check(scene)
     index, film = SceneIndex.of(scene), scene.film
+    if former:
+        index = replace(index, lit_before=former.features.lit_ghosts)
     cache = LoweringCache(former.cache if former else None)
     ends = film.lambda_min, film.lambda_max
     wavelengths = density(index) if index.spectral else Density(*ends)
