@@ -1,7 +1,6 @@
 /* A camera that moves, joined to a point p of the scene, or where `away` to one at infinity in the direction p: both
  * are taken to where the camera was lowered. A solid angle there is |M d|^3 / |det M| of one in the world, M being the
  * motion's matrix and d the direction there; importance counts it per t^2, which is |M d|^2 as much in the world. */
-#include "camera/moved.cl"
 
 inline vec3 camera_point_back(Motion m, vec3 p, mask away)
 {

@@ -1,5 +1,5 @@
 /* Lights that move, for paths that start there. What a light gives as it was lowered is brought to the time. */
-#include "light/moving.cl"
+#include "tracing/motion.cl"
 
 inline LightRay light_ray_moved(Motion m, LightRay r)
 {

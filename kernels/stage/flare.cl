@@ -7,7 +7,7 @@
 #include "generated/sampler.cl"
 #include "interface/camera.cl"
 #include "generated/camera.cl"
-#include "camera/lens_ghosts.cl"
+#include "generated/connect.cl"
 #include "film/film.cl"
 #include "film/work_list.cl"
 #include "interface/shape.cl"

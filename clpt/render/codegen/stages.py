@@ -51,7 +51,10 @@ def _moved(ray: str, moves: bool) -> str:
 
 
 def connect_text(features: Features) -> str:
-    """Return `camera_connect`, for paths that start at lights; nothing where none is joined."""
+    """Return `camera_connect`, for paths that start at lights, or what ghosts of a lens need;
+    nothing where no path is joined."""
+    if features.lit_ghosts and features.light_paths:
+        return '#include "camera/lens_ghosts.cl"\n'
     if not features.joined:
         return ""
     kind = features.camera
