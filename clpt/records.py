@@ -116,7 +116,7 @@ SETTINGS = Record(
     alpha=("integer", "1: the film has a channel of what is covered; the camera sees no sky"),
     light_paths=(
         "real",
-        "light paths for each camera sample, weighed against it; 0: there are none",
+        "light paths for each camera sample; 0: there are none",
     ),
     radius=("real", "of the disk in which photons are merged in the first pass [m]"),
     photon_places=("integer", "photons that a light path may leave"),

@@ -78,7 +78,7 @@ inline mask lens_passes(Scene scene, global const LensCamera *camera, LensSurfac
     return passes | (s.stop == 0);
 }
 
-#if LENS_LOSSES
+#if LENS_LOSSES || LENS_GHOSTS
 /* Of the wavelengths that count: where glasses disperse, a ray is the hero's alone. */
 #if CAMERA_DISPERSES
 #define LENS_EACH(F) F(x)
@@ -160,19 +160,21 @@ inline LensRay lens_through(Scene scene, global const LensCamera *camera, LensRa
 
 #if LENS_GHOSTS
 /* Through the lens with two reflections: at surface `far_one`, then, on the way back, at `near_one`, which is nearer to
- * the film. What does not reflect at a surface goes through it. */
+ * the film. What does not reflect at a surface goes through it. inward: the same way from the scene to the film. */
 inline LensRay lens_ghost(Scene scene, global const LensCamera *camera, LensRay r, integer near_one, integer far_one,
-                          Wavelengths lambdas)
+                          int inward, Wavelengths lambdas)
 {
-    integer at = 0, turns = 0;
+    integer at = inward ? camera->count - 1 : 0, turns = 0;
+    integer first = inward ? near_one : far_one, second = inward ? far_one : near_one;
     global const uint *rows = (global const uint *)(scene.camera);
     for (int step = 0; step < 3 * camera->count; ++step) {
-        mask going = r.alive & (at < camera->count);
+        mask going = r.alive & (at >= 0) & (at < camera->count);
         if (!any(going)) break;
         integer row = sel_i(going, at, (integer)(0)) * LENS_SURFACE_WORDS + camera->surfaces;
         LensSurface s = lens_surface_row(rows, row);
         vec3 o = r.o, n;
-        mask ahead = turns != 1, met = lens_meet(s, &o, r.d, &n) & lens_passes(scene, camera, s, o);
+        mask ahead = inward ? turns == 1 : turns != 1;
+        mask met = lens_meet(s, &o, r.d, &n) & lens_passes(scene, camera, s, o);
         r.o = sel3(going, o, r.o);
         real near = lens_index(scene, s.near_index, s.near_glass, lambdas);
         real far = lens_index(scene, s.far_index, s.far_glass, lambdas);
@@ -180,7 +182,7 @@ inline LensRay lens_ghost(Scene scene, global const LensCamera *camera, LensRay 
         real cosine = -dot3(r.d, n), ratio = sel(ahead, near / far, far / near);
         real other = sqrt_r(1.0f - ratio * ratio * (1.0f - cosine * cosine)); /* cosine on the other side */
         Spectrum back = lens_reflectance(scene, s, sel(ahead, cosine, other), near, far, lambdas);
-        mask passes, mirror = at == sel_i(turns == 0, far_one, sel_i(turns == 1, near_one, (integer)(-1)));
+        mask passes, mirror = at == sel_i(turns == 0, first, sel_i(turns == 1, second, (integer)(-1)));
         vec3 on = lens_refract(r.d, n, cosine, ratio, &passes);
         on = sel3(mirror, madd3(n, 2.0f * cosine, r.d), on);
         Spectrum share = spectrum_sel(mirror, back, spectrum_sub(spectrum_of(1.0f), back));
@@ -188,11 +190,18 @@ inline LensRay lens_ghost(Scene scene, global const LensCamera *camera, LensRay 
         r.d = sel3(going, on, r.d);
         r.alive = r.alive & (!going | (met & (passes | mirror) & (cosine > 0.0f)));
         turns = turns + sel_i(going & mirror, (integer)(1), (integer)(0));
-        at = at + sel_i(going, sel_i(turns == 1, (integer)(-1), (integer)(1)), (integer)(0));
-        r.alive = r.alive & (at >= 0);
+        at = at + sel_i(going, sel_i(inward ? turns == 1 : turns != 1, (integer)(1), (integer)(-1)), (integer)(0));
     }
-    r.alive = r.alive & (turns == 2) & (at >= camera->count);
+    r.alive = r.alive & (turns == 2) & (inward ? at < 0 : at >= camera->count);
     return r;
+}
+
+/* Two surfaces by a random number, and 1 / their probability; *u: uniform in [0, 1), and so again of what is left. */
+inline vec3 lens_ghost_pair(Scene scene, global const LensCamera *camera, real *u)
+{
+    real cell = min_r(*u * (real)(LENS_GHOST_CELLS), (real)(LENS_GHOST_CELLS - 1)), whole = floor(cell);
+    *u = min_r(cell - whole, (real)(1.0f));
+    return gather3(scene.camera, camera->ghost_cells + 3 * to_integer(whole));
 }
 #endif
 
@@ -209,9 +218,9 @@ CameraRay lens_ray(Scene scene, global const LensCamera *camera, vec2 film, vec2
 #if LENS_GHOSTS
     mask ghost = lens.x < camera->ghosts;
     lens.x = sel(ghost, lens.x / camera->ghosts, (lens.x - camera->ghosts) / (1.0f - camera->ghosts));
-    real cell = min_r(lens.x * (real)(LENS_GHOST_CELLS), (real)(LENS_GHOST_CELLS - 1)), whole = floor(cell);
-    vec3 pair = gather3(scene.camera, camera->ghost_cells + 3 * to_integer(whole)); /* two surfaces, 1 / probability */
-    lens.x = sel(ghost, min_r(cell - whole, (real)(1.0f)), lens.x);
+    real rest = lens.x;
+    vec3 pair = lens_ghost_pair(scene, camera, &rest);
+    lens.x = sel(ghost, rest, lens.x);
     share = sel(ghost, pair.z / camera->ghosts, (real)(1.0f / (1.0f - camera->ghosts)));
     ellipse.x = sel(ghost, (real)(0.0f), ellipse.x);
     ellipse.y = sel(ghost, (real)(camera->rear_radius), ellipse.y);
@@ -232,7 +241,7 @@ CameraRay lens_ray(Scene scene, global const LensCamera *camera, vec2 film, vec2
     twice.alive = r.alive & ghost;
     r = lens_through(scene, camera, straight, lambdas);
     if (any(twice.alive)) {
-        twice = lens_ghost(scene, camera, twice, to_integer(pair.x), to_integer(pair.y), lambdas);
+        twice = lens_ghost(scene, camera, twice, to_integer(pair.x), to_integer(pair.y), 0, lambdas);
         r.o = sel3(ghost, twice.o, r.o);
         r.d = sel3(ghost, twice.d, r.d);
         r.share = spectrum_sel(ghost, twice.share, r.share);

@@ -1,9 +1,14 @@
 /* A camera that moves: its ray as it was lowered, at the time of the path. */
 #include "tracing/motion.cl"
 
+inline Motion camera_motion(Scene scene)
+{
+    return motion_at(scene, (integer)(as_int(scene.distributions[MOTION_ROW + 1])));
+}
+
 inline CameraRay camera_moved(Scene scene, CameraRay ray)
 {
-    Motion m = motion_at(scene, (integer)(as_int(scene.distributions[MOTION_ROW + 1])));
+    Motion m = camera_motion(scene);
     ray.o = motion_point(m, ray.o);
     ray.d = motion_vector(m, ray.d);
 #if MOTION_SCALES

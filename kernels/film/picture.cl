@@ -34,7 +34,7 @@ inline uint film_samples(global const Settings *settings, global const uint *fil
 
 /* The number of samples of a pixel in a picture: its own, or, of light paths, how many there were per pixel, which the
  * host says, as each may have lit any pixel. */
-#if LIGHT_PATHS || WEIGHS_LIGHT_PATHS
+#if LIGHT_PATHS || SUMS_LIGHT_PATHS
 #define LIGHT_PATHS_ARG , float light_paths
 #else
 #define LIGHT_PATHS_ARG
@@ -45,7 +45,7 @@ inline uint film_samples(global const Settings *settings, global const uint *fil
 #define SAMPLES (float)film_samples(settings, film, pixel_index, halves)
 #endif
 
-#if WEIGHS_LIGHT_PATHS
+#if SUMS_LIGHT_PATHS
 /* One over what the sums of light paths are divided by; 0 where a pixel has no samples: it stays black. */
 inline float light_paths_mean(float light_paths, float samples)
 {

@@ -30,14 +30,14 @@ inline integer guide_row(Scene scene, vec3 p, vec3 n)
     return cell_number(scene, cell_at(scene, p, (real)(scene.settings->guide_side)), face * GUIDE_FACES) * GUIDE_BINS;
 }
 
-/* The part of the sphere that holds a direction. */
+/* The part of the sphere that holds a direction; some part also where it is not finite, as in idle lanes. */
 inline integer guide_bin(vec3 d)
 {
     real turn = atan2_r(d.y, d.x) * (0.5f / PI);
     turn -= floor(turn);
     integer row = min_i(to_integer((0.5f * d.z + 0.5f) * GUIDE_ROWS), (integer)(GUIDE_ROWS - 1));
     integer column = min_i(to_integer(turn * GUIDE_COLUMNS), (integer)(GUIDE_COLUMNS - 1));
-    return max_i(row, (integer)(0)) * GUIDE_COLUMNS + column;
+    return max_i(row, (integer)(0)) * GUIDE_COLUMNS + max_i(column, (integer)(0));
 }
 
 #if BSDF_GUIDED

@@ -27,6 +27,9 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
 #endif
     }
     mask lit = active & (s.light >= 0) & light_shows(scene, s.light, v.front) & !hidden;
+#if LIT_GHOSTS /* which light paths bring, see stage/flare.cl */
+    lit = lit & !((depth == 0) & ((state & PATH_GHOST) != 0));
+#endif
     if (any(lit)) {
         integer light = sel_i(lit, s.light, (integer)(0));
         real pdf = load_path_pdf(path, at), null_distance = path_null_distance(path, at);

@@ -100,9 +100,9 @@ inline LightRay aim_power(LightRay r, mask turned, LightSample s, real p)
 /* By how much aiming makes light paths along d denser. chosen: the sphere at which the ray was aimed, -1: none, or it
  * is not known; o: where the light starts, from infinity any point of the ray; n: of a light on a shape, toward d. 1
  * where p is 0: nothing aims there. */
-inline real light_gain(Scene scene, LightRow l, integer chosen, vec3 o, vec3 n, vec3 d, mask away)
+inline real light_gain(Scene scene, integer row, LightRow l, integer chosen, vec3 o, vec3 n, vec3 d, mask away)
 {
-    real p = light_start_pdf(scene, l, n, d), kept = 1.0f, aimed = 0.0f;
+    real p = light_start_pdf(scene, row, l, n, d), kept = 1.0f, aimed = 0.0f;
     mask outside = mask_of(1);
     n = sel3(l.shape >= 0, n, v3(0.0f, 0.0f, 0.0f));
     for (int k = 0; k < scene.settings->aim_count; k++) {
@@ -126,6 +126,6 @@ inline real light_path_pdf(Scene scene, integer row, vec3 p, vec3 wi, real t, ve
 {
     mask away = t >= FAR;
     vec3 o = sel3(away, p, madd3(wi, t, p)), front = sel3(dot3(n, wi) > 0.0f, neg3(n), n);
-    real gain = light_gain(scene, light_at(scene, row), (integer)(-1), o, front, neg3(wi), away);
+    real gain = light_gain(scene, row, light_at(scene, row), (integer)(-1), o, front, neg3(wi), away);
     return light_emit_pdf(scene, row, wi, t) * gain;
 }

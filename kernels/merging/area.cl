@@ -40,6 +40,18 @@ inline integer merging_group(Scene scene, real u)
     return min_i(to_integer(u * (float)groups), (integer)(groups - 1));
 }
 
+#if USES_MOTION
+/* What stands for a random number where the time is drawn: all paths of a pass and a group are at one time, so that
+ * photons are met where and as they were left. From pass to pass it goes in steps of the golden ratio. */
+inline real merging_moment(Scene scene, real u, integer pass)
+{
+    float groups = (float)scene.settings->wavelength_groups;
+    natural begin = hash_natural((natural)(scene.settings->seed ^ 0x2545f491u));
+    real moment = unit_interval(as_natural(pass) * 0x9e3779b9u + begin) + to_real(merging_group(scene, u)) / groups;
+    return moment - floor(moment);
+}
+#endif
+
 /* What stands for u where wavelengths are drawn: the same for all of a group. From pass to pass it goes through the
  * group's part of the unit interval as van der Corput's sequence, whose beginning the seed chooses. */
 inline real merging_wavelength(Scene scene, real u, integer pass)

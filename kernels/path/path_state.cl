@@ -7,6 +7,7 @@
 #define PATH_SHARP 0x8000 /* a surface of a light path was sharp, or all of a camera's path were */
 #define PATH_SHADOW 0x10000
 #define PATH_SEEN 0x10000000 /* layers for denoisers have the path, see path/layers.cl */
+#define PATH_GHOST 0x20000000 /* of a lens's samples, of light that two of its surfaces have reflected */
 
 /* A null surface (a hole of a mask, a boundary that neither bends nor scatters) is no step of a path: it adds nothing
  * to the depth. A path crosses this many of them, and then ends; a shadow ray that meets more is blocked. */
@@ -29,6 +30,7 @@
 #define DIMENSION_BSDF 1     /* a direction */
 #define DIMENSION_CHOICE 2   /* which light, which lobe */
 #define DIMENSION_ROULETTE 3 /* whether to go on; which part of a mixture */
+#define DIMENSION_LIGHT_TIME (DIMENSION_VERTEX + DIMENSION_BSDF) /* of a light path, whose first vertex has no BSDF */
 #define DIMENSION_TEXEL 0x10000 /* which texel stands for those around */
 #define DIMENSION_FLIGHT 0x20000 /* how far a ray flies through a medium */
 #define DIMENSION_AIM 0x30000 /* near which lamp */

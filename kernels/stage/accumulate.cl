@@ -11,7 +11,7 @@ kernel void accumulate(global const Settings *settings, global const uint *film,
         int pixel_index = film_pixel_index(settings, x, y);
         float count = SAMPLES, mean = film_mean(settings, film, pixel_index, halves, count);
         vec3 v = scale3(film_sum(settings, film, pixel_index, halves, 0), mean);
-#if WEIGHS_LIGHT_PATHS
+#if SUMS_LIGHT_PATHS
         vec3 brought = film_sum(settings, film, pixel_index, halves, FILM_GROUP_WORDS);
         v = add3(v, scale3(brought, light_paths_mean(light_paths, count)));
 #endif

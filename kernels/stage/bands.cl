@@ -16,7 +16,7 @@ kernel void accumulate_bands(global const Settings *settings, global const uint 
         global float *pixel = band_image + (size_t)count * ((size_t)y * settings->width + x);
         for (int band = 0; band < count; band++)
             pixel[band] = halves_sum(bands + bands_at(settings, 0, 0, band, pixel_index), stream, size, halves) * scale;
-#if WEIGHS_LIGHT_PATHS
+#if SUMS_LIGHT_PATHS
         float share = light_paths_mean(light_paths, samples) / settings->film_scale;
         for (int band = 0; band < count; band++) {
             size_t sum = bands_at(settings, 0, 1, band, pixel_index);

@@ -22,6 +22,7 @@
 #include "lighting/light_path.cl"
 #include "generated/light_medium.cl"
 #include "generated/merging.cl"
+#include "generated/motion.cl"
 
 /* Puts a ray from a light into the slots that `go` on, and, where the camera sees lights, one from it to the camera
  * into the shadow slab. Returns the bits of Path.state that follow. */
@@ -31,6 +32,14 @@ inline integer begin_light_path(Scene scene, Slab path, Slab shadow, uint at, ma
     global const Settings *settings = scene.settings;
     Sampler sampler = light_path_sampler(settings, pixel_index, sample);
     vec2 u = sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH));
+#if USES_MOTION
+    real moment = sampler_pair(sampler, (natural)(DIMENSION_LIGHT_TIME)).x;
+#if MERGES
+    moment = merging_moment(scene, u.x, merging_pass(scene, sample));
+#endif
+    scene.time = motion_time(scene, moment);
+    store_path_time(path, at, go, scene.time);
+#endif
 #if MERGES
     u.x = merging_wavelength(scene, u.x, merging_pass(scene, sample));
 #endif

@@ -26,6 +26,9 @@ inline Spectrum path_radiance(Scene scene, Slab path, uint at, PathEnd end, Wave
     Spectrum radiance = load_path_radiance(path, at);
 #if USES_INFINITE
     mask sky = end.missed & ((end.depth > 0) | mask_of(scene.settings->hide_lights + scene.settings->alpha == 0));
+#if LIT_GHOSTS /* which light paths bring, see stage/flare.cl */
+    sky = sky & !((end.depth == 0) & ((end.state & PATH_GHOST) != 0));
+#endif
     if (any(sky)) {
         real pdf = load_path_pdf(path, at);
         vec3 d = sel3(sky, load_path_d(path, at), v3(0.0f, 0.0f, 1.0f)); /* a slot without a pixel has none */
@@ -106,14 +109,18 @@ inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_i
     vec2 offset = exposure_begin(scene, path, at, go, sampler);
     vec2 position = film_position(settings, pixel, offset);
     real u = sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH)).x;
+#if USES_MOTION
+    real moment = sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH)).y;
+#if MERGES
+    moment = merging_moment(scene, u, sample);
+#endif
+    scene.time = motion_time(scene, moment);
+    store_path_time(path, at, go, scene.time);
+#endif
 #if MERGES
     u = merging_wavelength(scene, u, sample);
 #endif
     Wavelengths lambdas = wavelengths_sample(scene, u);
-#if USES_MOTION
-    scene.time = motion_time(scene, sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH)).y);
-    store_path_time(path, at, go, scene.time);
-#endif
     vec2 lens = sampler_pair(sampler, (natural)(DIMENSION_LENS));
 #if CAMERA_WEIGHS
     Spectrum weight;
@@ -154,6 +161,15 @@ inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_i
     store_path_ratio(path, at, go, camera_start());
 #endif
 }
+
+#if LIT_GHOSTS
+/* Whether a sample follows light that surfaces of the lens have reflected, as camera/lens.cl chooses. */
+inline mask begins_ghost(Scene scene, integer pixel_index, integer sample)
+{
+    Sampler sampler = pixel_sampler(scene.settings, pixel_key(scene.settings, pixel_index), sample);
+    return sampler_pair(sampler, (natural)(DIMENSION_LENS)).x < ((global const LensCamera *)scene.camera)->ghosts;
+}
+#endif
 
 STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
 {
@@ -196,6 +212,12 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
 #else
         integer begun = PATH_ALIVE;
 #endif
+#if LIT_GHOSTS
+        integer first = begun | sel_i(begins_ghost(scene, next.pixel_index, next.sample), (integer)(PATH_GHOST),
+                                      (integer)(0));
+        store_path_state(path, at, end.ended, sel_i(next.done, (integer)(PATH_DONE), first));
+#else
         store_path_state(path, at, end.ended, sel_i(next.done, (integer)(PATH_DONE), begun));
+#endif
     }
 }

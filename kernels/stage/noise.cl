@@ -19,7 +19,7 @@ kernel void noise(global const Settings *settings, global const uint *film, glob
     int row = tile / settings->tiles_x, column = tile - row * settings->tiles_x;
     int square = row * 4 / side * squares + column * 4 / side, group = 0;
     global float *previous = previous_mean;
-#if WEIGHS_LIGHT_PATHS
+#if SUMS_LIGHT_PATHS
     global float *beside = previous_mean + 2 * (size_t)padded_pixels; /* the luminance that the others bring */
     if (light_paths > 0.0f) {
         group = FILM_GROUP_WORDS;
@@ -34,7 +34,7 @@ kernel void noise(global const Settings *settings, global const uint *film, glob
             if (((x + y) & 1) != colour || x >= settings->width || y >= settings->height) continue;
             int2 halves = (int2)(0, settings->halves);
             float samples = (float)film_samples(settings, film, pixel_index, halves);
-#if WEIGHS_LIGHT_PATHS
+#if SUMS_LIGHT_PATHS
             if (group) samples = light_paths;
 #endif
             vec3 v = scale3(film_sum(settings, film, pixel_index, halves, group), 1.0f / fmax(samples, 1.0f));
@@ -48,7 +48,7 @@ kernel void noise(global const Settings *settings, global const uint *film, glob
             pixels += 1.0f;
             previous[pixel_index] = now;
             previous[padded_pixels + pixel_index] = samples;
-#if WEIGHS_LIGHT_PATHS
+#if SUMS_LIGHT_PATHS
             now += beside[pixel_index];
 #endif
             luminance += fabs(now);

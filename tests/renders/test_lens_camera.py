@@ -14,11 +14,12 @@ from clpt import transforms as tf
 from clpt.errors import SceneError
 from clpt.formats import load, native
 from clpt.lenses import Coat, Prescription, Surface
+from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.scene import lower
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Lens, Perspective
-from clpt.scene.integrators import Box
-from clpt.scene.lights import Constant
+from clpt.scene.integrators import Box, Path
+from clpt.scene.lights import Area, Constant, Directional, Point
 from clpt.scene.materials import Diffuse
 from clpt.scene.shapes import Sphere
 
@@ -65,6 +66,17 @@ def test_edits_give_the_picture_of_a_new_start():
         renderer.run(4)
         edited = renderer.image()
     np.testing.assert_array_equal(edited, clpt.render(second, spp=4))
+
+
+@pytest.mark.slow
+def test_edits_take_ghosts_away() -> None:
+    """With what the lens loses by them: the film keeps its place for light paths."""
+    bare = scene(Lens(focus_distance=6.0))
+    with clpt.Renderer(dataclasses.replace(bare, camera=Lens(ghosts=0.5))) as renderer:
+        renderer.update(camera=bare.camera)
+        renderer.run(4)
+        edited = renderer.image()
+    np.testing.assert_allclose(edited, clpt.render(bare, spp=4), rtol=1e-4, atol=1e-5)
 
 
 def test_what_a_scene_needs_of_the_kernels():
@@ -117,3 +129,72 @@ def test_broken_scene_files(tmp_path, lens, message):
     (tmp_path / "scene.json").write_text(text)
     with pytest.raises(SceneError, match=message):
         load(tmp_path / "scene.json")
+
+
+def test_ghosts_of_lamps_that_no_ray_meets() -> None:
+    """A plate in front of a film returns light twice: (1 - R)^2 R^2 of it, from any lamp."""
+    n = 4.0
+    r = ((n - 1.0) / (n + 1.0)) ** 2
+    made = Prescription(
+        (
+            Surface(0.0, 2.0, spectra.Constant(n), 40.0),
+            Surface(0.0, 1.0, semi_diameter=40.0),
+            Surface(0.0, 3.0, semi_diameter=40.0, stop=True),
+        )
+    )
+    camera = Lens(lens=made, film_width=0.05, ghosts=0.5, exposure="irradiance")
+    ahead = Directional(direction=(0.0, 0.0, -1.0), irradiance=1.0)
+    near = Point(position=(0.0, 0.0, 1.0), intensity=1.0)
+    film = Film(width=16, height=16, filter=Box(), mode="rgb")
+    whole = Scene(camera=camera, lights=[ahead, near], film=film, integrator=Path())
+    assert clpt.render(whole, spp=256)[..., :3].mean() == pytest.approx(
+        2.0 * (1.0 - r) ** 2 * r * r, rel=0.02
+    )
+    bare = dataclasses.replace(camera, ghosts=0.0)
+    with clpt.Renderer(whole) as renderer:  # ghosts go and come back by edits
+        renderer.run(4)
+        renderer.update(camera=bare)
+        renderer.run(4)
+        assert not renderer.image()[..., :3].any()
+        renderer.update(camera=camera)
+        renderer.run(4)
+        np.testing.assert_array_equal(renderer.image(), clpt.render(whole, spp=4))
+    with clpt.Renderer(dataclasses.replace(whole, camera=bare)) as renderer:
+        renderer.update(camera=camera)
+        renderer.run(4)
+        assert not renderer.image()[..., :3].any()  # its film has no place for light paths
+    hidden = dataclasses.replace(whole, integrator=Path(hide_lights=True))
+    assert not clpt.render(hidden, spp=1)[..., :3].any()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+@pytest.mark.parametrize("lit", ["lamp", "sky"])
+def test_light_paths_find_the_ghosts_of_rays(
+    lit: str, mode: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A z-test of blocks, at 5, against ghosts from the film on, of a double Gauss without films:
+    of a lamp beside the picture, and of an even sky."""
+    lamp = Sphere(center=(1.5, 0.4, 2.0), radius=0.6, emission=Area(radiance=50.0))
+    whole = Scene(
+        camera=Lens(film_width=0.036, focus_distance=2.5, f_number=2.8, ghosts=0.7),
+        shapes=[lamp] if lit == "lamp" else [],
+        lights=[] if lit == "lamp" else [Constant(radiance=1.0)],
+        film=Film(width=32, height=32, filter=Box(), mode=mode),
+        integrator=Path(max_depth=2),
+    )
+    means, errors = [], []
+    for by_rays in (False, True):
+        if by_rays:
+            monkeypatch.setattr(SceneIndex, "lit_ghosts", False)
+        assert lower(whole).features.weighed != by_rays
+        found = [
+            clpt.render(dataclasses.replace(whole, seed=8 * by_rays + i), spp=2048)
+            for i in range(8)
+        ]
+        blocks = np.array(found)[..., :3].mean(axis=-1).reshape(8, 4, 8, 4, 8).mean(axis=(2, 4))
+        means.append(blocks.mean(axis=0))
+        errors.append(blocks.var(axis=0, ddof=1) / 8)
+    assert (means[0] > 0).all()
+    z = (means[0] - means[1]) / np.sqrt(errors[0] + errors[1])
+    assert np.abs(z).max() < 5.0

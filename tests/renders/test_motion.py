@@ -27,6 +27,7 @@ WALL = shapes.Rectangle(
     material=materials.Diffuse(reflectance=0.6),
 )
 LOOK = transforms.look_at([0, 0, -5], [0, 0, 0], [0, 1, 0])
+STEPS = integrators.Path(max_depth=3)
 Z = 5.0  # of the largest of some hundreds of normal numbers: 1e-4
 
 
@@ -47,7 +48,7 @@ def scene(things: Any, lamps: Any, shutter: Shutter | None, **camera: Any) -> Sc
         shapes=list(things),
         lights=list(lamps),
         film=integrators.Film(width=32, height=32, mode="rgb", filter=integrators.Box()),
-        integrator=integrators.Path(max_depth=3),
+        integrator=STEPS,
     )
 
 
@@ -147,6 +148,19 @@ SHARED = shapes.Group(
         shapes.Cube(to_world=transforms.scale([0.5, 0.05, 0.05]), material=GREY),
     )
 )
+SWELLS = Keys(
+    [0.0, 1.0],
+    [
+        np.eye(4),
+        transforms.translate([0.3, 0, 0]) @ transforms.rotate([0, 1, 0], 30) @ transforms.scale(2),
+    ],
+)
+BEAM = lights.Spot(
+    to_world=transforms.look_at([2, 2, -3], [0, 0, 0], [0, 1, 0]),
+    intensity=40.0,
+    motion=slide([0, 0, 0], [-1, 0, 0]),
+)
+RISES = slide([0, 0, 0], [0, 1, 0])
 FLAT = shapes.Rectangle(
     to_world=transforms.translate([0, 1.2, -1])
     @ transforms.rotate([1, 0, 0], 90)
@@ -222,6 +236,22 @@ CASES: dict[str, tuple[Any, Any, dict[str, Any]]] = {
             ),
         },
     ),
+    "ghosts": (
+        (),
+        (
+            lights.Point(
+                position=(1.5, 0.3, -3), intensity=900.0, motion=slide([0, 0, 0], [0, 1, 0])
+            ),
+        ),
+        {
+            "kind": cameras.Lens,
+            "ghosts": 0.5,
+            "to_world": np.eye(4),
+            "motion": Keys(
+                [0.0, 1.0], [LOOK, transforms.look_at([0.4, 0.3, -5], [0, 0, 0], [0.1, 1, 0])]
+            ),
+        },
+    ),
     "flame": (
         (
             shapes.Cube(to_world=transforms.translate([-0.3, 0, 0]), material=AIR, interior=FLAME),
@@ -250,6 +280,58 @@ CASES: dict[str, tuple[Any, Any, dict[str, Any]]] = {
         (AMBIENT,),
         {},
     ),
+    "swelling": (
+        (
+            shapes.Sphere(
+                radius=0.2, center=(0.2, 0, 0), emission=lights.Area(radiance=4.0), motion=SWELLS
+            ),
+            shapes.Cube(
+                to_world=transforms.translate([-0.6, 0, 0]) @ transforms.scale(0.2),
+                emission=lights.Area(radiance=4.0),
+                motion=SWELLS,
+            ),
+        ),
+        (),
+        {},
+    ),
+    "beams": (
+        (shapes.Cube(to_world=transforms.scale(0.5), material=GREY, motion=turn([0, 0.3, 1], 60)),),
+        (
+            BEAM,
+            lights.Directional(direction=(0, 0, 1), irradiance=1.0, motion=turn([0, 1, 0], 40)),
+        ),
+        {},
+    ),
+    "zoom": (
+        (shapes.Sphere(radius=0.6, material=GREY),),
+        (AMBIENT, BEAM),
+        {
+            "to_world": np.eye(4),
+            "motion": Keys([0.0, 1.0], [LOOK, LOOK @ transforms.scale([1.0, 1.3, 0.8])]),
+        },
+    ),
+    "tilting lens": (
+        (shapes.Sphere(radius=0.6, material=GREY),),
+        (BEAM,),
+        {
+            "kind": cameras.ThinLens,
+            "aperture_radius": 0.1,
+            "focus_distance": 4.0,
+            "to_world": LOOK,
+            "motion": turn([0, 0, 1], 20),
+        },
+    ),
+    "caustic": (
+        (
+            shapes.Sphere(
+                radius=0.4,
+                material=materials.Dielectric(int_ior=1.5),
+                motion=slide([-0.8, 0, 0], [0.6, 0.4, 0]),
+            ),
+        ),
+        (lights.Point(position=(1, 1, -4), intensity=30.0, motion=slide([0, 0, 0], [-1, 0, 0])),),
+        {},
+    ),
     "tangents": ((BRUSHED,), (AMBIENT, lights.Point(position=(1, 2, -3), intensity=10.0)), {}),
     "sky": (
         (shapes.Sphere(radius=0.6, material=GREY),),
@@ -270,11 +352,20 @@ def blocks(picture: Any) -> np.ndarray:
     return values.reshape(4, 8, 4, 8).mean(axis=(1, 3)).ravel()
 
 
-def check_case(name: str, stills: int, spp: int, runs: int, **options: Any) -> None:
+def check_case(
+    name: str,
+    stills: int,
+    spp: int,
+    runs: int,
+    integrator: integrators.Integrator = STEPS,
+    **options: Any,
+) -> None:
     """A z-test, at Z, of all blocks of a picture in motion and of the mean of still ones."""
     things, lamps, camera = CASES[name]
     things = [*things, WALL]
-    whole = scene(things, lamps, Shutter(0.0, 1.0), **camera)
+    whole = dataclasses.replace(
+        scene(things, lamps, Shutter(0.0, 1.0), **camera), integrator=integrator
+    )
     moving = [
         blocks(clpt.render(dataclasses.replace(whole, seed=i), spp, **options)) for i in range(runs)
     ]
@@ -285,7 +376,8 @@ def check_case(name: str, stills: int, spp: int, runs: int, **options: Any) -> N
         for i in range(stills):
             at = (i + offset) / stills
             one = scene(things, lamps, Shutter(at, at), **camera)
-            seeded = dataclasses.replace(one, seed=100 + run * stills + i)
+            seed = 100 + run * stills + i
+            seeded = dataclasses.replace(one, seed=seed, integrator=integrator)
             frames.append(blocks(clpt.render(seeded, max(spp // stills, 4), **options)))
         still.append(np.mean(frames, axis=0))
     a, b = np.array(moving), np.array(still)
@@ -297,6 +389,63 @@ def check_case(name: str, stills: int, spp: int, runs: int, **options: Any) -> N
 @pytest.mark.parametrize("name", CASES)
 def test_a_picture_is_the_mean_of_still_ones(name: str) -> None:
     check_case(name, stills=64, spp=512, runs=4)
+
+
+@pytest.mark.slow
+def test_a_caustic_is_the_mean_of_still_ones() -> None:
+    """Of a bulb that moves, by a ball of glass that does, which light paths alone find."""
+    check_case("caustic", 64, 512, 4, integrators.Path(max_depth=5, light_paths=1))
+
+
+TRANSPORTS = {
+    "light paths": integrators.Path(max_depth=4, light_paths=1),
+    "light paths alone": integrators.ParticleTracer(max_depth=4),
+    "guide": integrators.Path(max_depth=4, guiding=True),
+    "photons": integrators.Vcm(max_depth=4),
+}
+
+
+def check_transport(name: str, integrator: integrators.Integrator, spp: int, runs: int) -> None:
+    """A z-test, at Z, against paths from the camera alone, of a shutter that opens slowly."""
+    things, lamps, camera = CASES[name]
+    whole = scene([*things, WALL], lamps, Shutter(0.0, 1.0, "triangle"), **camera)
+    a, b = (
+        np.array(
+            [
+                blocks(clpt.render(dataclasses.replace(whole, integrator=how, seed=seed + i), spp))
+                for i in range(runs)
+            ]
+        )
+        for seed, how in ((0, integrators.Path(max_depth=4, light_paths=0)), (100, integrator))
+    )
+    error = np.sqrt((a.var(axis=0, ddof=1) + b.var(axis=0, ddof=1)).mean() / runs)
+    assert np.abs(a.mean(axis=0) - b.mean(axis=0)).max() < Z * error + 2e-3 * a.mean()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", TRANSPORTS)
+@pytest.mark.parametrize(
+    "name", ["lamps", "swelling", "beams", "zoom", "tilting lens", "analytic", "instances", "sky"]
+)
+def test_light_paths_find_the_same_light(name: str, how: str) -> None:
+    check_transport(name, TRANSPORTS[how], spp=512, runs=6)
+
+
+def test_light_paths_meet_moving_lamps() -> None:
+    check_transport("lamps", TRANSPORTS["light paths alone"], spp=64, runs=3)
+
+
+def test_light_paths_aim_at_the_ways_of_what_is_sharp() -> None:
+    things, lamps, camera = CASES["caustic"]
+    whole = scene([*things, WALL], lamps, Shutter(0.0, 1.0), **camera)
+    lowered = lower(
+        dataclasses.replace(whole, integrator=integrators.Path(max_depth=5, light_paths=1))
+    )
+    first, number = (int(lowered.settings[n]) for n in ("aims", "aim_count"))
+    aims = lowered.tables["distributions"][first : first + 5 * number].reshape(-1, 5)
+    way = np.array([[-0.8, 0, 0], [0.6, 0.4, 0]])
+    away = np.linalg.norm(way[:, None] - aims[:, :3], axis=2)
+    assert (away + 0.4 < aims[:, 3]).any(axis=1).all()
 
 
 @pytest.mark.slow
@@ -423,11 +572,11 @@ def test_what_cannot_move_is_refused() -> None:
     group = shapes.Group(shapes=(shapes.Cube(motion=keys),))
     with pytest.raises(SceneError, match="to its instance"):
         lower(scene([shapes.Instance(group=group)], [AMBIENT], shutter))
+    things, lamps, camera = CASES["flame"]
     tracer = dataclasses.replace(
-        scene([shapes.Cube(motion=keys)], [AMBIENT], shutter),
-        integrator=integrators.ParticleTracer(),
+        scene(things, lamps, shutter, **camera), integrator=integrators.ParticleTracer()
     )
-    with pytest.raises(SceneError, match="nothing moves"):
+    with pytest.raises(SceneError, match="not known where things move"):
         lower(tracer)
 
 
@@ -435,9 +584,8 @@ def test_what_is_left_aside_is_told() -> None:
     things, lamps, camera = CASES["flame"]
     whole = scene([*things, WALL], lamps, Shutter(0.0, 1.0), **camera)
     told = {
-        "path.light_paths: left aside": integrators.Path(light_paths=1),
-        "path.guiding: left aside": integrators.Path(guiding=True),
-        "vcm.merging: left aside": integrators.Vcm(),
+        "path.light_paths: left aside, as the media": integrators.Path(light_paths=1),
+        "vcm.merging: left aside, as the media": integrators.Vcm(),
     }
     for line, integrator in told.items():
         lowered = lower(dataclasses.replace(whole, integrator=integrator))

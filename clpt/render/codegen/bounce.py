@@ -23,6 +23,8 @@ def order(features: Features, layout: str, lanes: int, interleaved: bool = False
     tracing = trace_lanes(layout, lanes)
     begin, join = begin_and_join(features)
     bounce = [Stage(begin, begin, lanes)]
+    if begin == "flare":
+        return [*bounce, Stage(join, join, tracing)]
     if features.shows_lights:
         bounce.append(Stage(join, join, tracing))
     bounce.append(Stage("intersect", "intersect", lanes if interleaved else tracing))
@@ -43,7 +45,9 @@ def order(features: Features, layout: str, lanes: int, interleaved: bool = False
 def begin_and_join(features: Features) -> tuple[str, str]:
     """Return the stage that begins paths, and the one that tests the rays that join them to a light
     or, of paths that start at lights, to the camera."""
-    return ("emit", "splat") if features.light_paths else ("generate", "shadow")
+    if not features.light_paths:
+        return "generate", "shadow"
+    return "flare" if features.lit_ghosts else "emit", "splat"
 
 
 def joins(features: Features) -> bool:
@@ -72,8 +76,8 @@ def trace_lanes(layout: str, lanes: int) -> int:
 
 
 def has_both(features: Features) -> bool:
-    """Whether there are paths from the camera and from lights."""
-    return len(features.passes) > 1
+    """Whether materials shade paths from the camera and from lights."""
+    return len(features.passes) > 1 and not features.lit_ghosts
 
 
 def loop_text(features: Features, layout: str, lanes: int, interleaved: bool) -> str:
@@ -209,6 +213,8 @@ def _walk_text(own: Features, calls: list[_Call], words: str) -> list[str]:
     """Statements that take the camera's paths in media from collision to collision, in a block,
     while most of its lanes have one; own: their features; calls: all of a bounce."""
     shading = [call for call in calls if call.stage.kernel == "shade"]
+    if not shading:
+        return []
     rest = [call for call in calls[1:] if call not in shading]
     join = [call for call in rest if calls.index(call) > calls.index(shading[0])]
     phases = {cls.kind for cls in own.leaves if cls.is_phase and not own.light_paths}

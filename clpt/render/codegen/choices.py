@@ -44,7 +44,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
             "generated/connect.cl",
             "lighting/rivals.cl",
         )
-        if f.weighed
+        if f.balanced
         else ()
     ),
     "generated/medium.cl": lambda f, _: (

@@ -19,18 +19,22 @@ from clpt.render.contract.light_records import (
 
 
 def dispatch_text(
-    kinds: Iterable[str], textured: bool, two_sided: bool = False, aimed: bool = False
+    kinds: Iterable[str],
+    textured: bool,
+    two_sided: bool = False,
+    aimed: bool = False,
+    moving: bool = False,
 ) -> str:
     """Return `light_emit(scene, pick, u, v, lambdas)`: a ray from a light that is chosen by `pick`.
 
     kinds: of the lights in the scene; textured: some emission is a texture; two_sided: some shape
-    emits from its back too; aimed: some rays go to what is sharp. It stands behind the text of
-    clpt.render.codegen.lights.dispatch_text.
+    emits from its back too; aimed: some rays go to what is sharp; moving: some lights move. It
+    stands behind the text of clpt.render.codegen.lights.dispatch_text.
     """
     present = [kind for kind in KINDS if kind in set(kinds)]
     others = [kind for kind in present if kind in RECORDS]
     surfaces = [kind for kind in present if kind in shape_records.RECORDS]
-    includes = _includes(present)
+    includes = _includes(present, moving)
     head = "LightRay light_emit(Scene scene, real pick, vec2 u, vec2 v, Wavelengths lambdas)"
     if not present:
         return "\n".join([*includes, function(head, "return light_ray_nothing();")])
@@ -39,14 +43,16 @@ def dispatch_text(
         "LightRow l = light_at(scene, row);",
         "LightRay r = light_ray_nothing();",
     ]
+    if moving:
+        rows.append("Motion motion = motion_of_light(scene, row, l);")
     if aimed:
         rows.append("integer chosen = aim_choose(scene, &v.x);")
-    cases = [Case(kind_test(kind, present), _lamp(kind)) for kind in others]
+    cases = [Case(kind_test(kind, present), _lamp(kind, moving)) for kind in others]
     rows += choose("r", "LightRay", *cases)
     if surfaces:
-        rows += _surfaces_text(surfaces, present, textured, two_sided)
+        rows += _surfaces_text(surfaces, present, textured, two_sided, moving)
     if aimed:
-        rows += _aimed_text(present, bool(surfaces))
+        rows += _aimed_text(present, bool(surfaces), moving)
     rows += [
         "r.row = row;",
         "real share = 1.0f / max_r(l.pmf, (real)(1e-30f));",
@@ -57,7 +63,9 @@ def dispatch_text(
     return "\n".join([*includes, function(head, *rows)])
 
 
-def densities_text(kinds: Iterable[str], two_sided: bool, tree: bool, aimed: bool) -> str:
+def densities_text(
+    kinds: Iterable[str], two_sided: bool, tree: bool, aimed: bool, moving: bool = False
+) -> str:
     """Return what kernels/lighting/rivals.cl asks of the light in a row, seen along wi.
 
     light_emit_pdf(scene, row, wi, t): how densely light_emit sends rays against wi to a surface
@@ -69,13 +77,16 @@ def densities_text(kinds: Iterable[str], two_sided: bool, tree: bool, aimed: boo
     light_path_pdf(scene, row, p, wi, t, n): light_emit_pdf of light that is aimed, too.
     """
     present = [kind for kind in KINDS if kind in set(kinds)]
+    motion = ("Motion motion = motion_of_light(scene, row, l);",) * moving
     emitted = Function(
         "real light_emit_pdf(Scene scene, integer row, vec3 wi, real t)",
         "0.0f",
-        [Case(kind_test(kind, present), _emit_pdf(kind, two_sided)) for kind in present],
+        [Case(kind_test(kind, present), _emit_pdf(kind, two_sided, moving)) for kind in present],
         (
             "LightRow l = light_at(scene, row);",
             "float disk = PI * emission_radius(scene.settings) * emission_radius(scene.settings);",
+            *motion,
+            *("wi = motion_back_unit(motion, wi);",) * moving,
         ),
         "value * l.pmf",
     )
@@ -86,30 +97,34 @@ def densities_text(kinds: Iterable[str], two_sided: bool, tree: bool, aimed: boo
         [
             Case(kind_test(kind, present), f"{kind}_pdf({row_text(kind)}, {given})")
             for kind in present
-            if (given := _pdf_arguments(kind))
+            if (given := _pdf_arguments(kind, moving))
         ],
-        ("LightRow l = light_at(scene, row);",),
+        ("LightRow l = light_at(scene, row);", *motion, *_BACK * moving),
         f"value * {pmf_text(tree)}",
     )
     either = "#define light_path_pdf(scene, row, p, wi, t, n) light_emit_pdf(scene, row, wi, t)"
     if aimed:
-        either = f'{_start_pdf_text(present)}#include "lighting/aiming.cl"'
-    return "\n".join([*_includes(present), emitted.text(), found.text(), either])
+        either = f'{_start_pdf_text(present, moving)}#include "lighting/aiming.cl"'
+    return "\n".join([*_includes(present, moving), emitted.text(), found.text(), either])
 
 
-def _includes(present: list[str]) -> list[str]:
+def _includes(present: list[str], moving: bool) -> list[str]:
     """Lines that include what lights of these kinds emit."""
     needed = {*present, *(BASES[kind] for kind in present if kind in BASES)}
     files = [k for k in KINDS if k in needed and (k in PLACED or k in shape_records.RECORDS)]
+    files += ["moving"] * moving
     return ['#include "interface/emission.cl"', *(f'#include "emission/{k}.cl"' for k in files)]
 
 
-def _emit_pdf(kind: str, two_sided: bool) -> str:
+def _emit_pdf(kind: str, two_sided: bool, moving: bool) -> str:
     """The density of a kind in light_emit_pdf, but for its row's chance."""
     row = row_text(kind)
     if kind in shape_records.RECORDS:
         sides = f" * sel(l.emission_mode == {BOTH}, (real)(0.5f), (real)(1.0f))" * two_sided
-        return f"INV_PI / {kind}_point({row}, (vec2){{0.5f, 0.5f}}).area{sides}"
+        point = f"{kind}_point({row}, (vec2){{0.5f, 0.5f}})"
+        if moving:
+            point = f"surface_point_moved(motion, {point})"
+        return f"INV_PI / {point}.area{sides}"
     if kind in PLACED:
         return f"{kind}_emit_pdf({row}, neg3(wi)) / (t * t)"
     if kind in INFINITE:
@@ -117,8 +132,8 @@ def _emit_pdf(kind: str, two_sided: bool) -> str:
     return "(real)(1.0f / disk)"
 
 
-def _start_pdf_text(present: list[str]) -> str:
-    """`light_start_pdf(scene, l, n, d)`: what aiming changes in the density of a ray along d.
+def _start_pdf_text(present: list[str], moving: bool) -> str:
+    """`light_start_pdf(scene, row, l, n, d)`: what aiming changes in the density of a ray along d.
 
     At a light it is the direction's [1/sr], n being the normal on a shape; from infinity the
     place's across it [1/m^2]; 0 where nothing aims.
@@ -127,16 +142,18 @@ def _start_pdf_text(present: list[str]) -> str:
     for kind in present:
         density = "1.0f / (PI * emission_radius(scene.settings) * emission_radius(scene.settings))"
         if kind in PLACED:
-            density = f"{kind}_emit_pdf({row_text(kind)}, d)"
+            along = "motion_back_unit(motion, d)" if moving else "d"
+            density = f"{kind}_emit_pdf({row_text(kind)}, {along})"
         elif kind in shape_records.RECORDS:
             even = f"(l.emission_mode != {ALONG}) & (dot3(n, d) > 0.0f)"
             density = f"sel({even}, max_r(dot3(n, d), (real)(1e-6f)) * INV_PI, (real)(0.0f))"
         cases.append(Case(kind_test(kind, present), density))
-    head = "real light_start_pdf(Scene scene, LightRow l, vec3 n, vec3 d)"
-    return Function(head, "0.0f", cases).text()
+    head = "real light_start_pdf(Scene scene, integer row, LightRow l, vec3 n, vec3 d)"
+    before = ("Motion motion = motion_of_light(scene, row, l);",) * moving
+    return Function(head, "0.0f", cases, before).text()
 
 
-def _aimed_text(present: list[str], surfaces: bool) -> list[str]:
+def _aimed_text(present: list[str], surfaces: bool, moving: bool) -> list[str]:
     """The ray `r` goes to the sphere `chosen`, and carries light over the density of all rays."""
     rows = ["mask turned;", f"vec3 n = {NOWHERE};"]
     if surfaces:
@@ -145,35 +162,56 @@ def _aimed_text(present: list[str], surfaces: bool) -> list[str]:
             f"chosen = sel_i(l.emission_mode == {ALONG}, (integer)(-1), chosen);",
         ]
     rows.append("r = aim_turn(scene, chosen, r, n, v, &turned);")
-    for kind in (kind for kind in present if kind in PLACED):
+    placed = [kind for kind in present if kind in PLACED]
+    at, along = "r.o", "r.d"
+    if moving and placed:
+        at, along = "rest", "along"
+        rows += [
+            "vec3 rest = motion_point_back(motion, r.o);",
+            "vec3 along = motion_back_unit(motion, r.d);",
+        ]
+    for kind in placed:
         row = row_text(kind)
-        seen = f"{kind}_sample({row}, scene, add3(r.o, r.d), u, lambdas)"
-        power = f"aim_power(r, turned, {seen}, {kind}_emit_pdf({row}, r.d))"
+        seen = f"{kind}_sample({row}, scene, add3({at}, {along}), u, lambdas)"
+        power = f"aim_power(r, turned, {seen}, {kind}_emit_pdf({row}, {along}))"
         rows += choose("r", "LightRay", Case(kind_test(kind, present), power))
     return [
         *rows,
-        "r.gain = light_gain(scene, l, chosen, r.o, n, r.d, r.away);",
+        "r.gain = light_gain(scene, row, l, chosen, r.o, n, r.d, r.away);",
         "r.power = spectrum_scale(r.power, 1.0f / r.gain);",
     ]
 
 
-def _pdf_arguments(kind: str) -> str:
+# of a point that a light shines on, where the light was lowered
+_BACK = (
+    "vec3 rest = motion_point_back(motion, p), along = motion_back_unit(motion, wi);",
+    "vec3 front = motion_front_back(motion, n), side = motion_back_unit(motion, hemisphere);",
+    "real far = t * motion_length_back(motion, wi);",
+)
+
+
+def _pdf_arguments(kind: str, moving: bool) -> str:
     """What `<kind>_pdf` is given, "" for delta lights, which have none."""
     if kind in shape_records.RECORDS:
-        return "p, wi, t, n"
-    return "scene, hemisphere, wi" if kind in INFINITE else ""
+        return "rest, along, far, front" if moving else "p, wi, t, n"
+    if kind in INFINITE:
+        return "scene, side, along" if moving else "scene, hemisphere, wi"
+    return ""
 
 
-def _lamp(kind: str) -> str:
+def _lamp(kind: str, moving: bool) -> str:
     """A ray from a lamp; from infinity, its direction is that of a light sample."""
     if kind in PLACED:
-        return f"{kind}_emit({row_text(kind)}, scene, u, v, lambdas)"
+        ray = f"{kind}_emit({row_text(kind)}, scene, u, v, lambdas)"
+        return f"light_ray_moved(motion, {ray})" if moving else ray
     sample = f"{kind}_sample({row_text(kind)}, scene, {NOWHERE}, u, lambdas)"
+    if moving:
+        sample = f"light_moved(motion, {sample})"
     return f"distant_emit(scene, {sample}, v)"
 
 
 def _surfaces_text(
-    kinds: list[str], present: list[str], textured: bool, two_sided: bool
+    kinds: list[str], present: list[str], textured: bool, two_sided: bool, moving: bool
 ) -> list[str]:
     """A point of the shape, its emission there, and the ray from it."""
     rows = [
@@ -184,6 +222,8 @@ def _surfaces_text(
         chosen = f"SurfacePoint p = {kind}_point({row_text(kind)}, u);"
         point = point_text(kind, "p.uv") if textured else ()
         rows += choose("q", "SurfacePoint", Case(kind_test(kind, present), "p", (chosen, *point)))
+    if moving:
+        rows.append("q = surface_point_moved(motion, q);")
     if two_sided:
         rows.append(f"q = surface_point_turned(q, l.emission_mode == {BOTH}, &v);")
     return [

@@ -41,6 +41,8 @@ def sources(
     """
     queued = queued and lanes == 1
     texts = _stages(features, layout, lanes, interleaved)
+    if "flare" in texts:
+        return _static(texts)
     texts |= _shading(features, layout, lanes, queued=queued)
     if queued:
         texts |= _alone(features, layout, "append")
@@ -54,6 +56,11 @@ def _stages(
     files, defines = _shared(features, layout), flags.defines(flags.SCENE, features)
     begin, join = bounce.begin_and_join(features)
     trace_lanes = bounce.trace_lanes(layout, lanes)
+    if begin == "flare":
+        return {
+            begin: _source(begin, files, defines, lanes),
+            join: _source(join, files, defines, trace_lanes),
+        }
     rays: Files = {}
     if interleaved and layout != "brute":
         rays["generated/trace.cl"] = ("tracing/trace_interleaved.cl",)
@@ -161,13 +168,20 @@ def _shared(features: Features, layout: str) -> Files:
         **parameters.virtual_files(features),
         **choices.virtual_files(features, layout),
         "generated/camera.cl": stages.camera_text(
-            features.camera, features.glass_lens, features.lens_losses, "camera" in features.moving
+            features.camera,
+            features.glass_lens,
+            features.lens_losses or features.lens_ghosts,
+            "camera" in features.moving,
         ),
         "generated/connect.cl": stages.connect_text(features),
         "generated/screen.cl": stages.screen_text(features),
         "generated/photon.cl": stages.photon_text(features) if features.merged else "",
         "generated/emission.cl": emission.dispatch_text(
-            features.lights, textured, features.two_sided_lights, features.aimed
+            features.lights,
+            textured,
+            features.two_sided_lights,
+            features.aimed,
+            "lights" in features.moving,
         ),
         "generated/textures.cl": textures.dispatch_text(
             features.textures,

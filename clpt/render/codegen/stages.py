@@ -18,7 +18,8 @@ from clpt.scene.scatterer import Scatterer
 def camera_text(kind: str, glass: bool, losses: bool = False, moves: bool = False) -> str:
     """Return `camera_ray`, or `camera_weighted_ray`.
 
-    glass: the lens is of one that disperses; losses: its surfaces reflect; moves: the camera does.
+    glass: the lens is of one that disperses; losses: what its surfaces reflect counts; moves: the
+    camera does.
     """
     record = camera_records.RECORDS[kind]
     camera = f"(global const {record.name} *)(scene).camera"
@@ -50,14 +51,27 @@ def _moved(ray: str, moves: bool) -> str:
 
 
 def connect_text(features: Features) -> str:
-    """Return `camera_connect`, for paths that start at lights; nothing where none is joined."""
+    """Return `camera_connect`, for paths that start at lights, or what ghosts of a lens need;
+    nothing where no path is joined."""
+    if features.lit_ghosts and features.light_paths:
+        return '#include "camera/lens_ghosts.cl"\n'
     if not features.joined:
         return ""
     kind = features.camera
     record = camera_records.RECORDS[kind]
+    files = f'#include "camera/{kind}_connect.cl"\n'
+    camera = f"(global const {record.name} *)(scene).camera"
+    if "camera" in features.moving:
+        rest = f"{kind}_connect({camera}, (scene).settings, p, away, lens)"
+        return f'{files}#include "camera/moved_connect.cl"\n' + function(
+            "CameraPoint camera_connect(Scene scene, vec3 p, mask away, vec2 lens)",
+            "Motion motion = camera_motion(scene);",
+            "p = camera_point_back(motion, p, away);",
+            f"return camera_point_moved(motion, camera_near(scene, {rest}), away);",
+        )
     return (
-        f'#include "camera/{kind}_connect.cl"\n#define camera_connect(scene, p, away, lens) '
-        f"camera_near(scene, {kind}_connect((global const {record.name} *)(scene).camera, "
+        f"{files}#define camera_connect(scene, p, away, lens) "
+        f"camera_near(scene, {kind}_connect({camera}, "
         "(scene).settings, p, away, lens))\n"
     )
 
@@ -94,9 +108,13 @@ def lights_text(features: Features) -> str:
     emissions = emission_sources(features)
     factors = features.sources_of("factor").get("value", frozenset())
     densities = ""
-    if features.weighed:
+    if features.balanced:
         densities = emission.densities_text(
-            features.lights, features.two_sided_lights, features.light_tree, features.aimed
+            features.lights,
+            features.two_sided_lights,
+            features.light_tree,
+            features.aimed,
+            "lights" in features.moving,
         )
     return (
         ('#include "generated/textures.cl"\n' if "texture" in emissions | factors else "")

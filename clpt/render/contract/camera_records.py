@@ -50,7 +50,7 @@ RECORDS: dict[str, Record] = {
         blade_distance=("real", "of a blade from the axis, in radii of the stop"),
         ghosts=("real", "share of samples that are reflected twice"),
         ghost_cells=("integer", "where the pairs of surfaces begin that they are drawn from"),
-        rear_radius=("real", "of the last surface [m]"),
+        rear_radius=("real", "on the rear plane, of rays that meet the last surface [m]"),
     ),
     "orthographic": Record(
         "OrthographicCamera",

@@ -79,7 +79,7 @@ class Features:
     null_surfaces: bool = False  # some surface lets light through as if it were not there
     infinite: bool = False
     light_paths: bool = False  # paths start at lights
-    weighed: bool = False  # paths from the camera are weighed against some from lights
+    weighed: bool = False  # light paths have sums of the film beside those of the camera's paths
     joined: bool = False  # those are joined to the camera
     merged: bool = False  # those leave photons, which paths from the camera gather
     guided: bool = False  # directions of the camera's paths are learned
@@ -111,6 +111,7 @@ class Features:
     glass_lens: bool = False  # of a glass that disperses
     lens_losses: bool = False  # surfaces of the camera's lens reflect a part of the light
     lens_ghosts: bool = False  # and samples follow it
+    lit_ghosts: bool = False  # light paths are these ghosts, and no more
     bands: bool = False  # a spectral film
     alpha: bool = False  # a film that tells what is covered
     layers: tuple[str, ...] = ()  # beside the picture
@@ -136,7 +137,12 @@ class Features:
     @property
     def light_media(self) -> bool:
         """Whether media are known around lights, as paths start there."""
-        return self.media and (self.light_paths or self.weighed)
+        return self.media and (self.light_paths or self.weighed) and not self.lit_ghosts
+
+    @property
+    def balanced(self) -> bool:
+        """Whether paths from the camera are weighed against these light paths."""
+        return self.weighed and not self.lit_ghosts
 
     @property
     def passes(self) -> tuple[Features, ...]:

@@ -29,7 +29,7 @@ def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> str | None:
     pairs = [] if scene.shapes is former.shapes else _pairs(former, scene)
     if pairs is None:
         return "a material is of another kind or structure"
-    if lowered.features.weighed and any(is_sharp(old) != is_sharp(new) for old, new in pairs):
+    if lowered.features.balanced and any(is_sharp(old) != is_sharp(new) for old, new in pairs):
         return "light paths aim at what is sharp, and a material is so now, or no more"
     if lowered.features.bodies and pairs:
         return "bodies that overlap know each other's indices"

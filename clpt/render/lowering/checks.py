@@ -68,10 +68,7 @@ def check(scene: Scene) -> None:
                 raise SceneError(message, where="film.layers")
     _check_light_layers(scene)
     _check_light_paths(scene, shapes_)
-    motions = Motions.of(scene)
-    check_motion(scene, motions)
-    if motions and isinstance(scene.integrator, ParticleTracer):
-        _refuse("a scene in which nothing moves while the shutter is open", "integrator")
+    check_motion(scene, Motions.of(scene))
     check_bodies([*shapes_, *(one for one in scene.shapes if isinstance(one, Instance))])
 
 

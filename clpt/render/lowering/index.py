@@ -14,12 +14,14 @@ from clpt.render.lowering.geometry.instancing import Placed, Prototype
 from clpt.render.lowering.motion import Motions
 from clpt.scene import Scene
 from clpt.scene import materials as mt
-from clpt.scene.integrators import Auto, ParticleTracer, Vcm
+from clpt.scene.cameras import Lens
+from clpt.scene.integrators import Auto, Direct, ParticleTracer, Path, Vcm
 from clpt.scene.layers import LAYERS
 from clpt.scene.media import PHASE_LEAVES, Lattice, Medium
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.shapes import Shape
 
+GHOSTS = 1.0  # light paths for each sample that are ghosts of a lens
 UNKNOWN = "its medium was not looked for"
 
 
@@ -31,7 +33,8 @@ class SceneIndex:
     as they are; prototypes: shapes that instances share; leaves: classes of leaf materials, in the
     order that material words count; normal_mapped: whether a material has a normal or a bump map;
     warnings: of instances that became triangles; motions: what moves; lit_media: why no paths can
-    start at some light in a medium, "" if they can.
+    start at some light in a medium, "" if they can; lit_before: whether light paths were ghosts of
+    a lens before an edit, whose film has sums for them or none.
     """
 
     scene: Scene
@@ -43,6 +46,7 @@ class SceneIndex:
     warnings: tuple[str, ...]
     motions: Motions
     lit_media: str = UNKNOWN
+    lit_before: bool | None = None
 
     @classmethod
     def of(cls, scene: Scene) -> SceneIndex:
@@ -119,24 +123,38 @@ class SceneIndex:
 
     @property
     def weighed(self) -> float:
-        """Light paths for each camera sample, weighed against it; 0: there are none.
+        """Light paths for each camera sample; 0: there are none.
 
         Where the scene says "auto" nothing may ask before `hard_light.decided` has chosen.
         """
+        return self.balanced or GHOSTS * self.lit_ghosts
+
+    @property
+    def balanced(self) -> float:
+        """Those that are weighed against the sample."""
         wanted: float = getattr(self.scene.integrator, "light_paths", 0)
         return wanted if (self.joined or self.merged) and self.lights_reach else 0
 
     @property
+    def lit_ghosts(self) -> bool:
+        """Whether light paths are ghosts of the lens, of light straight from lights."""
+        camera, integrator, before = self.scene.camera, self.scene.integrator, self.lit_before
+        wanted = isinstance(camera, Lens) and camera.ghosts > 0.0
+        ghosts = isinstance(camera, Lens) and (wanted if before is None else before)
+        alone = isinstance(integrator, (Path, Direct)) and not getattr(integrator, "guiding", False)
+        return ghosts and alone and not self.light_layers and not self.emitting
+
+    @property
     def lights_reach(self) -> bool:
-        """Whether paths can start at lights: none moves, and they know their medium."""
-        return not self.motions and (not self.has_media or not self.lit_media)
+        """Whether paths can start at lights: they know the light's medium."""
+        return not self.has_media or not self.lit_media
 
     @property
     def may_have_light_paths(self) -> bool:
         """Whether paths start at lights, if they can."""
         given = self.scene.integrator
         wanted = bool(getattr(given, "light_paths", 0))
-        return not self.motions and (isinstance(given, Auto | ParticleTracer) or wanted)
+        return isinstance(given, Auto | ParticleTracer) or wanted
 
     @property
     def joined(self) -> bool:
@@ -158,7 +176,7 @@ class SceneIndex:
     def guided(self) -> bool:
         """Whether directions of the camera's paths are learned from light paths."""
         wanted: bool = getattr(self.scene.integrator, "guiding", False)
-        return wanted and not self.weighed and not self.has_media and not self.motions
+        return wanted and not self.weighed and not self.has_media
 
     @property
     def shifts(self) -> bool:

@@ -70,6 +70,14 @@ class Motions:
         every = [*self.shapes.values(), *self.lamps.values(), self.camera]
         return any(keys is not None and not is_rigid(keys) for keys in every)
 
+    def halfway(self, keys: Keys | None, point: NDArray[Any]) -> NDArray[np.float64]:
+        """Return where a point (3,) is in the middle of the time in which the shutter is open."""
+        point = np.asarray(point, np.float64)
+        if keys is None:
+            return point
+        matrix = keys.at((self.shutter.open + self.shutter.close) / 2.0)
+        return np.asarray(transforms.transform_points(matrix, point), np.float64)
+
     def swept(self, number: int, boxes: NDArray[Any]) -> Boxes:
         """Return boxes (n, 2, 3) around those of one of the scene's shapes while it moves."""
         return swept(self.shapes[number], corners(boxes), self.shutter)

@@ -55,10 +55,12 @@ from clpt.render.lowering.settings import DEEPEST, settings_of
 from clpt.render.lowering.textures.attributes import Owner, lower_attributes
 from clpt.scene import Scene
 from clpt.scene import materials as mt
-from clpt.scene.integrators import AUTO, Film, Integrator
+from clpt.scene.integrators import Film, Integrator
 from clpt.scene.lights import Point
 from clpt.scene.media import Lattice
 from clpt.scene.shapes import Mesh
+
+IN_MOTION = "the media around lights are not known where things move"
 
 TREE_FROM = 16  # lights from which a tree chooses among them, see bench/lights.py
 
@@ -130,6 +132,8 @@ def lower(
     scene = at_rest(scene)
     check(scene)
     index, film = SceneIndex.of(scene), scene.film
+    if former:
+        index = replace(index, lit_before=former.features.lit_ghosts)
     cache = LoweringCache(former.cache if former else None)
     ends = film.lambda_min, film.lambda_max
     wavelengths = density(index) if index.spectral else Density(*ends)
@@ -153,7 +157,7 @@ def lower(
     before = former.integrator if former else None
     index, lit = _begin_at_lights(index, geometry, lights, media, bodies, sphere, cache)
     index, why = decided(index, geometry, encoder, lights, sphere, before, lit.scatter)
-    if index.has_media and (index.weighed or index.light_paths):
+    if index.has_media and (index.balanced or index.light_paths):
         encoder.store.append("media", lit.words)
     encoder.store.append("media", sides)
     around: tuple[Any, ...] = ()
@@ -234,6 +238,10 @@ def _begin_at_lights(
     """Return the index with whether paths can start at lights in media, and the lights' media."""
     if not index.has_media or not index.may_have_light_paths:
         return index, NOWHERE
+    if index.motions.shapes or index.motions.lamps:
+        if index.light_paths:
+            raise SceneError(f"no light paths: {IN_MOTION}", where="integrator")
+        return replace(index, lit_media=IN_MOTION), NOWHERE
     found = light_media(index, geometry.emitters, lights, media, bodies, sphere, cache)
     if found.refusal and index.light_paths:
         raise SceneError(f"no light paths: {found.refusal}", where="integrator")
@@ -351,7 +359,7 @@ def _warnings(index: SceneIndex) -> list[str]:
         warnings.append(f"{scene.camera.kind}.glass: in RGB mode all wavelengths have one focus")
     if index.motions:
         warnings += _of_motion(index)
-    elif getattr(scene.integrator, "light_paths", 0):
+    if getattr(scene.integrator, "light_paths", 0):
         warnings += _left_to_the_camera(index)
     if index.light_layers and index.emitting:
         warnings.append("film.layers: light that rays gather in media is in no layer of light")
@@ -373,16 +381,8 @@ def _warnings(index: SceneIndex) -> list[str]:
 
 
 def _of_motion(index: SceneIndex) -> list[str]:
-    """What is left aside where something moves."""
-    integrator, warnings = index.scene.integrator, []
-    if getattr(integrator, "light_paths", 0) not in (0, AUTO):
-        warnings.append(
-            f"{integrator.kind}.light_paths: left aside, as no light paths start where things move"
-        )
-    if getattr(integrator, "merging", False):
-        warnings.append(f"{integrator.kind}.merging: left aside, as photons have no time")
-    if getattr(integrator, "guiding", False):
-        warnings.append(f"{integrator.kind}.guiding: left aside, as light paths have no time")
+    """What does not move as it would."""
+    warnings: list[str] = []
     if index.has_media and index.motions.camera is not None:
         warnings.append("camera.motion: the media around the camera are those where it was lowered")
     for i in index.motions.shapes:
@@ -415,7 +415,7 @@ def _left_to_the_camera(index: SceneIndex) -> list[str]:
         warnings.append(f"{kind}.merging: left aside, as {reason}")
     if not index.lights_reach:
         warnings.append(f"{kind}.light_paths: left aside, as {index.lit_media}")
-    if index.weighed:
+    if index.balanced:
         warnings += [
             f"{kind}.light_paths: none start at lights[{i}], whose light does not fall with "
             "distance"

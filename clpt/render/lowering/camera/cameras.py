@@ -15,6 +15,7 @@ from clpt.errors import SceneError
 from clpt.render.contract.camera_records import RECORDS
 from clpt.render.lowering.camera import lens
 from clpt.scene.cameras import Camera, Lens, Matrix, Orthographic, Perspective, Spherical, ThinLens
+from clpt.scene.motion import Shutter
 from clpt.spectra import Constant, Spectrum
 
 CONNECTED = ("perspective", "thin_lens")  # cameras that a point can be joined to
@@ -49,13 +50,19 @@ class View:
 
 
 def view_of(camera: Camera, width: int, height: int) -> View | None:
-    """Return what a camera sees, None if not from a point; width, height: of the film [pixels]."""
+    """Return what a camera sees, None if not from a point; width, height: of the film [pixels].
+
+    Of one that moves it is what the camera sees halfway.
+    """
     if isinstance(camera, Lens):
         return None
     pinhole = MEMBERS[type(camera)](camera, width, height)
     if "extent" not in pinhole:
         return None
     matrix, extent = pinhole["to_world"], pinhole["extent"]
+    if camera.motion is not None:
+        shutter = camera.shutter or Shutter(0.0, 0.0)
+        matrix = camera.motion.at((shutter.open + shutter.close) / 2.0) @ matrix
     return View(matrix[:3, 3], matrix[:3, 2], extent[0], math.atan(math.hypot(*extent) / 2.0))
 
 

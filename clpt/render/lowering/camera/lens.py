@@ -20,6 +20,7 @@ from clpt.lenses.coatings import DESIGN, reflectance
 from clpt.lenses.glasses import LINE_D
 from clpt.lenses.paraxial import film_distance, stop_radius
 from clpt.lenses.pupils import ZONES, axis_solid_angle, zones
+from clpt.lenses.tracing import sag
 from clpt.render.contract.camera_records import GHOST_CELLS, LENS_SURFACE, RECORDS
 from clpt.scene.cameras import Lens
 from clpt.spectra import Constant, Spectrum
@@ -88,7 +89,7 @@ def lens_words(
     record["zones"] = tables.append(np.pad(ellipses * unit, ((0, 0), (0, 1))))
     record["zones_per_metre"], record["last_zone"] = ZONES / (radius * unit), ZONES - 1
     record["blades"] = camera.blades
-    record["rear_radius"] = lens.surfaces[-1].semi_diameter * unit
+    record["rear_radius"] = _rear_radius(lens, back, radius) * unit
     if camera.blades:
         # A blade's normal stands between two corners.
         turned = math.radians(camera.blade_angle) + turn * (np.arange(camera.blades) + 0.5)
@@ -98,6 +99,15 @@ def lens_words(
     if pairs is not None:
         record["ghosts"], record["ghost_cells"] = camera.ghosts, tables.append(_cells(*pairs))
     return tables.joined(record)
+
+
+def _rear_radius(lens: Prescription, back: float, film: float) -> float:
+    """The radius, on the rear plane, within which rays from a film of this radius meet the last
+    surface: more than its own, as its rim is off that plane [mm]."""
+    last = lens.surfaces[-1]
+    rim = float(sag(last, np.array(last.semi_diameter**2)))
+    slope = (film + last.semi_diameter) / max(back - rim, 0.1 * back)
+    return last.semi_diameter + abs(rim) * slope
 
 
 class _Tables:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from itertools import count
 from typing import Any
 
@@ -39,7 +39,8 @@ def aims(index: SceneIndex, geometry: Geometry, scene_radius: float) -> NDArray[
     areas of their disks. None where no path is aimed: one large sphere would gain nothing.
     """
     none = np.zeros((0, 5), np.float32)
-    found = [pieces for pieces in sharp_pieces(geometry) if len(pieces)] if index.weighed else []
+    every = sharp_pieces(geometry, index.motions.shapes) if index.balanced else ()
+    found = [pieces for pieces in every if len(pieces)]
     if not found:
         return none
     spheres = _spheres(np.concatenate(found))
@@ -78,11 +79,14 @@ def _roughness(material: mt.Material) -> float:
 
 
 def sharp_pieces(
-    geometry: Geometry, wanted: Callable[[mt.Material], bool] = is_sharp
+    geometry: Geometry,
+    moving: Collection[int] = (),
+    wanted: Callable[[mt.Material], bool] = is_sharp,
 ) -> Iterator[Pieces]:
     """Yield what every sharp shape consists of, in the world: a row for each triangle or ball.
 
-    wanted: tells of a material whether a shape of it is meant.
+    moving: the numbers of shapes that move, of which the boxes of their ways are taken; wanted:
+    tells of a material whether a shape of it is meant.
     """
     own, placed = geometry.owners, geometry.instances
     ends = [*(face for _, _, _, face in own[1:]), len(geometry.faces)]
@@ -97,11 +101,12 @@ def sharp_pieces(
             first = int(row["prim"]) if many else i - geometry.first_analytic
             behind = own[i + 1][0]["prim"] if i + 1 < len(own) else len(boxes)
             own_boxes = boxes[first : int(behind) if many else first + 1]
-            yield _fewer(_in_boxes(own_boxes, "sphere" in shape.kind))
+            still = int(row["number"]) not in moving
+            yield _fewer(_in_boxes(own_boxes, still and "sphere" in shape.kind))
         elif end > face:
             pieces = _of_triangles(geometry, face, end)
             prototype = int(np.searchsorted(firsts, face, side="right")) - 1
-            yield _fewer(pieces if prototype < 0 else _placed(geometry, pieces, prototype))
+            yield _fewer(pieces if prototype < 0 else _placed(geometry, pieces, prototype, moving))
 
 
 def _pieces(middles: NDArray[np.float64], reach: NDArray[np.float64]) -> Pieces:
@@ -121,12 +126,18 @@ def _of_triangles(geometry: Geometry, face: int, end: int) -> Pieces:
     return np.hstack([corners.reshape(-1, 9), np.zeros((len(corners), 1))])
 
 
-def _placed(geometry: Geometry, pieces: Pieces, prototype: int) -> Pieces:
+def _placed(geometry: Geometry, pieces: Pieces, prototype: int, moving: Collection[int]) -> Pieces:
     """What is around these in each instance of a prototype."""
-    rows = geometry.instances.rows[geometry.instances.prototypes == prototype]
+    own = geometry.instances.prototypes == prototype
+    rows = geometry.instances.rows[own]
     linear = np.linalg.inv(np.stack([rows[name] for name in "xyz"], axis=1).astype(np.float64))
     centre, radius = np.split(_around(pieces), [3])
-    return _pieces(linear @ centre + rows["origin"], np.linalg.norm(linear, 2, (1, 2)) * radius)
+    placed = _pieces(linear @ centre + rows["origin"], np.linalg.norm(linear, 2, (1, 2)) * radius)
+    ways = np.isin(rows["number"], list(moving))
+    if ways.any():
+        boxes = geometry.instances.boxes[own][ways].astype(np.float64)
+        placed[ways] = _in_boxes(boxes, False)
+    return placed
 
 
 def _corners(pieces: Pieces) -> list[NDArray[np.float64]]:

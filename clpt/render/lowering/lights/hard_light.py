@@ -90,8 +90,6 @@ def _choice(
 ) -> tuple[Integrator, str]:
     """The integrator but for its depths, and why; what is cheap to know is asked first."""
     scene, without = index.scene, Path(light_paths=0)
-    if index.motions:
-        return without, "light paths do not start from what moves"
     if not index.lights_reach:
         return without, index.lit_media
     if not cameras.is_connected(scene.camera, scene.film.mode):
@@ -121,6 +119,8 @@ def _choice(
         return Path(light_paths=number), f"{reason}; noise is not measured with photons"
     if index.has_media or index.shifts or _share_seen(index, geometry) < SEEN:
         return Path(light_paths=number), reason
+    if index.motions:
+        return Path(light_paths=number), f"{reason}; photons of a pass are all at one time"
     whole = max(1, int(number))
     return Vcm(light_paths=whole), f"{reason}; the camera sees what is sharp"
 
@@ -166,7 +166,7 @@ def _is_enclosed(geometry: Geometry, place: NDArray[np.float64] | None) -> bool:
     level = np.sqrt(1.0 - z * z)
     directions = np.stack([level * np.cos(turn), level * np.sin(turn), z])
     covered = np.zeros(DIRECTIONS, bool)
-    for pieces in sharp_pieces(geometry, lambda one: is_sharp(one) and not _is_dull(one)):
+    for pieces in sharp_pieces(geometry, (), lambda one: is_sharp(one) and not _is_dull(one)):
         a, b, c = (pieces[:, i : i + 3] - place for i in (0, 3, 6))
         ahead = np.sign(np.einsum("ij,ij->i", a, np.cross(b, c)))[:, None]
         edges = [np.cross(p, q) @ directions * ahead for p, q in ((a, b), (b, c), (c, a))]
@@ -181,7 +181,7 @@ def _share_seen(index: SceneIndex, geometry: Geometry) -> float:
     """The share of the picture that sharp things fill: as if nothing hid them, with all sides."""
     view = cameras.view_of(index.scene.camera, index.scene.film.width, index.scene.film.height)
     assert view is not None, "a camera that can be joined has a point"
-    pieces = np.concatenate([np.zeros((0, 10)), *sharp_pieces(geometry)])
+    pieces = np.concatenate([np.zeros((0, 10)), *sharp_pieces(geometry, index.motions.shapes)])
     a, b, c = (pieces[:, i : i + 3] - view.place for i in (0, 3, 6))
     middle, reach = (a + b + c) / 3.0, pieces[:, 9]
     away = np.maximum(np.linalg.norm(middle, axis=1), 1e-30)
@@ -225,6 +225,7 @@ def _small_rows(
     index: SceneIndex, geometry: Geometry, encoder: Encoder, lights: LightRows, sphere: Ball
 ) -> Iterator[tuple[str, NDArray[np.float64] | None, float, slice]]:
     """The same, and their rows in `lights`."""
+    motions = index.motions
     lamps, share = index.scene.lights, lights.power / max(lights.power.sum(), 1e-300)
     for row, i in enumerate(row_order(lamps)):
         lamp = lamps[i]
@@ -235,13 +236,17 @@ def _small_rows(
         else:
             small = lamp.reach in ("placed", "distant") and getattr(lamp, "falloff", True)
         if small:
-            bounds = light_bounds.of_lamp(lamp)
-            place = (bounds.low + bounds.high)[0] / 2.0 if lamp.reach == "placed" else None
+            place = None
+            if lamp.reach == "placed":
+                bounds = light_bounds.of_lamp(lamp)
+                place = motions.halfway(motions.lamps.get(i), (bounds.low + bounds.high)[0] / 2.0)
             yield f"lights[{i}]", place, float(share[row]), slice(row, row + 1)
     middle, radius = sphere
     ends = (*lights.first, len(share))[1:]
     for emitter, first, end in zip(geometry.emitters, lights.first, ends, strict=True):
         area, place = _area_and_place(emitter, encoder)
+        keys = motions.shapes.get(int(geometry.rows[emitter.shape_row]["number"]))
+        place = motions.halfway(keys, place)
         far = max(float(np.linalg.norm(place - middle)), NEAR * radius)
         if area < SMALL * 4.0 * np.pi * far**2:
             rows = slice(first, end)

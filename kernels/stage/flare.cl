@@ -1,0 +1,109 @@
+/* Begins light paths that are ghosts of the camera's lens, and no more: each is a ray from a point of the lens's front
+ * to a light, chosen as next-event estimation chooses it, and what its light adds to the film if nothing is between.
+ * The twin of stage/emit.cl; stage/splat.cl tests the rays. */
+#include "core/base.cl"
+#include "interface/stage.cl"
+#include "generated/begin_args.cl"
+#include "generated/sampler.cl"
+#include "interface/camera.cl"
+#include "generated/camera.cl"
+#include "generated/connect.cl"
+#include "film/film.cl"
+#include "film/work_list.cl"
+#include "interface/shape.cl"
+#include "core/rounding.cl"
+#include "interface/light.cl"
+#include "generated/lights.cl"
+#include "generated/medium.cl"
+#include "generated/motion.cl"
+#include "path/path_end.cl"
+#include "lighting/light_path_sampler.cl"
+
+/* Puts a ray to a light into the shadow slab of the slots that `go` on. Returns the bits of Path.state that follow. */
+inline integer begin_ghost(Scene scene, Slab path, Slab shadow, uint at, mask ended, mask go, integer pixel_index,
+                           integer sample)
+{
+    global const Settings *settings = scene.settings;
+    global const LensCamera *camera = (global const LensCamera *)scene.camera;
+    Sampler sampler = light_path_sampler(settings, pixel_index, sample);
+    vec2 u = sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH));
+    vec2 other = sampler_pair(sampler, (natural)(DIMENSION_LIGHT_TIME));
+    Wavelengths lambdas = wavelengths_sample(scene, u.x);
+    store_path_lambdas(path, at, go, lambdas);
+#if USES_NULL_SURFACES
+    store_path_nulls(path, at, go, (integer)(0));
+#endif
+#if USES_MOTION
+    scene.time = motion_time(scene, other.x);
+    store_path_time(path, at, go, scene.time);
+#endif
+    LensFront f = lens_front(scene, camera, sampler_pair(sampler, (natural)(DIMENSION_FILM)));
+    vec3 p = matrix_point(camera->to_world, f.p.x, f.p.y, f.p.z);
+    vec3 n = matrix_vector(camera->to_world, f.n.x, f.n.y, f.n.z);
+#if MOVES_CAMERA
+    CameraRay moved = {p, n, (real)(FAR)};
+    moved = camera_moved(scene, moved);
+    p = moved.o;
+    n = moved.d;
+#endif
+    LightSample ls = light_sample(scene, p, n, u.y, sampler_pair(sampler, (natural)(DIMENSION_LENS)), lambdas);
+    vec3 to = ls.wi;
+    real grows = 1.0f; /* a solid angle where the camera was lowered, over that in the world */
+#if MOVES_CAMERA
+    Motion motion = camera_motion(scene);
+    to = motion_back(motion, to);
+#if MOTION_SCALES
+    real longer = 1.0f / sqrt(max_r(dot3(to, to), (real)(1e-35f)));
+    to = scale3(to, longer);
+    grows = fabs(dot3(motion.x, cross3(motion.y, motion.z))) * longer * longer * longer;
+#endif
+#endif
+    global const float *m = camera->to_world; /* rigid, so that its transpose leads back */
+    vec3 d = v3(-(m[0] * to.x + m[4] * to.y + m[8] * to.z), -(m[1] * to.x + m[5] * to.y + m[9] * to.z),
+                -(m[2] * to.x + m[6] * to.y + m[10] * to.z));
+    Spectrum share;
+    CameraPoint c = lens_ghost_land(scene, camera, f, d, other.y, lambdas, &share);
+    mask away = ls.t >= FAR, shine = go & c.seen & (ls.pdf != 0.0f) & mask_of(settings->hide_lights == 0);
+    shine = shine & !(away & mask_of(settings->alpha != 0)); /* the film sees no sky */
+    real w = c.importance * grows / sel(shine, fabs(ls.pdf), (real)(1.0f));
+    Spectrum value = spectrum_scale(spectrum_mul(ls.radiance, spectrum_mul(camera_start(), share)), w);
+#if SHADOW_MEDIA
+#if USES_BODIES
+    store_shadow_through(shadow, at, shine, (integer)(settings->camera_bodies));
+#else
+    store_shadow_through(shadow, at, shine, (integer)(settings->camera_medium));
+#endif
+#elif USES_ABSORPTION
+    integer medium = MEDIUM_LEFT((integer)(settings->camera_medium));
+    value = spectrum_mul(value, medium_transmittance(scene, medium, ls.t, lambdas));
+#endif
+    store_shadow_o(shadow, at, shine, p);
+    store_shadow_d(shadow, at, shine, ls.wi);
+    store_shadow_t(shadow, at, ended, sel(shine, ls.t * SHADOW_SHORTER, (real)(-1.0f)));
+    store_shadow_value(shadow, at, shine, value);
+    store_shadow_film(shadow, at, shine, c.film);
+    return sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
+}
+
+STAGE(flare)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
+{
+    SLABS
+    SCENE
+    STAGE_AT
+    PathEnd end = path_end(path, hit, at);
+    if (any(end.ended)) {
+        integer slot = LANE_INDEX + (int)at;
+        integer pixel_index = load_path_pixel_index(path, at), sample = load_path_sample(path, at);
+        integer plane = slot_plane(settings, slot);
+        path_end_count(counters, end, end.depth - 1 + path_nulls(path, at));
+        film_count(settings, film, end.ended & end.begun, plane, film_nearest_index(settings, pixel_index));
+        NextSample next = next_sample(settings, work_list, samples, slot, end.ended, end.begun, pixel_index, sample);
+        count(counters, COUNTER_DONE, next.done, (integer)(1));
+        mask go = end.ended & !next.done;
+        store_path_pixel_index(path, at, go, next.pixel_index);
+        store_path_pixel_key(path, at, go, as_natural(next.pixel_index));
+        store_path_sample(path, at, go, next.sample);
+        integer state = begin_ghost(scene, path, shadow, at, end.ended, go, next.pixel_index, next.sample);
+        store_path_state(path, at, end.ended, sel_i(next.done, (integer)(PATH_DONE), state + 1));
+    }
+}
