@@ -28,7 +28,7 @@ from clpt.cli.checkpoints import PERIOD, Checkpoints, path_of
 from clpt.cli.rendering import PASS_SECONDS
 from clpt.cluster import processes
 from clpt.cluster.cluster_renderer import ClusterRenderer
-from clpt.render import film_file
+from clpt.render.film import film_file
 
 Record = dict[str, object]
 

@@ -25,8 +25,8 @@ from clpt.images import read as read_image
 from clpt.images import write as write_image
 from clpt.rays import Accel, AllHits, Hits, InstancedAccel
 from clpt.render.codegen.library import kernel_source
-from clpt.render.denoised_picture import DenoisedPicture
-from clpt.render.layer_channels import write_layers
+from clpt.render.film.denoised_picture import DenoisedPicture
+from clpt.render.film.layer_channels import write_layers
 from clpt.render.options import RenderOptions
 from clpt.render.progress import Progress
 from clpt.render.renderer import Renderer, render

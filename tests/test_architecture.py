@@ -38,7 +38,7 @@ MAY_IMPORT = {
 }
 OPENCL = {"device", "bvh", "denoise", "rays", "render"}  # only these import pyopencl
 # clpt/render/<room>: arrows point down; rooms of one floor do not know each other.
-FLOORS = ({"contract"}, {"lowering", "codegen"}, {"wavefront"}, {"editing"})
+FLOORS = ({"contract"}, {"lowering", "codegen"}, {"wavefront"}, {"editing", "film"})
 # What kinds share, by what a reader looks for.
 SHARED = {
     "colour", "core", "denoising", "film", "guiding", "interface", "lighting", "merging", "optics",

@@ -11,8 +11,8 @@ from pathlib import Path
 from .. import output_files
 from ..cluster.cluster_renderer import ClusterRenderer
 from ..errors import MemoryBudgetError, SceneError
-from ..render import film_file
-from ..render.saved_film import SavedFilm, differences_text, ranges_text
+from ..render.film import film_file
+from ..render.film.saved_film import SavedFilm, differences_text, ranges_text
 from ..scene import Scene
 from ..scene.fingerprint import fingerprint
 from . import outputs

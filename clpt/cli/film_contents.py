@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ..render import film_file
-from ..render.host_picture import HostPicture
-from ..render.layer_channels import channels_of
+from ..render.film import film_file
+from ..render.film.host_picture import HostPicture
+from ..render.film.layer_channels import channels_of
 from . import checkpoints
 from .image_contents import ImageContents, size_text
 from .output_console import shown

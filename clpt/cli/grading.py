@@ -8,7 +8,7 @@ import click
 
 from ..colour.tones import TONES
 from ..colour.view import DEFAULT_CONFIG, View
-from ..render.layer_channels import SETS
+from ..render.film.layer_channels import SETS
 from .option_sets import Command, with_options
 
 
@@ -17,7 +17,7 @@ class Grading:
     """How files say a picture.
 
     exposure [stops]; tone: a curve of clpt.colour.tones; view: of OpenColorIO, instead; names: of
-    channels of an .exr, a set of clpt.render.layer_channels.SETS.
+    channels of an .exr, a set of clpt.render.film.layer_channels.SETS.
     """
 
     exposure: float = 0.0

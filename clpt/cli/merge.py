@@ -9,9 +9,9 @@ import click
 
 from .. import __version__
 from ..errors import SceneError
-from ..render import film_file
-from ..render.host_picture import HostPicture
-from ..render.saved_film import SavedFilm, other_devices
+from ..render.film import film_file
+from ..render.film.host_picture import HostPicture
+from ..render.film.saved_film import SavedFilm, other_devices
 from . import checkpoints, outputs
 from .grading import grading, grading_options, names_option
 from .scene_options import denoise_option

@@ -20,9 +20,9 @@ from ..cluster.blocks import WorkerRecord
 from ..cluster.cluster_renderer import ClusterRenderer
 from ..errors import ClusterError
 from ..formats import load
+from ..render.film.saved_film import SavedFilm
 from ..render.lowering.checks import check
 from ..render.progress import Progress
-from ..render.saved_film import SavedFilm
 from . import checkpoints, outputs
 from .display import Display
 from .grading import Grading

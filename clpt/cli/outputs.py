@@ -11,9 +11,9 @@ from pathlib import Path
 from .. import __version__, images, output_files
 from ..cluster.cluster_renderer import ClusterRenderer
 from ..errors import ClptError, SceneError
-from ..render import film_file, layer_channels
-from ..render.denoised_picture import DenoisedPicture
-from ..render.host_picture import HostPicture
+from ..render.film import film_file, layer_channels
+from ..render.film.denoised_picture import DenoisedPicture
+from ..render.film.host_picture import HostPicture
 from .grading import Grading
 from .scene_options import AnyRenderer
 from .standard_output import is_standard

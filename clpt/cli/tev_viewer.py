@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import tev
-from ..render.layer_channels import channels_of
+from ..render.film.layer_channels import channels_of
 from .outputs import Film
 
 EVERYWHERE = tev.HOST  # what --tev without a value means

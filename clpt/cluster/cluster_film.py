@@ -15,10 +15,8 @@ from numpy.typing import NDArray
 from clpt import device as dev
 from clpt.cluster.cluster_noise import FarmTracer
 from clpt.errors import ClusterError, SceneError
-from clpt.render.film_keeping import FilmKeeping
-from clpt.render.pictures import Image
-from clpt.render.renderer import Renderer
-from clpt.render.saved_film import (
+from clpt.render.film.film_keeping import FilmKeeping
+from clpt.render.film.saved_film import (
     Origin,
     PictureForm,
     SavedFilm,
@@ -26,6 +24,8 @@ from clpt.render.saved_film import (
     classes_text,
     other_devices,
 )
+from clpt.render.pictures import Image
+from clpt.render.renderer import Renderer
 from clpt.render.wavefront.adaptive import Adaptive
 from clpt.render.wavefront.film_state import FilmState, Ranges
 from clpt.render.wavefront.tracer import OnBatch, Selection

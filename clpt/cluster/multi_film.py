@@ -15,9 +15,9 @@ from clpt.cluster.crew import Crew
 from clpt.cluster.device_worker import DeviceWorker
 from clpt.cluster.multi_noise import AdaptiveCrew
 from clpt.errors import ClusterError, DeviceError, MemoryBudgetError, SceneError
-from clpt.render.film_keeping import FilmKeeping
+from clpt.render.film.film_keeping import FilmKeeping
+from clpt.render.film.saved_film import Origin, PictureForm, SavedFilm, Session
 from clpt.render.pictures import Image, Pictures
-from clpt.render.saved_film import Origin, PictureForm, SavedFilm, Session
 from clpt.render.wavefront.adaptive import Adaptive
 from clpt.render.wavefront.film_state import FilmState, Ranges
 from clpt.render.wavefront.wavefront import Counts, Wavefront

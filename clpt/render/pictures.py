@@ -14,10 +14,10 @@ from clpt import device as dev
 from clpt import images
 from clpt.colour.view import View
 from clpt.errors import ClptError, SceneError
-from clpt.render.layers import layers_of
+from clpt.render.film.layers import layers_of
+from clpt.render.film.resolve import Resolve
+from clpt.render.film.saved_film import PictureForm
 from clpt.render.locking import DeviceOwner, synchronized
-from clpt.render.resolve import Resolve
-from clpt.render.saved_film import PictureForm
 from clpt.render.wavefront.wavefront import Wavefront
 from clpt.scene import Scene
 from clpt.spectral_exr import SpectralImage

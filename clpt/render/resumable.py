@@ -13,13 +13,11 @@ import numpy as np
 from clpt import device as dev
 from clpt.errors import SceneError
 from clpt.render.contract import custom_materials
-from clpt.render.denoised_noise import DenoisedNoise
 from clpt.render.editing.scene_edit import resolve_device_arrays
-from clpt.render.film_keeping import FilmKeeping
-from clpt.render.layers import white_paper
-from clpt.render.locking import synchronized
-from clpt.render.pictures import Pictures
-from clpt.render.saved_film import (
+from clpt.render.film.denoised_noise import DenoisedNoise
+from clpt.render.film.film_keeping import FilmKeeping
+from clpt.render.film.layers import white_paper
+from clpt.render.film.saved_film import (
     Origin,
     PictureForm,
     SavedFilm,
@@ -27,6 +25,8 @@ from clpt.render.saved_film import (
     classes_text,
     other_devices,
 )
+from clpt.render.locking import synchronized
+from clpt.render.pictures import Pictures
 from clpt.render.wavefront.adaptive import Adaptive
 from clpt.render.wavefront.film_state import FilmState, Ranges
 from clpt.render.wavefront.tracer import Tracer

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import images
-from clpt.render.layer_preview import viewable
+from clpt.render.film.layer_preview import viewable
 from clpt.scene.layers import LAYERS
 
 PICTURE, SAMPLES, ERROR, DENOISED = "picture", "samples", "error", "denoised"

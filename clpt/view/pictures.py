@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from clpt import images
 from clpt.colour.view import View
-from clpt.render.denoised_picture import DenoisedPicture, Source
+from clpt.render.film.denoised_picture import DenoisedPicture, Source
 from clpt.render.renderer import Renderer
 from clpt.view.commands import OF_VIEW, CommandError
 

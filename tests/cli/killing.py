@@ -20,8 +20,8 @@ import numpy as np
 
 from clpt.cli import checkpoints
 from clpt.output_files import PARTIAL
-from clpt.render import film_file
-from clpt.render.saved_film import SavedFilm
+from clpt.render.film import film_file
+from clpt.render.film.saved_film import SavedFilm
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENE = str(ROOT / "scenes" / "cornell_box")

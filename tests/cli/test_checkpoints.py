@@ -16,7 +16,7 @@ from clpt.__main__ import run
 from clpt.cli import checkpoints, outputs, rendering
 from clpt.errors import MemoryBudgetError, SceneError
 from clpt.output_files import PARTIAL
-from clpt.render import film_file
+from clpt.render.film import film_file
 from clpt.render.renderer import Renderer
 from tests.cli import killing
 

@@ -11,7 +11,7 @@ import pytest
 
 from clpt import images
 from clpt.__main__ import run
-from clpt.render import film_file
+from clpt.render.film import film_file
 from tests.cli import killing
 
 KINDS = {

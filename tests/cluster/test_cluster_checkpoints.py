@@ -24,7 +24,7 @@ from clpt.cli import outputs  # noqa: E402
 from clpt.cluster import processes  # noqa: E402
 from clpt.cluster.cluster_renderer import ClusterRenderer  # noqa: E402
 from clpt.cluster.tasks import film_digest  # noqa: E402
-from clpt.render import film_file  # noqa: E402
+from clpt.render.film import film_file  # noqa: E402
 from clpt.render.renderer import Renderer  # noqa: E402
 
 BOX = str(ROOT / "scenes/cornell_box")

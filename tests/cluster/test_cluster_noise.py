@@ -23,7 +23,7 @@ from clpt.__main__ import run  # noqa: E402
 from clpt.cluster import blocks, tasks  # noqa: E402
 from clpt.cluster.cluster_renderer import ClusterRenderer  # noqa: E402
 from clpt.errors import ClusterError, SceneError  # noqa: E402
-from clpt.render import film_file  # noqa: E402
+from clpt.render.film import film_file  # noqa: E402
 from clpt.scene.integrators import Path as PathIntegrator  # noqa: E402
 
 NOISE, MOST = 0.1, 300

@@ -17,7 +17,7 @@ from clpt import device as dev
 from clpt.cluster import crew
 from clpt.device.stream import Stream
 from clpt.errors import ClusterError, DeviceError, SceneError
-from clpt.render import film_file
+from clpt.render.film import film_file
 from clpt.scene import Scene
 from clpt.scene.integrators import Mitchell, ParticleTracer, Vcm
 from clpt.scene.integrators import Path as PathIntegrator

@@ -7,7 +7,7 @@ from clpt import device, images
 from clpt.colour import tones
 from clpt.device import DeviceArray
 from clpt.errors import UnknownKindError
-from clpt.render.resolve import Resolve
+from clpt.render.film.resolve import Resolve
 
 RNG = np.random.default_rng(7)
 CURVES = [name for name in tones.TONES if name != "none"]

@@ -9,7 +9,7 @@ from clpt.colour import view as views
 from clpt.colour.view import View
 from clpt.device import DeviceArray
 from clpt.errors import DeviceError, SceneError, UnknownKindError
-from clpt.render.resolve import Resolve
+from clpt.render.film.resolve import Resolve
 
 ocio = pytest.importorskip("PyOpenColorIO", reason="OpenColorIO is not installed")
 

@@ -192,7 +192,7 @@ def test_the_told_error_is_that_beside_a_reference(sampler):
 
 def test_the_picture_of_a_film_is_denoised_alike(statistical):
     """A film in a file has its halves, and no device of its own."""
-    from clpt.render.host_picture import HostPicture
+    from clpt.render.film.host_picture import HostPicture
 
     made = HostPicture(statistical.saved_film(), "statistical")
     for one, other in zip(made.halves(), statistical.halves(), strict=True):

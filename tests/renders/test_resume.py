@@ -11,8 +11,8 @@ import pytest
 
 import clpt
 from clpt.errors import SceneError
-from clpt.render import film_file
-from clpt.render.host_picture import HostPicture
+from clpt.render.film import film_file
+from clpt.render.film.host_picture import HostPicture
 from clpt.scene import Scene, lights, shapes
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import (

@@ -12,8 +12,9 @@ these samples do not go into the picture.
 
 Light paths, where the scene has them, reach all pixels: see clpt.render.wavefront.light_rounds.
 
-For a picture that is denoised what is left after that decides, see clpt.render.denoised_noise. That
-falls slower than noise does while samples are added, so nothing is decided ahead.
+For a picture that is denoised what is left after that decides, see
+clpt.render.film.denoised_noise. That falls slower than noise does while samples are added, so
+nothing is decided ahead.
 """
 
 from __future__ import annotations

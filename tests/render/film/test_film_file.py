@@ -14,8 +14,8 @@ import pytest
 
 import clpt
 from clpt.errors import SceneError
-from clpt.render import film_file
-from clpt.render.saved_film import Origin, PictureForm, SavedFilm, Session
+from clpt.render.film import film_file
+from clpt.render.film.saved_film import Origin, PictureForm, SavedFilm, Session
 from clpt.render.wavefront.film_state import FilmState
 from clpt.scene.fingerprint import Fingerprint
 

@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 from clpt import images, output_files
 from clpt.errors import SceneError
 from clpt.render.contract.layer_names import LayerNames
-from clpt.render.host_picture import HostPicture
-from clpt.render.saved_film import Origin, PictureForm, SavedFilm, Session
+from clpt.render.film.host_picture import HostPicture
+from clpt.render.film.saved_film import Origin, PictureForm, SavedFilm, Session
 from clpt.render.wavefront.film_state import FilmState
 from clpt.scene.fingerprint import Fingerprint
 from clpt.spectra.spaces import chromaticities

@@ -13,7 +13,7 @@ from clpt.denoise import needs
 from clpt.denoise.oidn import Oidn
 from clpt.denoise.statistical import Statistical
 from clpt.errors import SceneError
-from clpt.render.saved_film import PictureForm, SavedFilm
+from clpt.render.film.saved_film import PictureForm, SavedFilm
 from clpt.scene import Film
 from clpt.spectral_exr import SpectralImage
 

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import images, spectral_exr
-from clpt.render import cryptomatte
-from clpt.render.denoised_picture import DenoisedPicture
-from clpt.render.layers import GROUP, matte_names
-from clpt.render.saved_film import PictureForm
+from clpt.render.film import cryptomatte
+from clpt.render.film.denoised_picture import DenoisedPicture
+from clpt.render.film.layers import GROUP, matte_names
+from clpt.render.film.saved_film import PictureForm
 from clpt.scene.layers import LAYERS
 from clpt.spectra.spaces import chromaticities
 from clpt.spectral_exr import SpectralImage

@@ -11,7 +11,7 @@ from pyopencl.tools import get_gl_sharing_context_properties
 from clpt import device, images
 from clpt.device import DeviceArray
 from clpt.errors import DeviceError, UnknownKindError
-from clpt.render.resolve import Resolve
+from clpt.render.film.resolve import Resolve
 from clpt.spectra import spaces
 
 H, W = 65, 48

@@ -24,7 +24,7 @@ class PictureForm:
     to_output: (3, 3), rows of the matrix from the sums to the output space; light_paths: all paths
     start at lights; weighed: some do, beside the camera's; weights: samples serve several pixels;
     paper: the matrix (3, 3) from sums of layers that are colours to the output space, see
-    `clpt.render.layers.white_paper`; names: what layers tell of; the others are those of
+    `clpt.render.film.layers.white_paper`; names: what layers tell of; the others are those of
     `clpt.scene.Film`.
     """
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from clpt.errors import SceneError
 from clpt.render.contract.features import SUM_WORDS
-from clpt.render.layers import layers_of
-from clpt.render.saved_film import SavedFilm
+from clpt.render.film.layers import layers_of
+from clpt.render.film.saved_film import SavedFilm
 from clpt.render.wavefront.film_state import (
     FILM_WORDS,
     SAMPLES_WORD,

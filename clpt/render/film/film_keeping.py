@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from clpt.errors import SceneError
-from clpt.render import film_file
-from clpt.render.denoised_picture import DenoisedPicture, Image, Source
-from clpt.render.saved_film import SavedFilm, Session
+from clpt.render.film import film_file
+from clpt.render.film.denoised_picture import DenoisedPicture, Image, Source
+from clpt.render.film.saved_film import SavedFilm, Session
 from clpt.scene import Scene
 
 

@@ -12,9 +12,9 @@ import clpt
 from clpt import images, spectral_exr
 from clpt.__main__ import run
 from clpt.render.contract.layer_names import LayerNames
-from clpt.render.cryptomatte import RANKS
-from clpt.render.layer_channels import SETS, channels_of
-from clpt.render.saved_film import PictureForm
+from clpt.render.film.cryptomatte import RANKS
+from clpt.render.film.layer_channels import SETS, channels_of
+from clpt.render.film.saved_film import PictureForm
 from clpt.scene.layers import LAYERS
 
 SIZE = (3, 5)
