@@ -336,9 +336,11 @@ def test_mitsuba(written) -> None:
     medium = load(path).shapes[0].interior
     colours = medium.density.max() * medium.sigma_t.to_rgb("unbounded")
     np.testing.assert_allclose(colours, VALUES.max() * np.array([1.0, 2.0, 3.0]), rtol=1e-5)
-    written("a.vol", vol_bytes(np.random.default_rng(3).random((2, 2, 2, 3))))
-    with pytest.raises(SceneError, match="give one channel"):
-        load(path)
+    given = np.random.default_rng(3).random((2, 2, 2, 3), np.float32)
+    written("a.vol", vol_bytes(given))
+    medium = load(path).shapes[0].interior
+    colours = medium.density[..., None] * medium.colour_grid * medium.sigma_t.to_rgb("unbounded")
+    np.testing.assert_allclose(colours, given, rtol=1e-5)
 
 
 OURS = """<scene version="3.0.0"><shape type="cube"><bsdf type="null"/>

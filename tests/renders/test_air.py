@@ -40,6 +40,7 @@ def mean(spp: int, elevation: float, **parts: Any) -> np.ndarray:
         return np.asarray(renderer.image(), float)[..., :3].mean(axis=(0, 1))
 
 
+@pytest.mark.slow
 def test_the_sky_by_the_medium() -> None:
     """In the same air, with black ground and no ozone, sun at 40 degrees: at two heights."""
     sun = np.radians(ELEVATION)

@@ -104,6 +104,7 @@ MITSUBA = """<scene version="3.0.0">
 <rgb name="albedo" value="0.96774194"/></medium></shape></scene>"""
 
 
+@pytest.mark.slow
 @pytest.mark.peers
 def test_as_mitsuba_has_it_by_hand(tmp_path: Path) -> None:
     """Grey milk that its glass displaces, beside Mitsuba's boundary between the two."""

@@ -131,6 +131,7 @@ def test_broken_scene_files(tmp_path, lens, message):
         load(tmp_path / "scene.json")
 
 
+@pytest.mark.slow
 def test_ghosts_of_lamps_that_no_ray_meets() -> None:
     """A plate in front of a film returns light twice: (1 - R)^2 R^2 of it, from any lamp."""
     n = 4.0

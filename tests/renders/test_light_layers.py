@@ -52,7 +52,11 @@ def rendered(scene: Scene, samples: int = 32):
     ("how", "film"),
     [
         pytest.param(Path(light_paths=0), {}, marks=pytest.mark.slow),
-        (Auto(), {"mode": "spectral", "filter": Gaussian(), "white_balance": "A"}),
+        pytest.param(
+            Auto(),
+            {"mode": "spectral", "filter": Gaussian(), "white_balance": "A"},
+            marks=pytest.mark.slow,
+        ),
         (Path(light_paths=1), {"filter": Gaussian()}),
         pytest.param(Path(light_paths=0, guiding=True), {"alpha": True}, marks=pytest.mark.slow),
     ],

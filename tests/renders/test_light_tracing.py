@@ -104,7 +104,6 @@ LIGHTS = {
     "sphere": 30.0, "disk": 10.0, "rectangle": 10.0, "mesh": 20.0, "cylinder": 10.0, "point": 3.0,
     "spot": 8.0, "directional": 2.0, "constant": 1.0, "envmap": 2.0, "cube_map": 1.0,
 }  # fmt: skip
-QUICK = ("envmap",)  # around all; others in a point or on a surface
 
 
 def still_life(mode: str, on: dict[str, float], camera: Camera | None = None) -> Scene:
@@ -134,9 +133,8 @@ def both(scene: Scene, spp: int, what: str, *, many: int = 1, depth: int = 4, **
     assert_agree(blocks(exposures(from_lights, 12, many * spp, **kw)), reference, what)
 
 
-@pytest.mark.parametrize(
-    "kind", [pytest.param(k, marks=() if k in QUICK else pytest.mark.slow) for k in LIGHTS]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", LIGHTS)
 def test_every_light(kind: str) -> None:
     """Diffuse, rough and smoothed surfaces under one kind of light."""
     both(still_life("rgb", {kind: LIGHTS[kind]}), 16, kind)
@@ -167,7 +165,8 @@ def test_lights_that_throw_images_and_shine_from_both_sides() -> None:
     both(dataclasses.replace(scene, shapes=shapes, lights=thrown), 16, "thrown")
 
 
-@pytest.mark.parametrize("depth", [1, *(pytest.param(d, marks=pytest.mark.slow) for d in (2, 3))])
+@pytest.mark.slow
+@pytest.mark.parametrize("depth", [1, 2, 3])
 def test_depths(depth: int) -> None:
     both(still_life("rgb", {"sphere": 30.0, "spot": 8.0}), 16, f"depth {depth}", depth=depth)
 

@@ -15,6 +15,7 @@ from tests.measured.surfaces import metal
 NODES = np.linspace(380.0, 740.0, 10)
 
 
+@pytest.mark.slow
 def test_other_kinds_stand_before_them():
     """A table is read in the lanes of its material alone; the rest of a block reads what exists."""
     kinds = (

@@ -431,6 +431,7 @@ def test_light_paths_find_the_same_light(name: str, how: str) -> None:
     check_transport(name, TRANSPORTS[how], spp=512, runs=6)
 
 
+@pytest.mark.slow
 def test_light_paths_meet_moving_lamps() -> None:
     check_transport("lamps", TRANSPORTS["light paths alone"], spp=64, runs=3)
 

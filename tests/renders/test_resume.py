@@ -64,7 +64,7 @@ def box(scenes: Path, film: dict, changes: dict, noise: float | None) -> Scene:
 
 LONG = (
     "zsobol", "independent", "importance", "halves", "vcm", "rgb", "weights_alpha",
-    "light_share", "vcm_bands", "bands",
+    "light_share", "vcm_bands", "bands", "halves_bands",
 )  # fmt: skip
 
 
