@@ -361,8 +361,6 @@ def _warnings(index: SceneIndex) -> list[str]:
         warnings += _of_motion(index)
     if getattr(scene.integrator, "light_paths", 0):
         warnings += _left_to_the_camera(index)
-    if index.light_layers and index.emitting:
-        warnings.append("film.layers: light that rays gather in media is in no layer of light")
     depth = getattr(scene.integrator, "max_depth", -1)
     if depth > DEEPEST:
         warnings.append(f"integrator.max_depth: {depth} counts as {DEEPEST}, the longest path")
