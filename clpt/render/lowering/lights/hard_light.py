@@ -41,7 +41,7 @@ DIRECTIONS = 128  # in which a light looks for what is sharp
 BULB = 0.75  # of them: where what is sharp fills more, the light is in a bulb
 SEEN = 0.02  # of the picture: where what is sharp fills more, caustics may be seen through it
 
-THIN, DENSE = 0.3, 7.0  # optical depths from a light to the camera, see bench/NOTES.md
+THIN, DENSE = 0.3, 5.0  # optical depths from a light to the camera, see bench/NOTES.md
 ALL_AROUND = 0.49 * np.pi  # [rad] from a light's axis: what shines so far is no spot
 
 Ball = tuple[NDArray[np.float64], float]  # centre and radius
