@@ -11,6 +11,8 @@
 #include "generated/textures.cl"
 #include "generated/medium.cl"
 #include "generated/grid_flight.cl"
+#include "generated/flight_args.cl"
+#include "generated/flight_layers.cl"
 #include "optics/equiangular.cl"
 
 #define FLIES_NEAR_LAMPS (MEDIUM_AIMS && !LIGHT_PATHS) /* paths from lamps have no reason to stay there */
@@ -26,7 +28,7 @@ inline integer flight_medium(Scene scene, Slab path, Slab hit, uint at, mask met
 }
 #endif
 
-STAGE(flight)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
+STAGE(flight)(SLAB_ARGS, SCENE_ARGS FLIGHT_ARGS STAGE_AT_ARG)
 {
     SLABS
     SCENE
@@ -127,6 +129,10 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
 #if MEDIA_EMIT
         light = spectrum_mul(load_path_beta(path, at), light);
         store_path_radiance(path, at, flies, spectrum_add(load_path_radiance(path, at), light));
+#if LIGHT_LAYERS && !LIGHT_PATHS /* of the group that is told behind those of all lights */
+        integer rest = settings->light_count;
+        light_layers_add(scene, path, at, flies, state & PATH_DEPTH, rest, light, light_layers);
+#endif
 #endif
         store_path_beta(path, at, flies, spectrum_mul(load_path_beta(path, at), weight));
         store_hit_t(hit, at, collides, t - lead);

@@ -19,7 +19,7 @@ from clpt.scene import Film, Scene, media
 from clpt.scene import materials as m
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Auto, Box, ParticleTracer, Path, Vcm
-from clpt.scene.lights import Area, Constant, Directional, Light, Spot
+from clpt.scene.lights import Area, Constant, Directional, Light, Point, Spot
 from clpt.scene.shapes import Cube, Group, Instance, Rectangle, Shape, Sphere
 from tests.renders.support import assert_agree, assert_mean, blocks, exposures, pictures_of_parts
 from tests.renders.test_hybrid import both, narrow
@@ -196,11 +196,19 @@ def test_where_light_paths_do_not_know_their_medium() -> None:
 
 
 def test_auto_in_fog() -> None:
-    """Light paths serve where a small light is in what scatters, and where glass is in it."""
+    """Light paths serve where a small light is in what scatters, and where glass is in it; not
+    through much of it, and in little of it around a spot lamp alone."""
     fog = FOGS["grey"]
+    thin, dense = (media.Homogeneous(sigma_t=t, albedo=0.9) for t in (0.05, 5.0))
+    bulb = Point(position=(0.2, 0.7, 0.1))
     ball = Sphere(radius=0.3, material=m.Dielectric(), exterior=fog)
     for scene, number in (
         (room(fog, SPOT), 0.5),
+        (room(thin, SPOT), 0.5),
+        (room(dense, SPOT), 0.0),
+        (room(fog, bulb), 0.5),
+        (room(thin, bulb), 0.0),
+        (room(FOGS["grid"], bulb), 0.5),
         (room(fog, SUN), 0.0),
         (room(fog, SUN, ball), 0.5),
         (room(fog, SUN, dataclasses.replace(ball, interior=fog)), 0.0),

@@ -13,12 +13,12 @@ from clpt import transforms as tf
 from clpt.errors import SceneError
 from clpt.render.lowering.scene import lower
 from clpt.render.wavefront.adaptive import checked
-from clpt.scene import Film, Scene
+from clpt.scene import Film, Scene, media
 from clpt.scene.cameras import Perspective
-from clpt.scene.integrators import Auto, Gaussian, Path, Vcm
+from clpt.scene.integrators import Auto, Box, Gaussian, Path, Vcm
 from clpt.scene.lights import Area, Constant, Point
-from clpt.scene.materials import Conductor, Diffuse, Fluorescent
-from clpt.scene.shapes import Rectangle, Sphere
+from clpt.scene.materials import Conductor, Diffuse, Fluorescent, Null
+from clpt.scene.shapes import Cube, Rectangle, Sphere
 
 NAMES = ("direct", "indirect", "light_groups")
 
@@ -69,6 +69,38 @@ def test_parts_are_the_picture(how, film):
     assert min(part.mean() for part in (*groups, layers["indirect"])) > 0.003 * image.mean()
     np.testing.assert_allclose(sum(groups), image, rtol=1e-4, atol=1e-5)
     np.testing.assert_allclose(layers["direct"] + layers["indirect"], image, rtol=1e-4, atol=1e-5)
+
+
+def gas(kind: str) -> Cube:
+    """A cube of a medium that emits and scatters."""
+    given = {"sigma_a": 1.0, "sigma_s": 2.0, "emission": (4.0, 1.0, 0.5)}
+    own = media.Homogeneous(**given)
+    if kind == "grid":
+        box = tf.translate([-1, 0, -1]) @ tf.scale(2.0)
+        own = media.Grid(density=np.ones((9, 9, 9), np.float32), to_world=box, **given)
+    return Cube(material=Null(), interior=own, to_world=tf.translate([0, 1, 0]) @ tf.scale(0.8))
+
+
+@pytest.mark.parametrize("kind", ["homogeneous", pytest.param("grid", marks=pytest.mark.slow)])
+def test_light_of_media_is_in_layers(kind):
+    scene = corner(filter=Box())
+    scene.shapes = [*scene.shapes[:2], gas(kind)]
+    image, layers = rendered(scene)
+    assert [*layers] == ["direct", "indirect", "light_fill", "light_rest"]
+    groups = layers["light_fill"] + layers["light_rest"]
+    np.testing.assert_allclose(groups, image, rtol=1e-4, atol=1e-5)
+    np.testing.assert_allclose(layers["direct"] + layers["indirect"], image, rtol=1e-4, atol=1e-5)
+    assert layers["indirect"].any()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["homogeneous", "grid"])
+def test_light_of_media_that_is_scattered_once_is_direct(kind):
+    scene = corner(Path(max_depth=1), filter=Box())
+    scene.shapes, scene.lights = [gas(kind)], []
+    image, layers = rendered(scene)
+    assert image.mean() > 0.01 and not layers["indirect"].any()
+    np.testing.assert_allclose(layers["light_rest"], image, rtol=1e-4, atol=1e-5)
 
 
 @pytest.mark.slow

@@ -23,7 +23,7 @@ from clpt.scene.cameras import Perspective, Spherical
 from clpt.scene.integrators import Box
 from clpt.scene.integrators import Path as PathIntegrator
 from clpt.scene.lights import Area, Constant, Point
-from clpt.scene.materials import Dielectric, Diffuse, Null
+from clpt.scene.materials import Dielectric, Diffuse, GltfSurface, Null
 from clpt.scene.shapes import Cube, Rectangle, Sphere
 from tests.renders.support import assert_agree, assert_mean, blocks, exposures, pictures_of_parts
 
@@ -73,8 +73,17 @@ def test_furnace(phase: media.Phase, mode: str) -> None:
     assert_mean(exposures(with_mode(scene, mode), 8, 64), 1.0, WITHIN)
 
 
-def test_furnace_behind_glass() -> None:
-    scene = ball(media.Homogeneous(sigma_s=4.0), Dielectric(int_ior=1.3, ext_ior=1.0))
+GLASS = [
+    Dielectric(int_ior=1.3, ext_ior=1.0),
+    pytest.param(
+        GltfSurface(metallic=0.0, roughness=0.05, transmission=1.0), marks=pytest.mark.slow
+    ),
+]
+
+
+@pytest.mark.parametrize("glass", GLASS, ids=["dielectric", "gltf_surface"])
+def test_furnace_behind_glass(glass) -> None:
+    scene = ball(media.Homogeneous(sigma_s=4.0), glass)
     assert_mean(exposures(with_mode(scene, "rgb"), 8, 128), 1.0, WITHIN)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from clpt.formats.gltf import surface
+from clpt.formats.gltf import surface, volume
 from clpt.formats.gltf.document import Element
 from clpt.formats.gltf.textures import texture
 from clpt.scene.lights import Area
@@ -25,7 +25,7 @@ from clpt.scene.textures import Bitmap, MeshAttribute, Product
 UNLIT, EMISSIVE = "KHR_materials_unlit", "KHR_materials_emissive_strength"
 EXTENSIONS: tuple[str, ...] = (
     *surface.EXTENSIONS, surface.GLOSSINESS, UNLIT, EMISSIVE,
-    "KHR_materials_volume", "KHR_materials_dispersion",
+    volume.VOLUME, *volume.SCATTER, "KHR_materials_dispersion",
 )  # fmt: skip
 ONE_SIDE = Null()  # of a surface that is drawn from its front alone
 

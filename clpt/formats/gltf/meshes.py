@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
-from clpt.formats.gltf import materials, skins, variants
+from clpt.formats.gltf import materials, skins, variants, volume
 from clpt.formats.gltf.accessors import floats
 from clpt.formats.gltf.document import Element
 from clpt.formats.gltf.geometry import Geometry
@@ -19,6 +19,7 @@ from clpt.formats.gltf.primitives import geometry
 from clpt.formats.meshes.mesh import TANGENTS, checked
 from clpt.scene.lights import Area
 from clpt.scene.materials import Material, NormalMap
+from clpt.scene.media import Medium
 from clpt.scene.shapes import Group, Instance, Mesh, Shape
 from clpt.scene.textures import SECOND_UV
 
@@ -29,10 +30,12 @@ INSTANCED = 20_000  # triangles that copies would add; fewer are traced faster a
 
 @dataclass(frozen=True)
 class Surface:
-    """A material, what it emits, and the sets of texture coordinates that it looks up."""
+    """A material, what it emits, what it is the boundary of, and the sets of texture coordinates
+    that it looks up."""
 
     material: Material
     emission: Area | None
+    interior: Medium | None
     uv_sets: tuple[int, ...]
 
 
@@ -175,7 +178,13 @@ def _mesh(owner: Element, primitive: Element, made: Geometry) -> Mesh | None:
     values["tangents"] = values["attributes"].pop(TANGENTS, None)
     if not len(values["faces"]):
         return None
-    return Mesh(name=name, material=surface.material, emission=surface.emission, **values)
+    return Mesh(
+        name=name,
+        material=surface.material,
+        emission=surface.emission,
+        interior=surface.interior,
+        **values,
+    )
 
 
 def _surface(primitive: Element, colours: bool) -> Surface:
@@ -186,7 +195,8 @@ def _surface(primitive: Element, colours: bool) -> Surface:
     def make() -> Surface:
         document.uv_sets.clear()
         material, emission = materials.material(element, colours=colours)
-        return Surface(material, emission, tuple(document.uv_sets))
+        inside = volume.medium(element) if material.transmits else None
+        return Surface(material, emission, inside, tuple(document.uv_sets))
 
     return document.once(("surface", element.path if element else "", colours), make)
 

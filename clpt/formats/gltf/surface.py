@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from clpt.formats.gltf import volume
 from clpt.formats.gltf.document import Element
 from clpt.formats.gltf.textures import texture
 from clpt.scene.materials import GltfSurface
@@ -23,8 +24,6 @@ GLOSSINESS = "KHR_materials_pbrSpecularGlossiness"
 NORMAL = "clearcoatNormalTexture"
 AXES = {"x": "r", "y": "g", "z": "b"}  # of a normal, in the channels of its image
 WHITE = (1.0, 1.0, 1.0)
-DARKEST = 1e-4  # attenuation colour: black would absorb all at once
-DENSEST = 1e6  # [1/m]
 LEAST_ABBE = 1.0  # of any glass is above 9
 
 
@@ -225,18 +224,13 @@ EXTENSIONS = {
 def _body(element: Element, values: dict[str, Any]) -> None:
     """Tell a thin sheet from a body: one with a thickness, which absorbs and disperses."""
     lets_through = any(values.get(k, 0.0) != 0.0 for k in ("transmission", "diffuse_transmission"))
-    volume = element.extension("KHR_materials_volume")
-    thin = volume is None or volume.number("thicknessFactor", 0.0, low=0.0) == 0.0
-    values["thin"] = lets_through and thin
-    if volume is None or thin or not lets_through:
+    inside = volume.body(element)
+    values["thin"] = lets_through and inside is None
+    if inside is None:
         return
-    distance = volume.number("attenuationDistance", math.inf, low=0.0)
-    if distance == 0.0:
-        raise volume.error("must be above 0", "attenuationDistance")
-    left = volume.numbers("attenuationColor", 3, WHITE, low=0.0, high=1.0)
-    a = tuple(min(-math.log(max(v, DARKEST)) / distance, DENSEST) for v in left)
-    if max(a) > 0.0:
-        values["absorption"] = a[0] if a[0] == a[1] == a[2] else RGBUnbounded(*a)
+    absorption = volume.extinction(inside)
+    if absorption != 0.0 and volume.medium(element) is None:
+        values["absorption"] = absorption
     dispersion = element.extension("KHR_materials_dispersion")
     strength = 0.0 if dispersion is None else dispersion.number("dispersion", 0.0, low=0.0)
     ior = values.get("ior", 1.5)

@@ -144,6 +144,7 @@ def _call(features: Features, own: Features, layout: str, stage: Stage, which: i
     groups = {
         begin: signatures.begin_args(own),
         "intersect": signatures.trace_args(own, layout),
+        "flight": signatures.flight_args(own),
         "deposit": signatures.deposit_args(own),
         "train": signatures.deposit_args(own),
         join: signatures.join_args(own, layout),

@@ -35,6 +35,10 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         ("generated/light_layer_args.cl", "generated/sampler.cl", "film/light_layers.cl")
         * bool(f.light_layers)
     ),
+    "generated/flight_layers.cl": lambda f, _: (
+        ("film/light_layers.cl",)
+        * (bool(f.light_layers) and f.emissive_media and not f.light_paths)
+    ),
     "generated/rivals.cl": lambda f, _: (
         (
             "generated/merging.cl",

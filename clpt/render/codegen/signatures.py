@@ -41,6 +41,7 @@ def virtual_files(features: Features, layout: str) -> dict[str, str]:
         "shade": (shade_args(features), True),
         "layer": (layer_args(features), False),
         "light_layer": (light_layer_args(features), True),
+        "flight": (flight_args(features), True),
     }
     files = {"generated/scene.cl": scene_text()}
     for name, (args, behind) in groups.items():
@@ -147,6 +148,12 @@ def shade_args(features: Features) -> dict[str, str]:
     """Return what shading takes beside slabs and scene."""
     light = {} if features.light_paths else light_layer_args(features)
     return {**merge_args(features), **layer_args(features), **light}
+
+
+def flight_args(features: Features) -> dict[str, str]:
+    """Return what the stage takes that takes rays through media, beside slabs and scene."""
+    gathers = features.emissive_media and not features.light_paths
+    return light_layer_args(features) if gathers else {}
 
 
 def loop_files(features: Features, layout: str) -> dict[str, str]:

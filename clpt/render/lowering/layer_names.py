@@ -44,6 +44,7 @@ def lower_names(
         names["materials"] = tuple(_material_name(one, i) for i, one in enumerate(found))
     if "light_groups" in layers:
         groups = _groups(index, geometry, lights)
+        groups += [REST] * bool(index.emitting)  # of what rays gather in media
         names["light_groups"] = tuple(sorted({*groups})) or (REST,)
         numbers_of = np.searchsorted(names["light_groups"], np.array(groups, str))
         rows["light_groups"] = len(names["light_groups"])

@@ -42,7 +42,7 @@ from clpt.render.lowering.geometry.refining import is_refined
 from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.layer_names import lower_names
 from clpt.render.lowering.lights.aims import aims
-from clpt.render.lowering.lights.hard_light import decided
+from clpt.render.lowering.lights.hard_light import Lit, decided
 from clpt.render.lowering.lights.light_bounds import Bounds
 from clpt.render.lowering.lights.light_media import NOWHERE, LightMedia, light_media
 from clpt.render.lowering.lights.lights import Around, Emitter, LightRows, light_rows, row_order
@@ -156,7 +156,7 @@ def lower(
         sides = media.of_shapes(bounding)
     before = former.integrator if former else None
     index, lit = _begin_at_lights(index, geometry, lights, media, bodies, sphere, cache)
-    index, why = decided(index, geometry, encoder, lights, sphere, before, lit.scatter)
+    index, why = decided(Lit(index, geometry, encoder, lights, sphere, lit.extinction), before)
     if index.has_media and (index.balanced or index.light_paths):
         encoder.store.append("media", lit.words)
     encoder.store.append("media", sides)
@@ -361,8 +361,6 @@ def _warnings(index: SceneIndex) -> list[str]:
         warnings += _of_motion(index)
     if getattr(scene.integrator, "light_paths", 0):
         warnings += _left_to_the_camera(index)
-    if index.light_layers and index.emitting:
-        warnings.append("film.layers: light that rays gather in media is in no layer of light")
     depth = getattr(scene.integrator, "max_depth", -1)
     if depth > DEEPEST:
         warnings.append(f"integrator.max_depth: {depth} counts as {DEEPEST}, the longest path")

@@ -12,6 +12,7 @@ from PIL import Image
 
 from clpt.errors import SceneError
 from clpt.scene.materials import Diffuse, GltfSurface, Mask, NormalMap, Null, TwoSided
+from clpt.scene.media import Homogeneous
 from clpt.scene.textures import Bitmap, MeshAttribute, Mix, Product
 
 PIXEL = np.array([[[255, 128, 64, 192], [0, 255, 32, 96]]], np.uint8)
@@ -103,6 +104,44 @@ def test_sheet_and_body(shape):
     assert (d - 1.0) / (f - c) == pytest.approx(40.0, rel=2e-3)
     volume["thicknessFactor"] = 0  # thin-walled
     assert shape({"extensions": body})[0].material.thin
+
+
+def test_what_scatters_inside(shape):
+    through = {"KHR_materials_diffuse_transmission": {"diffuseTransmissionFactor": 1}}
+    volume = {
+        "thicknessFactor": 1,
+        "attenuationDistance": 0.5,
+        "attenuationColor": [1, math.exp(-1), math.exp(-2)],
+    }
+    scatter = {"multiscatterColor": [0.0, 0.5, 1.0], "scatterAnisotropy": 0.3}
+    body = {
+        **through,
+        "KHR_materials_volume": volume,
+        "KHR_materials_volume_scatter": scatter,
+    }
+    found, warnings = shape({"extensions": body})
+    inside = found.interior
+    assert not warnings and found.material.transmits and not found.material.thin
+    assert found.material.absorption.value == 0.0  # the medium has it
+    wanted = Homogeneous.from_albedo((0.0, 0.5, 1.0), 1.0, g=0.3)
+    taken = np.array([0.0, 2.0, 4.0])
+    absorbed, scattered = (v.to_rgb("unbounded") for v in inside.coefficients(spectral=False))
+    np.testing.assert_allclose(absorbed + scattered, taken, atol=1e-9)
+    np.testing.assert_allclose(scattered, taken * wanted.albedo.to_rgb(), atol=1e-9)
+    assert scattered[2] == pytest.approx(4.0) and inside.phase.g.value == 0.3
+    scatter["multiscatterColorFactor"] = scatter.pop("multiscatterColor")  # of a later draft
+    scatter["scatterAnisotropy"] = 1
+    assert shape({"extensions": body})[0].interior.phase.g.value == 0.99
+    del scatter["multiscatterColorFactor"]  # black
+    dark = shape({"extensions": body})[0]
+    assert dark.interior is None and dark.material.absorption.to_rgb("unbounded")[2] > 3.9
+    scatter["multiscatterColor"] = [1, 1, 1]
+    volume["thicknessFactor"] = 0
+    assert shape({"extensions": body})[0].interior is None  # a sheet has no inside
+    scatter["scatterAnisotropy"] = 2
+    volume["thicknessFactor"] = 1
+    with pytest.raises(SceneError, match="scatterAnisotropy"):
+        shape({"extensions": body})
 
 
 def test_layers(shape):

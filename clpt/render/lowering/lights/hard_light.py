@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from clpt.render.contract import shape_records
-from clpt.render.lowering.camera import cameras
+from clpt.render.lowering.camera import cameras, surroundings
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.geometry import analytic, shapes, triangles
 from clpt.render.lowering.geometry.geometry import Geometry
@@ -41,30 +41,41 @@ DIRECTIONS = 128  # in which a light looks for what is sharp
 BULB = 0.75  # of them: where what is sharp fills more, the light is in a bulb
 SEEN = 0.02  # of the picture: where what is sharp fills more, caustics may be seen through it
 
+THIN, DENSE = 0.3, 5.0  # optical depths from a light to the camera, see bench/NOTES.md
+ALL_AROUND = 0.49 * np.pi  # [rad] from a light's axis: what shines so far is no spot
+
 Ball = tuple[NDArray[np.float64], float]  # centre and radius
 
 
-def decided(
-    index: SceneIndex,
-    geometry: Geometry,
-    encoder: Encoder,
-    lights: LightRows,
-    sphere: Ball,
-    former: Integrator | None = None,
-    scattered: NDArray[np.bool_] | None = None,
-) -> tuple[SceneIndex, str]:
+@dataclass(frozen=True)
+class Lit:
+    """What the choice looks at.
+
+    sphere: centre and radius of one around the scene [m]; extinction (n,): of the medium around
+    each row of `lights` where it scatters, else 0, and nan on a grid [1/m]; () without media.
+    """
+
+    index: SceneIndex
+    geometry: Geometry
+    encoder: Encoder
+    lights: LightRows
+    sphere: Ball
+    extinction: NDArray[np.float64]
+
+
+def decided(lit: Lit, former: Integrator | None = None) -> tuple[SceneIndex, str]:
     """Return the index with the integrator that "auto" stands for, and the reason as a sentence.
 
-    The sentence is empty where the scene leaves no choice. sphere: centre and radius of one around
-    the scene [m]; former: what a renderer has chosen that goes on with this scene, whose film has a
-    place for light paths or none; scattered: of each row of `lights` whether it is in a medium that
-    scatters; none or None: no light is. Raises SceneError for an image light that is broken.
+    The sentence is empty where the scene leaves no choice. former: what a renderer has chosen that
+    goes on with this scene, whose film has a place for light paths or none. Raises SceneError for
+    an image light that is broken.
     """
+    index = lit.index
     given: Any = index.scene.integrator
     if not isinstance(given, Auto) and getattr(given, "light_paths", None) != AUTO:
         return index, ""
     if former is None:
-        chosen, reason = _choice(index, geometry, encoder, lights, sphere, scattered)
+        chosen, reason = _choice(lit)
     else:
         keeps = isinstance(former, Vcm) and isinstance(given, Auto)
         chosen = former if keeps else Path(light_paths=getattr(former, "light_paths", 0))
@@ -80,15 +91,9 @@ def decided(
     return replace(index, scene=replace(index.scene, integrator=chosen)), reason
 
 
-def _choice(
-    index: SceneIndex,
-    geometry: Geometry,
-    encoder: Encoder,
-    lights: LightRows,
-    sphere: Ball,
-    scattered: NDArray[np.bool_] | None,
-) -> tuple[Integrator, str]:
+def _choice(lit: Lit) -> tuple[Integrator, str]:
     """The integrator but for its depths, and why; what is cheap to know is asked first."""
+    index, geometry = lit.index, lit.geometry
     scene, without = index.scene, Path(light_paths=0)
     if not index.lights_reach:
         return without, index.lit_media
@@ -96,7 +101,7 @@ def _choice(
         return without, "points cannot be joined to this camera"
     if 0 <= scene.integrator.max_depth < FEWEST:  # type: ignore[attr-defined]
         return without, "the longest path is too short for a caustic"
-    in_fog = _in_fog(index, geometry, encoder, lights, sphere, scattered)
+    in_fog = _in_fog(lit)
     if in_fog is not None:
         return in_fog
     sharp = _first_with((one for one in index.shapes if not _hides(one)), is_sharp)
@@ -104,7 +109,7 @@ def _choice(
         return without, "nothing is sharp"
     if _first_with((one for one in index.shapes if one.emission is None), _is_dull) is None:
         return without, "there is nothing dull for a caustic to be seen on"
-    small = list(_small_lights(index, geometry, encoder, lights, sphere))
+    small = list(_small_lights(lit))
     if not small:
         return without, "no light is small"
     reason = f"{shapes.where(sharp)} is sharp, and {small[0][0]} is a small light"
@@ -125,25 +130,25 @@ def _choice(
     return Vcm(light_paths=whole), f"{reason}; the camera sees what is sharp"
 
 
-def _in_fog(
-    index: SceneIndex,
-    geometry: Geometry,
-    encoder: Encoder,
-    lights: LightRows,
-    sphere: Ball,
-    scattered: NDArray[np.bool_] | None,
-) -> tuple[Integrator, str] | None:
+def _in_fog(lit: Lit) -> tuple[Integrator, str] | None:
     """The integrator where small lights are in media that scatter, None where they are not.
 
-    Near such a light much is scattered that the camera's paths find by chance alone.
+    Near such a light much is scattered that the camera's paths find by chance alone. Through much
+    fog light paths do not come to the camera. In little, what is near a light is lit by it alone,
+    which the camera's paths find, but around a spot lamp.
     """
-    if scattered is None or not scattered.any():
+    if not lit.extinction.any():
         return None
-    share = lights.power / max(lights.power.sum(), 1e-300)
-    small = [
-        (name, share[rows][scattered[rows]].sum())
-        for name, _, _, rows in _small_rows(index, geometry, encoder, lights, sphere)
-    ]
+    share = lit.lights.power / max(lit.lights.power.sum(), 1e-300)
+    bounds = light_bounds.concatenated(lit.lights.bounds)
+    spots = bounds.theta_o + bounds.theta_e < ALL_AROUND
+    eye = surroundings.camera_origin(lit.index.scene)
+    small = []
+    for name, place, _, rows in _small_rows(lit):
+        far = 0.0 if place is None else float(np.linalg.norm(place - eye))
+        depth = far * lit.extinction[rows]
+        pays = np.isnan(depth) | (depth > np.where(spots[rows], 0.0, THIN)) & (depth < DENSE)
+        small.append((name, share[rows][pays].sum()))
     power = sum(part for _, part in small)
     if power < FEW:
         return None
@@ -213,20 +218,17 @@ def _is_dull(material: mt.Material) -> bool:
     return not material.delta and not is_sharp(material)
 
 
-def _small_lights(
-    index: SceneIndex, geometry: Geometry, encoder: Encoder, lights: LightRows, sphere: Ball
-) -> Iterator[tuple[str, NDArray[np.float64] | None, float]]:
+def _small_lights(lit: Lit) -> Iterator[tuple[str, NDArray[np.float64] | None, float]]:
     """The names of small lights, where they are [m], and the share of all light that is theirs."""
-    for name, place, share, _ in _small_rows(index, geometry, encoder, lights, sphere):
+    for name, place, share, _ in _small_rows(lit):
         yield name, place, share
 
 
-def _small_rows(
-    index: SceneIndex, geometry: Geometry, encoder: Encoder, lights: LightRows, sphere: Ball
-) -> Iterator[tuple[str, NDArray[np.float64] | None, float, slice]]:
+def _small_rows(lit: Lit) -> Iterator[tuple[str, NDArray[np.float64] | None, float, slice]]:
     """The same, and their rows in `lights`."""
-    motions = index.motions
-    lamps, share = index.scene.lights, lights.power / max(lights.power.sum(), 1e-300)
+    motions, geometry = lit.index.motions, lit.geometry
+    encoder, lights, (middle, radius) = lit.encoder, lit.lights, lit.sphere
+    lamps, share = lit.index.scene.lights, lights.power / max(lights.power.sum(), 1e-300)
     for row, i in enumerate(row_order(lamps)):
         lamp = lamps[i]
         if isinstance(lamp, (Envmap, CubeMap)):
@@ -241,7 +243,6 @@ def _small_rows(
                 bounds = light_bounds.of_lamp(lamp)
                 place = motions.halfway(motions.lamps.get(i), (bounds.low + bounds.high)[0] / 2.0)
             yield f"lights[{i}]", place, float(share[row]), slice(row, row + 1)
-    middle, radius = sphere
     ends = (*lights.first, len(share))[1:]
     for emitter, first, end in zip(geometry.emitters, lights.first, ends, strict=True):
         area, place = _area_and_place(emitter, encoder)

@@ -21,6 +21,7 @@ from clpt.render.lowering.lights.lights import Emitter, LightRows, row_order
 from clpt.render.lowering.lowering_cache import LoweringCache
 from clpt.render.lowering.media import MediumWords
 from clpt.scene import Scene
+from clpt.scene.media import Lattice
 
 POINTS = 6  # of a shape that shines
 BEFORE = 1e-4  # how far before it they are, over its size
@@ -31,15 +32,15 @@ Around = tuple[Any, ...]  # media, or the matter of bodies
 
 class LightMedia(NamedTuple):
     """words: bodies and medium of each row of lights (2 n,) uint32; refusal: why no paths can start
-    at some light, "" if they can; scatter: of each row, whether its light is scattered, (n,)
-    bool."""
+    at some light, "" if they can; extinction: of each row, of the medium that scatters its light,
+    else 0 (n,) [1/m]; nan where its density is on a grid."""
 
     words: NDArray[np.uint32]
     refusal: str
-    scatter: NDArray[np.bool_]
+    extinction: NDArray[np.float64]
 
 
-NOWHERE = LightMedia(np.zeros(0, np.uint32), "", np.zeros(0, bool))
+NOWHERE = LightMedia(np.zeros(0, np.uint32), "", np.zeros(0))
 
 
 def light_media(
@@ -94,21 +95,28 @@ def light_media(
             reason = f"{shapes.where(emitter.shape)} shines into more than one medium"
             return NOWHERE._replace(refusal=reason)
         rows.append((into, end - first))
-    words, scatter = [], []
+    words, extinction = [], []
     for around, count in rows:
         if bodies is None:
             own = 0, media.word(next(iter(around), None))
         else:
             own = bodies.around(around, media)
         words += [own] * count
-        scatter += [_scatters(around)] * count
-    return LightMedia(np.array(words, np.uint32).ravel(), "", np.array(scatter, bool))
+        extinction += [_extinction(around)] * count
+    return LightMedia(np.array(words, np.uint32).ravel(), "", np.array(extinction))
 
 
-def _scatters(around: Around) -> bool:
-    """Whether a medium scatters light, which is the first, or that in the first bodies."""
+def _extinction(around: Around) -> float:
+    """The extinction of a medium, which is the first, or that in the first bodies [1/m].
+
+    0 of one that scatters no light, nan of one whose density is on a grid.
+    """
     media = (one[-1] if isinstance(one, tuple) else one for one in around[:1])
-    return any(medium is not None and medium.scatters for medium in media)
+    medium = next((one for one in media if one is not None and one.scatters), None)
+    if medium is None or isinstance(medium, Lattice):
+        return 0.0 if medium is None else float("nan")
+    both = [one.to_rgb("unbounded") for one in medium.coefficients(spectral=False)]
+    return float(np.mean(np.add(*both)))
 
 
 class _Known:
