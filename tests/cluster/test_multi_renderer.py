@@ -21,6 +21,7 @@ from clpt.render.film import film_file
 from clpt.scene import Scene
 from clpt.scene.integrators import Mitchell, ParticleTracer, Vcm
 from clpt.scene.integrators import Path as PathIntegrator
+from clpt.scene.motion import Shutter
 from tests.renders.support import with_film
 
 SPP = 12
@@ -377,15 +378,17 @@ def test_saved_films_go_on_on_one_device_and_on_several(
 
 
 def test_updates_reach_all_devices(scene, pair):
-    """The scene changes in each of the three ways, and twice by the key of the first scene."""
+    """The scene changes in each of the three ways, twice by the key of the first scene, and with
+    motion from what it was."""
     shape = scene.shapes[0]
     moved, further = np.eye(4), np.eye(4)
     moved[:3, 3], further[:3, 3] = (0.1, 0.2, 0.0), (0.2, -0.1, 0.1)
     camera = dataclasses.replace(scene.camera, fov=30.0)
+    open_ = dataclasses.replace(camera, shutter=Shutter(0.0, 1.0))
     brighter = dataclasses.replace(scene, shapes=scene.shapes[1:])
     changes = (
         {"camera": camera}, {"transforms": {shape: moved}}, {"transforms": {0: further}},
-        {"scene": brighter},
+        {"transforms": {0: moved}, "camera": open_, "motion": True}, {"scene": brighter},
     )  # fmt: skip
     with clpt.Renderer(scene) as one, clpt.MultiRenderer(scene, pair) as several:
         for change in changes:
