@@ -411,12 +411,13 @@ def test_updates_reach_all_devices(scene, pair):
 def test_updates_with_motion_reach_all_devices(scene, pair):
     place = np.eye(4)
     place[:3, 3] = (0.1, 0.2, 0.0)
+    still = next(i for i, shape in enumerate(scene.shapes) if shape.emission is None)
     scene = dataclasses.replace(
         scene, camera=dataclasses.replace(scene.camera, shutter=Shutter(0.0, 1.0))
     )
     with clpt.Renderer(scene) as one, clpt.MultiRenderer(scene, pair) as several:
         for changed in (one, several):
-            changed.update(transforms={0: place}, motion=True)
+            changed.update(transforms={still: place}, motion=True)
             changed.run(4)
         assert one.wavefronts[0].features.moving
         assert same(several.film_state(), one.film_state())
