@@ -61,6 +61,16 @@ def test_variance_falls_by_four_a_level_and_the_mean_stays() -> None:
     assert 0.7 / 16 < ratio < 1.4 / 16
 
 
+def test_a_scene_may_come_to_have_levels() -> None:
+    """As of a new renderer; the programs are those of the tests before."""
+    with clpt.Renderer(wall(SIZE // 4, "bilinear")) as renderer:
+        renderer.run(1)
+        renderer.update(scene=wall(SIZE // 4, "trilinear")).wait()
+        renderer.run(1)
+        found = renderer.image()[..., 1].astype(np.float64)
+    np.testing.assert_array_equal(found, picture(wall(SIZE // 4, "trilinear"), 1))
+
+
 def test_the_level_follows_the_formula() -> None:
     """Pixels of a width between two levels, against the mean of both over each pixel."""
     width = 48

@@ -134,7 +134,10 @@ class Features:
 
     @property
     def slabs(self) -> tuple[Record, ...]:
-        """The records of the state of paths, see clpt.records, as the scene has them."""
+        """The records of the state of paths, see clpt.records, as the scene's kernels have them.
+
+        Their memory is that of `SLABS`, so that it serves whatever a scene changes to.
+        """
         return (PATH if self.mips else PATH.without("cone"), HIT, SHADOW)
 
     @property

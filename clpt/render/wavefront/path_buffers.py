@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -14,7 +13,6 @@ from numpy.typing import NDArray
 from clpt import device
 from clpt.device.buffers import Buffers
 from clpt.errors import MemoryBudgetError
-from clpt.layout import Record
 from clpt.records import PATH, SLABS
 from clpt.render.wavefront import queues, work_list
 from clpt.render.wavefront.cells import CellGrid
@@ -104,8 +102,8 @@ class PathBuffers:
     settings: those of the lowered scene, of which this is a copy, with the numbers of slots and
     planes and the seed of the samples; pixels: how many have samples, with those around the
     picture; blocks: slots beyond those of the paths, see kernels/path/queue.cl; footprint: words of
-    what a slot sums around its pixel, see kernels/film/splatting.cl; slabs: the records of the
-    state of paths; stride: words from one stream of a slab to the next.
+    what a slot sums around its pixel, see kernels/film/splatting.cl; stride: words from one stream
+    of a slab to the next.
 
     Raises MemoryBudgetError.
     """
@@ -120,7 +118,6 @@ class PathBuffers:
         queued: bool,
         kinds: int,
         footprint: int,
-        slabs: Sequence[Record] = SLABS,
     ):
         self.stream, self.buffers = stream, buffers
         self._slots, self.slots = slots, slots.total
@@ -128,7 +125,7 @@ class PathBuffers:
         self.settings = self._with_slots(settings)
         self._read = np.zeros(len(COUNTERS), np.uint64)
         self._fixed: dict[str, Any] = {"stride": self.stride, "slots": self.slots}
-        for record in slabs:
+        for record in SLABS:
             name, size = f"{record.name.lower()}_words", 4 * record.words * self.stride
             buffer = buffers.allocate(name, size, "lower the number of slots")
             stream.fill(buffer, 0, 0, size)

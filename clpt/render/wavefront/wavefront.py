@@ -147,15 +147,7 @@ class Wavefront:
         share = strategy.loop_share(on)
         blocks = -(-divided.total // share) * on.lanes if share > on.lanes else 0  # one each
         in_flight = PathBuffers(
-            stream,
-            buffers,
-            settings,
-            divided,
-            blocks,
-            chosen.queued,
-            kinds,
-            footprint,
-            lowered.features.slabs,
+            stream, buffers, settings, divided, blocks, chosen.queued, kinds, footprint
         )
         return cls(scene, in_flight, looped, tuning)
 
