@@ -91,6 +91,11 @@ class Record:
         """Size in 4-byte words."""
         return sum(m.words for m in self.members)
 
+    def without(self, *names: str) -> Record:
+        """Return the record without members of these names."""
+        kept = [m for m in self.members if m.name not in names]
+        return Record(self.name, self.doc, **{m.name: (m.type, m.doc, m.nothing) for m in kept})
+
     @cached_property
     def dtype(self) -> np.dtype:
         """The record as a packed numpy structure."""

@@ -54,6 +54,7 @@ PATH = Record(
     high=("natural3", "highest words of these sums"),
     covered=("fixed", "weights of those samples that met a surface; of a film with alpha"),
     samples=("natural", "number of samples in these sums"),
+    cone=("integer", "cone around the ray, see kernels/path/cone.cl; of a scene with mip levels"),
 )
 
 HIT = Record(

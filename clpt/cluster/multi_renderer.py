@@ -240,6 +240,7 @@ class MultiRenderer(MultiFilm):
         transforms: Mapping[ShapeKey, Any] | None = None,
         vertices: Mapping[ShapeKey, Any] | None = None,
         scene: Scene | None = None,
+        motion: bool = False,
     ) -> None:
         """Bring what changed to all devices, and begin again at sample 0; see `Renderer.update`.
 
@@ -253,7 +254,7 @@ class MultiRenderer(MultiFilm):
                 renderer.shared = shared
                 renderer.update(
                     camera=camera, materials=materials, transforms=transforms, vertices=vertices,
-                    scene=scene,
+                    scene=scene, motion=motion,
                 ).wait()  # fmt: skip
 
             self._on_each(change)

@@ -50,8 +50,11 @@ class Solid(Texture):
 class Bitmap(Placed):
     """An image; v = 0 is its bottom row. Where a number is asked for it takes `channel`.
 
-    It has no smaller copies: what lies within a pixel is averaged by its samples, without the blur
-    of MIP maps. With few samples a pixel, fine textures far away are noisy.
+    A pixel's samples average what lies within it. That is exact, but noisy where few samples meet
+    fine textures far away. The filter "trilinear" takes smaller copies of the image there, its MIP
+    levels: less noise, but a blur where a surface is seen at a grazing angle. The pixel's width
+    grows along the path as a cone; rough surfaces widen it much, mirrors do not. Lights, masks,
+    blends, images of spectra in spectral mode and mappings other than "uv" take no copies.
     """
 
     image: ImageLike | None = host(
@@ -61,7 +64,12 @@ class Bitmap(Placed):
         form="image",
     )
     raw: bool = host(False, "True: values as they are, without the sRGB decoding of 8-bit files")
-    filter: str = choice("bilinear", "between texels", ("bilinear", "nearest"))
+    filter: str = choice(
+        "bilinear",
+        "between texels; trilinear: and between smaller copies where texels are smaller than what "
+        "is looked at",
+        ("bilinear", "nearest", "trilinear"),
+    )
     wrap: str = choice("repeat", "outside [0, 1]; zero: black, and no alpha", WRAPS)
     wrap_v: str | None = choice(None, "the same for v alone; none: as `wrap`", WRAPS)
     channel: str = choice(

@@ -22,6 +22,9 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     if (any(hidden)) {
         store_path_o(path, at, hidden, surface_offset(s, v.d));
         store_path_pdf(path, at, hidden, load_path_pdf(path, at) + v.t);
+#if USES_MIPS
+        store_path_cone(path, at, hidden, cone_word(v.cone));
+#endif
 #if WEIGHS_LIGHT_PATHS /* the light is in the way of what light paths bring to the camera */
         store_path_rival(path, at, hidden, (real)(0.0f));
 #endif
@@ -160,6 +163,9 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
 #endif
 
     vertex_leave(path, at, next, v, onward, beta);
+#if USES_MIPS
+    store_path_cone(path, at, next, cone_scattered(v.cone, bs.pdf, (bs.lobe & LOBE_DELTA) != 0));
+#endif
 #if !BSDF_IS_NULL
     path_scattered(path, at, next);
     mask delta = (bs.lobe & LOBE_DELTA) != 0;

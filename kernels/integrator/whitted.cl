@@ -56,6 +56,9 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     beta = spectrum_scale(beta, shading_frame_share(scatter.shading, onward));
     store_path_radiance(path, at, active, radiance);
     vertex_leave(path, at, next, v, onward, beta);
+#if USES_MIPS
+    store_path_cone(path, at, next, cone_word(v.cone));
+#endif
 #if !BSDF_IS_NULL
     store_path_pdf(path, at, next, (real)(-1.0f));
 #endif

@@ -1,5 +1,7 @@
 /* What integrators share at a vertex of a path: the ray that arrives, the surface that it meets, how the material
  * scatters there, and how the path goes on. The ray's throughput has been dimmed by what absorbs along it. */
+#include "path/cone.cl"
+
 typedef struct {
     vec3 o, d;            /* the ray that arrives; d of unit length */
     real t;               /* and its length [m] */
@@ -10,6 +12,9 @@ typedef struct {
     Surface s;
     mask front;           /* the front was hit */
     integer row;          /* of the material */
+#if USES_MIPS
+    Cone cone;            /* around the ray, here */
+#endif
 #if NAMES_SURFACES
     integer object, primitive, material; /* index in the scene's shapes, number in the shape, number of the material */
 #endif
@@ -58,6 +63,10 @@ inline Vertex vertex_load(Scene scene, Slab path, Slab hit, uint at, mask active
     v.front = mask_of(1);
 #else
     v.s = surface_load(scene, hit, at, active, v.o, v.d, &v.front);
+#endif
+#if USES_MIPS
+    v.cone = cone_after(load_path_cone(path, at), v.t);
+    v.s.footprint = cone_footprint(v.cone, v.d, v.s.n, v.s.dpdu, v.s.dpdv);
 #endif
     v.row = MATERIAL_ROW(sel_i(active, load_hit_material(hit, at), (integer)(0)));
 #if NAMES_SURFACES && BSDF_IS_PHASE

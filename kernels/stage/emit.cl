@@ -57,6 +57,9 @@ inline integer begin_light_path(Scene scene, Slab path, Slab shadow, uint at, ma
     s.size = r.size;
     store_path_o(path, at, go, sel3(r.away, r.o, surface_offset(s, r.d)));
     store_path_d(path, at, go, r.d);
+#if USES_MIPS
+    store_path_cone(path, at, go, (integer)(0));
+#endif
     store_path_lambdas(path, at, go, lambdas);
     store_path_beta(path, at, go, r.power);
     store_path_weight(path, at, go, 1.0f / max_r(strength, (real)(1e-30f)));

@@ -15,6 +15,7 @@
 #include "generated/lights.cl"
 #include "generated/medium.cl"
 #include "generated/merging.cl"
+#include "path/cone.cl"
 #include "path/path_end.cl"
 #include "path/met_light.cl"
 #include "generated/layer_sums.cl"
@@ -129,6 +130,17 @@ inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_i
 #else
     CameraRay ray = camera_ray(scene, position, lens, lambdas);
     Spectrum beta = camera_start();
+#endif
+#if USES_MIPS
+    vec2 beside = {position.x + 1.0f / to_real((integer)(settings->film_width)),
+                   position.y + 1.0f / to_real((integer)(settings->film_height))};
+#if CAMERA_WEIGHS
+    Spectrum unused;
+    CameraRay other = camera_weighted_ray(scene, beside, lens, lambdas, &unused);
+#else
+    CameraRay other = camera_ray(scene, beside, lens, lambdas);
+#endif
+    store_path_cone(path, at, go, cone_word(cone_of_pixel(ray.o, ray.d, other.o, other.d)));
 #endif
     store_path_o(path, at, go, ray.o);
     store_path_d(path, at, go, ray.d);

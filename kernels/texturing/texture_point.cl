@@ -1,6 +1,6 @@
 /* What a texture may look at: every loader of parameters gets it. What a scene's textures do not ask for
  * is never computed. USES_ATTRIBUTES: some texture reads what a mesh says per vertex or face. STOCHASTIC_FILTERING:
- * a random texel stands for some parameter of the material. */
+ * a random texel stands for some parameter of the material. USES_MIPS: some image has levels. */
 typedef struct {
     vec2 uv;
     vec3 p; /* in the world [m] */
@@ -11,6 +11,9 @@ typedef struct {
 #endif
 #if STOCHASTIC_FILTERING
     vec2 u; /* uniform numbers, which choose the texel */
+#endif
+#if USES_MIPS
+    real footprint; /* how wide what is looked at is, in units of uv; 0: a point */
 #endif
 } TexturePoint;
 
@@ -42,6 +45,9 @@ inline TexturePoint texture_point(vec2 uv, vec3 p)
     t.u.x = 0.0f;
     t.u.y = 0.0f;
 #endif
+#if USES_MIPS
+    t.footprint = 0.0f;
+#endif
     return t;
 }
 /* For what is on no surface. */
@@ -60,6 +66,9 @@ inline TexturePoint texture_point_sel(mask m, TexturePoint a, TexturePoint b)
     a.face = sel_i(m, a.face, b.face);
     a.b.x = sel(m, a.b.x, b.b.x);
     a.b.y = sel(m, a.b.y, b.b.y);
+#endif
+#if USES_MIPS
+    a.footprint = sel(m, a.footprint, b.footprint);
 #endif
     return a;
 }

@@ -21,6 +21,7 @@ from clpt.render.film import film_file
 from clpt.scene import Scene
 from clpt.scene.integrators import Mitchell, ParticleTracer, Vcm
 from clpt.scene.integrators import Path as PathIntegrator
+from clpt.scene.motion import Shutter
 from tests.renders.support import with_film
 
 SPP = 12
@@ -404,6 +405,22 @@ def test_updates_reach_all_devices(scene, pair):
         with pytest.raises(SceneError, match="no shape"):
             several.update(transforms={99: moved})
         assert len(several.devices) == 2
+
+
+@pytest.mark.slow
+def test_updates_with_motion_reach_all_devices(scene, pair):
+    place = np.eye(4)
+    place[:3, 3] = (0.1, 0.2, 0.0)
+    still = next(i for i, shape in enumerate(scene.shapes) if shape.emission is None)
+    scene = dataclasses.replace(
+        scene, camera=dataclasses.replace(scene.camera, shutter=Shutter(0.0, 1.0))
+    )
+    with clpt.Renderer(scene) as one, clpt.MultiRenderer(scene, pair) as several:
+        for changed in (one, several):
+            changed.update(transforms={still: place}, motion=True)
+            changed.run(4)
+        assert one.wavefronts[0].features.moving
+        assert same(several.film_state(), one.film_state())
 
 
 def test_what_makes_no_sense(scene, pair):

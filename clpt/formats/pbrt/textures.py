@@ -1,7 +1,7 @@
 """Textures of a PBRT scene: each becomes a Texture, or a plain value where it is constant.
 
-pbrt's images have v = 1 in their top row, as ours. It filters them with MIP maps, which the many
-samples of a pixel do here.
+pbrt's images have v = 1 in their top row, as ours. Those that ask for MIP levels have them; "ewa"
+has round footprints here.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from clpt.spectra import Spectrum
 
 IDENTITY_UV = np.eye(3)
 WRAPS = {"repeat": "repeat", "black": "zero", "clamp": "clamp", "octahedralsphere": "clamp"}
-FILTERS = {"point": "nearest", **dict.fromkeys(("bilinear", "trilinear", "ewa"), "bilinear")}
+FILTERS = {"point": "nearest", "bilinear": "bilinear", "trilinear": "trilinear", "ewa": "trilinear"}
 
 
 def textured(params: Parameters, name: str, role: str, state: State, default: Any = None) -> Any:

@@ -83,6 +83,7 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "USES_UVS": lambda f: f.uvs,
     "USES_TANGENTS": lambda f: f.tangents,
     "VERTEX_TANGENTS": lambda f: (f.tangents and f.vertex_tangents) or False,
+    "USES_MIPS": lambda f: f.mips,
     "USES_ATTRIBUTES": lambda f: f.attributes,
     "USES_ANALYTIC": lambda f: bool(f.analytic),
     "USES_INSTANCES": lambda f: f.instances,

@@ -6,7 +6,10 @@ kernel, the one that passes it on, and what the host binds.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from clpt import device
+from clpt.layout import Record
 from clpt.records import INSTANCE, LIGHT, SETTINGS, SHAPE, SLABS, TABLES
 from clpt.render.contract.features import Features
 
@@ -43,16 +46,16 @@ def virtual_files(features: Features, layout: str) -> dict[str, str]:
         "light_layer": (light_layer_args(features), True),
         "flight": (flight_args(features), True),
     }
-    files = {"generated/scene.cl": scene_text()}
+    files = {"generated/scene.cl": scene_text(features.slabs)}
     for name, (args, behind) in groups.items():
         rows = args_text(name.upper(), args, behind)
         files[f"generated/{name}_args.cl"] = "\n".join([*rows, ""])
     return files
 
 
-def scene_text() -> str:
+def scene_text(records: Sequence[Record] = SLABS) -> str:
     """Return records, the `Scene` struct and the macros that carry it through arguments."""
-    slabs = [record.slab_text() for record in SLABS]
+    slabs = [record.slab_text() for record in records]
     rows = [record.row_text() for record in (SHAPE, INSTANCE, LIGHT)]
     members = [
         f"    global const {element} *{name}; /* {doc} */"

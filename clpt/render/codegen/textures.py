@@ -9,6 +9,7 @@ from clpt.render.contract.texture_records import (
     END,
     IMAGES,
     KINDS,
+    MIPS,
     OPERANDS,
     OPERATIONS,
     PROGRAM,
@@ -45,6 +46,7 @@ def dispatch_text(
         f"#define USES_MAPPINGS {int(mappings)}",
         f"#define TEXTURE_PERMUTATION {RECORDS['spectral_bitmap'].words}",
     ]
+    used |= {level for kind, level in MIPS.items() if kind in used}
     if used & {"spectral_bitmap", "packed_bitmap"}:
         used.add("bitmap")  # whose file has their addressing
     present = [kind for kind in RECORDS if kind in used]
@@ -84,6 +86,7 @@ def _choice_lines(cls: type[Texture]) -> list[str]:
         f"#define {f'{cls.kind}_{name}_{choice}'.upper()} {number}"
         for name, param in device_params(cls).items()
         for number, choice in enumerate(param.choices)
+        if choice != "trilinear"  # which is a kind of its own in the kernels
     ]
 
 

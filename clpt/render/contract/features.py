@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+from clpt.layout import Record
+from clpt.records import HIT, PATH, SHADOW
+from clpt.render.contract.texture_records import MIPS
 from clpt.scene.layers import LAYERS, WORDS, Form
 from clpt.scene.params import device_params
 from clpt.scene.scatterer import Scatterer
@@ -123,6 +126,19 @@ class Features:
     spectra_size: int = 0
     spectra_step: float = 1.0
     sources: Sources = frozenset()
+
+    @property
+    def mips(self) -> bool:
+        """Whether some image has smaller copies, which the cones around rays choose."""
+        return not MIPS.keys().isdisjoint(self.textures)
+
+    @property
+    def slabs(self) -> tuple[Record, ...]:
+        """The records of the state of paths, see clpt.records, as the scene's kernels have them.
+
+        Their memory is that of `SLABS`, so that it serves whatever a scene changes to.
+        """
+        return (PATH if self.mips else PATH.without("cone"), HIT, SHADOW)
 
     @property
     def film_weights(self) -> bool:

@@ -79,9 +79,22 @@ RECORDS["spectral_bitmap"] = Record(
     number=("integer", "row in `spectra`: the number of the band by wavelength"),
 )
 
-IMAGES = ("bitmap", "packed_bitmap", "spectral_bitmap")  # of texels, between which is filtered
+_LEVELS = {
+    "levels": ("integer", "how many, that of the image itself among them"),
+    "table": ("integer", "first of three words of each in `textures`: first word, width, height"),
+}
 
-KINDS = (*RECORDS, "program")
+# kinds of images with smaller copies, by the kind that each level is
+MIPS = {"mip_bitmap": "bitmap", "packed_mip_bitmap": "packed_bitmap"}
+
+RECORDS["mip_bitmap"] = Record("MipBitmap", "Levels of floats.", **_IMAGE, **_LEVELS)
+
+RECORDS["packed_mip_bitmap"] = Record("PackedMipBitmap", "Levels of bytes.", **_IMAGE, **_LEVELS)
+
+# of texels, between which is filtered
+IMAGES = ("bitmap", "packed_bitmap", "spectral_bitmap", *MIPS)
+
+KINDS = (*(kind for kind in RECORDS if kind not in MIPS), "program", *MIPS)
 
 PROGRAM = KINDS.index("program")
 

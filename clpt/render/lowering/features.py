@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from clpt.render.contract import shape_records
 from clpt.render.contract.features import Features, disperses
+from clpt.render.contract.texture_records import MIPS
 from clpt.render.lowering.camera.cameras import dispersive_glasses
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.geometry.geometry import Geometry
@@ -41,7 +42,8 @@ def features_of(
     """
     scene, textures = index.scene, encoder.textures
     sources = encoder.sources
-    tangents = materials.tangents or index.normal_mapped
+    mips = any(kind in MIPS for kind, _ in textures.roles)
+    tangents = materials.tangents or index.normal_mapped or mips
     uvs = materials.uvs or geometry.uvs or tangents or "uv" in index.layers
     glass_lens = index.spectral and bool(dispersive_glasses(scene.camera))
     return Features(

@@ -84,6 +84,16 @@ def test_images(images):
     assert made.image == images / "a.tga" and not made.raw  # the encoding is for PNG only
     assert (made.wrap, made.filter) == ("zero", "nearest")
     assert make("imagemap", "float", images, filename=("string", "a.tga"))[0].channel == "r"
+    levels = {
+        None: "bilinear",
+        "bilinear": "bilinear",
+        "trilinear": "trilinear",
+        "ewa": "trilinear",
+    }
+    for given, expected in levels.items():
+        filter = {} if given is None else {"filter": ("string", given)}
+        made, warnings = make("imagemap", folder=images, filename=("string", "a.tga"), **filter)
+        assert made.filter == expected and not warnings
 
 
 def test_encodings_scale_and_invert(images):

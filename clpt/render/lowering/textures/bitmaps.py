@@ -2,6 +2,9 @@
 
 Images of 8 bits a channel stay small: a number takes a byte, a colour four bytes, or as a spectrum
 eight: its sigmoid's argument at three wavelengths, of 21 bits each. Other images are floats.
+
+An image with levels has its smaller copies behind it. They are means of linear values; where a
+colour becomes a spectrum, that of the mean colour.
 """
 
 from __future__ import annotations
@@ -20,7 +23,7 @@ from numpy.typing import NDArray
 from clpt import images, spectra
 from clpt.errors import SceneError
 from clpt.images import Stored
-from clpt.render.contract.texture_records import KINDS
+from clpt.render.contract.texture_records import KINDS, MIPS
 from clpt.render.lowering.device_arrays import on_host
 from clpt.render.lowering.lowering_cache import LoweringCache, version
 from clpt.render.lowering.tables import TableStore, Words
@@ -83,10 +86,14 @@ class _Pixels:
 
 @dataclass
 class _Packed:
-    """The words of an image, a view of the table once that is joined; its height and width."""
+    """The words of an image, a view of the table once that is joined; its height and width.
+
+    levels: first word, width and height of each of its levels, the image itself the first; (n, 3).
+    """
 
     words: Words
     size: tuple[int, ...]
+    levels: NDArray[np.int64] | None = None
 
 
 @dataclass
@@ -98,6 +105,10 @@ class _Image:
     pixels: _Pixels
     rows: list[np.ndarray] = field(default_factory=list)
     halvings: int = 0
+
+    @property
+    def has_levels(self) -> bool:
+        return has_levels(self.texture, self.role)
 
 
 class Images:
@@ -120,7 +131,9 @@ class Images:
 
         Raises SceneError for what is no image.
         """
-        key: Any = (identity(texture), texture.raw, role, role == "real" and texture.channel)
+        channel_of = role == "real" and texture.channel
+        levels = has_levels(texture, role)
+        key: Any = (identity(texture), texture.raw, role, channel_of, levels)
         if key not in self._wanted:
             spectral = spectral_image(texture, role)
             image = texture.image if spectral is None else spectral.to_rgb()
@@ -146,10 +159,13 @@ class Images:
                 texture.channel,
                 halvings,
                 self.spectral,
+                image.has_levels,
             )
             packed: _Packed = self.cache(Images._words, self, image, by=by)
             height, width = packed.size
             kind = "packed_bitmap" if bytes_ else "bitmap"
+            if image.has_levels:
+                kind = next(name for name, level in MIPS.items() if level == kind)
             if store.size("images") + packed.words.size > LARGEST:
                 raise SceneError("all images together have too many texels", where="bitmap.image")
             curved = form.encoded and not image.texture.raw and not _is_alpha(image)
@@ -160,6 +176,11 @@ class Images:
             self._placed.append((first, packed))
             for row in image.rows:
                 row["first"] = first
+            if packed.levels is not None:
+                table = np.add(packed.levels, (first, 0, 0)).astype(np.uint32)
+                at = store.append("textures", table.reshape(-1))
+                for row in image.rows:
+                    row["levels"], row["table"] = len(table), at
             roles.add((kind, image.role))
         for image in wanted:
             image.pixels.let_go()
@@ -172,13 +193,23 @@ class Images:
             packed.words = table[first : first + packed.words.size]
 
     def _words(self, image: _Image) -> _Packed:
-        """The words of an image, row by row from the top."""
-        texture, role, stored = image.texture, image.role, image.pixels.stored
+        """The words of an image, level by level, of each row by row from the top."""
+        texture, stored = image.texture, image.pixels.stored
         packs = _packs(image.pixels.form, image, self.spectral)
         values, curved = _shaped(stored.values), stored.encoded and not texture.raw
         if image.halvings:
             values = _halved(values, curved, image.halvings)
-        size = values.shape[:2]
+        if not image.has_levels:
+            return self._level(image, values, curved, packs)
+        made = [self._level(image, one, curved, packs) for one in _levels(values, curved)]
+        firsts = np.cumsum([0, *(one.words.size for one in made[:-1])])
+        table = [(at, one.size[1], one.size[0]) for at, one in zip(firsts, made, strict=True)]
+        words = np.concatenate([one.words for one in made])
+        return _Packed(words, made[0].size, np.array(table, np.int64))
+
+    def _level(self, image: _Image, values: NDArray[Any], curved: bool, packs: bool) -> _Packed:
+        """The words of one size of an image; curved, packs: of its bytes."""
+        texture, role, size = image.texture, image.role, values.shape[:2]
         if role == "real" and packs:
             number = "rgba".find(texture.channel) if values.shape[2] > 1 else 0
             if texture.channel == "a" and values.shape[2] < 4:
@@ -232,6 +263,11 @@ def identity(texture: Bitmap) -> Any:
     return str(image) if isinstance(image, (str, Path)) else id(image)
 
 
+def has_levels(texture: Bitmap, role: str) -> bool:
+    """Return whether an image has smaller copies in a role: lights are sampled by the image."""
+    return texture.filter == "trilinear" and role != "emission"
+
+
 @cache
 def _pool(process: int) -> ThreadPoolExecutor:
     """The threads of a process, by its id: those of a parent do not come along when it forks."""
@@ -275,10 +311,13 @@ def _size(image: _Image, spectral: bool) -> int:
     height, width = (max(1, -(-n >> image.halvings)) for n in form.shape[:2])
     packed = _packs(form, image, spectral)
     if image.role == "real":
-        return height * width * (1 if packed else 4)
-    if packed:
-        return height * width * (8 if spectral else 4)
-    return height * width * (16 if spectral else 12)
+        texel = 1 if packed else 4
+    elif packed:
+        texel = 8 if spectral else 4
+    else:
+        texel = 16 if spectral else 12
+    sizes = _level_sizes(height, width) if image.has_levels else [(height, width)]
+    return sum(h * w for h, w in sizes) * texel
 
 
 def _note(image: _Image) -> str:
@@ -302,6 +341,42 @@ def _halved(values: NDArray[Any], curved: bool, times: int) -> NDArray[Any]:
         made = np.pad(made, (*odd, (0, 0)), "edge")
         made = made if made.shape[0] == 1 else 0.5 * (made[0::2] + made[1::2])
         made = made if made.shape[1] == 1 else 0.5 * (made[:, 0::2] + made[:, 1::2])
+    return _stored_as(values, made, curved)
+
+
+def _level_sizes(height: int, width: int) -> list[tuple[int, int]]:
+    """The heights and widths of an image's levels: halves, rounded down, until there is 1 texel."""
+    count = max(height, width).bit_length()
+    return [(max(height >> i, 1), max(width >> i, 1)) for i in range(count)]
+
+
+def _levels(values: NDArray[Any], curved: bool) -> list[NDArray[Any]]:
+    """An image (h, w, c) and its smaller copies: a texel is the mean of linear light over its part
+    of the level before, to which texels count by their share, so that each copy has its mean."""
+    made, found = Stored(values, curved).decoded(), [values]
+    for height, width in _level_sizes(*values.shape[:2])[1:]:
+        made = _means(_means(made, height).swapaxes(0, 1), width).swapaxes(0, 1)
+        found.append(_stored_as(values, made, curved))
+    return found
+
+
+def _means(values: NDArray[Any], count: int) -> NDArray[Any]:
+    """Means of `count` equal parts of the first axis."""
+    n = len(values)
+    if n == count:
+        return values
+    if n == 2 * count:
+        return 0.5 * (values[0::2] + values[1::2])
+    edges = np.arange(count + 1) * (n / count)
+    sums = np.concatenate([np.zeros_like(values[:1], np.float64), values.cumsum(0, np.float64)])
+    below = np.minimum(edges.astype(int), n - 1)
+    share = (edges - below).reshape(-1, *(1,) * (values.ndim - 1))
+    at = sums[below] + share * values[below]
+    return ((at[1:] - at[:-1]) * (count / n)).astype(values.dtype)
+
+
+def _stored_as(values: NDArray[Any], made: NDArray[Any], curved: bool) -> NDArray[Any]:
+    """Linear values in the form of `values`: encoded if curved, bytes if those are bytes."""
     stored = images.linear_to_srgb(made) if curved else made
     if values.dtype != np.uint8 and not curved:
         return made

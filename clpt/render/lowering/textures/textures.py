@@ -17,7 +17,7 @@ from clpt.render.contract.texture_records import KINDS, PROGRAM, RECORDS
 from clpt.render.lowering.spectra_table import SpectraTable
 from clpt.render.lowering.tables import TableStore
 from clpt.render.lowering.textures import noise
-from clpt.render.lowering.textures.bitmaps import Images, identity
+from clpt.render.lowering.textures.bitmaps import Images, has_levels, identity
 from clpt.render.lowering.textures.texels import bands, spectral_image
 from clpt.render.lowering.textures.texture_programs import folded, is_composite, program, separated
 from clpt.scene.params import params
@@ -179,16 +179,17 @@ def _checkerboard(
 
 def _bitmap(texture: Bitmap, role: str, table: TextureTable) -> int:
     """Append a bitmap's row; unless it is one of spectra, its image comes when all are known."""
-    filters = params(Bitmap)["filter"].choices
+    filters, smooth = params(Bitmap)["filter"].choices, texture.filter == "trilinear"
     members = {
         **_uv(texture, table, down=True),
-        "filter": filters.index(texture.filter),
+        "filter": filters.index("bilinear" if smooth else texture.filter),
         "wrap_u": WRAPS.index(texture.wrap),
         "wrap_v": WRAPS.index(texture.wrap_v or texture.wrap),
     }
     spectral = spectral_image(texture, role) if table.spectra.spectral and role != "real" else None
     if spectral is None:
-        at, row = table.append_row("bitmap", members)
+        kind = "mip_bitmap" if has_levels(texture, role) else "bitmap"
+        at, row = table.append_row(kind, members)
         table.images.add(texture, role, row)
         return at
     values, number = bands(spectral, *table.spectra.range)

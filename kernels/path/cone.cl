@@ -1,0 +1,55 @@
+/* The cone around a path's ray, by whose width images choose among their levels (Akenine-Moller et al. 2019, "Texture
+ * Level of Detail Strategies for Real-Time Ray Tracing"). It begins as wide as a pixel. A lobe that it is scattered by
+ * widens it, the more the lower the density of the sampled direction; a mirror keeps it, curved or not. A cone without
+ * width asks for the images themselves: so have paths from lights. */
+#if USES_MIPS
+typedef struct {
+    real width;  /* [m] */
+    real spread; /* what it grows by, per metre */
+} Cone;
+
+#define CONE_SHARE 0.25f  /* of the width of a lobe: what differs within it is averaged by samples */
+#define CONE_WIDEST 0.4f  /* what a lobe adds at most, as a diffuse one does */
+#define CONE_UPPER ((int)0xffff0000) /* bits of a float that are kept */
+
+/* The word of Path.cone: 16 bits each, which keep 8 bits of the mantissa. */
+inline integer cone_word(Cone c)
+{
+    integer width = as_integer(min_r(c.width, (real)(1e30f))) + 0x8000, spread = as_integer(c.spread) + 0x8000;
+    return (width & CONE_UPPER) | ((spread >> 16) & 0xffff);
+}
+
+/* The cone t metres along its ray. */
+inline Cone cone_after(integer word, real t)
+{
+    Cone c;
+    c.spread = as_real(word << 16);
+    c.width = as_real(word & CONE_UPPER) + c.spread * t;
+    return c;
+}
+
+/* A camera's ray and one that begins a pixel's side farther, both along x and along y of the film. */
+inline Cone cone_of_pixel(vec3 o, vec3 d, vec3 beside_o, vec3 beside_d)
+{
+    vec3 from = sub3(beside_o, o), turned = sub3(beside_d, d);
+    Cone c = {sqrt(0.5f * dot3(from, from)), sqrt(0.5f * dot3(turned, turned))};
+    c.spread = clamp_r(c.spread, (real)(0.0f), (real)(CONE_WIDEST));
+    return c;
+}
+
+/* The cone behind a surface or in a medium that scatters it: word for Path.cone. */
+inline integer cone_scattered(Cone c, real pdf, mask delta)
+{
+    real wider = min_r(CONE_SHARE / sqrt(max_r(pdf, (real)(1e-6f))), (real)(CONE_WIDEST));
+    c.spread = min_r(c.spread + sel(delta, (real)(0.0f), wider), (real)(1.0f));
+    return cone_word(c);
+}
+
+/* The longer axis of its section with a surface, in units of the surface's uv; 0 where that has none. */
+inline real cone_footprint(Cone c, vec3 d, vec3 n, vec3 dpdu, vec3 dpdv)
+{
+    vec3 across = cross3(dpdu, dpdv);
+    real area = sqrt(dot3(across, across)), cosine = max_r(fabs(dot3(n, d)), (real)(1e-3f));
+    return sel(area > 0.0f, c.width / (cosine * sqrt(max_r(area, (real)(1e-30f)))), (real)(0.0f));
+}
+#endif
