@@ -14,6 +14,7 @@ import clpt
 from clpt import transforms
 from clpt.errors import SceneError
 from clpt.render.lowering import motion
+from clpt.render.lowering.geometry.tubes import as_tubes
 from clpt.render.lowering.scene import lower
 from clpt.scene import Scene, cameras, integrators, lights, materials, media, shapes, textures
 from clpt.scene.motion import Deformation, Keys, Shutter, decomposed, rotation
@@ -134,7 +135,7 @@ CHECKED = dataclasses.replace(
     ),
     motion=turn([0, 0.3, 1], 60),
 )
-HAIR = shapes.Curves(
+STRANDS = shapes.Curves(
     points=(STRAND := np.array([[x, y, 0, 0.08] for x in (-0.6, 0, 0.6) for y in (-1, 0, 0.5, 1)])),
     lengths=(4, 4, 4),
     material=GREY,
@@ -142,6 +143,7 @@ HAIR = shapes.Curves(
         [0.0, 1.0], [STRAND, STRAND + np.outer(STRAND[:, 1] ** 2, [0.5, 0, 0.2, 0.02])]
     ),
 )
+HAIR = as_tubes(STRANDS)  # as which rays meet what deforms, at rest too
 SHARED = shapes.Group(
     shapes=(
         dataclasses.replace(BENT, to_world=transforms.scale(0.4), material=GREY),
@@ -386,8 +388,9 @@ def check_case(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", sorted(CASES.keys() - {"zoom"}))
 def test_a_picture_is_the_mean_of_still_ones(name: str) -> None:
+    """Of all but a camera that scales: at rest a pinhole must not."""
     check_case(name, stills=64, spp=512, runs=4)
 
 
