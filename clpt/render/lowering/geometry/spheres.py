@@ -77,7 +77,7 @@ def rows(shape: Shape, placed: Balls) -> shapes.Words:
 
 
 def swept(placed: Balls) -> NDArray[np.float32]:
-    """Return a box (n, 2, 3) around the way of each sphere (n, k, 4): all is linear between keys."""
+    """Return a box (n, 2, 3) around the way of each sphere (n, k, 4), linear between keys."""
     at_all = np.stack([boxes([placed[:, key]]) for key in range(placed.shape[1])])
     return np.stack([at_all[:, :, 0].min(axis=0), at_all[:, :, 1].max(axis=0)], axis=1)
 
