@@ -78,8 +78,9 @@ class Keys:
 class Deformation:
     """Points that move by themselves: where each is at times [s], linear in between.
 
-    points: (k, n, 3) for k times and n vertices of a mesh, (k, n, 4) for points of curves with the
-    radii. normals: (k, n, 3) of a mesh's vertices, or None. Both become float32.
+    points: (k, n, 3) for k times and n vertices of a mesh, (k, n, 4) for points of curves and for
+    many spheres with the radii, which spheres may do without.
+    normals: (k, n, 3) of a mesh's vertices, or None. Both become float32.
     Before the first time and after the last one nothing moves.
 
     Raises SceneError for times that do not ascend, arrays of other shapes, and values that are not

@@ -127,6 +127,9 @@ class Spheres(Shape):
     attributes: Any = host(
         {}, "name that begins with vertex_ -> (n, 1 or 3) float32, per sphere", form="attributes"
     )
+    deformation: Deformation | None = host(
+        None, "where the spheres are at times, perhaps with radii; None: still", form="deformation"
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -71,7 +71,7 @@ inline integer layers_record(Scene scene, Slab path, uint at, LAYER_ARGS, mask m
 #else
     integer mover = v.object;
 #endif
-#if MOVES_VERTICES
+#if MOVES_VERTICES || MOVES_SPHERES
     vec3 first_p = add3(v.s.p, v.s.to_open), last_p = add3(v.s.p, v.s.to_close);
 #else
     vec3 first_p = v.s.p, last_p = v.s.p;

@@ -22,7 +22,7 @@ typedef struct {
 #if USES_MIPS
     real footprint; /* of the path's cone, see texturing/texture_point.cl */
 #endif
-#if SCREEN_MOTION && MOVES_VERTICES
+#if SCREEN_MOTION && (MOVES_VERTICES || MOVES_SPHERES)
     vec3 to_open, to_close; /* from p to where what deforms has the point when the shutter opens, closes [m] */
 #endif
 } Surface;
@@ -97,9 +97,11 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
     mask placed = active & (h.instance > 0);
     InstanceFrame space = instance_frame(scene, placed, h.instance);
 #endif
-#if SCREEN_MOTION && MOVES_VERTICES
+#if SCREEN_MOTION && (MOVES_VERTICES || MOVES_SPHERES)
     s.to_open = v3(0.0f, 0.0f, 0.0f);
     s.to_close = s.to_open;
+#endif
+#if SCREEN_MOTION && MOVES_VERTICES
     mask deforms = active & ((shape.flags & SHAPE_DEFORMS) != 0);
     if (any(deforms)) {
         integer number = sel_i(deforms, shape.number, (integer)(0)), face = sel_i(deforms, prim, (integer)(0));
@@ -201,6 +203,23 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
 #else
         s.p = sel3(analytic, onto_of_shape(scene, shape, prim, madd3(d, h.t, o)), s.p);
 #endif
+#if SCREEN_MOTION && MOVES_SPHERES
+        mask spheres = analytic & ((shape.flags & SHAPE_MANY) != 0);
+        global const float *opens = scene.distributions + as_int(scene.distributions[MOTION_ROW]);
+#if MOVES_SHAPES
+        vec3 on = rest;
+#else
+        vec3 on = s.p;
+#endif
+        vec3 first_way = spheres_way(scene, shape, prim, spheres, on, (real)(opens[1]));
+        vec3 last_way = spheres_way(scene, shape, prim, spheres, on, (real)(opens[1] + opens[2]));
+#if MOVES_SHAPES
+        first_way = motion_vector(motion, first_way);
+        last_way = motion_vector(motion, last_way);
+#endif
+        s.to_open = sel3(spheres, first_way, s.to_open);
+        s.to_close = sel3(spheres, last_way, s.to_close);
+#endif
         s.size = sel(analytic, size_of_shape(scene, shape, prim), s.size);
 #if USES_TANGENTS
 #if MOVES_SHAPES
@@ -247,7 +266,7 @@ inline Surface surface_of_point(vec3 p)
     s.face = 0;
     s.b = s.uv;
 #endif
-#if SCREEN_MOTION && MOVES_VERTICES
+#if SCREEN_MOTION && (MOVES_VERTICES || MOVES_SPHERES)
     s.to_open = s.n;
     s.to_close = s.n;
 #endif

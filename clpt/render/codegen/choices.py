@@ -81,7 +81,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/instances.cl": lambda f, _: ("tracing/instances.cl",) * f.instances,
     "generated/motion.cl": lambda f, _: (
         ("tracing/motion.cl",) * bool(f.moving)
-        + ("tracing/vertex_keys.cl",) * ("vertices" in f.moving)
+        + ("tracing/vertex_keys.cl",) * bool({"vertices", "spheres"} & {*f.moving})
     ),
     "generated/keyed_layout.cl": lambda f, layout: (
         (f"bvh/{layout}_keyed.cl",) * ("vertices" in f.moving and layout != "brute")

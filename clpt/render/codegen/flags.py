@@ -93,6 +93,7 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "MOVES_CAMERA": lambda f: f.lit_ghosts and "camera" in f.moving,
     "MOVES_INSTANCES": lambda f: "instances" in f.moving,
     "MOVES_VERTICES": lambda f: "vertices" in f.moving,
+    "MOVES_SPHERES": lambda f: "spheres" in f.moving,
     "MOVES_SHAPES": lambda f: "shapes" in f.moving,
     "MOTION_SCALES": lambda f: f.motion_scales,
     "MOTION_ROW": lambda f: bool(f.moving) and f.motion_row,

@@ -31,16 +31,17 @@ def hit_text(features: Features) -> str:
     moved = _at_rest(word["number"], none) if moves else []
     back = _in_motion() if moves else [none]
     curves = "curves" in features.analytic
+    number = f"(integer)((int)shape[{word['number']}])"
     piece = f"scene.spheres + (int)gather_i(scene.geometry, params + {_FIRST}) + CURVE_WORDS * prim"
     beside = f"if (kind == {_number('curves')} && curve_beside({piece}, o, d)) return none;"
     cases = [beside] * curves + [
         f"if (kind == {_number(kind)}) {answer} {ONE_OF.get(kind, kind)}_intersect("
-        f"{_row_text(kind, 'params')}, o, d, tmin, tmax);"
+        f"{_row_text(features, kind, 'params', number)}, o, d, tmin, tmax);"
         for kind in features.analytic
     ]
     many = len(ONE_OF.keys() & set(features.analytic))
     # What moves by itself needs its own row to be met too.
-    rows = ("single", "many", "mixed")[2 if many and moves else many]
+    rows = ("single", "many", "mixed")[2 if many and (moves or _keyed(features)) else many]
     signature = (
         "ShapeHit shape_hit(Scene scene, int prim, int row, vec3 o, vec3 d, real tmin, real tmax)"
     )
@@ -96,11 +97,12 @@ def _of_shape(features: Features, type_: str, verb: str, *parameters: str) -> st
     """Return `<verb>_of_shape`, which chooses among `<kind>_<verb>` of the scene's kinds."""
     head = ", ".join(("Scene scene", "ShapeRow shape", "integer prim", *parameters))
     names = [parameter.split()[-1] for parameter in parameters]
+    at = active("shape.params"), active("shape.number")
     cases = [
         Case(
             f"shape.kind == {_number(kind)}",
             f"{ONE_OF.get(kind, kind)}_{verb}"
-            f"({', '.join((_row_text(kind, active('shape.params'), 'm'), *names))})",
+            f"({', '.join((_row_text(features, kind, *at, 'm'), *names))})",
         )
         for kind in features.analytic
     ]
@@ -109,7 +111,16 @@ def _of_shape(features: Features, type_: str, verb: str, *parameters: str) -> st
 
 
 def _includes(features: Features) -> str:
-    return "".join(f'#include "generated/shape/{kind}.cl"\n' for kind in features.analytic)
+    files = "".join(f'#include "generated/shape/{kind}.cl"\n' for kind in features.analytic)
+    if not _keyed(features):
+        return files
+    first = f"#define SPHERES_FIRST {ROWS['sphere'].words}\n"
+    return f'{files}{first}#include "generated/motion.cl"\n#include "shape/spheres_keyed.cl"\n'
+
+
+def _keyed(features: Features) -> bool:
+    """Whether many spheres in one shape have a row for each key."""
+    return "spheres" in features.moving
 
 
 def _number(kind: str) -> int:
@@ -117,8 +128,12 @@ def _number(kind: str) -> int:
     return 1 + ANALYTIC.index(kind)
 
 
-def _row_text(kind: str, params: str, mask: str = "mask_of(1)") -> str:
+def _row_text(
+    features: Features, kind: str, params: str, number: str, mask: str = "mask_of(1)"
+) -> str:
     """The parameters of primitive `prim`, which lie at `params` or, of many in one, beside it."""
+    if kind == "spheres" and _keyed(features):
+        return f"spheres_then(scene, {params}, prim, {number}, scene.time, {mask})"
     if kind in ONE_OF:
         return f"{kind}_one(scene, {params}, prim, {mask})"
     return f"{kind}_row(scene.geometry, {params})"

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clpt.errors import SceneError
 from clpt.render.lowering.device_arrays import on_host
@@ -14,7 +15,7 @@ from clpt.scene import Scene
 from clpt.scene.motion import Deformation, Shutter, placement, through
 from clpt.scene.shapes import Curves, Group, Instance, Mesh, Spheres
 
-POINTS = ((Mesh, "vertices"), (Curves, "points"))
+POINTS = ((Mesh, "vertices"), (Curves, "points"), (Spheres, "centers"))
 
 
 def between(former: Scene, scene: Scene) -> tuple[Scene, list[str]]:
@@ -74,15 +75,13 @@ class _Way:
 
     def deformed(self, old: Any, new: Any) -> Any:
         """A shape with keys of its points, if these are others than before."""
-        if isinstance(new, Spheres) and getattr(old, "centers", None) is not new.centers:
-            self.warnings.append(f"{shapes.where(new)}: its centers do not move, they are as now")
         kind, name = next((x for x in POINTS if isinstance(new, x[0])), (None, ""))
         if kind is None or not isinstance(old, kind) or new.deformation is not None:
             return new
         was, now = getattr(old, name), getattr(new, name)
-        if was is now:
+        if was is now and getattr(old, "radii", None) is getattr(new, "radii", None):
             return new
-        first, last = (np.asarray(on_host(values), np.float32) for values in (was, now))
+        first, last = (_points(one, name) for one in (old, new))
         if np.array_equal(first, last):
             return new
         if first.shape != last.shape or new.emission is not None:
@@ -106,6 +105,15 @@ class _Way:
         except SceneError as error:
             self.warnings.append(f"{name}: does not move: {error}")
             return new
+
+
+def _points(shape: Any, name: str) -> NDArray[np.float32]:
+    """The points of a shape on the host, of spheres with the radii (n, 4)."""
+    points = np.asarray(on_host(getattr(shape, name)), np.float32)
+    if not isinstance(shape, Spheres) or points.ndim != 2 or points.shape[1] != 3:
+        return points
+    radii = np.asarray(on_host(shape.radii), np.float32)
+    return np.column_stack([points, np.broadcast_to(radii, len(points))])
 
 
 def _read(thing: Any) -> Any:

@@ -118,6 +118,8 @@ class Moving:
             raise CannotMove("shapes move while the shutter is open")
         if "vertices" in self.target.lowered.features.moving:
             raise CannotMove("vertices move while the shutter is open")
+        if "spheres" in self.target.lowered.features.moving:
+            raise CannotMove("spheres move by themselves while the shutter is open")
         numbers = {id(shape): number for number, shape in enumerate(scene.shapes)}
         actions: list[Action] = []
         instances: list[tuple[int, Shape]] = []

@@ -7,7 +7,7 @@ from clpt.render.contract.features import Features, disperses
 from clpt.render.contract.texture_records import MIPS
 from clpt.render.lowering.camera.cameras import dispersive_glasses
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.geometry.geometry import Geometry
+from clpt.render.lowering.geometry.geometry import Geometry, spheres_move
 from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.lights.lights import LightRows
 from clpt.render.lowering.materials.material_words import MaterialWords
@@ -120,7 +120,12 @@ def features_of(
 def _few(index: SceneIndex, geometry: Geometry) -> int:
     """Return how many instances there are, if so few that a tree over them does not pay."""
     count = len(geometry.instances.rows)
-    return count if index.motions.deforming and count <= FEW_INSTANCES else 0
+    return count if _keyed(geometry) and count <= FEW_INSTANCES else 0
+
+
+def _keyed(geometry: Geometry) -> bool:
+    """Whether vertices have a row for each of several keys."""
+    return any(count > 1 for count in geometry.keys.values())
 
 
 def moving_parts(index: SceneIndex, geometry: Geometry) -> tuple[str, ...]:
@@ -135,6 +140,7 @@ def moving_parts(index: SceneIndex, geometry: Geometry) -> tuple[str, ...]:
         "instances": bool(placed & numbers),
         "shapes": bool(analytic & numbers),
         "lights": bool(motions.lamps) or bool(lit & numbers),
-        "vertices": any(count > 1 for count in geometry.keys.values()),
+        "vertices": _keyed(geometry),
+        "spheres": spheres_move(index),
     }
     return tuple(name for name, moves in found.items() if moves)

@@ -89,6 +89,7 @@ def lower_geometry(index: SceneIndex, encoder: Encoder, materials: MaterialWords
     others.sort(key=lambda one: one.shape.kind in many and 1 + many.index(one.shape.kind))
     single = [one for one in others if one.shape.kind not in shape_records.ONE_OF]
     builder = _Builder(encoder, materials, len(single), index.motions)
+    builder.spheres_move = spheres_move(index)
     for one in meshes:
         builder.add(one)
     world_vertices = builder.vertex_count
@@ -130,6 +131,12 @@ def lower_geometry(index: SceneIndex, encoder: Encoder, materials: MaterialWords
     )
 
 
+def spheres_move(index: SceneIndex) -> bool:
+    """Whether many spheres in one shape belong to something that deforms."""
+    deforming = index.motions.deforming
+    return any(one.shape.kind == "spheres" and one.number in deforming for one in index.placed)
+
+
 @dataclass
 class _Builder:
     """What `lower_geometry` has put into the tables so far."""
@@ -151,6 +158,7 @@ class _Builder:
     uvs: bool = False
     tangents: list[tuple[int, np.ndarray]] = field(default_factory=list)
     keys: dict[int, int] = field(default_factory=dict)
+    spheres_move: bool = False
 
     def add(self, one: Placed, times: Sequence[float] = ()) -> None:
         """Append a shape's row; its triangles, or its parameters, go into the tables.
@@ -174,7 +182,7 @@ class _Builder:
             else:
                 row["params"] = self.encoder.store.append("geometry", analytic.row(shape))
                 if shape.kind in shape_records.ONE_OF:
-                    corners = self._add_balls(shape, row)
+                    corners = self._add_balls(shape, row, self.motions.deforming.get(one.number))
         if shape.emission is not None:
             self.emitters.append(Emitter(shape, len(self.rows), *corners))
             values = vars(shape.emission).values()
@@ -187,13 +195,28 @@ class _Builder:
             return np.asarray(boxes, np.float32)
         return self.motions.swept(one.number, boxes)
 
-    def _add_balls(self, shape: Any, row: np.ndarray) -> tuple[Any, Any, Any]:
-        """Append many spheres; return them in the place of vertices."""
+    def _add_balls(
+        self, shape: Any, row: np.ndarray, times: tuple[float, ...] | None
+    ) -> tuple[Any, Any, Any]:
+        """Append many spheres; return them in the place of vertices.
+
+        times: at which they have rows, for what belongs to something that deforms.
+        """
         row["prim"] = self.single_count + sum(map(len, self.many))
         row["flags"] |= SHAPE_MANY
-        balls = self.encoder.cache(spheres.balls, shape, by=shapes.geometry(shape))
-        self.many.append(spheres.boxes([balls]))
-        self.encoder.store.append_floats("spheres", balls)
+        store, by = self.encoder.store, shapes.geometry(shape)
+        if times:
+            keyed = self.encoder.cache(spheres.keyed, shape, times, by=(*by, times))
+            self.many.append(spheres.swept(keyed))
+            at, balls = store.append_floats("spheres", keyed), keyed[:, 0]
+        else:
+            balls = self.encoder.cache(spheres.balls, shape, by=by)
+            self.many.append(spheres.boxes([balls]))
+            at = store.append_floats("spheres", balls)
+        if self.spheres_move:
+            # where primitive 0 would be
+            first = at - balls.shape[1] * len(times or (0.0,)) * int(row["prim"])
+            store.append("geometry", np.array([first], np.int32).view(np.uint32))
         return balls, None, None
 
     def _add_curves(self, shape: Any, row: np.ndarray) -> None:

@@ -1,7 +1,8 @@
 """Many spheres in one shape, on their way to the device: all at once, not one by one.
 
 One row of `shapes` stands for all of them, one row of `geometry` says how they are turned, and the
-table `spheres` has four words for each: centre and radius in the world.
+table `spheres` has four words for each: centre and radius in the world. Where spheres move by
+themselves there are so many rows for each key, and a word behind the row of `geometry` says where.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.errors import SceneError
 from clpt.render.lowering.device_arrays import on_host
-from clpt.render.lowering.geometry import analytic, shapes
+from clpt.render.lowering.geometry import analytic, shapes, triangles
 from clpt.scene.shapes import Shape, Spheres
 
 Balls = NDArray[np.float32]  # (n, 4): centre and radius
@@ -47,6 +48,20 @@ def balls(shape: Spheres) -> Balls:
     return made
 
 
+def keyed(shape: Spheres, times: Sequence[float]) -> Balls:
+    """Return what `balls` does at k times [s], (n, k, 4): those of a sphere side by side."""
+    if shape.deformation is None:
+        return np.repeat(balls(shape)[:, None], len(times), axis=1)
+    at_all = []
+    for time in times:
+        try:
+            at_all.append(balls(triangles.at_time(shape, time)))
+        except SceneError as error:
+            where = f"{shapes.where(shape)}.deformation"
+            raise SceneError(f"at {time:g} s: {error.message}", where=where) from None
+    return np.stack(at_all, axis=1)
+
+
 def common(shape: Shape) -> shapes.Words:
     """Return the row of `geometry` of all: a sphere of radius 1 before `to_world`."""
     return analytic.row(shape)
@@ -59,6 +74,12 @@ def rows(shape: Shape, placed: Balls) -> shapes.Words:
     made[:, center : center + 3] = placed[:, :3].view(np.uint32)
     made[:, radius] = placed[:, 3].view(np.uint32)
     return made
+
+
+def swept(placed: Balls) -> NDArray[np.float32]:
+    """Return a box (n, 2, 3) around the way of each sphere (n, k, 4), linear between keys."""
+    at_all = np.stack([boxes([placed[:, key]]) for key in range(placed.shape[1])])
+    return np.stack([at_all[:, :, 0].min(axis=0), at_all[:, :, 1].max(axis=0)], axis=1)
 
 
 def boxes(placed: Sequence[Balls]) -> NDArray[np.float32]:

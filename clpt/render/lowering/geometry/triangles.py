@@ -21,7 +21,9 @@ from clpt.scene import shapes
 from clpt.scene.motion import Deformation
 from clpt.scene.shapes import Shape
 
-POINTS = {"mesh": "vertices", "curves": "points", "tubes": "points"}  # what a deformation moves
+POINTS = {  # what a deformation moves
+    "mesh": "vertices", "curves": "points", "tubes": "points", "spheres": "centers",
+}  # fmt: skip
 SUMMED = 1 << 20  # triangles whose normals are summed at a time
 
 CHUNK = 1 << 16  # triangles that are looked at at a time: what is made of them stays in the cache
@@ -129,7 +131,8 @@ def check_deformation(shape: Any) -> None:
     if getattr(shape, name) is None:
         raise SceneError(f"a {shape.kind} that deforms needs {name} too", where=place)
     own = np.shape(on_host(getattr(shape, name)))
-    if given.points.shape[1:] != own:
+    with_radii = shape.kind == "spheres" and given.points.shape[1:] == (*own[:1], 4)
+    if given.points.shape[1:] != own and not with_radii:
         message = f"its keys have {given.points.shape[1:]} where {name} are {own}"
         raise SceneError(message, where=place)
     if shape.kind != "mesh":

@@ -102,6 +102,7 @@ def sharp_pieces(
             behind = own[i + 1][0]["prim"] if i + 1 < len(own) else len(boxes)
             own_boxes = boxes[first : int(behind) if many else first + 1]
             still = int(row["number"]) not in moving
+            still &= getattr(shape, "deformation", None) is None
             yield _fewer(_in_boxes(own_boxes, still and "sphere" in shape.kind))
         elif end > face:
             pieces = _of_triangles(geometry, face, end)
