@@ -238,7 +238,7 @@ def _begin_at_lights(
     """Return the index with whether paths can start at lights in media, and the lights' media."""
     if not index.has_media or not index.may_have_light_paths:
         return index, NOWHERE
-    if index.motions.shapes or index.motions.lamps:
+    if index.motions.moving or index.motions.lamps:
         if index.light_paths:
             raise SceneError(f"no light paths: {IN_MOTION}", where="integrator")
         return replace(index, lit_media=IN_MOTION), NOWHERE
