@@ -39,11 +39,7 @@ inline TriHit binary_keyed_trace(global const float *nodes, global const float *
         }
         for (uint i = link; i < link + node_count(node); i++) {
             global const float *record = leaves + (ulong)i * count * KEYED_LEAF;
-            float corners[9], t, u, v;
-            keyed_corners(record, 1, KEYED_LEAF, share, corners);
-            if (!keyed_intersect(&shear, corners, 1, &t, &u, &v) || !(t > tmin && t < hit.t)) continue;
-            hit = keyed_hit(corners, t, u, v, as_uint(record[12]), as_uint(record[13]));
-            if (first_only) return hit;
+            if (keyed_nearer(&shear, record, 12, KEYED_LEAF, share, tmin, &hit) && first_only) return hit;
         }
     }
     return hit;

@@ -76,6 +76,17 @@ inline void compact_bounds(global const float *nodes, float3 *low, float3 *high)
     *high = (float3)(highs[0], highs[1], highs[2]);
 }
 
+/* The bits of those of four slots whose box is met; meta: the slots' bytes. */
+inline uint compact_slots(const CompactRay *r, uint meta, int4 met)
+{
+    uint inner = (meta & meta << 1 & 0x10101010u) >> 4; /* 1 in the bytes of nodes */
+    uint4 shift = (uint4)(0, 8, 16, 24);
+    uint4 at = (uint4)(meta ^ (r->octants & inner * 7u)) >> shift & 31u;
+    uint4 bits = ((uint4)(meta >> 5) >> shift & 7u) << at;
+    bits &= as_uint4(met);
+    return bits.x | bits.y | bits.z | bits.w;
+}
+
 /* Of four slots the bits of those whose box the ray meets between tmin and t. `near` and `far`: the bytes of
  * their planes; planes are at step * byte + begin along the ray. */
 inline uint compact_boxes(const CompactRay *r, float t, float3 step, float3 begin, uint3 near, uint3 far,
@@ -87,17 +98,11 @@ inline uint compact_boxes(const CompactRay *r, float t, float3 step, float3 begi
     float4 entry = compact_max(compact_max(x, y), compact_max(z, (float4)(r->tmin)));
     float4 exit = compact_min(compact_min(far_x, far_y), far_z);
     exit = compact_min(compact_max(exit, exit * RAY_WIDER), (float4)(t));
-    uint inner = (meta & meta << 1 & 0x10101010u) >> 4; /* 1 in the bytes of nodes */
-    uint4 shift = (uint4)(0, 8, 16, 24);
-    uint4 at = (uint4)(meta ^ (r->octants & inner * 7u)) >> shift & 31u;
-    uint4 bits = ((uint4)(meta >> 5) >> shift & 7u) << at;
-    bits &= as_uint4(entry <= exit);
-    return bits.x | bits.y | bits.z | bits.w;
+    return compact_slots(r, meta, entry <= exit);
 }
 
-/* Looks into the next node: the items that the ray may meet there are bits 0 to 23 of items->y,
- * counted from items->x. Returns 0 if there was no node left. */
-inline int compact_next(global const float *nodes, const CompactRay *r, float t, CompactState *state, uint2 *items)
+/* Takes the next node from those that wait. Returns 0 if there was none left. */
+inline int compact_take(const CompactRay *r, CompactState *state, uint *at)
 {
     uint2 group = state->group;
     if (group.y < 1u << 24) {
@@ -108,8 +113,16 @@ inline int compact_next(global const float *nodes, const CompactRay *r, float t,
     group.y ^= 1u << bit;
     if (group.y >= 1u << 24) state->waiting[state->waits++] = group;
     uint slot = (bit - 24) ^ r->octant;
-    uint at = group.x + popcount(group.y & ((1u << slot) - 1) & 0xffu);
+    *at = group.x + popcount(group.y & ((1u << slot) - 1) & 0xffu);
+    return 1;
+}
 
+/* Looks into the next node: the items that the ray may meet there are bits 0 to 23 of items->y,
+ * counted from items->x. Returns 0 if there was no node left. */
+inline int compact_next(global const float *nodes, const CompactRay *r, float t, CompactState *state, uint2 *items)
+{
+    uint at;
+    if (!compact_take(r, state, &at)) return 0;
     global const uint4 *node = (global const uint4 *)nodes + (ulong)at * (COMPACT_WORDS / 4);
     uint4 a = node[0], b = node[1], c = node[2], d = node[3], e = node[4];
     float3 begin = (as_float3(a.xyz) - r->o) * r->r;

@@ -45,29 +45,16 @@ inline uint compact_keyed_boxes(const CompactRay *r, float t, const CompactKey *
 #undef HIGH
 #undef LOW
     exit = compact_min(compact_max(exit, exit * RAY_WIDER), (float4)(t));
-    uint meta = half_ ? p->b.w : p->b.z, inner = (meta & meta << 1 & 0x10101010u) >> 4;
-    uint4 shift = (uint4)(0, 8, 16, 24);
-    uint4 at = (uint4)(meta ^ (r->octants & inner * 7u)) >> shift & 31u;
-    uint4 bits = ((uint4)(meta >> 5) >> shift & 7u) << at;
-    bits &= as_uint4(entry <= exit);
-    return bits.x | bits.y | bits.z | bits.w;
+    return compact_slots(r, half_ ? p->b.w : p->b.z, entry <= exit);
 }
 
 /* As compact_next. */
 inline int compact_keyed_next(global const float *nodes, uint count, float share, const CompactRay *r, float t,
                               CompactState *state, uint2 *items)
 {
-    uint2 group = state->group;
-    if (group.y < 1u << 24) {
-        if (!state->waits) return 0;
-        group = state->waiting[--state->waits];
-    }
-    uint bit = 31 - clz(group.y);
-    group.y ^= 1u << bit;
-    if (group.y >= 1u << 24) state->waiting[state->waits++] = group;
-    uint slot = (bit - 24) ^ r->octant;
-    uint at = (group.x + popcount(group.y & ((1u << slot) - 1) & 0xffu)) * count;
-
+    uint at;
+    if (!compact_take(r, state, &at)) return 0;
+    at *= count;
     global const uint4 *node = (global const uint4 *)nodes + (ulong)at * (COMPACT_WORDS / 4);
     CompactKey p = compact_key(node, r), q = compact_key(node + COMPACT_WORDS / 4, r);
     uint bits = compact_keyed_boxes(r, t, &p, &q, share, 0) | compact_keyed_boxes(r, t, &p, &q, share, 1);
@@ -90,11 +77,7 @@ inline TriHit compact_keyed_trace(global const float *nodes, global const float 
     while (compact_keyed_next(nodes, count, share, &r, hit.t, &state, &items)) {
         while (items.y) {
             global const float *record = leaves + (ulong)compact_item(&items) * count * KEYED_LEAF;
-            float corners[9], t, u, v;
-            keyed_corners(record, 1, KEYED_LEAF, share, corners);
-            if (!keyed_intersect(&shear, corners, 1, &t, &u, &v) || !(t > tmin && t < hit.t)) continue;
-            hit = keyed_hit(corners, t, u, v, as_uint(record[9]), as_uint(record[10]));
-            if (first_only) return hit;
+            if (keyed_nearer(&shear, record, 9, KEYED_LEAF, share, tmin, &hit) && first_only) return hit;
         }
     }
     return hit;

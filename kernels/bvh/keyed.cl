@@ -37,3 +37,15 @@ inline int keyed_intersect(const Shear *s, const float v[9], uint step, float *t
 {
     SHEAR_INTERSECT
 }
+
+/* Takes the triangle of a record, whose corners stand in a row, as the hit if it is met before that. names: where in
+ * the record its number and tag are; size: of a record [floats]. */
+inline int keyed_nearer(const Shear *shear, global const float *record, uint names, uint size, float share, float tmin,
+                        TriHit *hit)
+{
+    float corners[9], t, u, v;
+    keyed_corners(record, 1, size, share, corners);
+    if (!keyed_intersect(shear, corners, 1, &t, &u, &v) || !(t > tmin && t < hit->t)) return 0;
+    *hit = keyed_hit(corners, t, u, v, as_uint(record[names]), as_uint(record[names + 1]));
+    return 1;
+}

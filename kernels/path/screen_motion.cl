@@ -60,7 +60,7 @@ inline void screen_motion_put(integer *words, mask m, ScreenMotion s, real weigh
     layer_put_long(words + 9, m, s.forward.y * weight);
 }
 
-/* Adds that of what is infinitely far, which the `unseen` paths have come to. */
+/* Adds the motion of the sky, which the `unseen` paths have come to. */
 inline void layers_of_sky(Scene scene, Slab path, uint at, global uint *layers, mask unseen)
 {
     mask m = layers_want(path, at, unseen);

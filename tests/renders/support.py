@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
@@ -41,6 +43,15 @@ def exposures(scene: Scene, count: int, spp: int, first_seed: int = 1, **wavefro
         assert renderer.wavefronts[0].counts.rejected == 0, "samples were not finite"
         images.append(renderer.image().astype(np.float64))
     return np.array(images)
+
+
+def mitsubas(path: Path, count: int, spp: int) -> Values:
+    """Mitsuba's pictures of a file in RGB, (count, height, width, 3); skips without Mitsuba."""
+    mi = pytest.importorskip("mitsuba", reason="the renderer that we compare with")
+    mi.set_variant("scalar_rgb")
+    loaded = mi.load_file(str(path))
+    images = [np.array(mi.render(loaded, spp=spp, seed=i))[:, :, :3] for i in range(count)]
+    return np.array(images, np.float64)
 
 
 def layers_of(scene: Scene, spp: int, **options: Any) -> dict[str, NDArray[np.float32]]:

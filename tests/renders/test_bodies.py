@@ -29,6 +29,7 @@ from tests.renders.support import (
     assert_mean,
     blocks,
     exposures,
+    mitsubas,
 )
 
 MILK = media.Homogeneous(sigma_s=3.0, sigma_a=(0.1, 0.3, 1.0), name="milk")
@@ -108,16 +109,13 @@ MITSUBA = """<scene version="3.0.0">
 @pytest.mark.peers
 def test_as_mitsuba_has_it_by_hand(tmp_path: Path) -> None:
     """Grey milk that its glass displaces, beside Mitsuba's boundary between the two."""
-    mi = pytest.importorskip("mitsuba", reason="the renderer that we compare with")
-    mi.set_variant("scalar_rgb")
     file = tmp_path / "milk.xml"
     file.write_text(MITSUBA)
-    loaded = mi.load_file(str(file))
-    theirs = np.array([np.array(mi.render(loaded, spp=48, seed=i))[:, :, :3] for i in range(12)])
+    theirs = mitsubas(file, 12, 48)
     milk = media.Homogeneous(sigma_s=3.0, sigma_a=0.1)
     glass, shell, liquid = SAME["glass displaces milk"]
     ours = exposures(scene(glass, shell, dataclasses.replace(liquid, interior=milk)), 12, 128)
-    assert_agree(blocks(ours), blocks(theirs.astype(np.float64)), "milk in a glass")
+    assert_agree(blocks(ours), blocks(theirs), "milk in a glass")
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,14 @@ from clpt.scene.integrators import Path as PathIntegrator
 from clpt.scene.lights import Area, Constant, Point
 from clpt.scene.materials import Dielectric, Diffuse, GltfSurface, Null
 from clpt.scene.shapes import Cube, Rectangle, Sphere
-from tests.renders.support import assert_agree, assert_mean, blocks, exposures, pictures_of_parts
+from tests.renders.support import (
+    assert_agree,
+    assert_mean,
+    blocks,
+    exposures,
+    mitsubas,
+    pictures_of_parts,
+)
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "bench" / "media"
 LONG = PathIntegrator(max_depth=-1, rr_depth=1000, light_paths=0)
@@ -313,11 +320,8 @@ MITSUBA = """<scene version="3.0.0">
 @pytest.mark.slow
 def test_tables_and_blends_are_mitsubas(tmp_path: Path) -> None:
     """The same picture, and a table that looks forward where Mitsuba's does."""
-    mi = pytest.importorskip("mitsuba", reason="the renderer that we compare with")
-    mi.set_variant("scalar_rgb")
     path = tmp_path / "blend.xml"
     path.write_text(MITSUBA)
-    loaded = mi.load_file(str(path))
-    theirs = np.array([np.array(mi.render(loaded, spp=64, seed=i))[:, :, :3] for i in range(24)])
+    theirs = mitsubas(path, 24, 64)
     ours = exposures(with_mode(clpt.load(path), "rgb"), 24, 64)
-    assert_agree(blocks(ours), blocks(theirs.astype(np.float64)), "a blend of hg and a table")
+    assert_agree(blocks(ours), blocks(theirs), "a blend of hg and a table")

@@ -17,19 +17,17 @@ from clpt.formats.native.transforms import matrix
 from clpt.scene.motion import SHAPES, Deformation, Keys, Shutter
 
 MEMBERS = ("open", "close", "shape")
-KEYS_SCHEMA: Schema = {
-    "type": "array",
-    "minItems": 1,
-    "items": {
-        "type": "object",
-        "properties": {
-            "time": {**NUMBER, "description": "[s]; they ascend"},
-            "transform": ref("transform"),
-        },
-        "required": ["time", "transform"],
-        "additionalProperties": False,
-    },
-}
+
+
+def _keys_schema(name: str, **properties: Schema) -> Schema:
+    """A list of keys, each with a time and at least the property `name`."""
+    time = {**NUMBER, "description": "[s]; they ascend"}
+    key = object_of({"time": time, **properties}, ["time", name])
+    return {"type": "array", "minItems": 1, "items": key}
+
+
+KEYS_SCHEMA = _keys_schema("transform", transform=ref("transform"))
+LIST: Schema = {"type": "array", "items": NUMBERS}
 POINTS = ("points", "normals")
 DEFORMATION_SCHEMA: Schema = {
     "anyOf": [
@@ -37,20 +35,7 @@ DEFORMATION_SCHEMA: Schema = {
             {"file": {**STRING, "description": "name of a .npz of times, points, normals"}},
             ["file"],
         ),
-        {
-            "type": "array",
-            "minItems": 1,
-            "items": {
-                "type": "object",
-                "properties": {
-                    "time": {**NUMBER, "description": "[s]; they ascend"},
-                    "points": {"type": "array", "items": NUMBERS},
-                    "normals": {"type": "array", "items": NUMBERS},
-                },
-                "required": ["time", "points"],
-                "additionalProperties": False,
-            },
-        },
+        _keys_schema("points", points=LIST, normals=LIST),
     ]
 }
 SHUTTER_SCHEMA: Schema = {

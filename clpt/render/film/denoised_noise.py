@@ -7,7 +7,7 @@ and b, and d of them denoised, the square of (d(a) + d(b)) / 2 - truth is on ave
     ((d(a) - b)^2 + (d(b) - a)^2) / 2 - (a - b)^2 / 2 - (d(a) - d(b))^2 / 4
 
 The two colours of the chessboard (clpt.render.wavefront.adaptive) are denoised apart, each in a
-picture of half the width. So what is told of one colour's pixels does not depend on the samples of
+picture of half the width. So the error of one colour's pixels does not depend on the samples of
 the other, whose numbers it decides.
 """
 
