@@ -5,6 +5,7 @@ from .buffers import Buffers, host_buffer
 from .building import build, build_all, compile_ahead, link
 from .compilers import Compilers, spare_cores
 from .context import Device, DeviceInfo, choose, choose_all, devices, names_several
+from .flag import Flag
 from .program import Argument, BoundKernel, Kernel, Program
 from .refusals import refused, wait
 from .source import Part, Source, Virtual, assemble, kernels_folder
@@ -20,6 +21,7 @@ __all__ = [
     "DeviceArray",
     "DeviceInfo",
     "Events",
+    "Flag",
     "Kernel",
     "Part",
     "Program",

@@ -74,6 +74,15 @@ class DeviceInfo:
         """
         return self.platform.casefold() != "rusticl"
 
+    @cached_property
+    def shares_words(self) -> bool:
+        """Whether kernels that run see what the host writes: fine-grained shared memory."""
+        try:
+            has = self.cl_device.svm_capabilities
+        except (AttributeError, cl.Error):  # a driver before OpenCL 2.0
+            return False
+        return bool(has & cl.device_svm_capabilities.FINE_GRAIN_BUFFER)
+
     @property
     def label(self) -> str:
         """Platform and device, for people to read."""

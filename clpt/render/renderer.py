@@ -224,15 +224,19 @@ class Renderer(Resumable):
                 return not self._stop.is_set()
             try:
                 so_far = Progress(paths / pixels, end, paths, rays, seconds, self.active)
-                return progress(so_far) is not False
+                if progress(so_far) is False:
+                    self._stop.set()
             except BaseException as error:
                 raised.append(error)
-                return False
+                self._stop.set()
+            return not self._stop.is_set()
 
         if self._stop.is_set():  # before it began: nothing is taken
             self._discards = False
             self._stop.clear()
             return False
+        for wavefront in self.wavefronts:
+            wavefront.leave.lower()  # that a `cancel` raised which came too late for another run
         try:
             finished = self._render_samples(first, end, noise, on_batch)
             self._taken = join_ranges(self._taken, ((first, end),))
@@ -288,7 +292,10 @@ class Renderer(Resumable):
         sooner, and a run that has begun leaves the film as after `reset`. A step is not stopped.
         It may be called from anywhere, also from a signal's handler, and waits for nothing.
         """
-        self._discards = discard
+        if discard:  # in this order: who sees the flag finds the reason soon
+            for wavefront in self.wavefronts:
+                wavefront.leave.raise_()
+            self._discards = True
         self._stop.set()
 
     @synchronized

@@ -11,6 +11,7 @@ import pytest
 import clpt
 from clpt.errors import SceneError
 from clpt.render.wavefront.film_state import FILM_WORDS, SAMPLES_WORD, SUM_WORDS, FilmState
+from clpt.render.wavefront.wavefront import Counts
 from clpt.scene import Film, Scene, lights
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import (
@@ -212,6 +213,43 @@ def test_a_run_that_is_discarded_leaves_nothing(looped):
     with clpt.Renderer(scene, slots=64, looped=looped) as fresh:
         fresh.run(3)
         np.testing.assert_array_equal(found, fresh.film.get())
+
+
+def test_a_stop_that_becomes_a_discard():
+    """Paths that were to come to their end are left in flight after all."""
+    with clpt.Renderer(sky(width=40, height=40), slots=64) as renderer:
+
+        def stop(_: object) -> None:
+            renderer.cancel()
+            renderer.cancel(discard=True)
+            renderer.cancel()  # which does not bring the film back
+
+        assert not renderer.run(4096, stop) and renderer.samples == 0
+        assert renderer.run(2) and renderer.samples == 2
+
+
+def test_a_flag_that_running_kernels_see():
+    """Where a device shares words, no bounce begins while `leave` is raised, but for steps."""
+    with clpt.Renderer(sky(width=40, height=40), slots=64) as renderer:
+        (wavefront,) = renderer.wavefronts
+        if not (wavefront.looped and renderer.device.info.shares_words):
+            pytest.skip("this device's kernels see nothing while they run")
+        taken = []
+
+        def look(counts: Counts) -> bool:
+            taken.append(counts.samples)
+            if len(taken) == 3:
+                wavefront.leave.lower()
+            return True
+
+        wavefront.leave.raise_()
+        assert wavefront.render_samples(0, 2, look)
+        assert taken[:3] == [0, 0, 0] and taken[-1] == 2 * 40 * 40
+        wavefront.leave.raise_()
+        renderer.reset()
+        renderer.step(3).wait()
+        assert (renderer.film_state().samples == 3).all()
+        assert renderer.image().all()
 
 
 @pytest.mark.parametrize("number", [-1, 0.5, True, "2", 2**31])

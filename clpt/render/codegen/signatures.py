@@ -178,6 +178,7 @@ def loop_arguments(features: Features, layout: str) -> tuple[device.Argument, ..
     """Return what the kernel of stage/loop.cl takes: a linked kernel has no argument names."""
     args = {**SLAB_ARGS, **SCENE_ARGS, **loop_args(features, layout), "queue": "global uint *"}
     args |= dict.fromkeys(("share", "bounces", "restart", "which"), "uint ")
+    args["leave"] = "global const volatile uint *"
     return tuple(
         device.Argument(
             name,

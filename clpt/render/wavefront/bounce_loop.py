@@ -31,7 +31,7 @@ CORE_BOUNCES = 1 << 16  # of all slots, that a core's part of a loop takes at on
 LEAST_LAUNCH = 1 / 2  # of the usual one: shorter ones cost too much
 LAUNCHES = 3  # that a run has to wait for, about, before it ends
 ENDLESS = 0xFFFFFFFF  # bounces of a loop that goes on till all paths have ended
-IDLE = {"samples": (0, 0), "bounces": 0, "restart": 0}  # of a loop that has nothing to do
+IDLE = {"samples": (0, 0), "bounces": 0, "restart": 0, "leave": None}  # has nothing to do
 
 
 @dataclass(frozen=True)
@@ -80,8 +80,9 @@ class BounceLoop:
     """The bounce loop of one kind of paths in a scene.
 
     which: of `Features.passes`; per_sample: how many of its paths are traced for a sample;
-    features_of: returns the features of a lowering, for the film's channel; cancel_seconds: in
-    which a run is to end that is stopped [s], None for what suits the device.
+    leave: raised, it lets `run` leave its paths in flight, where the device runs the loop and sees
+    it: then on_batch must raise. cancel_seconds: in which a run is to end that is stopped [s], None
+    for what suits the device.
     """
 
     def __init__(
@@ -92,12 +93,13 @@ class BounceLoop:
         timings: Timings,
         looped: bool,
         which: int,
+        leave: device.Flag,
         cancel_seconds: float | None = None,
     ):
         self.kernels, self.scene, self.paths, self.timings = kernels, scene, paths, timings
         self.device, self.stream, self.looped = scene.device, scene.stream, looped
         self.lanes = self.device.lanes
-        self._which = which
+        self._which, self._leave = which, leave
         self.is_last = which == len(scene.lowered.features.passes) - 1
         self.per_sample = 1 if self.is_last else float(scene.lowered.settings["light_paths"]) or 1
         self._label = "" if self.is_last else "light "
@@ -156,7 +158,7 @@ class BounceLoop:
     def enqueue(self, first: int, end: int) -> None:
         """Enqueue the paths of samples first to end - 1 of every pixel; wait for nothing."""
         samples = np.array(self.numbers(first, end), np.int32)
-        self.loop.set_args(samples=samples, bounces=ENDLESS, restart=1)
+        self.loop.set_args(samples=samples, bounces=ENDLESS, restart=1, leave=None)
         event = self.stream.run(self.loop, *self._loop_sizes())
         self.timings.add(f"{self._label}loop", event)
 
@@ -164,16 +166,16 @@ class BounceLoop:
         """Trace the paths of samples first to end - 1 of every pixel, and wait.
 
         on_batch is called every few iterations with the counters; if it returns False, every path
-        is brought to its end and no other begins. What it raises is raised when the device has done
-        what it was given; paths are left in flight then, and the film is not whole. Returns whether
-        all paths were traced.
+        is brought to its end, and no other begins. What it raises is raised when the device has
+        done what it was given; paths are left in flight then, and the film is not whole. Returns
+        whether all paths were traced.
         """
         steps = self._batch()
         begin, numbers = steps[0].bound, self.numbers(first, end)
         self.paths.restart()
         begin.set_args(samples=numbers)
         if self.looped:
-            begin.set_args(bounces=self._bounces, restart=0)
+            begin.set_args(bounces=self._bounces, restart=0, leave=self._leave.argument)
         finished = True
         reads: deque[tuple[NDArray[np.uint64], cl.Event]] = deque()
         before = time.perf_counter()

@@ -59,7 +59,8 @@ class Wavefront:
     scene, paths: what is on the device; looped: whether a kernel on the device runs the loop;
     tuning: for the strategies of other lowerings.
 
-    counts: of rays and samples.
+    counts: of rays and samples; leave: raised, it lets `render_samples` and the like leave paths in
+    flight as soon as the device can; their on_batch must raise then, and the film is not whole.
 
     Raises MemoryBudgetError, KernelBuildError, DeviceError.
     """
@@ -90,9 +91,10 @@ class Wavefront:
                 **scene.arguments, **paths.arguments, **film.arguments, **own
             },
         )  # fmt: skip
+        self.leave = device.Flag(self.device)
         self.loops = [
             BounceLoop(
-                self.kernels, scene, paths, self.timings, looped, which,
+                self.kernels, scene, paths, self.timings, looped, which, self.leave,
                 tuning.cancel_seconds,
             )
             for which in range(len(features.passes))
@@ -249,8 +251,8 @@ class Wavefront:
         """Add samples first to end - 1 of every pixel to the film, and wait.
 
         on_batch is called every few iterations with the counts; if it returns False, every path is
-        brought to its end and no other begins: a valid film, whose pixels differ in their number of
-        samples. Returns whether all samples were added.
+        brought to its end, while it is still called, and no other begins: a valid film, whose
+        pixels differ in their number of samples. Returns whether all samples were added.
         """
         finished = all(
             self._run(loop, *turn, on_batch)
@@ -358,7 +360,7 @@ class Wavefront:
         def count(counters: NDArray[np.uint64]) -> bool:
             nonlocal wanted
             self._count(counters, loop.is_last)
-            wanted = wanted and (on_batch is None or on_batch(self.counts))
+            wanted = (on_batch is None or on_batch(self.counts)) and wanted
             return wanted
 
         return loop.run(first, end, count)
