@@ -17,6 +17,7 @@
 #include "generated/medium.cl"
 #include "generated/motion.cl"
 #include "path/path_end.cl"
+#include "path/next_light_path.cl"
 #include "lighting/light_path_sampler.cl"
 
 /* Puts a ray to a light into the shadow slab of the slots that `go` on. Returns the bits of Path.state that follow. */
@@ -92,17 +93,8 @@ STAGE(flare)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
     STAGE_AT
     PathEnd end = path_end(path, hit, at);
     if (any(end.ended)) {
-        integer slot = LANE_INDEX + (int)at;
-        integer pixel_index = load_path_pixel_index(path, at), sample = load_path_sample(path, at);
-        integer plane = slot_plane(settings, slot);
-        path_end_count(counters, end, end.depth - 1 + path_nulls(path, at));
-        film_count(settings, film, end.ended & end.begun, plane, film_nearest_index(settings, pixel_index));
-        NextSample next = next_sample(settings, work_list, samples, slot, end.ended, end.begun, pixel_index, sample);
-        count(counters, COUNTER_DONE, next.done, (integer)(1));
+        NextSample next = next_light_path(scene, path, at, BEGIN_PASSED, end);
         mask go = end.ended & !next.done;
-        store_path_pixel_index(path, at, go, next.pixel_index);
-        store_path_pixel_key(path, at, go, as_natural(next.pixel_index));
-        store_path_sample(path, at, go, next.sample);
         integer state = begin_ghost(scene, path, shadow, at, end.ended, go, next.pixel_index, next.sample);
         store_path_state(path, at, end.ended, sel_i(next.done, (integer)(PATH_DONE), state + 1));
     }
