@@ -30,8 +30,8 @@ inline CurveTree curve_tree(global const float *nodes, global const uint *indice
     return tree;
 }
 
-/* A ray goes to a node or a leaf, whose memory is asked for. */
-inline void curve_ray_goes(CurveTree tree, CurveRay *r, uint at)
+/* Move a ray to a node or a leaf, and fetch its memory. */
+inline void curve_ray_visit(CurveTree tree, CurveRay *r, uint at)
 {
     r->at = at;
     if (at & BVH_LEAF) {
@@ -43,16 +43,16 @@ inline void curve_ray_goes(CurveTree tree, CurveRay *r, uint at)
     }
 }
 
-/* To what waits next; 0 at the end. */
+/* Visit what waits next; return 0 at the end. */
 inline int curve_ray_next(CurveTree tree, CurveRay *r)
 {
     uint at;
     if (!wide8_next(r->waiting, &r->waits, r->t, &at)) return 0;
-    curve_ray_goes(tree, r, at);
+    curve_ray_visit(tree, r, at);
     return 1;
 }
 
-/* One step; 0 at the end. */
+/* Take one step; return 0 at the end. */
 inline int curve_ray_step(CurveTree tree, CurveRay *r)
 {
     if (r->at & BVH_LEAF) return curve_ray_next(tree, r);
@@ -61,7 +61,7 @@ inline int curve_ray_step(CurveTree tree, CurveRay *r)
     Mask8 m = wide8_boxes(node, &r->ray, r->t, &entry.v);
     if (!m) return curve_ray_next(tree, r);
     global const uint *words = (global const uint *)(node + 48);
-    curve_ray_goes(tree, r, wide8_nearest(words, entry.at, m, r->waiting, &r->waits));
+    curve_ray_visit(tree, r, wide8_nearest(words, entry.at, m, r->waiting, &r->waits));
     return 1;
 }
 
@@ -71,7 +71,7 @@ inline int curve_ray_waits(CurveTree tree, const CurveRay *r)
     return r->at & BVH_LEAF && !curve_beside(tree.pieces + CURVE_WORDS * r->piece, r->o, r->d);
 }
 
-/* Starts the rays that are finite; how many of them there are. */
+/* Start the active rays that are finite; return how many they are. */
 inline uint curve_rays_start(const TraceRays *rays, CurveRay *states, mask active, uint *going)
 {
     uint begun[LANES], count = trace_active(active, begun), n = 0;
