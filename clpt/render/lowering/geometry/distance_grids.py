@@ -3,8 +3,8 @@
 Between the grid's points the distance is trilinear. Each cell that the surface goes through is cut
 into pieces. A piece whose corners are on one side is left: the distance in it lies between those at
 its corners. The others are cut into six tetrahedra that meet those of their neighbours. Vertices
-lie where the trilinear distance is zero. Normals are those of Mitsuba's smooth sdfgrids (Soderlund et al.
-2022): the gradients of the eight cells around a point, trilinear between their middles.
+lie where the trilinear distance is zero. Normals are those of Mitsuba's smooth sdfgrids (Soderlund
+et al. 2022): the gradients of the eight cells around a point, trilinear between their middles.
 """
 
 from __future__ import annotations
@@ -158,11 +158,11 @@ def _tetrahedra(
     count = np.zeros((len(cells), pieces, pieces, pieces), np.int8)
     for x, y, z in CORNERS:
         count += distance[:, x : x + pieces, y : y + pieces, z : z + pieces] < 0.0
-    cell, *piece = np.nonzero((count > 0) & (count < 8))
-    ends = np.stack(piece, axis=1)[:, None, None] + TETRAHEDRA  # of tetrahedra, in their cell
-    ends = ends.reshape(-1, 4, 3)
-    cell = np.repeat(cell, len(TETRAHEDRA))
-    found = distance[(cell[:, None], *np.moveaxis(ends, -1, 0))]
+    crossed = np.argwhere((count > 0) & (count < 8))
+    ends = (crossed[:, None, None, 1:] + TETRAHEDRA).reshape(-1, 4, 3)  # in their cell
+    cell = np.repeat(crossed[:, 0], len(TETRAHEDRA))
+    x, y, z = np.moveaxis(ends, -1, 0)
+    found = distance[cell[:, None], x, y, z]
     inside = found < 0.0
     some = inside.any(axis=1) & ~inside.all(axis=1)
     cell, found = cell[some], found[some]
