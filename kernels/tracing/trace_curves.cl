@@ -1,4 +1,4 @@
-/* Tracing the rays of a work-item's lanes where curves are all that is no triangle. Rays step from node to node of
+/* Tracing the rays of a work-item's lanes where there are curves, and few shapes but triangles beside them. Rays step from node to node of
  * the tree over pieces in turn, while what each needs next is fetched, until they come to a piece that they do not
  * pass beside. When all have come to one, or ended, these pieces are tested in lanes. Triangles are met before, by one
  * ray after another. The hits are those of tracing/trace_one.cl, to the bit. */
@@ -10,21 +10,29 @@
 #include "tracing/curve_beside.cl"
 #include "tracing/shape_rows_many.cl"
 #include "tracing/trace_each.cl"
+#include "generated/curve_others.cl"
 
 typedef struct {
     Wide8Ray ray;
     float3 o, d;
     float t;
-    uint at, waits, piece; /* a node, or a leaf with its piece */
+    uint at, waits; /* at: a node, or a leaf */
+    int piece;      /* of the leaf */
     ulong waiting[WIDE8_STACK];
 } CurveRay;
 
 typedef struct { global const float *nodes; global const uint *indices; global const float *pieces; } CurveTree;
 
-/* `pieces`: where piece 0 lies, and behind it all others, those of the next shape behind those of the one before. */
+/* The row in `shapes` of the first curves, and where in memory primitive 0 would be if it were a piece: pieces follow
+ * each other, those of the next shape behind those of the one before. */
+inline integer curve_row_first(Scene scene)
+{
+    return (integer)((scene.settings->first_analytic + scene.settings->single_count) * SHAPE_ROW_WORDS);
+}
+
 inline CurveTree curve_tree(global const float *nodes, global const uint *indices, Scene scene)
 {
-    ShapeRow row = shape_row_row(scene.shapes, (integer)(shape_row_like(scene, 0) * SHAPE_ROW_WORDS));
+    ShapeRow row = shape_row_row(scene.shapes, curve_row_first(scene));
     TraceInteger first = {curve_row(scene.geometry, row.params).first};
     CurveTree tree = {nodes, indices, scene.spheres + first.at[0]};
     return tree;
@@ -35,7 +43,7 @@ inline void curve_ray_visit(CurveTree tree, CurveRay *r, uint at)
 {
     r->at = at;
     if (at & BVH_LEAF) {
-        r->piece = tree.indices[at & ~BVH_LEAF];
+        r->piece = (int)tree.indices[at & ~BVH_LEAF];
         FETCH(tree.pieces + CURVE_WORDS * r->piece);
         FETCH(tree.pieces + CURVE_WORDS * r->piece + 15);
     } else {
@@ -65,10 +73,11 @@ inline int curve_ray_step(CurveTree tree, CurveRay *r)
     return 1;
 }
 
-/* Whether a ray is at a piece that it may meet. */
-inline int curve_ray_waits(CurveTree tree, const CurveRay *r)
+/* Whether a ray is at a piece, or at another shape, that it may meet. */
+inline int curve_ray_waits(CurveTree tree, Scene scene, const CurveRay *r)
 {
-    return r->at & BVH_LEAF && !curve_beside(tree.pieces + CURVE_WORDS * r->piece, r->o, r->d);
+    if (!(r->at & BVH_LEAF)) return 0;
+    return r->piece < CURVE_OTHERS || !curve_beside(tree.pieces + CURVE_WORDS * r->piece, r->o, r->d);
 }
 
 /* Start the active rays that are finite; return how many they are. */
@@ -89,15 +98,14 @@ inline uint curve_rays_start(const TraceRays *rays, CurveRay *states, mask activ
     return n;
 }
 
-/* The nearest piece that each active ray meets before *t, which becomes its distance, or with `first_only` any;
+/* The nearest primitive that each active ray meets before *t, which becomes its distance, or with `first_only` any;
  * -1 if none. */
 inline integer curves_trace(CurveTree tree, Scene scene, vec3 o, vec3 d, mask active, int first_only, real *t)
 {
     CurveRay states[LANES];
     TraceRays rays = trace_rays(o, d, *t);
     TraceInteger piece = {(integer)(0)};
-    integer best = -1, row = shape_row_like(scene, 0) * SHAPE_ROW_WORDS;
-    integer params = shape_row_row(scene.shapes, row).params;
+    integer best = -1, params = shape_row_row(scene.shapes, curve_row_first(scene)).params;
     uint going[LANES], count = curve_rays_start(&rays, states, active, going);
     while (count) {
         TraceInteger tests = {(integer)(0)};
@@ -106,7 +114,7 @@ inline integer curves_trace(CurveTree tree, Scene scene, vec3 o, vec3 d, mask ac
             uint left = 0;
             for (uint k = 0; k < count; k++) {
                 uint i = going[k];
-                if (curve_ray_waits(tree, states + i)) {
+                if (curve_ray_waits(tree, scene, states + i)) {
                     piece.at[i] = states[i].piece;
                     tests.at[i] = -1;
                     waiting[waits++] = i;
@@ -118,7 +126,9 @@ inline integer curves_trace(CurveTree tree, Scene scene, vec3 o, vec3 d, mask ac
         }
         if (!waits) break;
         mask tested = tests.v != 0;
-        ShapeHit hit = curve_intersect(curves_one(scene, params, piece.v, tested), o, d, (real)(0.0f), rays.t.v);
+        Curve q = curves_one(scene, params, piece.v, tested & (piece.v >= CURVE_OTHERS));
+        ShapeHit hit = curve_intersect(q, o, d, (real)(0.0f), rays.t.v);
+        hit = curve_others(scene, piece.v, tested, o, d, rays.t.v, hit);
         mask met = tested & (hit.t < rays.t.v);
         rays.t.v = sel(met, hit.t, rays.t.v);
         best = sel_i(met, piece.v, best);
@@ -149,9 +159,11 @@ inline TraceHit trace_closest(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real far,
         if (of.at[rays[k]] >= 0) shape.at[rays[k]] = shape_row_of(scene, of.at[rays[k]]);
     h.shape = shape.v;
     h.prim = sel_i(met, piece, h.prim);
-    integer row = sel_i(met, h.shape, (integer)(shape_row_like(scene, 0))) * SHAPE_ROW_WORDS;
-    Curve q = curves_one(scene, shape_row_row(scene.shapes, row).params, piece, met);
+    mask curved = met & (piece >= CURVE_OTHERS);
+    integer row = sel_i(curved, h.shape * SHAPE_ROW_WORDS, curve_row_first(scene));
+    Curve q = curves_one(scene, shape_row_row(scene.shapes, row).params, piece, curved);
     ShapeHit s = curve_intersect(q, o, d, (real)(0.0f), (real)(FAR));
+    s = curve_others(scene, piece, met, o, d, (real)(FAR), s);
     h.n = sel3(met, s.n, h.n);
     h.u = sel(met, s.uv.x, h.u);
     h.v = sel(met, s.uv.y, h.v);

@@ -60,7 +60,7 @@ def _stages(
     join_lanes = bounce.join_lanes(features, layout, lanes, interleaved)
     rays: Files = {}
     if interleaved and layout != "brute":
-        traced = "curves" if features.analytic else "interleaved"
+        traced = "curves" if "curves" in features.analytic else "interleaved"
         rays["generated/trace.cl"] = (f"tracing/trace_{traced}.cl",)
     joins = {**files, **(rays if features.analytic else {})}
     if begin == "flare":

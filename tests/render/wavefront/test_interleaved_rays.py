@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 import clpt
-from clpt import device
+from clpt import device, transforms
 from clpt.render.lowering.scene import Lowered, lower
 from clpt.render.wavefront import strategy
 from clpt.render.wavefront.strategy import Tuning
 from clpt.scene import Film, Scene, integrators, materials
 from clpt.scene.cameras import Perspective
-from clpt.scene.lights import Constant
-from clpt.scene.shapes import Curves, Mesh, Sphere
+from clpt.scene.lights import Area, Constant
+from clpt.scene.shapes import Curves, Disk, Mesh, Sphere, Spheres
 
 
 def scene(*more) -> Scene:
@@ -61,18 +61,25 @@ def strands(seed: int, basis: str, opacity: float = 1.0) -> Curves:
     return Curves(points=points.reshape(-1, 4), lengths=(7,) * 40, basis=basis, material=own)
 
 
+OTHERS = (
+    Sphere(center=(0.5, 0.3, -1.0), radius=0.3, emission=Area(radiance=4.0)),
+    Sphere(center=(-0.4, 0.0, -1.5), radius=0.4),
+    Disk(to_world=transforms.translate([0.0, -0.5, -2.0]), flip_normals=True),
+)
+
+
 @pytest.mark.parametrize(
-    ("integrator", "opacity", "looped"),
+    ("integrator", "opacity", "others", "looped"),
     [
-        (integrators.Path(max_depth=5), 1.0, True),
-        pytest.param(integrators.Path(max_depth=5), 0.7, False, marks=pytest.mark.slow),
-        pytest.param(integrators.Vcm(max_depth=4), 0.7, True, marks=pytest.mark.slow),
+        (integrators.Path(max_depth=5), 1.0, (), True),
+        pytest.param(integrators.Path(max_depth=5), 0.7, OTHERS, False, marks=pytest.mark.slow),
+        pytest.param(integrators.Vcm(max_depth=4), 0.7, OTHERS, True, marks=pytest.mark.slow),
     ],
 )
-def test_the_same_picture_of_curves(monkeypatch, integrator, opacity, looped) -> None:
+def test_the_same_picture_of_curves(monkeypatch, integrator, opacity, others, looped) -> None:
     """Nearest hits, rays to lights, also through what lets light pass, and to the camera."""
     hair = strands(1, "bspline", opacity), strands(2, "linear", opacity)
-    shown = dataclasses.replace(scene(*hair), integrator=integrator)
+    shown = dataclasses.replace(scene(*hair, *others), integrator=integrator)
     pictures = []
     for least in (1 << 30, 100):
         monkeypatch.setattr(strategy, "INTERLEAVED_PIECES", least)
@@ -87,16 +94,20 @@ def test_the_same_picture_of_curves(monkeypatch, integrator, opacity, looped) ->
         np.testing.assert_allclose(*pictures, rtol=1e-4, atol=1e-5)
 
 
-def test_many_curves_and_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_many_curves_and_little_else(monkeypatch: pytest.MonkeyPatch) -> None:
     on, hair = device.choose(), lower(scene(strands(1, "bspline")))
     ball = lower(scene(strands(1, "bspline"), Sphere()))
+    balls = lower(scene(strands(1, "bspline"), Spheres(centers=[[0, 0, 0]], radii=1.0)))
 
     def interleaved(lowered: Lowered, layout: str = "wide8") -> bool:
         return strategy.choose(on, lowered, Tuning(layout=layout)).interleaved
 
     assert not interleaved(hair)
     monkeypatch.setattr(strategy, "INTERLEAVED_PIECES", len(hair.boxes))
-    assert interleaved(hair) == (on.lanes > 1) and not interleaved(ball)
+    assert interleaved(hair) == interleaved(ball) == (on.lanes > 1) and not interleaved(balls)
+    with monkeypatch.context() as patched:
+        patched.setattr(strategy, "FEW_OTHERS", 0)
+        assert not interleaved(ball)
     assert not interleaved(hair, "binary")
     for what in ("camera", "shapes", "vertices"):
         moving = dataclasses.replace(hair.features, moving=(what,))
