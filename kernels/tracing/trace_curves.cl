@@ -1,7 +1,7 @@
-/* Tracing the rays of a work-item's lanes where there are curves, and few shapes but triangles beside them. Rays step from node to node of
- * the tree over pieces in turn, while what each needs next is fetched, until they come to a piece that they do not
- * pass beside. When all have come to one, or ended, these pieces are tested in lanes. Triangles are met before, by one
- * ray after another. The hits are those of tracing/trace_one.cl, to the bit. */
+/* Tracing the rays of a work-item's lanes where there are curves, and few shapes but triangles beside them. Rays step
+ * from node to node of the tree over pieces in turn, while what each needs next is fetched, until they come to a piece
+ * that they do not pass beside. When all have come to one, or ended, these pieces are tested in lanes. Triangles are
+ * met before, by one ray after another. The hits are those of tracing/trace_one.cl, to the bit. */
 #include "tracing/trace.cl"
 #include "generated/layout.cl"
 #include "generated/trace_args.cl"
