@@ -187,7 +187,9 @@ class SdfGrid(Shape):
     """The surface where a signed distance on a grid over the unit cube is zero; as triangles.
 
     Between the grid's points, which lie on the faces of the cube too, the distance is trilinear.
-    The front is where it is positive.
+    The front is where it is positive. Corners of triangles lie on that surface. Inside, a triangle
+    is off it by at most .005 of a cell on a ball 11 cells across, and .09 at a sharp edge, with 2
+    `pieces`; by a quarter of that with twice the pieces.
     """
 
     values: Any = host(

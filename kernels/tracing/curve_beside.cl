@@ -1,8 +1,7 @@
 /* Whether one ray passes beside a piece of a curve: all its control points are farther on one side than its radius.
  * Most pieces whose boxes a ray enters are left here, four points at a time. `piece`: its words, see
  * kernels/shape/curves.cl. */
-#if LANES == 1
-inline int curve_beside(global const float *piece, vec3 o, vec3 d)
+inline int curve_beside(global const float *piece, float3 o, float3 d)
 {
     float4 x = vload4(0, piece) - o.x, y = vload4(1, piece) - o.y, z = vload4(2, piece) - o.z;
     float4 r = fabs(vload4(3, piece));
@@ -14,6 +13,10 @@ inline int curve_beside(global const float *piece, vec3 o, vec3 d)
     float limit = reach * reach * (nx * nx + ny * ny + nz * nz);
     return all((w * w > limit) & (w > 0.0f)) || all((w * w > limit) & (w < 0.0f));
 }
+
+/* The same for what is traced one ray a work-item; in lanes it is not asked. */
+#if LANES == 1
+#define curve_beside_one(piece, o, d) curve_beside(piece, (float3)(o.x, o.y, o.z), (float3)(d.x, d.y, d.z))
 #else
-#define curve_beside(piece, o, d) 0
+#define curve_beside_one(piece, o, d) 0
 #endif

@@ -4,23 +4,7 @@
 #include "tracing/trace.cl"
 #include "bvh/wide8_interleaved.cl"
 #include "generated/trace_args.cl"
-
-typedef union { real v; float at[LANES]; } TraceReal;
-typedef union { integer v; int at[LANES]; } TraceInteger;
-typedef struct { TraceReal ox, oy, oz, dx, dy, dz, t; } TraceRays;
-typedef struct { TraceReal t, u, v, nx, ny, nz, plane, side; TraceInteger prim, tag; } TraceHits;
-#define TRACE_RAY(r, i) (r)->ox.at[i], (r)->oy.at[i], (r)->oz.at[i], (r)->dx.at[i], (r)->dy.at[i], \
-                        (r)->dz.at[i], 0.0f, (r)->t.at[i]
-
-/* The lanes with a ray, in their order, and how many they are. */
-inline uint trace_active(mask active, uint *rays)
-{
-    TraceInteger is = {active};
-    uint n = 0;
-    for (uint i = 0; i < LANES; i++)
-        if (is.at[i]) rays[n++] = i;
-    return n;
-}
+#include "tracing/trace_each.cl"
 
 /* Whether three quarters of the rays have about the direction of the one before. */
 inline int trace_alike(const TraceRays *r, const uint *rays, uint count)
@@ -32,20 +16,6 @@ inline int trace_alike(const TraceRays *r, const uint *rays, uint count)
                              (float3)(r->dx.at[j], r->dy.at[j], r->dz.at[j]));
     }
     return 4 * alike + 3 >= 3 * count;
-}
-
-inline void trace_put(TraceHits *h, uint i, TriHit hit)
-{
-    h->t.at[i] = hit.t;
-    h->u.at[i] = hit.u;
-    h->v.at[i] = hit.v;
-    h->nx.at[i] = hit.nx;
-    h->ny.at[i] = hit.ny;
-    h->nz.at[i] = hit.nz;
-    h->plane.at[i] = hit.plane;
-    h->side.at[i] = hit.side;
-    h->prim.at[i] = as_int(hit.prim);
-    h->tag.at[i] = as_int(hit.tag);
 }
 
 /* Steps every ray in turn, until all have finished. */
@@ -70,9 +40,8 @@ inline void trace_step_all(global const float *nodes, global const float *leaves
 
 inline TraceHit trace_closest(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real far, mask active)
 {
-    TraceReal none = {(real)(0.0f)};
-    TraceHits h = {{far}, none, none, none, none, none, none, none, {(integer)(-1)}, {(integer)(0)}};
-    TraceRays r = {{o.x}, {o.y}, {o.z}, {d.x}, {d.y}, {d.z}, {far}};
+    TraceHits h = trace_missed(far);
+    TraceRays r = trace_rays(o, d, far);
     uint rays[LANES], count = trace_active(active, rays);
     if (!trace_alike(&r, rays, count)) {
         trace_step_all(nodes, leaves, &r, rays, count, &h);
@@ -80,6 +49,5 @@ inline TraceHit trace_closest(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real far,
         for (uint k = 0; k < count; k++)
             trace_put(&h, rays[k], wide8_closest(nodes, leaves, TRACE_RAY(&r, rays[k])));
     }
-    TraceHit hit = {h.t.v, h.u.v, h.v.v, {h.nx.v, h.ny.v, h.nz.v}, h.plane.v, h.side.v, h.prim.v, h.tag.v};
-    return hit;
+    return trace_together(h);
 }

@@ -20,13 +20,13 @@ class Stage:
 
 def order(features: Features, layout: str, lanes: int, interleaved: bool = False) -> list[Stage]:
     """Return the stages of a bounce in their order, but for sorting."""
-    tracing = trace_lanes(layout, lanes)
+    tracing, joining = trace_lanes(layout, lanes), join_lanes(features, layout, lanes, interleaved)
     begin, join = begin_and_join(features)
     bounce = [Stage(begin, begin, lanes)]
     if begin == "flare":
-        return [*bounce, Stage(join, join, tracing)]
+        return [*bounce, Stage(join, join, joining)]
     if features.shows_lights:
-        bounce.append(Stage(join, join, tracing))
+        bounce.append(Stage(join, join, joining))
     bounce.append(Stage("intersect", "intersect", lanes if interleaved else tracing))
     if features.media:
         bounce.append(Stage(flight(features), "flight", lanes))
@@ -38,7 +38,7 @@ def order(features: Features, layout: str, lanes: int, interleaved: bool = False
         bounce.append(Stage("mix", "mix_materials", lanes))
     bounce += [Stage(f"shade_{kind}", "shade", lanes) for kind in features.materials]
     if joins(features) and any(not cls.delta for cls in features.leaves):
-        bounce.append(Stage(join, join, tracing))
+        bounce.append(Stage(join, join, joining))
     return bounce
 
 
@@ -73,6 +73,11 @@ def flight(features: Features) -> str:
 def trace_lanes(layout: str, lanes: int) -> int:
     """How many rays a work-item traces: those of one path, but where there is no tree."""
     return lanes if layout == "brute" else 1
+
+
+def join_lanes(features: Features, layout: str, lanes: int, interleaved: bool) -> int:
+    """How many rays a work-item tests that join paths: interleaved ones where there are curves."""
+    return lanes if interleaved and features.analytic else trace_lanes(layout, lanes)
 
 
 def has_both(features: Features) -> bool:

@@ -75,6 +75,9 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/trace.cl": lambda _, layout: (
         f"tracing/trace_{'lanes' if layout == 'brute' else 'one'}.cl",
     ),
+    "generated/curve_others.cl": lambda f, _: (
+        f"tracing/curve_others{'_none' * (f.analytic == ('curves',))}.cl",
+    ),
     "generated/shape_traversal.cl": lambda f, layout: (
         (f"bvh/{bvh.shapes_layout(layout)}.cl", "bvh/shapes.cl") * bool(f.analytic)
     ),

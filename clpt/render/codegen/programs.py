@@ -37,7 +37,8 @@ def sources(
 
     layout: of the triangles, a name in clpt.bvh.LAYOUTS; lanes: paths that a work-item shades;
     queued: whether shading goes along queues, which `append` fills, if a work-item shades one path;
-    interleaved: a work-item of `intersect` has the rays of `lanes` paths in flight.
+    interleaved: a work-item of `intersect` has the rays of `lanes` paths in flight, and where there
+    are curves, that of `shadow` or `splat` too.
     """
     queued = queued and lanes == 1
     texts = _stages(features, layout, lanes, interleaved)
@@ -56,14 +57,17 @@ def _stages(
     files, defines = _shared(features, layout), flags.defines(flags.SCENE, features)
     begin, join = bounce.begin_and_join(features)
     trace_lanes = bounce.trace_lanes(layout, lanes)
+    join_lanes = bounce.join_lanes(features, layout, lanes, interleaved)
+    rays: Files = {}
+    if interleaved and layout != "brute":
+        traced = "curves" if "curves" in features.analytic else "interleaved"
+        rays["generated/trace.cl"] = (f"tracing/trace_{traced}.cl",)
+    joins = {**files, **(rays if features.analytic else {})}
     if begin == "flare":
         return {
             begin: _source(begin, files, defines, lanes),
-            join: _source(join, files, defines, trace_lanes),
+            join: _source(join, joins, defines, join_lanes),
         }
-    rays: Files = {}
-    if interleaved and layout != "brute":
-        rays["generated/trace.cl"] = ("tracing/trace_interleaved.cl",)
     texts = {
         begin: _source(begin, files, defines, lanes),
         "intersect": _source(
@@ -71,7 +75,7 @@ def _stages(
         ),
     }
     if bounce.joins(features):
-        texts[join] = _source(join, files, defines, trace_lanes)
+        texts[join] = _source(join, joins, defines, join_lanes)
     if bounce.deposits(features):
         texts["deposit"] = _source("deposit", files, defines, lanes)
     if bounce.trains(features):

@@ -33,7 +33,7 @@ def hit_text(features: Features) -> str:
     curves = "curves" in features.analytic
     number = f"(integer)((int)shape[{word['number']}])"
     piece = f"scene.spheres + (int)gather_i(scene.geometry, params + {_FIRST}) + CURVE_WORDS * prim"
-    beside = f"if (kind == {_number('curves')} && curve_beside({piece}, o, d)) return none;"
+    beside = f"if (kind == {_number('curves')} && curve_beside_one({piece}, o, d)) return none;"
     cases = [beside] * curves + [
         f"if (kind == {_number(kind)}) {answer} {ONE_OF.get(kind, kind)}_intersect("
         f"{_row_text(features, kind, 'params', number)}, o, d, tmin, tmax);"

@@ -14,6 +14,8 @@ from clpt.render.lowering.scene import Lowered
 
 BRUTE_SHAPES = 32  # analytic shapes up to which a ray tests all of them
 INTERLEAVED_TRIANGLES = 1 << 20  # from which interleaved rays pay; measured, see bench/NOTES.md
+INTERLEAVED_PIECES = 1 << 14  # of curves; measured, see bench/NOTES.md
+FEW_OTHERS = 64  # shapes beside them that are no triangles, each of which is tested in all lanes
 SHARE = 512  # slots of a work-item of the loop on a CPU, which fit into the second cache of a core
 
 
@@ -82,8 +84,14 @@ def _queued(on: device.Device, lowered: Lowered, wanted: bool | None) -> bool:
 
 
 def _interleaved(on: device.Device, lowered: Lowered, layout: str) -> bool:
-    """Whether interleaved rays pay: in trees of nothing but triangles, larger than the caches."""
+    """Whether interleaved rays pay: in trees of nothing but triangles that are larger than the
+    caches, and where there are many pieces of curves, and of other shapes than triangles few."""
     features, count = lowered.features, len(lowered.faces)
+    if "curves" in features.analytic and "spheres" not in features.analytic:
+        others = int(lowered.settings["single_count"])
+        still = not {"shapes", "instances", "vertices", "spheres"} & set(features.moving)
+        many = others <= FEW_OTHERS and len(lowered.boxes) - others >= INTERLEAVED_PIECES
+        return layout == "wide8" and on.lanes > 1 and many and still and not features.instances
     only_triangles = not (features.instances or features.analytic)
     large = count >= INTERLEAVED_TRIANGLES and bvh.outgrows_caches(on, layout, count)
     return only_triangles and large

@@ -19,8 +19,10 @@ from clpt.device import Source
 from clpt.render.codegen import programs
 from clpt.render.contract.features import Features
 from clpt.render.lowering.scene import lower
+from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Path as PathTracer
 from clpt.scene.integrators import Vcm
+from clpt.scene.shapes import Curves
 
 ROOT = Path(__file__).resolve().parents[3]
 SCENES = [
@@ -34,7 +36,9 @@ SCENES = [
     "tests/scenes/textures.xml",
     "tests/scenes/principled.xml",
     "tests/scenes/thrown_images.xml",
+    "curves",
 ]
+HAIR = clpt.Scene(camera=Perspective(), shapes=[Curves(points=[[i, 0, 0, 0.1] for i in range(4)])])
 WAYS = [("brute", 8, False), ("wide8", 8, True), ("compact", 1, False), ("binary", 16, False)]
 DIRECTIVE = re.compile(r"^[ \t]*#(?:[^\n]*\\\n)*[^\n]*", re.MULTILINE)
 
@@ -61,7 +65,7 @@ def definitions(source: Source) -> Iterator[tuple[str, str]]:
 
 
 def features_of(name: str, integrator: PathTracer | Vcm | None = None) -> Features:
-    scene = clpt.load(ROOT / name)
+    scene = HAIR if name == "curves" else clpt.load(ROOT / name)
     return lower(dataclasses.replace(scene, integrator=integrator or scene.integrator)).features
 
 

@@ -1,9 +1,10 @@
 """Surfaces of signed distances on a grid, as triangles: marching tetrahedra (Doi and Koide 1991).
 
 Between the grid's points the distance is trilinear. Each cell that the surface goes through is cut
-into pieces, each piece into six tetrahedra that meet those of its neighbours. Vertices lie where
-the trilinear distance is zero. Normals are those of Mitsuba's smooth sdfgrids (Soderlund et al.
-2022): the gradients of the eight cells around a point, trilinear between their middles.
+into pieces. A piece whose corners are on one side is left: the distance in it lies between those at
+its corners. The others are cut into six tetrahedra that meet those of their neighbours. Vertices
+lie where the trilinear distance is zero. Normals are those of Mitsuba's smooth sdfgrids (Soderlund
+et al. 2022): the gradients of the eight cells around a point, trilinear between their middles.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from clpt.scene.shapes import SdfGrid
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]
 MOST_PIECES = 16
-MOST_TETRAHEDRA = 1 << 26
+MOST_POINTS = 1 << 26  # at which distances are computed: corners of all pieces, cell by cell
+AT_ONCE = 1 << 21  # of them
 CORNERS = np.array([[i >> 2 & 1, i >> 1 & 1, i & 1] for i in range(8)])  # of a cell, z fastest
 # Six tetrahedra around the diagonal of a cell, one for each order of the axes (Kuhn 1960).
 TETRAHEDRA = np.array(
@@ -46,7 +48,7 @@ def surface(shape: SdfGrid, name: str) -> tuple[Any, Any, Any, None]:
     if not len(cells):
         message = "its distances are all of one sign, so that it has no surface"
         raise SceneError(message, where=name)
-    if 6 * len(cells) * pieces**3 > MOST_TETRAHEDRA:
+    if len(cells) * (pieces + 1) ** 3 > MOST_POINTS:
         message = f"{len(cells):,} cells of {pieces}^3 pieces are too many; lower `pieces`"
         raise SceneError(message, where=name)
     points, faces = _march(values, cells, pieces)
@@ -108,16 +110,13 @@ def _gradient(values: Floats, cells: Whole, at: Floats) -> Floats:
 def _march(values: Floats, cells: Whole, pieces: int) -> tuple[Floats, Whole]:
     """Vertices (n, 3) [cells] and faces (m, 3)."""
     fine = np.array(values.shape) * pieces
-    steps = np.indices((pieces,) * 3).reshape(3, -1).T
-    corners = (cells[:, None] * pieces + steps).reshape(-1, 1, 1, 3) + TETRAHEDRA
-    corners = corners.reshape(-1, 4, 3)  # of tetrahedra, on the fine grid
-    owner = np.repeat(np.arange(len(cells)), len(steps) * len(TETRAHEDRA))
-    local = corners / pieces - cells[owner][:, None]
-    found = np.stack([_distance(values, cells[owner], local[:, i]) for i in range(4)], axis=1)
+    step = max(AT_ONCE // (pieces + 1) ** 3, 1)
+    parts = [
+        _tetrahedra(values, cells[first : first + step], first, pieces)
+        for first in range(0, len(cells), step)
+    ]
+    corners, owner, local, found = (np.concatenate(each) for each in zip(*parts, strict=True))
     inside = found < 0.0
-    some = inside.any(axis=1) & ~inside.all(axis=1)
-    corners, owner, local = corners[some], owner[some], local[some]
-    found, inside = found[some], inside[some]
     keys = np.ravel_multi_index(tuple(np.moveaxis(corners, -1, 0)), tuple(fine))
     ends = []
     for number, edges in _cases():
@@ -139,6 +138,36 @@ def _march(values: Floats, cells: Whole, pieces: int) -> tuple[Floats, Whole]:
     )  # fmt: skip
     points, faces = cells[owner[tetrahedron]] + zero, inverse.reshape(-1, 3)
     return points, _outward(points, faces, corners, inside, triangles[:, 0, 0], pieces)
+
+
+def _tetrahedra(
+    values: Floats, cells: Whole, first: int, pieces: int
+) -> tuple[Whole, Whole, Floats, Floats]:
+    """The tetrahedra of cells (k, 3) that the surface goes through.
+
+    Their corners (n, 4, 3) on the fine grid; the cell of each, counted from `first`; where its
+    corners are in it (n, 4, 3); the distances there (n, 4).
+    """
+    side = pieces + 1
+    lattice = np.indices((side,) * 3).reshape(3, -1).T
+    points = cells[:, None] * pieces + lattice
+    whose = np.repeat(np.arange(len(cells)), len(lattice))
+    distance = _distance(
+        values, cells[whose], (points / pieces - cells[:, None]).reshape(-1, 3)
+    ).reshape(len(cells), side, side, side)
+    count = np.zeros((len(cells), pieces, pieces, pieces), np.int8)
+    for x, y, z in CORNERS:
+        count += distance[:, x : x + pieces, y : y + pieces, z : z + pieces] < 0.0
+    crossed = np.argwhere((count > 0) & (count < 8))
+    ends = (crossed[:, None, None, 1:] + TETRAHEDRA).reshape(-1, 4, 3)  # in their cell
+    cell = np.repeat(crossed[:, 0], len(TETRAHEDRA))
+    x, y, z = np.moveaxis(ends, -1, 0)
+    found = distance[cell[:, None], x, y, z]
+    inside = found < 0.0
+    some = inside.any(axis=1) & ~inside.all(axis=1)
+    cell, found = cell[some], found[some]
+    corners = cells[cell][:, None] * pieces + ends[some]
+    return corners, first + cell, corners / pieces - cells[cell][:, None], found
 
 
 def _cases() -> list[tuple[int, list[tuple[int, ...]]]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from clpt.errors import SceneError
 from clpt.formats import load
@@ -41,6 +42,64 @@ def test_closed_and_where_the_distance_is_zero(smooth, pieces):
     assert (distance_grids._distance(values.astype(float), cells, at - cells) < 0).mean() > 0.95
     if normals is not None:
         assert (np.einsum("ij,ij->i", across, normals[faces[:, 0]]) > 0).mean() > 0.999
+
+
+def points_where_zero(values: np.ndarray, n: int) -> np.ndarray:
+    """Points (m, 3) [cells] of the trilinear surface: it is linear along an axis in a cell."""
+    rng, values = np.random.default_rng(7), values.astype(np.float64)
+    cells = distance_grids._crossed(values)
+    cells = cells[rng.integers(0, len(cells), n)]
+    begin, axis = rng.random((n, 3)), rng.integers(0, 3, n)
+    begin[np.arange(n), axis] = 0.0
+    end = begin + np.eye(3)[axis]
+    at_begin, at_end = (distance_grids._distance(values, cells, at) for at in (begin, end))
+    crossed = (at_begin < 0.0) != (at_end < 0.0)
+    cells, begin, end, at_begin, at_end = (
+        each[crossed] for each in (cells, begin, end, at_begin, at_end)
+    )
+    return cells + begin + (end - begin) * (at_begin / (at_begin - at_end))[:, None]
+
+
+def from_triangles(p: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+    """Distance (n,) of points (n, 3) from triangles (n, 3) each."""
+    normal = np.cross(b - a, c - a)
+    above, nearest = np.ones(len(p), bool), np.full(len(p), np.inf)
+    for start, end in ((a, b), (b, c), (c, a)):
+        side = end - start
+        length2 = np.maximum((side * side).sum(1), 1e-300)
+        share = np.clip(((p - start) * side).sum(1) / length2, 0.0, 1.0)
+        nearest = np.minimum(nearest, np.linalg.norm(start + side * share[:, None] - p, axis=1))
+        above &= (np.cross(side, p - start) * normal).sum(1) >= 0.0
+    size = np.maximum(np.linalg.norm(normal, axis=1), 1e-300)
+    return np.where(above, np.abs(((p - a) * normal).sum(1)) / size, nearest)
+
+
+def ball(p: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(p, axis=0) - 0.35
+
+
+def box(p: np.ndarray) -> np.ndarray:
+    beyond = np.abs(p) - np.array([0.31, 0.27, 0.22])[:, None, None, None]
+    return np.linalg.norm(np.maximum(beyond, 0.0), axis=0) + np.minimum(beyond.max(axis=0), 0.0)
+
+
+@pytest.mark.parametrize(
+    ("distance", "size", "most", "mean"), [(ball, 17, 0.02, 0.0033), (box, 33, 0.36, 0.012)]
+)
+def test_how_far_triangles_are_off(distance, size, most, mean):
+    """In cells, times the square of `pieces`: from points of the surface, in float64."""
+    values = distance(np.array(np.meshgrid(*[np.linspace(-0.5, 0.5, size)] * 3, indexing="ij")))
+    values = values.astype(np.float32)
+    points = points_where_zero(values, 6000)
+    assert len(points) > 2000
+    for pieces in (1, 2, 4):
+        shape = SdfGrid(values=values, pieces=pieces, smooth=False)
+        vertices, faces, _, _ = triangles.triangulate(shape)
+        corners = vertices.astype(np.float64)[faces] * (size - 1)
+        near = cKDTree(corners.mean(axis=1)).query(points, k=24)[1]
+        off = [from_triangles(points, *corners[near[:, k]].swapaxes(0, 1)) for k in range(24)]
+        off = np.min(off, axis=0) * pieces**2
+        assert 0.2 * most < off.max() < most and 0.4 * mean < off.mean() < mean
 
 
 def test_default_is_a_ball():

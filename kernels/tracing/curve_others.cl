@@ -1,0 +1,21 @@
+/* Hits of shapes beside curves, such as a sphere that is a lamp. They are few: each is tested against all lanes. */
+#include "generated/shape_tree.cl"
+#define CURVE_OTHERS scene.settings->single_count /* primitives below are no pieces */
+
+/* `hit` with the hits before t of the active lanes whose primitive is no piece. */
+inline ShapeHit curve_others(Scene scene, integer prim, mask active, vec3 o, vec3 d, real t, ShapeHit hit)
+{
+    TraceInteger prims = {prim}, left = {active & (prim < CURVE_OTHERS)};
+    for (uint i = 0; i < LANES; i++) {
+        if (!left.at[i]) continue;
+        int shape = prims.at[i];
+        ShapeHit own = shape_hit(scene, shape, shape_row_like(scene, shape), o, d, (real)(0.0f), t);
+        mask same = (left.v != 0) & (prim == shape);
+        hit.t = sel(same, own.t, hit.t);
+        hit.n = sel3(same, own.n, hit.n);
+        hit.uv.x = sel(same, own.uv.x, hit.uv.x);
+        hit.uv.y = sel(same, own.uv.y, hit.uv.y);
+        left.v = sel_i(same, (integer)(0), left.v);
+    }
+    return hit;
+}

@@ -1,0 +1,183 @@
+/* Tracing the rays of a work-item's lanes where there are curves, and few shapes but triangles beside them. Rays step
+ * from node to node of the tree over pieces in turn, while what each needs next is fetched, until they come to a piece
+ * that they do not pass beside. When all have come to one, or ended, these pieces are tested in lanes. Triangles are
+ * met before, by one ray after another. The hits are those of tracing/trace_one.cl, to the bit. */
+#include "tracing/trace.cl"
+#include "generated/layout.cl"
+#include "generated/trace_args.cl"
+#include "bvh/fetch.cl"
+#include "generated/shape/curves.cl"
+#include "tracing/curve_beside.cl"
+#include "tracing/shape_rows_many.cl"
+#include "tracing/trace_each.cl"
+#include "generated/curve_others.cl"
+
+typedef struct {
+    Wide8Ray ray;
+    float3 o, d;
+    float t;
+    uint at, waits; /* at: a node, or a leaf */
+    int piece;      /* of the leaf */
+    ulong waiting[WIDE8_STACK];
+} CurveRay;
+
+typedef struct { global const float *nodes; global const uint *indices; global const float *pieces; } CurveTree;
+
+/* The row in `shapes` of the first curves, and where in memory primitive 0 would be if it were a piece: pieces follow
+ * each other, those of the next shape behind those of the one before. */
+inline integer curve_row_first(Scene scene)
+{
+    return (integer)((scene.settings->first_analytic + scene.settings->single_count) * SHAPE_ROW_WORDS);
+}
+
+inline CurveTree curve_tree(global const float *nodes, global const uint *indices, Scene scene)
+{
+    ShapeRow row = shape_row_row(scene.shapes, curve_row_first(scene));
+    TraceInteger first = {curve_row(scene.geometry, row.params).first};
+    CurveTree tree = {nodes, indices, scene.spheres + first.at[0]};
+    return tree;
+}
+
+/* Move a ray to a node or a leaf, and fetch its memory. */
+inline void curve_ray_visit(CurveTree tree, CurveRay *r, uint at)
+{
+    r->at = at;
+    if (at & BVH_LEAF) {
+        r->piece = (int)tree.indices[at & ~BVH_LEAF];
+        FETCH(tree.pieces + CURVE_WORDS * r->piece);
+        FETCH(tree.pieces + CURVE_WORDS * r->piece + 15);
+    } else {
+        for (uint line = 0; line < 4; line++) FETCH(tree.nodes + (ulong)at * 64 + 16 * line);
+    }
+}
+
+/* Visit what waits next; return 0 at the end. */
+inline int curve_ray_next(CurveTree tree, CurveRay *r)
+{
+    uint at;
+    if (!wide8_next(r->waiting, &r->waits, r->t, &at)) return 0;
+    curve_ray_visit(tree, r, at);
+    return 1;
+}
+
+/* Take one step; return 0 at the end. */
+inline int curve_ray_step(CurveTree tree, CurveRay *r)
+{
+    if (r->at & BVH_LEAF) return curve_ray_next(tree, r);
+    union { float8 v; uint at[8]; } entry;
+    global const float *node = tree.nodes + (ulong)r->at * 64;
+    Mask8 m = wide8_boxes(node, &r->ray, r->t, &entry.v);
+    if (!m) return curve_ray_next(tree, r);
+    global const uint *words = (global const uint *)(node + 48);
+    curve_ray_visit(tree, r, wide8_nearest(words, entry.at, m, r->waiting, &r->waits));
+    return 1;
+}
+
+/* Whether a ray is at a piece, or at another shape, that it may meet. */
+inline int curve_ray_waits(CurveTree tree, Scene scene, const CurveRay *r)
+{
+    if (!(r->at & BVH_LEAF)) return 0;
+    return r->piece < CURVE_OTHERS || !curve_beside(tree.pieces + CURVE_WORDS * r->piece, r->o, r->d);
+}
+
+/* Start the active rays that are finite; return how many they are. */
+inline uint curve_rays_start(const TraceRays *rays, CurveRay *states, mask active, uint *going)
+{
+    uint begun[LANES], count = trace_active(active, begun), n = 0;
+    for (uint k = 0; k < count; k++) {
+        uint i = begun[k];
+        CurveRay *r = states + i;
+        r->o = (float3)(rays->ox.at[i], rays->oy.at[i], rays->oz.at[i]);
+        r->d = (float3)(rays->dx.at[i], rays->dy.at[i], rays->dz.at[i]);
+        if (!ray_finite(r->o.x, r->o.y, r->o.z, r->d.x, r->d.y, r->d.z)) continue;
+        r->ray = wide8_ray(r->o.x, r->o.y, r->o.z, r->d.x, r->d.y, r->d.z, 0.0f);
+        r->t = rays->t.at[i];
+        r->at = r->waits = 0;
+        going[n++] = i;
+    }
+    return n;
+}
+
+/* The nearest primitive that each active ray meets before *t, which becomes its distance, or with `first_only` any;
+ * -1 if none. */
+inline integer curves_trace(CurveTree tree, Scene scene, vec3 o, vec3 d, mask active, int first_only, real *t)
+{
+    CurveRay states[LANES];
+    TraceRays rays = trace_rays(o, d, *t);
+    TraceInteger piece = {(integer)(0)};
+    integer best = -1, params = shape_row_row(scene.shapes, curve_row_first(scene)).params;
+    uint going[LANES], count = curve_rays_start(&rays, states, active, going);
+    while (count) {
+        TraceInteger tests = {(integer)(0)};
+        uint waiting[LANES], waits = 0;
+        while (count) {
+            uint left = 0;
+            for (uint k = 0; k < count; k++) {
+                uint i = going[k];
+                if (curve_ray_waits(tree, scene, states + i)) {
+                    piece.at[i] = states[i].piece;
+                    tests.at[i] = -1;
+                    waiting[waits++] = i;
+                } else if (curve_ray_step(tree, states + i)) {
+                    going[left++] = i;
+                }
+            }
+            count = left;
+        }
+        if (!waits) break;
+        mask tested = tests.v != 0;
+        Curve q = curves_one(scene, params, piece.v, tested & (piece.v >= CURVE_OTHERS));
+        ShapeHit hit = curve_intersect(q, o, d, (real)(0.0f), rays.t.v);
+        hit = curve_others(scene, piece.v, tested, o, d, rays.t.v, hit);
+        mask met = tested & (hit.t < rays.t.v);
+        rays.t.v = sel(met, hit.t, rays.t.v);
+        best = sel_i(met, piece.v, best);
+        TraceInteger ends = {met & mask_of(first_only)};
+        for (uint k = 0; k < waits; k++) {
+            uint i = waiting[k];
+            states[i].t = rays.t.at[i];
+            if (!ends.at[i] && curve_ray_next(tree, states + i)) going[count++] = i;
+        }
+    }
+    *t = rays.t.v;
+    return best;
+}
+
+inline TraceHit trace_closest(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real far, mask active)
+{
+    TraceHits hits = trace_missed(far);
+    TraceRays r = trace_rays(o, d, far);
+    uint rays[LANES], count = trace_active(active, rays);
+    for (uint k = 0; k < count; k++)
+        trace_put(&hits, rays[k], LAYOUT(closest)(nodes, leaves, TRACE_RAY(&r, rays[k])));
+    TraceHit h = trace_together(hits);
+    integer piece = curves_trace(curve_tree(shape_nodes, shape_indices, scene), scene, o, d, active, 0, &h.t);
+    mask met = piece >= 0;
+    if (!any(met)) return h;
+    TraceInteger of = {piece}, shape = {h.shape};
+    for (uint k = 0; k < count; k++)
+        if (of.at[rays[k]] >= 0) shape.at[rays[k]] = shape_row_of(scene, of.at[rays[k]]);
+    h.shape = shape.v;
+    h.prim = sel_i(met, piece, h.prim);
+    mask curved = met & (piece >= CURVE_OTHERS);
+    integer row = sel_i(curved, h.shape * SHAPE_ROW_WORDS, curve_row_first(scene));
+    Curve q = curves_one(scene, shape_row_row(scene.shapes, row).params, piece, curved);
+    ShapeHit s = curve_intersect(q, o, d, (real)(0.0f), (real)(FAR));
+    s = curve_others(scene, piece, met, o, d, (real)(FAR), s);
+    h.n = sel3(met, s.n, h.n);
+    h.u = sel(met, s.uv.x, h.u);
+    h.v = sel(met, s.uv.y, h.v);
+    return h;
+}
+
+inline mask trace_occluded(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real t, mask active)
+{
+    TraceRays r = trace_rays(o, d, t);
+    TraceInteger blocked = {(integer)(0)};
+    uint rays[LANES], count = trace_active(active, rays);
+    for (uint k = 0; k < count; k++)
+        if (LAYOUT(occluded)(nodes, leaves, TRACE_RAY(&r, rays[k]))) blocked.at[rays[k]] = -1;
+    mask behind = blocked.v != 0;
+    CurveTree tree = curve_tree(shape_nodes, shape_indices, scene);
+    return behind | (curves_trace(tree, scene, o, d, active & !behind, 1, &t) >= 0);
+}
