@@ -580,7 +580,7 @@ def test_what_cannot_move_is_refused() -> None:
     tracer = dataclasses.replace(
         scene(things, lamps, shutter, **camera), integrator=integrators.ParticleTracer()
     )
-    with pytest.raises(SceneError, match="not known where things move"):
+    with pytest.raises(SceneError, match="which gives out light"):
         lower(tracer)
 
 
@@ -588,8 +588,8 @@ def test_what_is_left_aside_is_told() -> None:
     things, lamps, camera = CASES["flame"]
     whole = scene([*things, WALL], lamps, Shutter(0.0, 1.0), **camera)
     told = {
-        "path.light_paths: left aside, as the media": integrators.Path(light_paths=1),
-        "vcm.merging: left aside, as the media": integrators.Vcm(),
+        "path.light_paths: left aside, as no path starts": integrators.Path(light_paths=1),
+        "vcm.merging: left aside, as no path starts": integrators.Vcm(),
     }
     for line, integrator in told.items():
         lowered = lower(dataclasses.replace(whole, integrator=integrator))

@@ -22,6 +22,7 @@ from clpt.scene.motion import Keys, Shutter, arc, decomposed, rotation, slerp
 from clpt.scene.shapes import Cylinder, Group, Instance, Shape, Sphere
 
 STEP = 29  # floats of a step between two keys, see kernels/tracing/motion.cl
+LOOKS = 33  # even times at which it is looked what is around a light
 TURN = 0.1  # [rad] of a rotation that a box is looked at again
 ROUNDING = 4e-6  # of its coordinates, by which a box is larger than what float32 makes of it
 EVEN = 1e-5  # relative difference of scales from which a motion stretches
@@ -69,6 +70,17 @@ class Motions:
         """Whether something is scaled, or mirrored, while it moves."""
         every = [*self.shapes.values(), *self.lamps.values(), self.camera]
         return any(keys is not None and not is_rigid(keys) for keys in every)
+
+    def looks(self) -> tuple[float, ...]:
+        """Return times from when the shutter opens to when it closes; one if nothing moves."""
+        if not self:
+            return (self.shutter.open,)
+        keys = [*self.shapes.values(), *self.lamps.values(), self.camera]
+        times = {t for one in keys if one is not None for t in one.times}
+        times |= {t for own in self.deforming.values() for t in own}
+        inner = {t for t in times if self.shutter.open < t < self.shutter.close}
+        even = np.linspace(self.shutter.open, self.shutter.close, LOOKS).tolist()
+        return tuple(sorted({*inner, *even}))
 
     def halfway(self, keys: Keys | None, point: NDArray[Any]) -> NDArray[np.float64]:
         """Return where a point (3,) is in the middle of the time in which the shutter is open."""
