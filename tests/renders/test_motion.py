@@ -388,9 +388,8 @@ def check_case(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", sorted(CASES.keys() - {"zoom"}))
+@pytest.mark.parametrize("name", sorted(CASES))
 def test_a_picture_is_the_mean_of_still_ones(name: str) -> None:
-    """Of all but a camera that scales: at rest a pinhole must not."""
     check_case(name, stills=64, spp=512, runs=4)
 
 
@@ -508,6 +507,28 @@ def test_a_shutter_without_length_is_still() -> None:
     assert not lower(scene([moved], [AMBIENT], Shutter(0.3, 0.3))).features.moving
     assert not lower(scene([moved], [AMBIENT], Shutter(2.0, 3.0))).features.moving  # after its keys
     assert lower(scene([moved], [AMBIENT], Shutter(0.3, 0.4))).features.moving == ("instances",)
+    _, _, zoom = CASES["zoom"]  # what scales a pinhole stays a key
+    assert lower(scene([cube], [AMBIENT], Shutter(0.3, 0.3), **zoom)).features.moving == ("camera",)
+
+
+@pytest.mark.slow
+def test_a_pinhole_that_is_scaled_at_rest() -> None:
+    """Squeezed by keys across its axis it has a smaller field of view; `to_world` may not say it."""
+    share = np.tan(np.radians(10.0)) / np.tan(np.radians(20.0))
+    once = LOOK @ transforms.scale([share, share, 1.0])
+    twice = LOOK @ transforms.scale([share**2, share**2, 1.0])
+    at = 1.0 / (1.0 + share)  # where a scale that changes linearly from 1 to its square has come
+    given: list[tuple[dict[str, Any], Shutter | None]] = [
+        ({"fov": 20.0}, None),
+        ({"to_world": np.eye(4), "motion": Keys([0.0], [once])}, None),
+        ({"to_world": np.eye(4), "motion": Keys([0.0, 1.0], [LOOK, twice])}, Shutter(at, at)),
+    ]
+    things = [shapes.Sphere(radius=0.6, material=GREY), WALL]
+    wholes = [scene(things, [AMBIENT], shutter, **camera) for camera, shutter in given]
+    expected, *found = (blocks(clpt.render(whole, 16)) for whole in wholes)
+    assert all(np.abs(one - expected).max() < 2e-3 for one in found)
+    with pytest.raises(SceneError, match="must not scale"):
+        lower(scene(things, [AMBIENT], None, to_world=once))
 
 
 def test_boxes_hold_what_moves() -> None:

@@ -16,7 +16,7 @@ from clpt.errors import SceneError
 from clpt.render.lowering.geometry import shapes, triangles
 from clpt.render.lowering.tables import TableStore
 from clpt.scene import Scene
-from clpt.scene.cameras import Camera, Matrix
+from clpt.scene.cameras import Camera, Matrix, Orthographic
 from clpt.scene.lights import Light
 from clpt.scene.motion import Keys, Shutter, arc, decomposed, rotation, slerp
 from clpt.scene.shapes import Cylinder, Group, Instance, Shape, Sphere
@@ -191,6 +191,9 @@ def _rest(thing: Any, shutter: Shutter) -> Any:
     if thing.motion is None or _moves(thing.motion, shutter):
         return thing
     matrix = thing.motion.at(shutter.open)
+    angular = isinstance(thing, Camera) and not isinstance(thing, (Matrix, Orthographic))
+    if angular and not _keeps_lengths(matrix):  # which its `to_world` must
+        return replace(thing, motion=Keys((0.0, 1.0), (matrix, matrix)))
     if isinstance(thing, Matrix):
         return replace(thing, motion=None, view=thing.view @ transforms.inverse(matrix))
     if isinstance(thing, ROUND) and not is_even(thing.motion):
@@ -204,6 +207,11 @@ def _rest(thing: Any, shutter: Shutter) -> Any:
     if hasattr(thing, "direction"):
         changes["direction"] = tuple(transforms.transform_vectors(matrix, thing.direction))
     return replace(thing, **changes)
+
+
+def _keeps_lengths(matrix: NDArray[np.float64]) -> bool:
+    linear = matrix[:3, :3]
+    return np.allclose(linear.T @ linear, np.eye(3), atol=1e-6)
 
 
 def _moves(keys: Keys, shutter: Shutter) -> bool:
