@@ -169,6 +169,30 @@ FLAT = shapes.Rectangle(
     @ transforms.scale(0.5),
     emission=lights.Area(radiance=4.0, two_sided=True),
 )
+SHEET = np.array([[-0.6, -0.2, 0], [0.6, -0.2, 0], [0.6, 0.2, 0], [-0.6, 0.2, 0]], np.float32)
+GLOWS = shapes.Mesh(  # a lamp that grows and bends
+    vertices=SHEET,
+    faces=[[0, 1, 2], [0, 2, 3]],
+    emission=lights.Area(radiance=4.0, two_sided=True),
+    deformation=Deformation(
+        [0.0, 0.4, 1.0],
+        [
+            SHEET * [1, 0.2, 1],
+            SHEET * [0.5, 3, 1] + [0, 0.3, 0],
+            SHEET + np.array([[0, 0, 1], [0, 0, 0], [0, 1, 0], [0, 0, -1]]),
+        ],
+    ),
+)
+TURNS = dataclasses.replace(
+    GLOWS,
+    uvs=SHEET[:, :2] + 0.5,
+    emission=lights.Area(
+        radiance=textures.Checkerboard(color0=1.0, color1=6.0, to_uv=np.diag([3.0, 3.0, 1.0]))
+    ),
+    motion=SWELLS,
+)
+DULL = shapes.Sphere(center=(0, -0.8, -0.3), radius=0.4, material=GREY)
+STRIP = as_tubes(dataclasses.replace(STRANDS, emission=lights.Area(radiance=3.0)))
 CASES: dict[str, tuple[Any, Any, dict[str, Any]]] = {
     "turning": ((shapes.Cube(material=GREY, motion=turn([0, 0.3, 1], 300)),), (AMBIENT,), {}),
     "scaling": (
@@ -302,6 +326,21 @@ CASES: dict[str, tuple[Any, Any, dict[str, Any]]] = {
             BEAM,
             lights.Directional(direction=(0, 0, 1), irradiance=1.0, motion=turn([0, 1, 0], 40)),
         ),
+        {},
+    ),
+    "glowing": ((GLOWS, DULL), (), {}),
+    "glowing and turning": ((TURNS, DULL), (lights.Point(position=(2, 2, -3)),), {}),
+    "glowing strands": ((STRIP, DULL), (), {}),
+    "glowing and shared": (
+        [
+            shapes.Instance(
+                group=shapes.Group((GLOWS, shapes.Cube(to_world=transforms.scale(0.1)), FLAT)),
+                to_world=transforms.translate([x, 0, 0]) @ transforms.scale(0.6),
+                motion=turn([0, 0, 1], 40) if x > 0 else None,
+            )
+            for x in (-0.7, 0.7)
+        ],
+        (),
         {},
     ),
     "zoom": (
@@ -513,7 +552,7 @@ def test_a_shutter_without_length_is_still() -> None:
 
 @pytest.mark.slow
 def test_a_pinhole_that_is_scaled_at_rest() -> None:
-    """Squeezed by keys across its axis it has a smaller field of view; `to_world` may not say it."""
+    """Squeezed by keys across its axis it has a smaller view, which `to_world` may not say."""
     share = np.tan(np.radians(10.0)) / np.tan(np.radians(20.0))
     once = LOOK @ transforms.scale([share, share, 1.0])
     twice = LOOK @ transforms.scale([share**2, share**2, 1.0])

@@ -174,8 +174,8 @@ def _opening(shape: Any, shutter: Shutter) -> Any:
         return shape
     triangles.check_deformation(shape)
     still = len(given.while_open(shutter)) == 1
-    if not still and shape.emission is not None:
-        message = "a shape that emits light cannot deform: leave one of the two out"
+    if not still and shape.emission is not None and shape.kind == "spheres":
+        message = "spheres that emit light cannot deform: leave one of the two out"
         raise SceneError(message, where=f"{shapes.where(shape)}.deformation")
     changes = {} if still else {"deformation": given}
     return replace(triangles.at_time(shape, shutter.open), **changes)

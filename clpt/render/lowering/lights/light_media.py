@@ -6,6 +6,8 @@ else into what is at some points just before it: these must agree.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -100,7 +102,7 @@ def light_media(
         if unknown and not _says(emitter.shape):
             return NOWHERE._replace(refusal=unknown.format(shapes.where(emitter.shape)))
         number = int(geometry.rows[emitter.shape_row]["number"])
-        into = _around_shape(emitter, known, motions.shapes.get(number))
+        into = _around_shape(emitter, known, motions, number)
         if into is None:
             reason = f"{shapes.where(emitter.shape)} shines into more than one medium"
             if motions.moving:
@@ -153,13 +155,16 @@ class _Known:
         found = (surroundings.open_medium(self.scene, self.cache, time) for time in times)
         return next((one for one in found if one is not None), None)
 
-    def along(self, p: NDArray[np.float64], keys: Keys | None) -> Around | None:
+    def along(
+        self, p: NDArray[np.float64], keys: Keys | None, times: Sequence[float] = ()
+    ) -> Around | None:
         """The media at a point (3,) [m] that moves by keys, that which counts first; or the bodies.
 
-        None where they change while the shutter is open.
+        times: at which it is looked, by default all of them. None where what is found changes.
         """
         first: Around | None = None
-        for time in self.looks[:1] if self.still and keys is None else self.looks:
+        looks = times or self.looks
+        for time in looks[:1] if self.still and keys is None else looks:
             at = p if keys is None else transforms.transform_points(keys.at(time), p)
             found = self._at(np.asarray(at, np.float64), time)
             if first is not None and found != first:
@@ -173,7 +178,7 @@ class _Known:
         return surroundings.media_at(self.scene, p, self.cache, time)[:1] or self.rest
 
 
-def _around_shape(emitter: Emitter, known: _Known, keys: Keys | None) -> Around | None:
+def _around_shape(emitter: Emitter, known: _Known, motions: Motions, number: int) -> Around | None:
     """What a shape shines into, None if that is not the same everywhere, at all times."""
     shape: Any = emitter.shape
     both = getattr(shape.emission, "two_sided", False)
@@ -183,11 +188,30 @@ def _around_shape(emitter: Emitter, known: _Known, keys: Keys | None) -> Around 
         if both and shape.interior is not shape.exterior:
             return None
         return () if shape.exterior is None else (shape.exterior,)
-    points = _before(emitter)
-    if both:
-        points = np.concatenate([points, _before(emitter, -BEFORE)])
-    found = [known.along(p, keys) for p in points]
+    sides = (BEFORE, -BEFORE) if both else (BEFORE,)
+    keys = motions.shapes.get(number)
+    if emitter.keys == 1:
+        found = [known.along(p, keys) for side in sides for p in _before(emitter, side)]
+    else:
+        then = ((_then(emitter, motions.deforming[number], t), t) for t in known.looks)
+        found = [
+            known.along(p, keys, (time,))
+            for one, time in then
+            for side in sides
+            for p in _before(one, side)
+        ]
     return found[0] if all(one == found[0] for one in found) else None
+
+
+def _then(emitter: Emitter, times: Sequence[float], time: float) -> Emitter:
+    """A shape that deforms as it is at a time, by its rows of vertices at times."""
+    assert emitter.vertices is not None and emitter.faces is not None
+    rows = emitter.vertices.reshape(-1, emitter.keys, 3)
+    i = int(np.clip(np.searchsorted(times, time, "right") - 1, 0, emitter.keys - 2))
+    share = (time - times[i]) / (times[i + 1] - times[i])
+    vertices = (1.0 - share) * rows[:, i] + share * rows[:, i + 1]
+    faces = emitter.faces // np.uint32(emitter.keys)
+    return replace(emitter, vertices=vertices.astype(np.float32), faces=faces, keys=1)
 
 
 def _says(shape: Any) -> bool:
@@ -195,7 +219,7 @@ def _says(shape: Any) -> bool:
     return shape.interior is not None or shape.exterior is not None
 
 
-def _before(emitter: Emitter, before: float = BEFORE) -> NDArray[np.float64]:
+def _before(emitter: Emitter, before: float) -> NDArray[np.float64]:
     """Some points before a shape that shines, or behind it (n, 3) [m]."""
     shape, vertices, faces = emitter.shape, emitter.vertices, emitter.faces
     six = np.concatenate([np.eye(3), -np.eye(3)])
