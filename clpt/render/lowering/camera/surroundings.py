@@ -299,9 +299,10 @@ def _areas(shape: Shape, cached: Callable[..., Any] | None, time: float) -> NDAr
     if isinstance(then, Spheres):
         return np.array([0.0, 0.0, 0.0, 4.0 * np.pi * float((_balls(then)[1] ** 2).sum())])
     vertices, faces = triangles_of(then, cached if then is shape else None)
+    points = np.asarray(vertices, np.float64)
     if shape.motion is not None:
-        vertices = transforms.transform_points(shape.motion.at(time), vertices)
-    a, b, c = np.moveaxis(np.asarray(vertices, np.float64)[faces], 1, 0)
+        points = transforms.transform_points(shape.motion.at(time), points)
+    a, b, c = np.moveaxis(points[faces], 1, 0)
     n = np.cross(b - a, c - a) / 2.0
     return np.array([*n.sum(axis=0), np.linalg.norm(n, axis=1).sum()])
 
