@@ -1,6 +1,7 @@
 /* Lights whose triangles deform: `geometry` has a row of such a triangle for each key, side by side, and all of it is
  * linear from one to the next, as its vertices are (tracing/vertex_keys.cl). */
-#include "generated/motion.cl"
+#include "tracing/motion.cl"
+#include "tracing/vertex_keys.cl"
 
 inline Triangle triangle_then(Scene scene, LightRow l, mask active)
 {
