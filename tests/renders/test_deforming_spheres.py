@@ -96,7 +96,7 @@ def test_what_is_refused() -> None:
         ),
         (dataclasses.replace(ball, deformation=3), "must be a Deformation"),
         (dataclasses.replace(ball, centers=None), "needs centers too"),
-        (dataclasses.replace(ball, emission=lights.Area()), "emits light cannot deform"),
+        (dataclasses.replace(ball, emission=lights.Area()), "emit light cannot deform"),
         (dataclasses.replace(ball, deformation=gone), r"deformation: at 1 s: radii\[1\] must be"),
         (shapes.Spheres(centers=FAR, deformation=normals), "spheres take no normals"),
     ]

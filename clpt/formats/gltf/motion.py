@@ -88,9 +88,6 @@ def _deforming(
         normals = np.stack([np.asarray(way.normals) for way in ways])
     if not np.ptp(points, axis=0).any() and (normals is None or not np.ptp(normals, axis=0).any()):
         return shape
-    if shape.emission is not None:
-        warnings.append(f"{name}, as it emits light: what deforms cannot")
-        return shape
     step = _step(points)
     normals = None if normals is None else normals[::step]
     keys = Deformation(times[::step].tolist(), points[::step], normals)

@@ -24,12 +24,14 @@ def dispatch_text(
     two_sided: bool = False,
     aimed: bool = False,
     moving: bool = False,
+    deforming: bool = False,
 ) -> str:
     """Return `light_emit(scene, pick, u, v, lambdas)`: a ray from a light that is chosen by `pick`.
 
     kinds: of the lights in the scene; textured: some emission is a texture; two_sided: some shape
-    emits from its back too; aimed: some rays go to what is sharp; moving: some lights move. It
-    stands behind the text of clpt.render.codegen.lights.dispatch_text.
+    emits from its back too; aimed: some rays go to what is sharp; moving: some lights move;
+    deforming: triangles of some have a row for each key. It stands behind the text of
+    clpt.render.codegen.lights.dispatch_text.
     """
     present = [kind for kind in KINDS if kind in set(kinds)]
     others = [kind for kind in present if kind in RECORDS]
@@ -50,7 +52,7 @@ def dispatch_text(
     cases = [Case(kind_test(kind, present), _lamp(kind, moving)) for kind in others]
     rows += choose("r", "LightRay", *cases)
     if surfaces:
-        rows += _surfaces_text(surfaces, present, textured, two_sided, moving)
+        rows += _surfaces_text(surfaces, present, textured, two_sided, moving, deforming)
     if aimed:
         rows += _aimed_text(present, bool(surfaces), moving)
     rows += [
@@ -64,7 +66,12 @@ def dispatch_text(
 
 
 def densities_text(
-    kinds: Iterable[str], two_sided: bool, tree: bool, aimed: bool, moving: bool = False
+    kinds: Iterable[str],
+    two_sided: bool,
+    tree: bool,
+    aimed: bool,
+    moving: bool = False,
+    deforming: bool = False,
 ) -> str:
     """Return what kernels/lighting/rivals.cl asks of the light in a row, seen along wi.
 
@@ -81,7 +88,10 @@ def densities_text(
     emitted = Function(
         "real light_emit_pdf(Scene scene, integer row, vec3 wi, real t)",
         "0.0f",
-        [Case(kind_test(kind, present), _emit_pdf(kind, two_sided, moving)) for kind in present],
+        [
+            Case(kind_test(kind, present), _emit_pdf(kind, two_sided, moving, deforming))
+            for kind in present
+        ],
         (
             "LightRow l = light_at(scene, row);",
             "float disk = PI * emission_radius(scene.settings) * emission_radius(scene.settings);",
@@ -95,7 +105,7 @@ def densities_text(
         "vec3 n)",
         "1.0f",
         [
-            Case(kind_test(kind, present), f"{kind}_pdf({row_text(kind)}, {given})")
+            Case(kind_test(kind, present), f"{kind}_pdf({row_text(kind, deforming)}, {given})")
             for kind in present
             if (given := _pdf_arguments(kind, moving))
         ],
@@ -116,9 +126,9 @@ def _includes(present: list[str], moving: bool) -> list[str]:
     return ['#include "interface/emission.cl"', *(f'#include "emission/{k}.cl"' for k in files)]
 
 
-def _emit_pdf(kind: str, two_sided: bool, moving: bool) -> str:
+def _emit_pdf(kind: str, two_sided: bool, moving: bool, deforming: bool) -> str:
     """The density of a kind in light_emit_pdf, but for its row's chance."""
-    row = row_text(kind)
+    row = row_text(kind, deforming)
     if kind in shape_records.RECORDS:
         sides = f" * sel(l.emission_mode == {BOTH}, (real)(0.5f), (real)(1.0f))" * two_sided
         point = f"{kind}_point({row}, (vec2){{0.5f, 0.5f}})"
@@ -211,7 +221,12 @@ def _lamp(kind: str, moving: bool) -> str:
 
 
 def _surfaces_text(
-    kinds: list[str], present: list[str], textured: bool, two_sided: bool, moving: bool
+    kinds: list[str],
+    present: list[str],
+    textured: bool,
+    two_sided: bool,
+    moving: bool,
+    deforming: bool,
 ) -> list[str]:
     """A point of the shape, its emission there, and the ray from it."""
     rows = [
@@ -219,7 +234,7 @@ def _surfaces_text(
         "TexturePoint point = texture_point_nowhere();",
     ]
     for kind in kinds:
-        chosen = f"SurfacePoint p = {kind}_point({row_text(kind)}, u);"
+        chosen = f"SurfacePoint p = {kind}_point({row_text(kind, deforming)}, u);"
         point = point_text(kind, "p.uv") if textured else ()
         rows += choose("q", "SurfacePoint", Case(kind_test(kind, present), "p", (chosen, *point)))
     if moving:

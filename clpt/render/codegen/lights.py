@@ -41,14 +41,16 @@ def dispatch_text(
     aimed: bool = False,
     grouped: bool = False,
     moving: bool = False,
+    deforming: bool = False,
 ) -> str:
     """Return the functions over all lights, for the kinds in the scene (`LightRows.kinds`).
 
     textured: some emission is a texture, so that triangles need the uv of their mesh; two_sided:
     some shape emits from its back too; tree: the rows are followed by a tree that chooses among
     them; densities: the functions that weigh light paths, where there are some; aimed: some of
-    these start toward what is sharp; grouped: a sample tells its light; moving: some lights move.
-    It includes the files of `virtual_files`, here and in clpt.render.codegen.shapes.
+    these start toward what is sharp; grouped: a sample tells its light; moving: some lights move;
+    deforming: triangles of some have a row for each key. It includes the files of
+    `virtual_files`, here and in clpt.render.codegen.shapes.
 
     light_sample(scene, p, hemisphere, pick, u, lambdas): chooses a light and a direction to it
     light_pdf(scene, row, p, hemisphere, wi, t, n): of it, [1/sr], for a ray that met a shape
@@ -66,16 +68,21 @@ def dispatch_text(
     includes += [f"generated/shape/{kind}.cl" for kind in surfaces]
     includes += ["light/area.cl"] if surfaces else []
     includes += ["light/moving.cl"] if moving else []
-    parts = [f"#define LIGHT_ROW_WORDS {LIGHT.words}", f"#define SHAPE_ROW_WORDS {SHAPE.words}"]
+    includes += ["light/deforming.cl"] if deforming else []
+    words = shape_records.RECORDS["triangle"].words
+    parts = [f"#define TRIANGLE_ROW_WORDS {words}"] * deforming
+    parts += [f"#define LIGHT_ROW_WORDS {LIGHT.words}", f"#define SHAPE_ROW_WORDS {SHAPE.words}"]
     parts += [f"#define LIGHT_{kind.upper()} {KINDS.index(kind)}" for kind in present]
     parts += [f'#include "{name}"' for name in includes]
     parts += _tree_text() if tree else []
     parts.append(_sides_text(two_sided))
     weighed = bool(densities)
     parts.append(
-        _sample_text(others, surfaces, textured, two_sided, tree, weighed, aimed, grouped, moving)
+        _sample_text(
+            others, surfaces, textured, two_sided, tree, weighed, aimed, grouped, moving, deforming
+        )
     )
-    parts += [_pdf_text(surfaces, tree, moving), densities]
+    parts += [_pdf_text(surfaces, tree, moving, deforming), densities]
     parts += [_brick_pdf_text(tree)] if VOLUME in present else []
     parts += _infinite_text([kind for kind in others if kind in INFINITE], tree, moving)
     return "\n".join(parts) + "\n"
@@ -86,8 +93,10 @@ def kind_test(kind: str, kinds: Iterable[str]) -> str:
     return "" if {*kinds} == {kind} else f"l.kind == LIGHT_{kind.upper()}"
 
 
-def row_text(kind: str) -> str:
+def row_text(kind: str, deforming: bool = False) -> str:
     """The kind's parameters of the light `l`; other lanes read the first row, see `blank_row`."""
+    if deforming and kind == "triangle":
+        return "triangle_then(scene, l, m)"
     table = "light_params" if kind in RECORDS else "geometry"
     return f"{kind}_row(scene.{table}, {active('l.params')})"
 
@@ -135,6 +144,7 @@ def _sample_text(
     aimed: bool,
     grouped: bool,
     moving: bool,
+    deforming: bool,
 ) -> str:
     kinds = [*others, *surfaces]
     head = (
@@ -169,7 +179,7 @@ def _sample_text(
             "TexturePoint point = texture_point_nowhere();",
         ]
     for kind in surfaces:
-        sampled = f"ShapeSample r = {kind}_sample({row_text(kind)}, p, u);"
+        sampled = f"ShapeSample r = {kind}_sample({row_text(kind, deforming)}, p, u);"
         point = point_text(kind, "r.uv") if textured else ()
         rows += choose("q", "ShapeSample", Case(kind_test(kind, kinds), "r", (sampled, *point)))
     if moving:
@@ -194,7 +204,7 @@ def _sample_text(
     return function(head, *rows, "return s;")
 
 
-def _pdf_text(surfaces: list[str], tree: bool, moving: bool) -> str:
+def _pdf_text(surfaces: list[str], tree: bool, moving: bool, deforming: bool) -> str:
     at, along, far, front = ("p", "wi", "t", "n")
     before = ["LightRow l = light_at(scene, row);"]
     if moving and surfaces:
@@ -212,7 +222,7 @@ def _pdf_text(surfaces: list[str], tree: bool, moving: bool) -> str:
         [
             Case(
                 kind_test(kind, surfaces),
-                f"{kind}_pdf({row_text(kind)}, {at}, {along}, {far}, {front})",
+                f"{kind}_pdf({row_text(kind, deforming)}, {at}, {along}, {far}, {front})",
             )
             for kind in surfaces
         ],

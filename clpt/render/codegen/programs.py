@@ -186,6 +186,7 @@ def _shared(features: Features, layout: str) -> Files:
             features.two_sided_lights,
             features.aimed,
             "lights" in features.moving,
+            "emitters" in features.moving,
         ),
         "generated/textures.cl": textures.dispatch_text(
             features.textures,

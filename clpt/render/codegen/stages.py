@@ -115,6 +115,7 @@ def lights_text(features: Features) -> str:
             features.light_tree,
             features.aimed,
             "lights" in features.moving,
+            "emitters" in features.moving,
         )
     return (
         ('#include "generated/textures.cl"\n' if "texture" in emissions | factors else "")
@@ -129,6 +130,7 @@ def lights_text(features: Features) -> str:
             features.aimed,
             features.light_groups > 0,
             "lights" in features.moving,
+            "emitters" in features.moving,
         )
     )
 

@@ -84,8 +84,9 @@ class _Way:
         first, last = (_points(one, name) for one in (old, new))
         if np.array_equal(first, last):
             return new
-        if first.shape != last.shape or new.emission is not None:
-            why = "emits light" if new.emission is not None else f"had {len(first)} of them"
+        shines = new.emission is not None and isinstance(new, Spheres)
+        if first.shape != last.shape or shines:
+            why = "emits light" if shines else f"had {len(first)} of them"
             self.warnings.append(f"{shapes.where(new)}: its {name} do not move, as it {why}")
             return new
         normals = [getattr(one, "normals", None) for one in (old, new)]

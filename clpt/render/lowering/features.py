@@ -134,6 +134,7 @@ def moving_parts(index: SceneIndex, geometry: Geometry) -> tuple[str, ...]:
     analytic = {one.number for one in index.placed if one.shape.kind in shape_records.ANALYTIC}
     placed = {int(number) for prototype in index.prototypes for number in prototype.numbers}
     lit = {int(geometry.rows[one.shape_row]["number"]) for one in geometry.emitters}
+    deform = any(one.keys > 1 for one in geometry.emitters)
     numbers = motions.shapes.keys()
     found = {
         "camera": motions.camera is not None,
@@ -142,5 +143,6 @@ def moving_parts(index: SceneIndex, geometry: Geometry) -> tuple[str, ...]:
         "lights": bool(motions.lamps) or bool(lit & numbers),
         "vertices": _keyed(geometry),
         "spheres": spheres_move(index),
+        "emitters": deform,
     }
     return tuple(name for name, moves in found.items() if moves)

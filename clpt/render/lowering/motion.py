@@ -16,12 +16,13 @@ from clpt.errors import SceneError
 from clpt.render.lowering.geometry import shapes, triangles
 from clpt.render.lowering.tables import TableStore
 from clpt.scene import Scene
-from clpt.scene.cameras import Camera, Matrix
+from clpt.scene.cameras import Camera, Matrix, Orthographic
 from clpt.scene.lights import Light
 from clpt.scene.motion import Keys, Shutter, arc, decomposed, rotation, slerp
 from clpt.scene.shapes import Cylinder, Group, Instance, Shape, Sphere
 
 STEP = 29  # floats of a step between two keys, see kernels/tracing/motion.cl
+LOOKS = 33  # even times at which it is looked what is around a light
 TURN = 0.1  # [rad] of a rotation that a box is looked at again
 ROUNDING = 4e-6  # of its coordinates, by which a box is larger than what float32 makes of it
 EVEN = 1e-5  # relative difference of scales from which a motion stretches
@@ -69,6 +70,17 @@ class Motions:
         """Whether something is scaled, or mirrored, while it moves."""
         every = [*self.shapes.values(), *self.lamps.values(), self.camera]
         return any(keys is not None and not is_rigid(keys) for keys in every)
+
+    def looks(self) -> tuple[float, ...]:
+        """Return times from when the shutter opens to when it closes; one if nothing moves."""
+        if not self:
+            return (self.shutter.open,)
+        keys = [*self.shapes.values(), *self.lamps.values(), self.camera]
+        times = {t for one in keys if one is not None for t in one.times}
+        times |= {t for own in self.deforming.values() for t in own}
+        inner = {t for t in times if self.shutter.open < t < self.shutter.close}
+        even = np.linspace(self.shutter.open, self.shutter.close, LOOKS).tolist()
+        return tuple(sorted({*inner, *even}))
 
     def halfway(self, keys: Keys | None, point: NDArray[Any]) -> NDArray[np.float64]:
         """Return where a point (3,) is in the middle of the time in which the shutter is open."""
@@ -162,8 +174,8 @@ def _opening(shape: Any, shutter: Shutter) -> Any:
         return shape
     triangles.check_deformation(shape)
     still = len(given.while_open(shutter)) == 1
-    if not still and shape.emission is not None:
-        message = "a shape that emits light cannot deform: leave one of the two out"
+    if not still and shape.emission is not None and shape.kind == "spheres":
+        message = "spheres that emit light cannot deform: leave one of the two out"
         raise SceneError(message, where=f"{shapes.where(shape)}.deformation")
     changes = {} if still else {"deformation": given}
     return replace(triangles.at_time(shape, shutter.open), **changes)
@@ -179,6 +191,9 @@ def _rest(thing: Any, shutter: Shutter) -> Any:
     if thing.motion is None or _moves(thing.motion, shutter):
         return thing
     matrix = thing.motion.at(shutter.open)
+    angular = isinstance(thing, Camera) and not isinstance(thing, (Matrix, Orthographic))
+    if angular and not _keeps_lengths(matrix):  # which its `to_world` must
+        return replace(thing, motion=Keys((0.0, 1.0), (matrix, matrix)))
     if isinstance(thing, Matrix):
         return replace(thing, motion=None, view=thing.view @ transforms.inverse(matrix))
     if isinstance(thing, ROUND) and not is_even(thing.motion):
@@ -192,6 +207,11 @@ def _rest(thing: Any, shutter: Shutter) -> Any:
     if hasattr(thing, "direction"):
         changes["direction"] = tuple(transforms.transform_vectors(matrix, thing.direction))
     return replace(thing, **changes)
+
+
+def _keeps_lengths(matrix: NDArray[np.float64]) -> bool:
+    linear = matrix[:3, :3]
+    return np.allclose(linear.T @ linear, np.eye(3), atol=1e-6)
 
 
 def _moves(keys: Keys, shutter: Shutter) -> bool:

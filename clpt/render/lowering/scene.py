@@ -20,8 +20,10 @@ from clpt.render.lowering.camera import cameras, filters
 from clpt.render.lowering.camera.colour import sensor
 from clpt.render.lowering.camera.surroundings import (
     bodies_around,
+    boundaries,
     contested,
     media_around,
+    stands_still,
     warnings_of,
 )
 from clpt.render.lowering.camera.wavelengths import Density, density, emissions
@@ -59,8 +61,6 @@ from clpt.scene.integrators import Film, Integrator
 from clpt.scene.lights import Point
 from clpt.scene.media import Lattice
 from clpt.scene.shapes import Mesh
-
-IN_MOTION = "the media around lights are not known where things move"
 
 TREE_FROM = 16  # lights from which a tree chooses among them, see bench/lights.py
 
@@ -169,6 +169,8 @@ def lower(
         around = media_around(scene, cache) if index.media else ()
         camera = 0, media.word(next(iter(around), None))
         noted = warnings_of(around)
+    if index.motions and index.has_media and scene.camera.medium is None:
+        noted += _passed_through(scene, index, cache)
     density_row, tabulated, profile = _lower_film(index, encoder, wavelengths)
     targets = aims(index, geometry, sphere[1])
     first_aim = encoder.store.append_floats("distributions", targets)
@@ -238,11 +240,7 @@ def _begin_at_lights(
     """Return the index with whether paths can start at lights in media, and the lights' media."""
     if not index.has_media or not index.may_have_light_paths:
         return index, NOWHERE
-    if index.motions.moving or index.motions.lamps:
-        if index.light_paths:
-            raise SceneError(f"no light paths: {IN_MOTION}", where="integrator")
-        return replace(index, lit_media=IN_MOTION), NOWHERE
-    found = light_media(index, geometry.emitters, lights, media, bodies, sphere, cache)
+    found = light_media(index, geometry, lights, media, bodies, sphere, cache)
     if found.refusal and index.light_paths:
         raise SceneError(f"no light paths: {found.refusal}", where="integrator")
     return replace(index, lit_media=found.refusal), found
@@ -381,8 +379,6 @@ def _warnings(index: SceneIndex) -> list[str]:
 def _of_motion(index: SceneIndex) -> list[str]:
     """What does not move as it would."""
     warnings: list[str] = []
-    if index.has_media and index.motions.camera is not None:
-        warnings.append("camera.motion: the media around the camera are those where it was lowered")
     for i in index.motions.shapes:
         shape: Any = index.scene.shapes[i]
         inner = getattr(getattr(shape, "group", None), "shapes", (shape,))
@@ -391,6 +387,25 @@ def _of_motion(index: SceneIndex) -> list[str]:
                 f"{shapes.where(shape)}.motion: its boundary moves, the grid of its medium stays"
             )
     return warnings
+
+
+def _passed_through(scene: Scene, index: SceneIndex, cache: LoweringCache) -> list[str]:
+    """A warning where the camera is not in the same media all the time, else none."""
+    bounding = boundaries(scene, matter_of if index.nested else None)
+    if index.motions.camera is None and stands_still(bounding):
+        return []
+    found = [
+        bodies_around(bounding, matter_of, cache, time)
+        if index.nested
+        else media_around(bounding, cache, time)
+        for time in index.motions.looks()
+    ]
+    if all(one == found[0] for one in found):
+        return []
+    return [
+        "camera: it comes into another medium while the shutter is open; all its paths begin in "
+        "what is around it when that opens"
+    ]
 
 
 def _left_to_the_camera(index: SceneIndex) -> list[str]:

@@ -5,6 +5,9 @@ nothing of it around a point outside. So a medium fills a point where the shapes
 wind once more around it than those that have it outside; of one that nothing encloses, as its
 signed volume tells, they wind as often. A boundary may have several parts, as a
 tube and two disks, and no ray can slip between its triangles.
+
+What moves while the shutter is open is met at a time [s]: the point is taken back to where a shape
+was lowered. By default that time is when the shutter opens.
 """
 
 from __future__ import annotations
@@ -16,10 +19,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt import transforms
 from clpt.render.lowering.camera.cameras import MEMBERS
 from clpt.render.lowering.geometry import analytic, shapes, spheres
 from clpt.render.lowering.geometry.tessellate import keeps_its_kind, tessellate
-from clpt.render.lowering.geometry.triangles import counted, triangulate
+from clpt.render.lowering.geometry.triangles import at_time, counted, triangulate
+from clpt.render.lowering.motion import AT_ONCE, corners
 from clpt.scene import Scene
 from clpt.scene.media import Medium
 from clpt.scene.shapes import Cylinder, Disk, Instance, Mesh, Shape, Sphere, Spheres
@@ -31,7 +36,9 @@ OPEN = 1e-2  # of its area: what a closed boundary may lack
 CHUNK = 1 << 18  # triangles that are summed at a time
 
 
-def media_around(scene: Scene, cached: Callable[..., Any] | None = None) -> tuple[Medium, ...]:
+def media_around(
+    scene: Scene, cached: Callable[..., Any] | None = None, time: float | None = None
+) -> tuple[Medium, ...]:
     """Return the media at the camera, of the smallest extent first; the named one alone.
 
     cached: `LoweringCache`, which keeps the triangles of boundaries. Raises SceneError for shapes
@@ -39,22 +46,26 @@ def media_around(scene: Scene, cached: Callable[..., Any] | None = None) -> tupl
     """
     if scene.camera.medium is not None:
         return (scene.camera.medium,)
-    return media_at(scene, camera_origin(scene), cached)
+    return media_at(scene, camera_origin(scene, time), cached, time)
 
 
 def media_at(
-    scene: Scene, p: NDArray[np.float64], cached: Callable[..., Any] | None = None
+    scene: Scene,
+    p: NDArray[np.float64],
+    cached: Callable[..., Any] | None = None,
+    time: float | None = None,
 ) -> tuple[Medium, ...]:
     """Return the media that boundaries put at a point (3,) [m], of the smallest extent first."""
-    bounding = [shape for shape in every(scene) if _bounds_media(shape)]
+    bounding = [shape for shape in every(scene) if bounds_media(shape)]
     if not bounding:
         return ()
+    time = _moment(scene, time)
     turns: dict[Medium, float] = {}
     extents: dict[Medium, float] = {}
     bounds: dict[Medium, list[NDArray[np.float64]]] = {}
     parts: dict[Medium, list[tuple[float, Shape]]] = {}
     for shape in bounding:
-        low, high = box(shape, cached)
+        low, high = _swept_box(shape, cached, time)
         for medium, sign in ((shape.interior, 1.0), (shape.exterior, -1.0)):
             if medium is not None:
                 parts.setdefault(medium, []).append((sign, shape))
@@ -67,19 +78,22 @@ def media_at(
         turns[medium] = 1.0 if endless else 0.0
         extents[medium] = np.inf if endless else float(np.linalg.norm(high - low))
         if ((p >= low) & (p <= high)).all():
-            turns[medium] += sum(sign * _winding(shape, p, cached) for sign, shape in own)
+            turns[medium] += sum(sign * _winding(shape, p, cached, time) for sign, shape in own)
     found = [medium for medium, number in turns.items() if number > 0.5]
     return tuple(sorted(found, key=lambda medium: extents[medium]))
 
 
-def open_medium(scene: Scene, cached: Callable[..., Any] | None = None) -> Medium | None:
+def open_medium(
+    scene: Scene, cached: Callable[..., Any] | None = None, time: float | None = None
+) -> Medium | None:
     """Return a medium whose boundary has a hole, None where all are closed.
 
     The areas of a closed surface, each along its normal, add up to nothing.
     """
+    time = _moment(scene, time)
     sums: dict[Medium, NDArray[np.float64]] = {}
     for shape in every(scene):
-        area = _areas(shape, cached)
+        area = _areas(shape, cached, time)
         for medium, sign in ((shape.interior, 1.0), (shape.exterior, -1.0)):
             if medium is not None:
                 signed = area * np.array([sign, sign, sign, 1.0])
@@ -94,13 +108,14 @@ def bodies_around(
     scene: Scene,
     matter: Callable[[Shape], tuple[Any, ...] | None],
     cached: Callable[..., Any] | None = None,
+    time: float | None = None,
 ) -> tuple[tuple[Any, ...], ...]:
     """Return the matter of the bodies that the camera is in. Raises as `media_around`.
 
     matter: of a shape's body, None of a shape that is none. What a body has inside of it faces it,
     as the inner side of a glass does.
     """
-    return bodies_at(scene, matter, camera_origin(scene), cached)
+    return bodies_at(scene, matter, camera_origin(scene, time), cached, time)
 
 
 def bodies_at(
@@ -108,15 +123,18 @@ def bodies_at(
     matter: Callable[[Shape], tuple[Any, ...] | None],
     p: NDArray[np.float64],
     cached: Callable[..., Any] | None = None,
+    time: float | None = None,
 ) -> tuple[tuple[Any, ...], ...]:
     """Return the matter of the bodies at a point (3,) [m]; matter: as of `bodies_around`."""
+    time = _moment(scene, time)
     turns: dict[tuple[Any, ...], float] = {}
     for shape in every(scene, lambda one: matter(one) is not None):
         own = matter(shape)
         if own is not None:
-            low, high = box(shape, cached)
+            low, high = _swept_box(shape, cached, time)
             within = ((p >= low) & (p <= high)).all()
-            turns[own] = turns.get(own, 0.0) + (_winding(shape, p, cached) if within else 0.0)
+            turned = _winding(shape, p, cached, time) if within else 0.0
+            turns[own] = turns.get(own, 0.0) + turned
     return tuple(own for own, number in turns.items() if number > 0.5)
 
 
@@ -131,7 +149,8 @@ def warnings_of(found: tuple[Any, ...]) -> list[str]:
     ]
 
 
-def _bounds_media(shape: Shape) -> bool:
+def bounds_media(shape: Shape) -> bool:
+    """Whether a shape says what is on its sides."""
     return shape.interior is not None or shape.exterior is not None
 
 
@@ -164,9 +183,9 @@ def contested(
     return []
 
 
-def every(scene: Scene, bounds: Callable[[Shape], bool] = _bounds_media) -> Iterator[Shape]:
+def every(scene: Scene, bounds: Callable[[Shape], bool] = bounds_media) -> Iterator[Shape]:
     """Return the shapes of a scene that may bound media, those of instances where they are
-    placed."""
+    placed, with their motion."""
     for thing in scene.shapes:
         if not isinstance(thing, Instance):
             yield thing
@@ -174,16 +193,64 @@ def every(scene: Scene, bounds: Callable[[Shape], bool] = _bounds_media) -> Iter
         for shape in thing.group.shapes:
             if bounds(shape):
                 matrix = shapes.placement(thing) @ shapes.placement(shape)
-                yield dataclasses.replace(shape, to_world=matrix)
+                yield dataclasses.replace(shape, to_world=matrix, motion=thing.motion)
 
 
-def camera_origin(scene: Scene) -> NDArray[np.float64]:
+def boundaries(
+    scene: Scene, matter: Callable[[Shape], tuple[Any, ...] | None] | None = None
+) -> Scene:
+    """Return a scene of nothing but boundaries of media, or of bodies, where they are placed.
+
+    matter: of bodies, as of `bodies_around`; None: of media.
+    """
+
+    def wanted(shape: Shape) -> bool:
+        return bounds_media(shape) if matter is None else matter(shape) is not None
+
+    found = [shape for shape in every(scene, wanted) if wanted(shape)]
+    return dataclasses.replace(scene, shapes=found)
+
+
+def stands_still(scene: Scene) -> bool:
+    """Whether no shape of a scene of `boundaries` moves or deforms."""
+    moving = ((one.motion, getattr(one, "deformation", None)) for one in scene.shapes)
+    return all(keys is None and points is None for keys, points in moving)
+
+
+def camera_origin(scene: Scene, time: float | None = None) -> NDArray[np.float64]:
     """The point from which a camera sees; of one without, that in the middle of its film."""
     members = MEMBERS[type(scene.camera)](scene.camera, *scene.film.size)
     if "to_world" in members:
-        return np.asarray(members["to_world"], np.float64)[:3, 3]
-    near = np.asarray(members["near"], np.float64)
-    return near[:3] / near[3]
+        origin = np.asarray(members["to_world"], np.float64)[:3, 3]
+    else:
+        near = np.asarray(members["near"], np.float64)
+        origin = near[:3] / near[3]
+    if scene.camera.motion is None:
+        return origin
+    matrix = scene.camera.motion.at(_moment(scene, time))
+    return np.asarray(transforms.transform_points(matrix, origin), np.float64)
+
+
+def _moment(scene: Scene, time: float | None) -> float:
+    """A time, by default that when the shutter opens [s]."""
+    return (scene.camera.shutter or AT_ONCE).open if time is None else time
+
+
+def _then(shape: Any, time: float) -> Any:
+    """A shape whose points are where they are at a time, before what its keys do."""
+    return shape if getattr(shape, "deformation", None) is None else at_time(shape, time)
+
+
+def _swept_box(
+    shape: Shape, cached: Callable[..., Any] | None, time: float
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """The lowest and the highest corner of a box around a shape at a time."""
+    then = _then(shape, time)
+    low, high = box(then, cached if then is shape else None)
+    if shape.motion is None or not np.isfinite([low, high]).all():
+        return low, high
+    hull = transforms.transform_points(shape.motion.at(time), corners(np.array([[low, high]]))[0])
+    return hull.min(axis=0), hull.max(axis=0)
 
 
 def box(shape: Shape, cached: Callable[..., Any] | None) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -199,8 +266,23 @@ def box(shape: Shape, cached: Callable[..., Any] | None) -> tuple[NDArray[Any], 
     return vertices.min(axis=0), vertices.max(axis=0)
 
 
-def _winding(shape: Shape, p: NDArray[np.float64], cached: Callable[..., Any] | None) -> float:
+def _winding(
+    shape: Shape, p: NDArray[np.float64], cached: Callable[..., Any] | None, time: float
+) -> float:
     """How often a shape winds around a point: 1 inside of one that is closed and faces outward."""
+    then = _then(shape, time)
+    if shape.motion is not None:
+        p = transforms.transform_points(transforms.inverse(shape.motion.at(time)), p)
+    if cached is None or then is not shape:
+        return _winding_still(then, p, None)
+    by = (*shapes.geometry(shape), p.tobytes())
+    return float(cached(_winding_still, shape, p, cached, by=by))
+
+
+def _winding_still(
+    shape: Shape, p: NDArray[np.float64], cached: Callable[..., Any] | None
+) -> float:
+    """The same of a shape where it was lowered."""
     side = -1.0 if shape.flip_normals else 1.0
     if isinstance(shape, Sphere) and keeps_its_kind(shape):
         members = analytic.members_of(shape)
@@ -211,12 +293,16 @@ def _winding(shape: Shape, p: NDArray[np.float64], cached: Callable[..., Any] | 
     return winding_number(*triangles_of(shape, cached), p)
 
 
-def _areas(shape: Shape, cached: Callable[..., Any] | None) -> NDArray[np.float64]:
+def _areas(shape: Shape, cached: Callable[..., Any] | None, time: float) -> NDArray[np.float64]:
     """The sum of a shape's areas along their normals, and of the areas alone (4,) [m^2]."""
-    if isinstance(shape, Spheres):
-        return np.array([0.0, 0.0, 0.0, 4.0 * np.pi * float((_balls(shape)[1] ** 2).sum())])
-    vertices, faces = triangles_of(shape, cached)
-    a, b, c = np.moveaxis(np.asarray(vertices, np.float64)[faces], 1, 0)
+    then = _then(shape, time)
+    if isinstance(then, Spheres):
+        return np.array([0.0, 0.0, 0.0, 4.0 * np.pi * float((_balls(then)[1] ** 2).sum())])
+    vertices, faces = triangles_of(then, cached if then is shape else None)
+    points = np.asarray(vertices, np.float64)
+    if shape.motion is not None:
+        points = transforms.transform_points(shape.motion.at(time), points)
+    a, b, c = np.moveaxis(points[faces], 1, 0)
     n = np.cross(b - a, c - a) / 2.0
     return np.array([*n.sum(axis=0), np.linalg.norm(n, axis=1).sum()])
 

@@ -184,7 +184,8 @@ class _Builder:
                 if shape.kind in shape_records.ONE_OF:
                     corners = self._add_balls(shape, row, self.motions.deforming.get(one.number))
         if shape.emission is not None:
-            self.emitters.append(Emitter(shape, len(self.rows), *corners))
+            count = len(times) if _in_triangles(shape) else 1
+            self.emitters.append(Emitter(shape, len(self.rows), *corners, keys=max(count, 1)))
             values = vars(shape.emission).values()
             self.uvs |= any(getattr(value, "is_texture", False) for value in values)
         self.rows.append(row)
@@ -307,6 +308,11 @@ class _Builder:
         self.parts.clear()
         tags = [np.full(len(f), n, np.uint32) for f, n in zip(faces, numbers, strict=True)]
         return np.concatenate(vertices), np.concatenate(faces), np.concatenate(tags)
+
+
+def _in_triangles(shape: Shape) -> bool:
+    """Whether each triangle of a shape that emits is a light."""
+    return shape.kind not in (*shape_records.RECORDS, *shape_records.ANALYTIC)
 
 
 def shape_words(rows: Sequence[np.ndarray]) -> NDArray[np.uint32]:

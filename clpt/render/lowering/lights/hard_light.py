@@ -142,7 +142,8 @@ def _in_fog(lit: Lit) -> tuple[Integrator, str] | None:
     share = lit.lights.power / max(lit.lights.power.sum(), 1e-300)
     bounds = light_bounds.concatenated(lit.lights.bounds)
     spots = bounds.theta_o + bounds.theta_e < ALL_AROUND
-    eye = surroundings.camera_origin(lit.index.scene)
+    shutter = lit.index.motions.shutter
+    eye = surroundings.camera_origin(lit.index.scene, (shutter.open + shutter.close) / 2.0)
     small = []
     for name, place, _, rows in _small_rows(lit):
         far = 0.0 if place is None else float(np.linalg.norm(place - eye))

@@ -7,25 +7,31 @@ else into what is at some points just before it: these must agree.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt import transforms
 from clpt.render.lowering.bodies import BodyWords, matter_of
 from clpt.render.lowering.camera import surroundings
 from clpt.render.lowering.geometry import analytic, shapes
+from clpt.render.lowering.geometry.geometry import Geometry
 from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.lights import light_bounds
 from clpt.render.lowering.lights.lights import Emitter, LightRows, row_order
 from clpt.render.lowering.lowering_cache import LoweringCache
 from clpt.render.lowering.media import MediumWords
+from clpt.render.lowering.motion import Motions
 from clpt.scene import Scene
-from clpt.scene.media import Lattice
+from clpt.scene.media import Lattice, Medium
+from clpt.scene.motion import Keys
 
 POINTS = 6  # of a shape that shines
 BEFORE = 1e-4  # how far before it they are, over its size
 AFAR = 1e4  # radii of the scene: a place that stands for infinity
+CROSSES = "{} comes into another medium while the shutter is open"
 
 Around = tuple[Any, ...]  # media, or the matter of bodies
 
@@ -45,7 +51,7 @@ NOWHERE = LightMedia(np.zeros(0, np.uint32), "", np.zeros(0))
 
 def light_media(
     index: SceneIndex,
-    emitters: Sequence[Emitter],
+    geometry: Geometry,
     lights: LightRows,
     media: MediumWords,
     bodies: BodyWords | None,
@@ -54,15 +60,18 @@ def light_media(
 ) -> LightMedia:
     """Return the media around all lights of a scene that has media.
 
-    bodies: where these overlap; sphere: centre and radius of one around the scene [m].
+    geometry: of the shapes that shine; bodies: where these overlap; sphere: centre and radius of
+    one around the scene [m]. What moves is looked at again and again while the shutter is open:
+    a light must stay in one medium.
     """
-    scene, rows = index.scene, []
+    scene, rows, motions = index.scene, [], index.motions
     if index.emitting:
         name = index.emitting[0].name or index.emitting[0].kind
         return NOWHERE._replace(
             refusal=f"no path starts in the medium {name!r}, which gives out light"
         )
-    hole = None if bodies is not None else surroundings.open_medium(scene, cache)
+    known = _Known(scene, bodies is not None, cache, motions)
+    hole = None if bodies is not None else known.open_medium()
     unknown = (
         ""
         if hole is None
@@ -71,7 +80,6 @@ def light_media(
             "knows whether {} is in it"
         )
     )
-    known = _Known(scene, bodies is not None, cache)
     afar = sphere[0] + AFAR * sphere[1] * np.ones(3)
     for i in row_order(scene.lights):
         lamp = scene.lights[i]
@@ -79,20 +87,26 @@ def light_media(
             return NOWHERE._replace(refusal=unknown.format(f"lights[{i}]"))
         if lamp.reach == "placed":
             bounds = light_bounds.of_lamp(lamp)
-            rows.append((known.at(bounds.low[0]), 1))
+            inside = known.along(bounds.low[0], motions.lamps.get(i))
+            if inside is None:
+                return NOWHERE._replace(refusal=CROSSES.format(f"lights[{i}]"))
+            rows.append((inside, 1))
             continue
-        found = known.at(afar)
-        if found:
+        found = known.along(afar, None)
+        if found or found is None:
             reason = f"the light of lights[{i}] comes from infinity, where a medium has no end"
             return NOWHERE._replace(refusal=reason)
         rows.append((found, 1))
     ends = (*lights.first, len(lights.rows))[1:]
-    for emitter, first, end in zip(emitters, lights.first, ends, strict=True):
+    for emitter, first, end in zip(geometry.emitters, lights.first, ends, strict=True):
         if unknown and not _says(emitter.shape):
             return NOWHERE._replace(refusal=unknown.format(shapes.where(emitter.shape)))
-        into = _around_shape(emitter, known)
+        number = int(geometry.rows[emitter.shape_row]["number"])
+        into = _around_shape(emitter, known, motions, number)
         if into is None:
             reason = f"{shapes.where(emitter.shape)} shines into more than one medium"
+            if motions.moving:
+                reason += " while the shutter is open"
             return NOWHERE._replace(refusal=reason)
         rows.append((into, end - first))
     words, extinction = [], []
@@ -122,24 +136,50 @@ def _extinction(around: Around) -> float:
 class _Known:
     """What is at points of a scene."""
 
-    def __init__(self, scene: Scene, nested: bool, cache: LoweringCache):
-        self.scene, self.nested, self.cache = scene, nested, cache
+    def __init__(self, scene: Scene, nested: bool, cache: LoweringCache, motions: Motions):
+        self.scene = surroundings.boundaries(scene, matter_of if nested else None)
+        self.nested, self.cache = nested, cache
+        self.looks = motions.looks()
+        self.still = surroundings.stands_still(self.scene)
         # A camera's medium that no boundary holds is wherever there is no other.
         self.rest: Around = ()
         named = scene.camera.medium
         if named is not None and not nested:
             origin = surroundings.camera_origin(scene)
-            self.rest = () if named in surroundings.media_at(scene, origin, cache) else (named,)
+            found = surroundings.media_at(self.scene, origin, cache)
+            self.rest = () if named in found else (named,)
 
-    def at(self, p: NDArray[np.float64]) -> Around:
-        """The media at a point (3,) [m], that which counts first; or the bodies."""
+    def open_medium(self) -> Medium | None:
+        """A medium whose boundary has a hole at some time."""
+        times = self.looks[:1] if self.still else self.looks
+        found = (surroundings.open_medium(self.scene, self.cache, time) for time in times)
+        return next((one for one in found if one is not None), None)
+
+    def along(
+        self, p: NDArray[np.float64], keys: Keys | None, times: Sequence[float] = ()
+    ) -> Around | None:
+        """The media at a point (3,) [m] that moves by keys, that which counts first; or the bodies.
+
+        times: at which it is looked, by default all of them. None where what is found changes.
+        """
+        first: Around | None = None
+        looks = times or self.looks
+        for time in looks[:1] if self.still and keys is None else looks:
+            at = p if keys is None else transforms.transform_points(keys.at(time), p)
+            found = self._at(np.asarray(at, np.float64), time)
+            if first is not None and found != first:
+                return None
+            first = found
+        return first
+
+    def _at(self, p: NDArray[np.float64], time: float) -> Around:
         if self.nested:
-            return surroundings.bodies_at(self.scene, matter_of, p, self.cache)
-        return surroundings.media_at(self.scene, p, self.cache)[:1] or self.rest
+            return surroundings.bodies_at(self.scene, matter_of, p, self.cache, time)
+        return surroundings.media_at(self.scene, p, self.cache, time)[:1] or self.rest
 
 
-def _around_shape(emitter: Emitter, known: _Known) -> Around | None:
-    """What a shape shines into, None if that is not the same everywhere."""
+def _around_shape(emitter: Emitter, known: _Known, motions: Motions, number: int) -> Around | None:
+    """What a shape shines into, None if that is not the same everywhere, at all times."""
     shape: Any = emitter.shape
     both = getattr(shape.emission, "two_sided", False)
     if known.nested and matter_of(shape) is not None:
@@ -148,11 +188,30 @@ def _around_shape(emitter: Emitter, known: _Known) -> Around | None:
         if both and shape.interior is not shape.exterior:
             return None
         return () if shape.exterior is None else (shape.exterior,)
-    points = _before(emitter)
-    if both:
-        points = np.concatenate([points, _before(emitter, -BEFORE)])
-    found = [known.at(p) for p in points]
+    sides = (BEFORE, -BEFORE) if both else (BEFORE,)
+    keys = motions.shapes.get(number)
+    if emitter.keys == 1:
+        found = [known.along(p, keys) for side in sides for p in _before(emitter, side)]
+    else:
+        then = ((_then(emitter, motions.deforming[number], t), t) for t in known.looks)
+        found = [
+            known.along(p, keys, (time,))
+            for one, time in then
+            for side in sides
+            for p in _before(one, side)
+        ]
     return found[0] if all(one == found[0] for one in found) else None
+
+
+def _then(emitter: Emitter, times: Sequence[float], time: float) -> Emitter:
+    """A shape that deforms as it is at a time, by its rows of vertices at times."""
+    assert emitter.vertices is not None and emitter.faces is not None
+    rows = emitter.vertices.reshape(-1, emitter.keys, 3)
+    i = int(np.clip(np.searchsorted(times, time, "right") - 1, 0, emitter.keys - 2))
+    share = (time - times[i]) / (times[i + 1] - times[i])
+    vertices = (1.0 - share) * rows[:, i] + share * rows[:, i + 1]
+    faces = emitter.faces // np.uint32(emitter.keys)
+    return replace(emitter, vertices=vertices.astype(np.float32), faces=faces, keys=1)
 
 
 def _says(shape: Any) -> bool:
@@ -160,7 +219,7 @@ def _says(shape: Any) -> bool:
     return shape.interior is not None or shape.exterior is not None
 
 
-def _before(emitter: Emitter, before: float = BEFORE) -> NDArray[np.float64]:
+def _before(emitter: Emitter, before: float) -> NDArray[np.float64]:
     """Some points before a shape that shines, or behind it (n, 3) [m]."""
     shape, vertices, faces = emitter.shape, emitter.vertices, emitter.faces
     six = np.concatenate([np.eye(3), -np.eye(3)])

@@ -7,7 +7,7 @@ an emissive mesh or cube. Infinite lights come first, for the rays that leave th
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -38,7 +38,8 @@ class Emitter:
     """A shape with an `emission`.
 
     shape_row: its row in `shapes`; vertices, faces, uvs: its triangles as `shapes.triangles` gave
-    them, needed for a mesh and a cube; of `spheres`, vertices are their balls.
+    them, needed for a mesh and a cube; of `spheres`, vertices are their balls; keys: rows of each
+    vertex, as of `triangles.keyed`.
     """
 
     shape: Shape
@@ -46,6 +47,7 @@ class Emitter:
     vertices: shapes.Points | None = None
     faces: shapes.Faces | None = None
     uvs: shapes.Points | None = None
+    keys: int = 1
 
 
 Around: TypeAlias = Callable[[int | Emitter, light_bounds.Bounds], light_bounds.Bounds] | None
@@ -208,16 +210,45 @@ def _emitter_block(emitter: Emitter, encoder: Encoder) -> Block:
         return _balls_block(emitter, encoder, emission_mode, radiance, strength * brightness(value))
     if emitter.vertices is None or emitter.faces is None:
         raise SceneError("its triangles are missing", where=shapes.where(shape))
-    cache, corners = encoder.cache, (emitter.vertices, emitter.faces)
-    geometry = cache(triangles.triangle_rows, *corners)
+    cache, corners = encoder.cache, (emitter.vertices, emitter.faces, emitter.keys)
+    geometry = cache(_triangle_rows, *corners)
     count, words = geometry.shape
     at = encoder.store.append("geometry", geometry) + words * np.arange(count)
     rows = _block(count, "triangle", at, radiance, emitter.shape_row)
     rows["emission_mode"] = emission_mode
-    bounds = cache(light_bounds.of_triangles, *corners, emission_mode == BOTH)
+    bounds = cache(_triangle_bounds, *corners, emission_mode == BOTH)
     bright = cache(triangle_means, value, emitter.uvs, emitter.faces)
-    areas = cache(triangles.triangle_areas, *corners)
+    areas = cache(_triangle_areas, *corners)
     return Block(rows, strength * areas * bright, bounds)
+
+
+def _triangle_rows(vertices: shapes.Points, faces: shapes.Faces, keys: int) -> NDArray[np.uint32]:
+    """Rows of `Triangle` (m, 10 k) uint32 of faces: one for each of k keys, side by side."""
+    rows = [triangles.triangle_rows(vertices, faces + np.uint32(i)) for i in range(keys)]
+    return np.ascontiguousarray(np.hstack(rows))
+
+
+def _triangle_areas(vertices: shapes.Points, faces: shapes.Faces, keys: int) -> NDArray[np.float64]:
+    """The mean area over all keys (m,) [m^2]: by it triangles are chosen, at any time alike."""
+    areas = (triangles.triangle_areas(vertices, faces + np.uint32(i)) for i in range(keys))
+    return np.asarray(sum(areas) / keys)
+
+
+def _triangle_bounds(
+    vertices: shapes.Points, faces: shapes.Faces, keys: int, two_sided: bool
+) -> light_bounds.Bounds:
+    """Bounds (m) that hold at all times: between two keys a triangle is in the box around both."""
+    first, *others = (
+        light_bounds.of_triangles(vertices, faces + np.uint32(i), two_sided) for i in range(keys)
+    )
+    if not others:
+        return first
+    return replace(
+        first,
+        low=np.minimum.reduce([first.low, *(one.low for one in others)]),
+        high=np.maximum.reduce([first.high, *(one.high for one in others)]),
+        theta_o=np.full(len(faces), np.pi),
+    )
 
 
 def _balls_block(
