@@ -800,7 +800,7 @@ class Mixture(Lattice):
 
     @cached_property
     def _densest(self) -> list[float]:
-        densities = [getattr(part, "density", None) for part in self.parts]
+        densities: list[Any] = [getattr(part, "density", None) for part in self.parts]
         numbers = [d.get() if hasattr(d, "get") else d for d in densities]
         return [1.0 if one is None else float(np.max(one)) for one in numbers]
 

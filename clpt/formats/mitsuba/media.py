@@ -163,6 +163,13 @@ def _dyed(props: Properties) -> media.Dyed:
     return media.Dyed(dye=dye(props), strength=strength, **_plain(props))
 
 
+def _mixture(props: Properties) -> media.Mixture:
+    """Several media in one place, a plugin of our own."""
+    parts = [medium(one, props.context) for one in props.objects("medium")]
+    name = props.element.attributes.get("id", "")
+    return media.Mixture(parts=tuple(parts), to_world=props.placement(), name=name)
+
+
 def _plain(props: Properties) -> dict[str, Any]:
     """Take what each medium of our own has: the words, and defaults, of scene.json."""
     given = {name: spectra.coefficient(props, name) for name in ("sigma_a", "sigma_s", "sigma_t")}
@@ -251,6 +258,7 @@ MEDIA: dict[str, Callable[[Properties], Medium]] = {
     "soot": _soot,
     "cloud": _cloud,
     "dyed": _dyed,
+    "mixture": _mixture,
 }
 PHASES: dict[str, Callable[[Properties], Phase]] = {
     "isotropic": lambda props: media.Isotropic(),
