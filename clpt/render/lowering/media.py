@@ -87,11 +87,12 @@ class MediumWords:
         spectral = self._index.spectral
         absorbs, scatters = medium.coefficients(spectral)
         phases = medium.collisions(spectral) if medium.scatters else ()
-        rows = self._part_words(phases, (absorbs, scatters))
-        mixture = self._mixture_words(medium)
+        rows = []
         if self._index.emitting:
             light = medium.light or Constant(0.0)
-            rows.insert(0, self._encoder.named_words("medium", "light", light, "emission")[0])
+            rows.append(self._encoder.named_words("medium", "light", light, "emission")[0])
+        rows += self._part_words(phases, (absorbs, scatters))
+        mixture = self._mixture_words(medium)
         word = FLIES | (SEALED if medium in self._sealed else 0)
         if isinstance(medium, Dyed) and medium.glows and spectral:
             word |= DYED
