@@ -99,6 +99,29 @@ def test_colours_of_transmittance() -> None:
 
 
 @pytest.mark.slow
+def test_beside_other_grids() -> None:
+    """The same where other media of the scene have colours and light on their grids."""
+    colours = np.full((*RANDOM.shape, 3), 0.5)
+    other = grid(
+        RANDOM, sigma_t=2.0, albedo_grid=colours, colour_grid=colours,
+        temperature=np.full(RANDOM.shape, 1500.0), brightness=1e-6,
+    )  # fmt: skip
+    mixture = media.Mixture(parts=(SMOKE, DARK, MIST))
+    scenes = [scene_of(mixture, max_depth=1) for _ in range(2)]
+    far = dataclasses.replace(scenes[1].shapes[0], to_world=clpt.transforms.translate([0, 0, 60]))
+    scenes[1].shapes.append(dataclasses.replace(far, interior=other))
+    pictures = [exposures(one, 16, 64).mean(axis=(1, 2), keepdims=True) for one in scenes]
+    assert_agree(*pictures, "alone, and beside other grids", 2e-4)
+    scenes[1].shapes[0] = dataclasses.replace(scenes[1].shapes[0], interior=other)
+    scenes[1].shapes[2] = dataclasses.replace(far, interior=mixture)
+    plain = dataclasses.replace(scenes[1], shapes=scenes[1].shapes[:2])
+    pictures = [
+        exposures(one, 16, 64).mean(axis=(1, 2), keepdims=True) for one in (scenes[1], plain)
+    ]
+    assert_agree(*pictures, "the other grid, beside a mixture and alone", 2e-4)
+
+
+@pytest.mark.slow
 def test_light_paths() -> None:
     """Paths from both ends find the light of a lamp that the camera's paths find."""
     scene = scene_of(media.Mixture(parts=(SMOKE, MIST)), light=0.0)
