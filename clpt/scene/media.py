@@ -48,6 +48,7 @@ COLDEST = 100.0  # [K] below which nothing is seen of a black body
 ON_POINTS = ("emission_grid", "temperature", "albedo_grid", "colour_grid")  # of a `Grid`
 OCTAVE = 1.99  # how much finer each octave of a cloud's noise is than the one before
 CLOUD_LEAST, CLOUD_MOST, CLOUD_FINEST = 32, 256, 1024  # points along a cloud's longest side
+MOST_PARTS = 8  # of a mixture
 RADIANCE = "W m^-2 sr^-1 nm^-1"
 
 
@@ -254,12 +255,12 @@ class Medium(Kind):
         """Whether it scatters light of any wavelength."""
         raise NotImplementedError
 
-    def collisions(self, spectral: bool) -> Phase:
-        """Return what becomes of light that collides.
+    def collisions(self, spectral: bool) -> tuple[Phase, ...]:
+        """Return what becomes of light that collides, with each part of the medium that scatters.
 
         spectral: whether it has wavelengths, or three numbers.
         """
-        return self.phase
+        return (self.phase,)
 
     @property
     def is_chromatic(self) -> bool:
@@ -417,8 +418,8 @@ class Dyed(Homogeneous):
             _combined([scatters, given], lambda v: v[0] + strength * v[1], spectral),
         )
 
-    def collisions(self, spectral: bool) -> Phase:
-        return self._collisions if spectral and self.glows else self.phase
+    def collisions(self, spectral: bool) -> tuple[Phase, ...]:
+        return (self._collisions if spectral and self.glows else self.phase,)
 
     @cached_property
     def _collisions(self) -> Phase:
@@ -448,7 +449,7 @@ def _whole(rows: Any, cosines: Any) -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Lattice(Homogeneous):
+class Lattice(Medium):
     """Base of media whose coefficients a density multiplies, at points of a lattice in a box."""
 
     to_world: Matrix4 = host(np.eye(4), "takes the unit cube to the grid's box")
@@ -471,7 +472,7 @@ class Lattice(Homogeneous):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Cloud(Lattice):
+class Cloud(Lattice, Homogeneous):
     """A homogeneous medium whose coefficients are multiplied by the density of a cloud.
 
     That is PBRT's, from Perlin's noise: five octaves, at places that two more shift. In the cloud's
@@ -529,7 +530,7 @@ class Cloud(Lattice):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Grid(Lattice):
+class Grid(Lattice, Homogeneous):
     """A homogeneous medium whose coefficients are multiplied by a density on a grid.
 
     The density (nx, ny, nz) is that at the centres of the cells of a box, trilinear between these;
@@ -659,6 +660,11 @@ def _combined(values: list[Any], combine: Callable[[list[Any]], Any], spectral: 
     return spectra.Tabulated(WIDEST, combine([value.sample(WIDEST) for value in values]), "hold")
 
 
+def _alone(value: Spectrum, spectral: bool) -> Spectrum:
+    """A spectrum as `_combined` makes them."""
+    return _combined([value], lambda v: v[0], spectral)
+
+
 def _mapped(value: Any, function: Callable[[Any], Any]) -> Spectrum:
     """What becomes of a spectrum at each wavelength, or of a colour's three numbers."""
     if isinstance(value, RGB | RGBUnbounded):
@@ -702,6 +708,103 @@ def _lit(value: Any) -> Spectrum:
     return lit
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Mixture(Lattice):
+    """Several media in one place: their coefficients add up, and each keeps its phase function.
+
+    Each part is `homogeneous`, and then everywhere in the box, or a `grid` with a density of its
+    own. Grids have the same box, which `to_world` moves. Along each axis there are as many points
+    as the finest of them has. A point takes 2 bytes, and 4 more for each part.
+
+    Raises SceneError for parts that give out light, that have a dye, colours on a grid or another
+    box than the first grid, and for a `phase` beside those of the parts.
+    """
+
+    parts: tuple[Medium, ...] = host(
+        (Homogeneous(),), f"the media that it is made of, up to {MOST_PARTS}", form="media"
+    )
+
+    def check(self) -> None:
+        """Check the parts."""
+        if not isinstance(self.parts, tuple | list) or not 1 <= len(self.parts) <= MOST_PARTS:
+            message = f"must be a list of 1 to {MOST_PARTS} media"
+            raise SceneError(message, where=f"{self.kind}.parts")
+        object.__setattr__(self, "parts", tuple(self.parts))
+        for i, part in enumerate(self.parts):
+            self._check_part(part, f"{self.kind}.parts[{i}]")
+        if not isinstance(self.phase, Isotropic):
+            message = "a mixture has the phase functions of its parts: leave it out"
+            raise SceneError(message, where=f"{self.kind}.phase")
+        super().check()
+
+    def _check_part(self, part: Any, where: str) -> None:
+        if not isinstance(part, Homogeneous) or isinstance(part, Cloud | Dyed):
+            shown = part.kind if isinstance(part, Medium) else repr(part)
+            raise SceneError(f"must be homogeneous or a grid, not {shown}", where=where)
+        if part.light is not None:
+            raise SceneError("gives out light, as no part of a mixture can", where=where)
+        if not isinstance(part, Grid):
+            return
+        if part.albedo_grid is not None or part.colour_grid is not None:
+            raise SceneError("has colours on its grid, as no part of a mixture can", where=where)
+        if not np.allclose(part.box, self.grids[0].box, 1e-6, 1e-9):
+            raise SceneError("its box is not that of the first grid", where=where)
+
+    @property
+    def grids(self) -> tuple[Grid, ...]:
+        """Those of the parts that have a density of their own."""
+        return tuple(part for part in self.parts if isinstance(part, Grid))
+
+    @property
+    def size(self) -> tuple[int, ...]:
+        shapes = [(1, 1, 1), *(grid.density.shape for grid in self.grids)]
+        return tuple(max(axis) for axis in zip(*shapes, strict=True))
+
+    @property
+    def box(self) -> NDArray[np.float64]:
+        own = np.asarray(self.to_world, float)
+        return own @ self.grids[0].box if self.grids else own
+
+    @property
+    def scatters(self) -> bool:
+        return any(part.scatters for part in self.parts)
+
+    def collisions(self, spectral: bool) -> tuple[Phase, ...]:
+        return tuple(one for p in self.parts if p.scatters for one in p.collisions(spectral))
+
+    @property
+    def is_chromatic(self) -> bool:
+        return True  # which part light meets depends on the wavelength
+
+    @property
+    def light(self) -> Spectrum | None:
+        return None
+
+    def coefficients(self, spectral: bool) -> tuple[Spectrum, Spectrum]:
+        """Return those of all parts where each is densest [1/m], which bound what is anywhere."""
+        absorbs, scatters = (
+            _combined(list(each), lambda v: sum(map(np.multiply, self._densest, v)), spectral)
+            for each in zip(*self.of_parts(spectral), strict=True)
+        )
+        return absorbs, scatters
+
+    def of_parts(self, spectral: bool) -> list[tuple[Spectrum, Spectrum]]:
+        """Return how much a metre of each part absorbs and scatters [1/m].
+
+        At wavelengths that are whole nanometres, so that sums of them are exact.
+        """
+        found = [part.coefficients(spectral) for part in self.parts]
+        return [
+            (_alone(absorbs, spectral), _alone(scatters, spectral)) for absorbs, scatters in found
+        ]
+
+    @cached_property
+    def _densest(self) -> list[float]:
+        densities: list[Any] = [getattr(part, "density", None) for part in self.parts]
+        numbers = [d.get() if hasattr(d, "get") else d for d in densities]
+        return [1.0 if one is None else float(np.max(one)) for one in numbers]
+
+
 PHASE_LEAVES: tuple[type[Phase], ...] = (
     Isotropic,
     HenyeyGreenstein,
@@ -711,4 +814,4 @@ PHASE_LEAVES: tuple[type[Phase], ...] = (
     Tabulated,
 )
 PHASES: tuple[type[Phase], ...] = (*PHASE_LEAVES, Blend)
-KINDS: tuple[type[Medium], ...] = (Homogeneous, Grid, Cloud, Dyed, Soot)
+KINDS: tuple[type[Medium], ...] = (Homogeneous, Grid, Cloud, Dyed, Soot, Mixture)

@@ -64,7 +64,7 @@ DEVICE_ROLES = (
 HostForm = Literal[
     "boolean", "integer", "number", "text", "names", "numbers",
     "vector", "direction", "matrix3", "matrix4",
-    "material", "medium", "phase", "texture", "filter", "area_light", "group",
+    "material", "medium", "media", "phase", "texture", "filter", "area_light", "group",
     "rows2", "rows3", "rows4", "grid", "normals", "triangles", "attributes",
     "number_or_list", "lengths",
     "image", "volume", "colour_volume", "cube_images", "crop", "sensor", "white_balance",

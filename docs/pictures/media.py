@@ -15,6 +15,7 @@ from .materials import blue_lamp, dye
 from .studio import PLACES, Array, Picture, studio
 
 BLUE: dict[str, Any] = {"mode": "spectral", "lamps": blue_lamp(), "dim": 0.05}
+STEPS = np.linspace(0.0, 1.0, 9)
 WHITE, AMBER, WINE = (5.0, 5.0, 5.0), (1.5, 4.0, 9.0), (0.4, 5.0, 4.4)
 
 
@@ -36,7 +37,7 @@ def balls(caption: str, *made: media.Medium, spp: int = 128, **lit: Any) -> Pict
 def _ball(density: Array, x: float, **given: Any) -> media.Grid:
     """A density in the box around one of the balls."""
     box = translate([x - 0.55, 0.01, -0.55]) @ scale(1.1)
-    return media.Grid(density=density, to_world=box, scale=2.0, albedo=0.95, **given)
+    return media.Grid(density=density, to_world=box, scale=2.0, **{"albedo": 0.95, **given})
 
 
 def _phases(caption: str, *made: media.Phase) -> Picture:
@@ -98,6 +99,22 @@ MEDIA = {
                 to_world=translate([x - 0.55, 0.01, -0.55]) @ scale(1.1),
             )
             for x, share in ((-1.42, 1.0), (0.0, 4.0), (1.42, 16.0))
+        ),
+    ),
+    "mixture": balls(
+        "mist that thins out upward; wine that thins out downward; a mixture of both",
+        *(
+            media.Mixture(
+                parts=tuple(
+                    _ball(STEPS[None, ::way, None], x, **given)
+                    for way, given in (
+                        (-1, {"sigma_t": 4.0}),
+                        (1, {"sigma_t": WINE, "albedo": 0.0}),
+                    )
+                    if way in ways
+                )
+            )
+            for x, ways in ((-1.42, (-1,)), (0.0, (1,)), (1.42, (-1, 1)))
         ),
     ),
 }

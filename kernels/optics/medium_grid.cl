@@ -175,9 +175,46 @@ inline Spectrum grid_tint(Scene scene, integer name, int at, GridWalk w, mask ac
 }
 #endif
 
+#if GRIDS_MIXED
+#if GRIDS_COLOURED
+#define GRID_MIXED (GRID_COLOUR + 1)
+#elif GRIDS_TINTED
+#define GRID_MIXED (GRID_ALBEDO + 1)
+#elif GRIDS_EMIT
+#define GRID_MIXED (2 * MEDIUM_SCATTERING + 25) /* as GRID_ALBEDO */
+#else
+#define GRID_MIXED (2 * MEDIUM_SCATTERING + 19)
+#endif
+/* Of a mixture word GRID_MIXED of its row is 1 + the first word of its shares in `images`, 0 of what is none. These are
+ * for each brick where its points begin from there, and for each point the density of GRIDS_MIXED parts over that of
+ * the bricks. Behind that word there stand for each part the word of its phase function and its coefficients. The
+ * mixture's own coefficients, times the density of its bricks, are at all wavelengths at least those of all parts. */
+inline integer grid_shares(Scene scene, integer name, GridWalk w, mask active, natural bits)
+{
+    integer first = gather_i(scene.materials, sel_i(active, MEDIUM_ROW(name) + GRID_MIXED, (integer)(0))) - 1;
+    active = active & (first >= 0);
+    integer brick = (w.z * w.ny + w.y) * w.nx + w.x;
+    integer points = first + gather_i(scene.images, sel_i(active, first + brick, (integer)(0)));
+    return sel_i(active, points + GRIDS_MIXED * grid_corner(w, bits), (integer)(0));
+}
+
+/* A part of a mixture at the point whose shares stand at word `shares` of `images`, where the density of the bricks is
+ * 1. Lanes without shares have any medium. */
+inline Medium grid_part(Scene scene, integer name, int part, integer shares, Wavelengths lambdas)
+{
+    integer row = MEDIUM_ROW(name) + GRID_MIXED + 2 + part * (1 + 2 * MEDIUM_SCATTERING);
+    Medium m = medium_load(scene, sel_i(shares != 0, row + 1, (integer)(0)), lambdas);
+    real share = gather_w(scene.images, sel_i(shares != 0, shares + part, (integer)(0)));
+    m.sigma_s = spectrum_scale(m.sigma_s, share);
+    m.sigma_t = spectrum_scale(m.sigma_t, share);
+    return m;
+}
+#endif
+
 /* The medium at the point that `bits` choose, where its density is 1: albedo and extinction may have colours there.
  * These are at most 1, so that the highest density of a brick bounds the extinction at all wavelengths. */
-#if GRIDS_TINTED || GRIDS_COLOURED
+#define GRIDS_VARY (GRIDS_COLOURED || GRIDS_MIXED) /* their extinction has other colours from point to point */
+#if GRIDS_TINTED || GRIDS_VARY
 #define GRID_TINT_ARGS , Wavelengths lambdas
 #define GRID_TINT_PASSED , lambdas
 #else
@@ -194,6 +231,19 @@ inline Medium grid_medium(Scene scene, integer name, Medium m, GridWalk w, mask 
 #if GRIDS_TINTED
     m.sigma_s = spectrum_mul(m.sigma_s, grid_tint(scene, name, GRID_ALBEDO, w, active, bits, lambdas));
 #endif
+#if GRIDS_MIXED
+    integer shares = grid_shares(scene, name, w, active, bits);
+    if (any(shares != 0)) {
+        Medium whole = grid_part(scene, name, 0, shares, lambdas);
+        for (int i = 1; i < GRIDS_MIXED; i++) {
+            Medium part = grid_part(scene, name, i, shares, lambdas);
+            whole.sigma_s = spectrum_add(whole.sigma_s, part.sigma_s);
+            whole.sigma_t = spectrum_add(whole.sigma_t, part.sigma_t);
+        }
+        m.sigma_s = spectrum_sel(shares != 0, whole.sigma_s, m.sigma_s);
+        m.sigma_t = spectrum_sel(shares != 0, whole.sigma_t, m.sigma_t);
+    }
+#endif
     return m;
 }
 
@@ -205,7 +255,7 @@ inline Spectrum grid_transmittance(Scene scene, integer name, Medium m, vec3 o, 
     active = grid_begin(scene, name, o, d, t, active, &w);
     real most = max_r(spectrum_max(m.sigma_t), (real)(1e-30f)), inverse = 1.0f / most;
     Spectrum passes = spectrum_of(1.0f);
-#if !GRIDS_COLOURED
+#if !GRIDS_VARY
     Spectrum share = spectrum_scale(m.sigma_t, inverse);
 #endif
     natural count = 1u, bits = hash_natural(key);
@@ -220,7 +270,7 @@ inline Spectrum grid_transmittance(Scene scene, integer name, Medium m, vec3 o, 
             bits = hash_natural(key + count * 0x9e3779b9u);
             natural more = hash_natural(bits ^ 0x68bc21ebu);
             real density = grid_density(scene, w, b, meets, more);
-#if GRIDS_COLOURED
+#if GRIDS_VARY
             Spectrum share = grid_medium(scene, name, m, w, meets, more GRID_TINT_PASSED).sigma_t;
             share = spectrum_scale(share, inverse);
 #endif

@@ -124,6 +124,9 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS FLIGHT_ARGS STAGE_AT_ARG)
             collides = sel_i(gridded, own.collides, collides);
             t = sel(gridded, own.t, t);
             hero_keep(path, at, gridded, own.ratio);
+#if GRIDS_MIXED
+            m.phase = sel_i(gridded, own.phase, m.phase);
+#endif
         }
 #endif
 #if MEDIA_EMIT

@@ -378,6 +378,48 @@ def test_mitsuba_light(written) -> None:
         made("heterogeneous", VOLUME % "temperature")
 
 
+DYE = """<spectrum name="absorption" value="300:0.7, 350:1, 410:0"/>
+<spectrum name="emission" value="380:0, 450:1, 650:0"/><float name="quantum_yield" value="0.5"/>"""
+
+
+def test_mitsuba_clouds_and_dyes(written) -> None:
+    """Words of our own: `cloud`, `dyed` and `reradiating`, with what scene.json has by default."""
+
+    def made(kind: str, words: str = "") -> media.Medium:
+        return load(written("a.xml", (OURS % (kind, words)).encode())).shapes[0].interior
+
+    words = """<float name="wispiness" value="2"/><point name="high" value="1, 1, 2"/>
+        <float name="sigma_s" value="60"/><integer name="resolution" value="32"/>
+        <phase type="hg"><float name="g" value="0.5"/></phase>
+        <transform name="to_world"><scale value="3"/></transform>"""
+    cloud = made("cloud", words)
+    assert (cloud.kind, cloud.wispiness, cloud.frequency) == ("cloud", 2.0, 5.0)
+    assert (cloud.low, cloud.high, cloud.size) == ((0, 0, 0), (1, 1, 2), (16, 16, 32))
+    assert (cloud.sigma_s.value, cloud.phase.g.value) == (60.0, 0.5)
+    np.testing.assert_allclose(cloud.box @ [1, 1, 1, 1], [3, 3, 6, 1])
+    dyed = made(
+        "dyed", DYE + '<float name="strength" value="330"/><float name="sigma_a" value="2"/>'
+    )
+    assert (dyed.kind, dyed.strength, dyed.sigma_a.value, dyed.glows) == ("dyed", 330, 2, True)
+    assert (dyed.dye.quantum_yield, dyed.dye.absorption.sample(350.0)) == (0.5, 1.0)
+    pigment = '<phase type="reradiating"><float name="reflectance" value="0.1"/>' + DYE
+    phase = made("homogeneous", pigment + "</phase>").phase
+    assert (phase.kind, phase.amount, phase.reradiation) == ("reradiating", 1.0, dyed.dye)
+    white = pigment.replace("0.1", "1") + "</phase>"
+    for kind, given, said in (
+        ("cloud", '<point name="high" value="0, 1, 1"/>', "<medium type=.cloud.>.*is flat"),
+        ("cloud", '<float name="wispines" value="2"/>', "wispiness"),
+        ("cloud", '<float name="sigma_s" value="-2"/>', "sigma_s: -2"),
+        ("cloud", '<integer name="resolution" value="9999"/>', "must be 0 to 1024"),
+        ("dyed", "", "<medium type=.dyed.>.*needs the spectrum 'emission'"),
+        ("dyed", DYE + '<phase type="hg"/>', "scatters alike in all directions"),
+        ("homogeneous", white, "<phase type=.reradiating.>.*would leave"),
+    ):
+        with pytest.raises(SceneError, match=said) as caught:
+            made(kind, given)
+        assert (caught.value.file.name, caught.value.line) == ("a.xml", 2)
+
+
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the volumes of others are not there")
 def test_a_volume_of_others() -> None:
     """A cloud with tiles and leaves, of the size that is told beside it."""

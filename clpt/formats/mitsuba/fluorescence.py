@@ -1,4 +1,4 @@
-"""The plugin `fluorescent`, clpt's own: Mitsuba has no fluorescent material."""
+"""Light of other wavelengths in plugins of clpt's own: Mitsuba has no fluorescence."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from clpt.spectra import Constant, Spectrum
 
 
 def fluorescent(props: Properties) -> dict[str, Any]:
-    """Take the parameters of clpt.scene.materials.Fluorescent."""
+    """Take the parameters of materials.Fluorescent and media.Reradiating."""
     made: dict[str, Any] = {"amount": real(props, "amount", 1.0)}
     own = reflectance(props, "reflectance", 0.5) if "reflectance" in props.named else None
     if "filename" in props.named:
@@ -21,12 +21,18 @@ def fluorescent(props: Properties) -> dict[str, Any]:
             if own is None and path.suffix.lower() == ".bfc":
                 own = spectra.read_bispectral(path)[0]
     elif "emission" in props.named:
-        absorption, emission = (_spectrum(props, name) for name in ("absorption", "emission"))
-        share = props.number("quantum_yield", 1.0)
-        made["reradiation"] = spectra.Fluorophore(absorption, emission, share)
+        made["reradiation"] = dye(props)
     else:
         raise props.element.error("needs 'filename', or 'absorption' and 'emission'")
     return made if own is None else {**made, "reflectance": own}
+
+
+def dye(props: Properties) -> spectra.Fluorophore:
+    """Take the spectra of a dye; its `emission` must be given."""
+    if "emission" not in props.named:
+        raise props.element.error("needs the spectrum 'emission' of its dye")
+    absorption, emission = (_spectrum(props, name) for name in ("absorption", "emission"))
+    return spectra.Fluorophore(absorption, emission, props.number("quantum_yield", 1.0))
 
 
 def _spectrum(props: Properties, name: str) -> Spectrum:

@@ -9,6 +9,7 @@ import numpy as np
 
 from clpt.formats import volumes
 from clpt.formats.mitsuba import spectra
+from clpt.formats.mitsuba.fluorescence import dye, fluorescent
 from clpt.formats.mitsuba.properties import Context, Properties, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.formats.volumes import vol
@@ -142,6 +143,47 @@ def _soot(props: Properties) -> media.Soot:
     )
 
 
+def _cloud(props: Properties) -> media.Cloud:
+    """A cloud by formula, a plugin of our own."""
+    return media.Cloud(
+        density=props.number("density", 1.0),
+        wispiness=props.number("wispiness", 1.0),
+        frequency=props.number("frequency", 5.0),
+        low=props.vector("low", (0.0, 0.0, 0.0)),
+        high=props.vector("high", (1.0, 1.0, 1.0)),
+        resolution=props.integer("resolution", 0),
+        to_world=props.placement(),
+        **_plain(props),
+    )
+
+
+def _dyed(props: Properties) -> media.Dyed:
+    """A liquid with a dye in it, a plugin of our own."""
+    strength = props.number("strength", 1.0)
+    return media.Dyed(dye=dye(props), strength=strength, **_plain(props))
+
+
+def _mixture(props: Properties) -> media.Mixture:
+    """Several media in one place, a plugin of our own."""
+    parts = [medium(one, props.context) for one in props.objects("medium")]
+    name = props.element.attributes.get("id", "")
+    return media.Mixture(parts=tuple(parts), to_world=props.placement(), name=name)
+
+
+def _plain(props: Properties) -> dict[str, Any]:
+    """Take what each medium of our own has: the words, and defaults, of scene.json."""
+    given = {name: spectra.coefficient(props, name) for name in ("sigma_a", "sigma_s", "sigma_t")}
+    child = props.object("phase")
+    if child is not None:
+        given["phase"] = phase(child, props.context)
+    return {
+        **given,
+        "albedo": spectra.reflectance(props, "albedo", 1.0),
+        "scale": props.number("scale", 1.0),
+        "name": props.element.attributes.get("id", ""),
+    }
+
+
 def _more(props: Properties) -> dict[str, Any]:
     """Take what a grid has beside its density: `bits`, an albedo, and light (ours) on grids."""
     found: dict[str, Any] = {}
@@ -214,6 +256,9 @@ MEDIA: dict[str, Callable[[Properties], Medium]] = {
     "homogeneous": _homogeneous,
     "heterogeneous": _heterogeneous,
     "soot": _soot,
+    "cloud": _cloud,
+    "dyed": _dyed,
+    "mixture": _mixture,
 }
 PHASES: dict[str, Callable[[Properties], Phase]] = {
     "isotropic": lambda props: media.Isotropic(),
@@ -221,5 +266,6 @@ PHASES: dict[str, Callable[[Properties], Phase]] = {
     "rayleigh": lambda props: media.Rayleigh(),
     "tabphase": _tabulated,
     "blendphase": _blend,
+    "reradiating": lambda props: media.Reradiating(**fluorescent(props)),
     "sggx": _sggx,
 }

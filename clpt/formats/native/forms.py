@@ -410,6 +410,12 @@ FORMS: dict[str, Form] = {
         lambda cursor, reader: reader.medium(cursor),
         lambda value, writer: writer.medium(value),
     ),
+    "media": Form(
+        "list of media, or of their names",
+        {"type": "array", "items": {"anyOf": [ref("medium"), NAME_OF_MEDIUM]}, "minItems": 1},
+        lambda cursor, reader: tuple(reader.medium(entry) for entry in cursor.entries()),
+        lambda value, writer: [writer.medium(one) for one in value],
+    ),
     "phase": Form(
         "phase function",
         ref("phase"),

@@ -55,7 +55,7 @@ class _Reader:
             self.outside[cls.kind] = cls
         # None while one is being read: it refers to itself then
         self.materials: dict[str, materials.Material | None] = {}
-        self.media: dict[str, media.Medium] = {}
+        self.media: dict[str, media.Medium | None] = {}
         self.volumes: dict[str, Volume] = {}
         self.measurements: dict[str, Any] = {}
         self.groups: dict[str, shapes.Group | None] = {}
@@ -213,9 +213,14 @@ class _Reader:
     def named_medium(self, name: str, referrer: Cursor) -> media.Medium:
         """Read the medium of that name, once."""
         if name not in self.media:
-            made = self.kind(self._entry("media", "medium name", name, referrer), "medium")
+            entry = self._entry("media", "medium name", name, referrer)
+            self.media[name] = None
+            made = self.kind(entry, "medium")
             self.media[name] = made if made.name else dataclasses.replace(made, name=name)
-        return self.media[name]
+        found = self.media[name]
+        if found is None:
+            raise referrer.error(f"the medium {name!r} refers to itself")
+        return found
 
     def group(self, cursor: Cursor) -> shapes.Group:
         """Find the group of a name."""

@@ -197,6 +197,8 @@ def _shown(value: Any) -> str:
         return "identity" if value.ndim == 2 else f"{value.flat[0]:g}"
     if isinstance(value, Kind):
         return f"`{value.kind}`"
+    if isinstance(value, tuple) and value and isinstance(value[0], Kind):
+        return ", ".join(_shown(one) for one in value)
     if isinstance(value, tuple) and value and isinstance(value[0], str):
         return "all"
     if isinstance(value, float):

@@ -113,7 +113,10 @@ def _parameter(param: Param, default: Any) -> Schema:
     """The values of a parameter, with its description and its default."""
     doc = f"{param.doc} [{param.unit}]" if param.unit else param.doc
     shown = forms.plain(default)
-    has_default = isinstance(shown, (bool, int, float, str, list)) and param.form != "volume"
+    has_default = isinstance(shown, (bool, int, float, str, list)) and param.form not in (
+        "volume",
+        "media",
+    )
     return {
         "description": doc,
         **({"default": shown} if has_default else {}),

@@ -108,6 +108,7 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "GRIDS_TINTED": lambda f: f.tinted_grids,
     "USES_DYES": lambda f: f.dyed_media,
     "GRIDS_COLOURED": lambda f: f.coloured_grids,
+    "GRIDS_MIXED": lambda f: f.mixed_grids or False,
     "USES_BYTES": lambda f: f.byte_grids,
     "USES_BODIES": lambda f: f.bodies,
     "SHADOW_MEDIA": lambda f: f.shadow_media,

@@ -106,6 +106,7 @@ class Features:
     tinted_grids: bool = False  # of these some have an albedo on a grid
     dyed_media: bool = False  # of media some have a dye that gives out light
     coloured_grids: bool = False  # of these some have colours of their extinction on a grid
+    mixed_grids: int = 0  # parts of that of these which is made of most
     byte_grids: bool = False  # of these some have 8 bits for each number
     bodies: bool = False  # that may overlap, of different priorities
     moving: tuple[str, ...] = ()  # while the shutter is open: "camera", "instances", ...

@@ -124,7 +124,8 @@ def _refuse(needed: str, where: str) -> NoReturn:
 
 def _gives_other_light(medium: Medium | None) -> bool:
     """Whether a medium gives light other wavelengths."""
-    return medium is not None and any(one.fluoresces for one in medium.collisions(True).leaves)
+    phases = () if medium is None else medium.collisions(True)
+    return any(one.fluoresces for phase in phases for one in phase.leaves)
 
 
 def _has(material: Any, trait: str) -> bool:

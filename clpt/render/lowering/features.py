@@ -101,6 +101,7 @@ def features_of(
         tinted_grids=index.tinted,
         dyed_media=index.dyed,
         coloured_grids=index.coloured,
+        mixed_grids=index.most_parts,
         byte_grids=any(isinstance(one, Grid) and one.bits == 8 for one in index.media),
         dispersion=glass_lens or disperses(index.leaves, sources),
         glass_lens=glass_lens,

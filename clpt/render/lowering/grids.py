@@ -13,16 +13,18 @@ from clpt.render.lowering import device_grids
 from clpt.render.lowering.device_arrays import on_host
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.tables import Words, as_words
-from clpt.scene.media import Cloud, Grid, Lattice
-from clpt.scene.volumes import check_density
-from clpt.spectra import cie, uplift
+from clpt.scene.media import Cloud, Grid, Lattice, Medium, Mixture
+from clpt.scene.volumes import check_density, resampled
+from clpt.spectra import Spectrum, cie, uplift
 from clpt.spectra.emission import planck
+from clpt.spectra.spectrum import gridded
 
 CELLS = 8  # of a brick, along an axis
 POINTS = CELLS + 1
 AT_ONCE = 4096  # bricks
 LEAST = 0.01  # of what a brick would emit whose density and light were spread evenly
 FAINT = 1e-3  # of all light, which bricks may emit that are not lights
+ROUNDED = 1e-4  # by how much a mixture's density bounds more than its parts
 GLOW_WORDS = 6  # behind the row of a grid, see kernels/optics/medium_grid_light.cl
 BODIES = 1024  # temperatures in a table of black bodies
 PEAK = 4.0956747e-15  # highest radiance of a black body over T^5 [W m^-2 sr^-1 nm^-1 K^-5]
@@ -37,6 +39,8 @@ def row(medium: Lattice, encoder: Encoder) -> Words:
     if isinstance(medium, Cloud):
         density = device_grids.cloud_density(medium)
         first = device_grids.reserve(encoder.store, density, counts)
+    elif isinstance(medium, Mixture):
+        first = encoder.store.append("images", bricks(mixed(medium, encoder)[0]))
     elif not isinstance(medium, Grid):
         raise TypeError(medium.kind)
     elif device_grids.stays_there(medium):
@@ -84,13 +88,75 @@ def colours(density: object, values: NDArray[Any], spectral: bool) -> Words:
 
     The first says where its points begin, 0 for nowhere. spectral: they are coefficients of curves.
     """
-    used = np.flatnonzero(Windows(density).most)
-    channels = [Windows(values[..., c]) for c in range(3)]
-    points = np.stack([one.of(used) for one in channels], axis=-1)
+    table, points = _on_used(density, values)
     words = uplift(points) if spectral else points
-    table = np.zeros(len(channels[0].most), np.uint32)
-    table[used] = len(table) + 3 * POINTS**3 * np.arange(len(used))
     return np.concatenate([table, as_words(words.ravel())])
+
+
+def _on_used(density: object, values: NDArray[Any]) -> tuple[Words, NDArray[np.float32]]:
+    """Where the points begin of each brick that has a density, 0 of others; and what these hold.
+
+    values: some channels at the points of the density.
+    """
+    used = np.flatnonzero(Windows(density).most)
+    channels = [Windows(values[..., c]) for c in range(values.shape[-1])]
+    points = np.stack([one.of(used) for one in channels], axis=-1)
+    table = np.zeros(len(channels[0].most), np.uint32)
+    table[used] = len(table) + len(channels) * POINTS**3 * np.arange(len(used))
+    return table, points
+
+
+def shares(medium: Mixture, encoder: Encoder, count: int) -> Words:
+    """Return how dense each part of a mixture is over the density of its bricks.
+
+    As the colours of bricks: a word for each brick, then `count` for a point, 0 beyond its parts.
+    """
+    density, parts = mixed(medium, encoder)
+    over = parts / np.where(density > 0.0, density, 1.0)[..., None]
+    beyond = count - parts.shape[-1]
+    table, points = _on_used(density, np.pad(over, [(0, 0)] * 3 + [(0, beyond)]))
+    return np.concatenate([table, as_words(points.ravel())])
+
+
+def mixed(medium: Mixture, encoder: Encoder) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return the density of a mixture (nx, ny, nz), made once, and those of its parts (..., n).
+
+    Where the coefficients of the medium are multiplied by the former, they are at all wavelengths
+    at least those of the parts together; a little more, lest rounding makes them less.
+    """
+    table = encoder.spectra
+    return encoder.cache(_mixed, medium, table.spectral, *table.range, table.samples)
+
+
+def _mixed(
+    medium: Mixture, spectral: bool, low: float, high: float, samples: int
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    lambdas = np.linspace(low, high, samples)
+
+    def extinction(coefficients: tuple[Spectrum, Spectrum]) -> NDArray[np.float64]:
+        values = [gridded(c, lambdas) if spectral else c.to_rgb("unbounded") for c in coefficients]
+        return np.asarray(values[0] + values[1], np.float64)
+
+    whole = extinction(medium.coefficients(spectral))
+    over = np.where(whole > 0.0, 1.0 / np.maximum(whole, 1e-30), 0.0)
+    most = np.unique([extinction(own) * over for own in medium.of_parts(spectral)], axis=1)
+    parts = np.stack([_at_points(part, medium) for part in medium.parts], axis=-1)
+    rows = parts.reshape(-1, len(medium.parts))
+    density = np.empty(len(rows), np.float32)
+    for some in _parts(len(rows)):
+        density[some] = (rows[some] @ most).max(axis=1) * (1.0 + ROUNDED)
+    return density.reshape(parts.shape[:3]), parts
+
+
+def _at_points(part: Medium, medium: Mixture) -> NDArray[np.float32]:
+    """The density of a part at the points of its mixture."""
+    if not isinstance(part, Grid):
+        return np.ones(medium.size, np.float32)
+    values: NDArray[Any] = np.asarray(on_host(part.density))
+    check_density(values, "grid.density")
+    if values.shape != medium.size:
+        values = resampled(values, np.eye(4), medium.size, np.eye(4))
+    return values.astype(np.float32)
 
 
 class Windows:

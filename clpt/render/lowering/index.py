@@ -102,6 +102,11 @@ class SceneIndex:
         return any(getattr(medium, "colour_grid", None) is not None for medium in self.media)
 
     @property
+    def most_parts(self) -> int:
+        """Of how many media the mixture of most is made; 0: there is none."""
+        return max((len(getattr(medium, "parts", ())) for medium in self.media), default=0)
+
+    @property
     def dyed(self) -> bool:
         """Whether some medium has a dye that gives out light."""
         return self.spectral and any(getattr(medium, "glows", False) for medium in self.media)
@@ -261,7 +266,8 @@ def _media(scene: Scene, shapes_: tuple[Shape, ...]) -> list[Medium]:
 def _phase_kinds(scene: Scene, shapes_: tuple[Shape, ...]) -> tuple[type[Scatterer], ...]:
     """The kinds of phase functions of a scene, in the order of their table."""
     scattering = (medium for medium in _media(scene, shapes_) if medium.scatters)
-    phases = [medium.collisions(scene.film.mode == "spectral") for medium in scattering]
+    spectral = scene.film.mode == "spectral"
+    phases = (phase for medium in scattering for phase in medium.collisions(spectral))
     found = {type(leaf) for phase in phases for leaf in phase.leaves}
     return tuple(cls for cls in PHASE_LEAVES if cls in found)
 

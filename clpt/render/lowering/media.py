@@ -16,7 +16,7 @@ from clpt.render.lowering.lights.brick_lights import BrickLights
 from clpt.render.lowering.lights.lights import LightRows
 from clpt.render.lowering.materials.material_words import MaterialWords
 from clpt.render.lowering.tables import Words, as_words
-from clpt.scene.media import Dyed, Grid, Lattice, Medium
+from clpt.scene.media import Dyed, Grid, Lattice, Medium, Mixture, Phase
 from clpt.scene.shapes import Shape
 from clpt.spectra import Constant, Spectrum
 
@@ -84,18 +84,17 @@ class MediumWords:
         return np.array(sides, np.uint32)
 
     def _new_word(self, medium: Medium) -> int:
-        phase = (
-            self._materials.phase(medium.collisions(self._index.spectral)) if medium.scatters else 0
-        )
-        absorbs, scatters = medium.coefficients(self._index.spectral)
-        rows = [np.array([phase], np.uint32)]
+        spectral = self._index.spectral
+        absorbs, scatters = medium.coefficients(spectral)
+        phases = medium.collisions(spectral) if medium.scatters else ()
+        rows = []
         if self._index.emitting:
             light = medium.light or Constant(0.0)
-            rows.insert(0, self._encoder.named_words("medium", "light", light, "emission")[0])
-        for name, value in (("absorption", absorbs), ("scattering", scatters)):
-            rows.append(self._encoder.named_words("medium", name, value, "coefficient")[0])
+            rows.append(self._encoder.named_words("medium", "light", light, "emission")[0])
+        rows += self._part_words(phases, (absorbs, scatters))
+        mixture = self._mixture_words(medium)
         word = FLIES | (SEALED if medium in self._sealed else 0)
-        if isinstance(medium, Dyed) and medium.glows and self._index.spectral:
+        if isinstance(medium, Dyed) and medium.glows and spectral:
             word |= DYED
         if isinstance(medium, Lattice):
             rows.append(grids.row(medium, self._encoder))
@@ -108,8 +107,33 @@ class MediumWords:
             rows.append(self._tint(medium, "albedo_grid"))
         if isinstance(medium, Lattice) and self._index.coloured:
             rows.append(self._tint(medium, "colour_grid"))
+        rows += mixture
         self._encoder.store.append("materials", np.concatenate(rows))
         return word
+
+    def _part_words(
+        self, phases: tuple[Phase, ...], coefficients: tuple[Spectrum, Spectrum]
+    ) -> list[Words]:
+        """The word of the first phase function, 0 of none, and those of the coefficients."""
+        first = self._materials.phase(phases[0]) if phases else 0
+        words = [np.array([first], np.uint32)]
+        for name, value in zip(("absorption", "scattering"), coefficients, strict=True):
+            words.append(self._encoder.named_words("medium", name, value, "coefficient")[0])
+        return words
+
+    def _mixture_words(self, medium: Medium) -> list[Words]:
+        """What stands behind all: where the shares of parts begin, 0 for nowhere, and the parts."""
+        count, spectral = self._index.most_parts, self._index.spectral
+        if not isinstance(medium, Mixture):
+            return [np.zeros(1, np.uint32)] if count and isinstance(medium, Lattice) else []
+        first = self._encoder.store.append("images", grids.shares(medium, self._encoder, count))
+        words = [np.array([1 + first], np.uint32)]
+        for part, coefficients in zip(medium.parts, medium.of_parts(spectral), strict=True):
+            phases = part.collisions(spectral) if part.scatters else ()
+            words += self._part_words(phases, coefficients)
+        for _ in range(count - len(medium.parts)):
+            words += self._part_words((), (Constant(0.0), Constant(0.0)))
+        return words
 
     def _tint(self, medium: Lattice, name: str) -> Words:
         """What stands behind that: where the colours of its bricks begin, 0 for nowhere."""

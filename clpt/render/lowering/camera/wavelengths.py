@@ -130,9 +130,8 @@ def _glow(index: SceneIndex, nodes: Values) -> Callable[[Spectrum], Values]:
     cells = int(np.ceil((film.lambda_max - film.lambda_min) / STEP - 1e-9))
     into = np.linspace(film.lambda_min, film.lambda_max, cells + 1)
     found = {id(m): m for shape in index.shapes for m in _fluorescent(shape.material)}
-    for medium in index.media:
-        phases = medium.phase.leaves
-        given = [getattr(one, "reradiation", None) for one in phases]
+    for medium in (part for one in index.media for part in getattr(one, "parts", (one,))):
+        given = [getattr(one, "reradiation", None) for one in medium.phase.leaves]
         found |= {id(m): m for m in (*given, getattr(medium, "dye", None)) if m is not None}
     whole = np.zeros((len(nodes), len(into)))
     for matrix in found.values():

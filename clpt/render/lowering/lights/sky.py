@@ -17,6 +17,7 @@ from clpt.render.lowering.lights import atmosphere, block_grids, image_lights, s
 from clpt.render.lowering.textures.texels import bands, texels
 from clpt.scene.lights import Sky
 from clpt.spectra import Tabulated, luminance
+from clpt.spectra.air import EARTH, LAMBDAS, SUNLIGHT, Atmosphere
 from clpt.spectral_exr import SpectralImage
 
 Floats = NDArray[np.float64]
@@ -83,7 +84,7 @@ def _found(lamp: Sky, encoder: Encoder) -> _Content:
 def _numbers(lamp: Sky) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """What a sky follows from: its parameters, and the albedo of the ground at LAMBDAS."""
     albedo: Any = lamp.ground
-    ground = np.clip(albedo.sample(atmosphere.LAMBDAS), 0.0, 1.0)
+    ground = np.clip(albedo.sample(LAMBDAS), 0.0, 1.0)
     return (
         lamp.sun_elevation, lamp.altitude, lamp.aerosol, lamp.exponent, lamp.aerosol_albedo,
         lamp.asymmetry, lamp.ozone, lamp.sky_scale, lamp.sun_scale,
@@ -97,7 +98,7 @@ def height(altitude: float) -> float:
 
 def horizon(altitude: float) -> float:
     """Return the angle of the horizon above the level [rad], at an altitude [m]; below 0."""
-    return -float(np.arccos(atmosphere.EARTH / (atmosphere.EARTH + height(altitude))))
+    return -float(np.arccos(EARTH / (EARTH + height(altitude))))
 
 
 def elevations(at: float, row: ArrayLike) -> Floats:
@@ -116,14 +117,14 @@ def directions(at: float, row: ArrayLike, column: ArrayLike) -> Floats:
 
 
 def sky_image(lamp: Sky) -> tuple[Floats, Floats]:
-    """Radiance at atmosphere.LAMBDAS of the dome and the ground (2, rows + 1, columns / 2 + 1, n),
+    """Radiance at LAMBDAS of the dome and the ground (2, rows + 1, columns / 2 + 1, n),
     and of the sun's disc (rows, columns, n) [W m^-2 sr^-1 nm^-1]."""
     return _images(*_numbers(lamp))
 
 
 def _images(numbers: tuple[float, ...], ground: tuple[float, ...]) -> tuple[Floats, Floats]:
     elevation, altitude, aerosol, exponent, share, asymmetry, ozone, sky, sun = numbers
-    air = atmosphere.Atmosphere(aerosol, exponent, share, asymmetry, ozone)
+    air = Atmosphere(aerosol, exponent, share, asymmetry, ozone)
     at, high, zenith = horizon(altitude), height(altitude), np.radians(90.0 - elevation)
     rows = np.arange(ROWS + 1) / ROWS
     angles = np.stack([elevations(at, rows), elevations(at, 1.0 + rows)])
@@ -132,22 +133,22 @@ def _images(numbers: tuple[float, ...], ground: tuple[float, ...]) -> tuple[Floa
     turns = np.cos(2.0 * np.pi * np.arange(COLUMNS // 2 + 1) / COLUMNS)
     mu, turn = np.broadcast_arrays(np.sin(angles)[..., None], turns)
     around = skylight.radiance(air, np.array(ground), zenith, high, mu.ravel(), turn.ravel())
-    around = around.reshape(*mu.shape, -1) * (sky * atmosphere.SUNLIGHT)
+    around = around.reshape(*mu.shape, -1) * (sky * SUNLIGHT)
     return np.maximum(around, 0.0), _disc(air, np.radians(elevation), at, high) * sun
 
 
-def _disc(air: atmosphere.Atmosphere, elevation: float, at: float, high: float) -> Floats:
+def _disc(air: Atmosphere, elevation: float, at: float, high: float) -> Floats:
     """The sun's disc, darker toward its edge, through the air of each row."""
     rows = elevation + SUN_RADIUS * np.linspace(-1.0, 1.0, SUN_ROWS)
     cosine = np.linspace(0.0, 1.0, SUN_COLUMNS)
-    power = -0.023 + 292.0 / atmosphere.LAMBDAS
+    power = -0.023 + 292.0 / LAMBDAS
     dark = np.maximum(cosine, 1e-6)[:, None] ** power * (0.5 * power + 1.0)
     way, _ = atmosphere.sun_columns(
-        np.full(SUN_ROWS, atmosphere.EARTH + high), np.sin(np.maximum(rows, at + 1e-6))
+        np.full(SUN_ROWS, EARTH + high), np.sin(np.maximum(rows, at + 1e-6))
     )
-    passed = np.exp(-(way.T @ air.depths(atmosphere.LAMBDAS)))
+    passed = np.exp(-(way.T @ air.depths(LAMBDAS)))
     passed[rows + SUN_RADIUS / SUN_ROWS < at] = 0.0
-    even = atmosphere.SUNLIGHT / (np.pi * np.sin(SUN_RADIUS) ** 2)
+    even = SUNLIGHT / (np.pi * np.sin(SUN_RADIUS) ** 2)
     return passed[:, None] * dark * even
 
 
@@ -158,7 +159,7 @@ def _content(
     around, sun = _images(numbers, ground)
     at = horizon(numbers[1])
     flat = (f.reshape(1, -1, f.shape[-1]) for f in (around, sun))
-    images = [SpectralImage(f.astype(np.float32), atmosphere.LAMBDAS, True) for f in flat]
+    images = [SpectralImage(f.astype(np.float32), LAMBDAS, True) for f in flat]
     colours = [np.maximum(image.to_rgb(), 0.0) for image in images]
     seen = [
         luminance(colour) + image_lights.UNSEEN * image.values.mean(axis=2)

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.render.lowering.lights import atmosphere
-from clpt.render.lowering.lights.atmosphere import EARTH, TOP, Atmosphere
+from clpt.render.lowering.lights.atmosphere import TOP
+from clpt.spectra.air import DEPOLARISED, EARTH, LAMBDAS, Atmosphere, densities
 
 Floats = NDArray[np.float64]
 
@@ -44,7 +45,7 @@ class Air(NamedTuple):
 
 def air(given: Atmosphere, lambdas: Floats) -> Air:
     """The air at wavelengths."""
-    extinct, gamma = given.depths(lambdas), atmosphere.DEPOLARISED
+    extinct, gamma = given.depths(lambdas), DEPOLARISED
     rayleigh = np.zeros(DEGREE + 1)
     rayleigh[0], rayleigh[2] = 1.0, (1.0 - gamma) / (10.0 * (1.0 + 2.0 * gamma))
     moments = np.stack([rayleigh, given.asymmetry ** np.arange(DEGREE + 1)])
@@ -176,7 +177,7 @@ def once(a: Air, way: Rays, at: Places, count: int) -> Floats:
     if not len(kept):
         return out
     depth = (way.columns + toward)[:, kept].T @ a.extinct
-    dense = atmosphere.densities(at.height[kept]) * way.weight[kept]
+    dense = densities(at.height[kept]) * way.weight[kept]
     angle = at.angle[kept]
     haze = atmosphere.aerosol_phase(angle, a.asymmetry)
     phases = dense[:2] * np.stack([atmosphere.rayleigh_phase(angle), haze])
@@ -206,7 +207,7 @@ class Plan(NamedTuple):
 
 def plans(a: Air, angles: Floats, way: Rays, at: Places) -> list[Plan]:
     """How points on rays see a field of sun angles: by the air, and low down by haze."""
-    dense = atmosphere.densities(at.height)[:2] * way.weight
+    dense = densities(at.height)[:2] * way.weight
     h, x = _between(HEIGHTS, at.height)
     s, y = _between(angles, np.arccos(at.sun))
     share = np.exp(-(way.columns.T @ a.extinct))
@@ -363,7 +364,7 @@ def radiance(
     height: float,
     mu: Floats,
     turn: Floats,
-    lambdas: Floats = atmosphere.LAMBDAS,
+    lambdas: Floats = LAMBDAS,
 ) -> Floats:
     """Radiance of the sky and the ground per irradiance of the sun, (n, m) [1/sr] at lambdas (m,).
 

@@ -10,7 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from clpt.render.lowering.lights import atmosphere
-from clpt.render.lowering.lights.atmosphere import EARTH, TOP, Atmosphere
+from clpt.render.lowering.lights.atmosphere import TOP
+from clpt.spectra.air import EARTH, OZONE_MIDDLE, Atmosphere, densities
 
 FEW = 1e-3  # throughput at which a walk goes on by chance
 MOST = 200  # collisions
@@ -34,7 +35,7 @@ def radiance(air: Atmosphere, albedo, sun, height, mu, turn, lambda_nm, count, s
             beta[ground] / np.pi * np.maximum(up @ toward, 0.0) * _lit(depth, p[ground], toward)
         )
         d[ground] = _cosine(rng, up)
-        scatter = atmosphere.densities(np.linalg.norm(p[air_hit], axis=1) - EARTH) * depth[:, None]
+        scatter = densities(np.linalg.norm(p[air_hit], axis=1) - EARTH) * depth[:, None]
         share = np.stack([scatter[0], scatter[1] * air.aerosol_albedo])
         beta[air_hit] *= share.sum(axis=0) / scatter.sum(axis=0)
         part = share[0] / share.sum(axis=0)
@@ -75,7 +76,7 @@ def _flight(rng, depth, p, d):
         t[going] += np.minimum(step, 40.0)
         out = t[going] >= end[going]
         r = np.sqrt(c[going] + t[going] ** 2 + 2.0 * b[going] * t[going])
-        real = atmosphere.densities(np.maximum(r - EARTH, 0.0)).T @ depth
+        real = densities(np.maximum(r - EARTH, 0.0)).T @ depth
         assert (real <= bound * (1.0 + 1e-9))[~out].all()
         hit = ~out & ~stopped & (rng.random(len(going)) * bound < real)
         state[going[hit]] = 1
@@ -90,8 +91,8 @@ def _flight(rng, depth, p, d):
 def _bound(height, depth):
     """What extinction is nowhere above, at a height or higher [1/km]."""
     h = np.maximum(height, 0.0)
-    dense = atmosphere.densities(h)
-    dense[2] = atmosphere.densities(np.maximum(h, atmosphere.OZONE_MIDDLE))[2]
+    dense = densities(h)
+    dense[2] = densities(np.maximum(h, OZONE_MIDDLE))[2]
     return np.maximum(dense.T @ depth, 1e-9)
 
 

@@ -10,11 +10,11 @@ import pytest
 import clpt
 from clpt.errors import SceneError
 from clpt.render.lowering.lights import atmosphere, sky, skylight
-from clpt.render.lowering.lights.atmosphere import EARTH, LAMBDAS, SUNLIGHT, Atmosphere
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Perspective
 from clpt.scene.lights import Sky
 from clpt.spectra import air, cie
+from clpt.spectra.air import EARTH, LAMBDAS, SUNLIGHT, Atmosphere, densities
 from tests.kernels.light_probe import lit
 from tests.kernels.test_lights import SIGMAS, TURNED, irradiance
 from tests.render.lowering.lights import sky_walk
@@ -71,7 +71,7 @@ def test_columns_are_those_of_a_fine_sum():
     for radius, mu in ((EARTH, 1.0), (EARTH, 0.3), (EARTH, 0.0), (EARTH + 20.0, 0.05)):
         t = np.linspace(0.0, atmosphere.to_top(np.array(radius), np.array(mu)), 200_001)
         height = np.sqrt(radius**2 + t**2 + 2.0 * radius * mu * t) - EARTH
-        dense = atmosphere.densities(height)
+        dense = densities(height)
         fine = ((dense[:, 1:] + dense[:, :-1]) * 0.5 * np.diff(t)).sum(axis=1)
         np.testing.assert_allclose(atmosphere.columns(radius, mu), fine, rtol=1e-3, atol=1e-9)
 
