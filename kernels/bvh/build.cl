@@ -45,7 +45,7 @@ inline int4 build_bin(float8 item, float4 low, float4 scale)
 /* What it costs to test `count` items in a box. A side that nothing is in has no number for an area. */
 inline float build_cost(const Build *b, float8 bounds, uint count)
 {
-    return item_half_area(bounds) * (int)(count + (1u << b->at_once) - 1 >> b->at_once);
+    return item_half_area(bounds) * (int)((count + (1u << b->at_once) - 1) >> b->at_once);
 }
 
 /* Adds an item to its bins of the three axes, and to their numbers of items, 8 bits a bin. */

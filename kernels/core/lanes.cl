@@ -34,7 +34,7 @@ typedef uint natural;
 #undef any
 #define any(m) (m)
 #define LANE_INDEX 0
-#define lanes_of(m) ((uint)(m))
+inline uint lanes_of(int m) { return (uint)m; }
 #else
 typedef CAT(float, LANES) real;
 typedef CAT(int, LANES) integer;
