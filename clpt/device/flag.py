@@ -19,10 +19,14 @@ class Flag:
 
     def __init__(self, device: Device):
         self.argument: Any = None
-        if device.info.shares_words:
+        if not device.info.shares_words:
+            return
+        try:
             self._words = cl.fsvm_empty(device.context, 1, np.uint32)
-            self._words[0] = 0
-            self.argument = cl.SVM(self._words)
+        except cl.Error:  # another device of the caller's context cannot share it
+            return
+        self._words[0] = 0
+        self.argument = cl.SVM(self._words)
 
     def raise_(self) -> None:
         """Let kernels see 1."""
