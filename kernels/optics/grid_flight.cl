@@ -13,7 +13,7 @@ typedef struct {
     Spectrum light; /* that it gathers */
 #endif
 #if GRIDS_MIXED
-    integer phase; /* material word of what it collides with */
+    integer phase; /* material word of the part that it collides with */
 #endif
 } GridFlight;
 

@@ -192,15 +192,7 @@ class _Reader:
 
     def named_material(self, name: str, referrer: Cursor) -> Any:
         """Read the material of that name, once."""
-        if name not in self.materials:
-            cursor = self._entry("materials", "material name", name, referrer)
-            self.materials[name] = None
-            material = self.kind(cursor, "material")
-            named = material if material.name else dataclasses.replace(material, name=name)
-            self.materials[name] = named
-        if self.materials[name] is None:
-            raise referrer.error(f"the material {name!r} refers to itself")
-        return self.materials[name]
+        return self._named(self.materials, "materials", "material", name, referrer)
 
     def medium(self, cursor: Cursor) -> Any:
         """Read a medium, or find the one of that name; null is none."""
@@ -210,17 +202,22 @@ class _Reader:
             return self.kind(cursor, "medium")
         return self.named_medium(cursor.expect(str, "a medium or its name"), cursor)
 
-    def named_medium(self, name: str, referrer: Cursor) -> media.Medium:
+    def named_medium(self, name: str, referrer: Cursor) -> Any:
         """Read the medium of that name, once."""
-        if name not in self.media:
-            entry = self._entry("media", "medium name", name, referrer)
-            self.media[name] = None
-            made = self.kind(entry, "medium")
-            self.media[name] = made if made.name else dataclasses.replace(made, name=name)
-        found = self.media[name]
-        if found is None:
-            raise referrer.error(f"the medium {name!r} refers to itself")
-        return found
+        return self._named(self.media, "media", "medium", name, referrer)
+
+    def _named(
+        self, known: dict[str, Any], table: str, family: str, name: str, referrer: Cursor
+    ) -> Any:
+        """Read the entry of that name, once; known: what a table has given so far."""
+        if name not in known:
+            cursor = self._entry(table, f"{family} name", name, referrer)
+            known[name] = None
+            made = self.kind(cursor, family)
+            known[name] = made if made.name else dataclasses.replace(made, name=name)
+        if known[name] is None:
+            raise referrer.error(f"the {family} {name!r} refers to itself")
+        return known[name]
 
     def group(self, cursor: Cursor) -> shapes.Group:
         """Find the group of a name."""

@@ -6,7 +6,7 @@ else into what is at some points just before it: these must agree.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -26,7 +26,7 @@ from clpt.render.lowering.media import MediumWords
 from clpt.render.lowering.motion import Motions
 from clpt.scene import Scene
 from clpt.scene.media import Lattice, Medium
-from clpt.scene.motion import Keys
+from clpt.scene.motion import Deformation, Keys
 
 POINTS = 6  # of a shape that shines
 BEFORE = 1e-4  # how far before it they are, over its size
@@ -193,25 +193,25 @@ def _around_shape(emitter: Emitter, known: _Known, motions: Motions, number: int
     if emitter.keys == 1:
         found = [known.along(p, keys) for side in sides for p in _before(emitter, side)]
     else:
-        then = ((_then(emitter, motions.deforming[number], t), t) for t in known.looks)
         found = [
             known.along(p, keys, (time,))
-            for one, time in then
+            for one, time in _deformed(emitter, motions.deforming[number], known.looks)
             for side in sides
             for p in _before(one, side)
         ]
     return found[0] if all(one == found[0] for one in found) else None
 
 
-def _then(emitter: Emitter, times: Sequence[float], time: float) -> Emitter:
-    """A shape that deforms as it is at a time, by its rows of vertices at times."""
+def _deformed(
+    emitter: Emitter, times: Sequence[float], looks: Sequence[float]
+) -> Iterator[tuple[Emitter, float]]:
+    """A shape that deforms as it is at each time of looks; times: of its rows of vertices."""
     assert emitter.vertices is not None and emitter.faces is not None
     rows = emitter.vertices.reshape(-1, emitter.keys, 3)
-    i = int(np.clip(np.searchsorted(times, time, "right") - 1, 0, emitter.keys - 2))
-    share = (time - times[i]) / (times[i + 1] - times[i])
-    vertices = (1.0 - share) * rows[:, i] + share * rows[:, i + 1]
+    way = Deformation(times, np.moveaxis(rows, 1, 0))
     faces = emitter.faces // np.uint32(emitter.keys)
-    return replace(emitter, vertices=vertices.astype(np.float32), faces=faces, keys=1)
+    for time in looks:
+        yield replace(emitter, vertices=way.at(time)[0], faces=faces, keys=1), time
 
 
 def _says(shape: Any) -> bool:
