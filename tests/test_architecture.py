@@ -17,7 +17,7 @@ PACKAGE, KERNELS = ROOT / "clpt", ROOT / "kernels"
 
 BASE = {
     "colour", "errors", "layout", "measured", "records", "transforms", "images",
-    "output_files", "spectra",
+    "output_files", "spectra", "text",
     "spectral_exr", "tev", "version",
 }  # fmt: skip
 # What a part may import of the others; itself always.
