@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from clpt import images, transforms
 from clpt.errors import SceneError
 from clpt.formats.meshes import ply
+from clpt.formats.meshes.triangles import TANGENTS, Triangles, attributes
 from clpt.scene.materials import Diffuse, Material, TwoSided
 from clpt.scene.shapes import Mesh
 from clpt.scene.textures import Bitmap, MeshAttribute
@@ -27,13 +28,12 @@ if TYPE_CHECKING:
     import trimesh  # imported where it is used: it takes a second, which scenes without files save
 
 SUFFIXES = (".obj", ".ply", ".stl", ".off")
-TANGENTS = "vertex tangents"  # among attributes, while a mesh is read
-TANGENT_COLUMNS = ("tx", "ty", "tz", "tw")  # of a PLY file that clpt has written
 COLOURS = ("vertex_color", "face_color")  # attributes that show where no material is named
 DUMMIES = (None, (2, 2))  # sizes of the image in trimesh's default material
 SUMMED = 1 << 20  # triangles whose normals are summed at a time
 CHUNK = 1 << 14  # triangles that are checked at a time: in float64 they take 400 bytes each
 USEMTL = re.compile(rb"(?m)^[ \t]*usemtl[^\n]*")
+READERS = {".ply": lambda path: [ply.read(path)]}
 GREY = TwoSided(front=Diffuse(reflectance=0.6, name="grey"))
 
 
@@ -52,8 +52,12 @@ def read_mesh(path: Path, *, materials: bool = True) -> MeshFile:
     not finite and for faces that name vertices which are not there.
     """
     warnings: list[str] = []
-    if path.suffix.lower() == ".ply":
-        return MeshFile([_ply(path, materials, warnings)], warnings)
+    if path.suffix.lower() in READERS:
+        found = READERS[path.suffix.lower()](path)
+        made = [mesh for part in found for mesh in _meshes(path, part, materials, warnings)]
+        if not made:
+            raise SceneError("holds no triangles", file=path)
+        return MeshFile(made, list(dict.fromkeys(warnings)))
     scene = _open(path, materials)
     parts = [_mesh(path, key, part, materials, warnings) for key, part in scene.geometry.items()]
     meshes = [mesh for mesh in parts if mesh is not None]
@@ -193,25 +197,56 @@ def _check_stl(data: bytes) -> None:
         raise ValueError(f"it ends early: it holds {held} of {count} triangles")
 
 
-def _ply(path: Path, materials: bool, warnings: list[str]) -> Mesh:
-    """Read a PLY file; trimesh would take ten times as long."""
-    triangles = ply.read(path)
-    warnings += triangles.warnings
-    own = _attributes(triangles)
-    arrays = checked(
-        path,
-        path.name,
-        triangles.vertices,
-        triangles.faces,
-        triangles.normals,
-        triangles.uvs,
-        warnings,
-        own,
-    )
+def _meshes(path: Path, made: Triangles, materials: bool, warnings: list[str]) -> list[Mesh]:
+    """Return the triangles that a reader has found, a mesh for each image that they show."""
+    warnings += made.warnings
+    if not materials or not made.textures:
+        parts = [_plain(path, made, materials, warnings)]
+    else:
+        parts = [_plain(path, part, True, warnings) for part in _by_texture(made, warnings)]
+    return [mesh for mesh in parts if mesh is not None]
+
+
+def _plain(path: Path, made: Triangles, materials: bool, warnings: list[str]) -> Mesh | None:
+    name, own = made.name or path.name, attributes(made)
+    arrays = checked(path, name, made.vertices, made.faces, made.normals, made.uvs, warnings, own)
     if not len(arrays["faces"]):
-        raise SceneError("holds no triangles", file=path)
+        return None
+    material = _coloured(own) if materials else GREY
+    if materials and made.textures and made.uvs is not None:
+        material = _pictured(path, made.textures[0], material, warnings)
     arrays["tangents"] = arrays["attributes"].pop(TANGENTS, None)
-    return Mesh(name=path.name, material=_coloured(own) if materials else GREY, **arrays)
+    return Mesh(name=name, material=material, **arrays)
+
+
+def _by_texture(made: Triangles, warnings: list[str]) -> list[Triangles]:
+    """Return the triangles that show each image, by their column texnumber."""
+    if made.uvs is None:
+        warnings.append(f"image {made.textures[0]!r} left out, as there are no texture coordinates")
+        return [made]
+    number = made.columns["face"].get("texnumber")
+    if len(made.textures) == 1 or number is None:
+        told = ", ".join(map(repr, made.textures[1:4]))
+        warnings += [f"image {told} left out, as no face is said to show it"] if told else []
+        return [made]
+    number = np.clip(number.astype(np.int64), 0, len(made.textures) - 1)
+    parts = []
+    for i, image in enumerate(made.textures):
+        own = number == i
+        columns = {n: values[own] for n, values in made.columns["face"].items()}
+        columns = {"vertex": made.columns["vertex"], "face": columns}
+        part = replace(made, faces=made.faces[own], columns=columns, textures=[image])
+        parts.append(part)
+    return parts
+
+
+def _pictured(path: Path, image: str, otherwise: Material, warnings: list[str]) -> Material:
+    """Return the material that shows an image beside a file, the other where there is none."""
+    file = path.parent / image.replace("\\", "/")
+    if not file.is_file():
+        warnings.append(f"image {image!r} left out, as it is not there")
+        return otherwise
+    return TwoSided(front=Diffuse(reflectance=Bitmap(image=str(file)), name=file.stem))
 
 
 def _mesh(
@@ -232,40 +267,6 @@ def _mesh(
         return None
     material = _material(geometry.visual, warnings) if materials else GREY
     return Mesh(name=name, material=material, **arrays)
-
-
-def _attributes(triangles: ply.Triangles) -> dict[str, NDArray[np.float32]]:
-    """Return colours and other numbers of a PLY file per vertex and face, by Mitsuba's names.
-
-    r, g, b or red, green, blue are vertex_color or face_color, bytes decoded from sRGB; x_0, x_1,
-    x_2 or x_r, x_g, x_b are vertex_x.
-    """
-    attributes: dict[str, NDArray[np.float32]] = {}
-    for element in ("vertex", "face"):
-        for name, parts in _grouped(triangles.columns[element]).items():
-            values = np.column_stack(parts)
-            if values.shape[1] in (1, 3):
-                scaled = values.dtype == np.uint8
-                linear = images.srgb_to_linear(values / np.float32(255.0)) if scaled else values
-                attributes[f"{element}_{name}"] = linear.astype(np.float32)
-    vertex = triangles.columns["vertex"]
-    if all(name in vertex for name in TANGENT_COLUMNS):
-        columns = [vertex[name] for name in TANGENT_COLUMNS]
-        attributes[TANGENTS] = np.column_stack(columns).astype(np.float32)
-    return attributes
-
-
-def _grouped(columns: dict[str, NDArray[Any]]) -> dict[str, list[NDArray[Any]]]:
-    """Return the columns of each attribute by its name."""
-    groups: dict[str, list[NDArray[Any]]] = {}
-    for name, values in columns.items():
-        head, _, tail = name.rpartition("_")
-        letter = {"red": "r", "green": "g", "blue": "b"}.get(name, name)
-        if letter in ("r", "g", "b"):
-            groups.setdefault("color", []).append(values)
-        elif head and tail in (*"rgbxyz", *"012"):
-            groups.setdefault(head, []).append(values)
-    return groups
 
 
 def _per_vertex(values: Any, vertices: NDArray[Any], width: int) -> NDArray[np.float32] | None:
