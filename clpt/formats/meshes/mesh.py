@@ -1,4 +1,4 @@
-"""Triangle meshes from .ply, and through trimesh from .obj, .stl and .off files.
+"""Triangle meshes from .ply, .stl and .off, and through trimesh from .obj files.
 
 Normals and texture coordinates are kept where the file has them. Of a material only the base colour
 is read.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from clpt import images, transforms
 from clpt.errors import SceneError
-from clpt.formats.meshes import ply
+from clpt.formats.meshes import off, ply, stl
 from clpt.formats.meshes.triangles import TANGENTS, Triangles, attributes
 from clpt.scene.materials import Diffuse, Material, TwoSided
 from clpt.scene.shapes import Mesh
@@ -33,7 +33,11 @@ DUMMIES = (None, (2, 2))  # sizes of the image in trimesh's default material
 SUMMED = 1 << 20  # triangles whose normals are summed at a time
 CHUNK = 1 << 14  # triangles that are checked at a time: in float64 they take 400 bytes each
 USEMTL = re.compile(rb"(?m)^[ \t]*usemtl[^\n]*")
-READERS = {".ply": lambda path: [ply.read(path)]}
+READERS: dict[str, Callable[[Path], list[Triangles]]] = {
+    ".ply": lambda path: [ply.read(path)],
+    ".stl": stl.read,
+    ".off": off.read,
+}
 GREY = TwoSided(front=Diffuse(reflectance=0.6, name="grey"))
 
 
@@ -173,8 +177,6 @@ def _open(path: Path, materials: bool) -> trimesh.Scene:
 
     suffix = path.suffix.lower()
     try:
-        if suffix == ".stl":
-            _check_stl(path.read_bytes())
         with np.errstate(all="ignore"):
             if suffix == ".obj" and not materials:
                 # In one piece: trimesh cuts the mesh, and its normals, where the material changes.
@@ -184,17 +186,6 @@ def _open(path: Path, materials: bool) -> trimesh.Scene:
     except Exception as error:  # trimesh's readers raise whatever their parsing runs into
         reason = str(error).splitlines()[0][:100] if str(error) else type(error).__name__
         raise SceneError(f"cannot be read as a {suffix} mesh: {reason}", file=path) from None
-
-
-def _check_stl(data: bytes) -> None:
-    """Raise ValueError for a binary file that is cut off, which trimesh would take for a text."""
-    if data.lstrip().startswith(b"solid") and b"\0" not in data[:1024]:
-        return
-    if len(data) < 84:
-        raise ValueError("it ends within its header")
-    count, held = int.from_bytes(data[80:84], "little"), (len(data) - 84) // 50
-    if held < count:
-        raise ValueError(f"it ends early: it holds {held} of {count} triangles")
 
 
 def _meshes(path: Path, made: Triangles, materials: bool, warnings: list[str]) -> list[Mesh]:

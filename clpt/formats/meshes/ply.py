@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from clpt import text
 from clpt.errors import SceneError
 from clpt.formats.gzip_file import LARGEST, read_bytes
-from clpt.formats.meshes.triangles import Triangles, see_through
+from clpt.formats.meshes.triangles import Triangles, indices, see_through
 from clpt.geometry.polygons import triangulate
 
 TYPES = {
@@ -38,7 +38,6 @@ HEADER = re.compile(
     re.DOTALL,
 )
 LONGEST_HEADER = 1 << 16
-LARGEST_INDEX = 1 << 53
 MOST_CORNERS = 1 << 16  # of one polygon
 EVEN = 1 << 12  # values of a list whose rows are read in one go
 
@@ -213,10 +212,7 @@ def _ascii(data: bytes, elements: list[Element], start: int) -> dict[str, dict[s
 
     Rows may have more words than the header tells, if each row is a line; the first words count.
     """
-    try:
-        words = np.array(data[start:].split(), np.float64)
-    except ValueError:
-        raise _no_number(data, start) from None
+    words = text.numbers(data, start)
     lines = [line for line in data[start:].splitlines() if line.strip()]
     if len(lines) != sum(element.count for element in elements):
         return _ascii_tables(words, elements)
@@ -224,19 +220,6 @@ def _ascii(data: bytes, elements: list[Element], start: int) -> dict[str, dict[s
         return _ascii_tables(words, elements, to_the_end=True)
     except SceneError:
         return _ascii_tables(_told_words(lines, elements), elements)
-
-
-def _no_number(data: bytes, start: int) -> SceneError:
-    """Return the error for the first line of an ascii file with a word that is no number."""
-    first = 1 + len(data[:start].splitlines())
-    for number, line in enumerate(data[start:].splitlines(), first):
-        try:
-            np.array(line.split(), np.float64)
-        except ValueError:
-            shown = text.decode(line).strip()[:60]
-            comma = text.comma_message(shown)
-            return SceneError(comma or f"not all words are numbers: {shown!r}", line=number)
-    return SceneError("it holds words that are no numbers")
 
 
 def _ascii_tables(
@@ -360,17 +343,7 @@ def _corners(face: dict[str, Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]
     counts = found[0].astype(np.int64)
     if len(counts) and counts.max() > MOST_CORNERS:
         raise SceneError(f"a polygon has {counts.max()} corners, more than {MOST_CORNERS}")
-    return counts, _indices(found[1])
-
-
-def _indices(values: NDArray[Any]) -> NDArray[np.int64]:
-    """Return numbers of vertices. Raises SceneError for what is no whole number."""
-    if values.dtype.kind == "f":
-        whole = np.abs(values) < LARGEST_INDEX  # false for nan
-        whole[whole] = values[whole] == np.trunc(values[whole])
-        if not whole.all():
-            raise SceneError(f"a face names vertex {values[np.argmin(whole)]:g}")
-    return values.astype(np.int64)
+    return counts, indices(found[1])
 
 
 def _strips(table: dict[str, Any]) -> NDArray[np.int64]:
@@ -381,7 +354,7 @@ def _strips(table: dict[str, Any]) -> NDArray[np.int64]:
     found = next((table[name] for name in CORNERS if name in table), None)
     if not isinstance(found, tuple) or not len(found[1]):
         return np.zeros((0, 3), np.int64)
-    values = _indices(found[1])
+    values = indices(found[1])
     begins = np.zeros(len(values), np.bool_)
     begins[(np.cumsum(found[0]) - found[0]).astype(np.int64)[found[0] > 0]] = True
     begins[1:] |= values[:-1] == RESTART

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import images
+from clpt.errors import SceneError
 
 TANGENTS = "vertex tangents"  # among attributes, while a mesh is read
 TANGENT_COLUMNS = ("tx", "ty", "tz", "tw")  # of a PLY file that clpt has written
@@ -18,6 +19,7 @@ COLOURS = (
     ("diffuse_red", "diffuse_green", "diffuse_blue"),
 )
 ALPHAS = ("alpha", "a", "diffuse_alpha")
+LARGEST_INDEX = 1 << 53
 FULL = (255, 65535)  # largest values of colours that are whole numbers of wider types
 
 
@@ -79,6 +81,16 @@ def linear(colours: NDArray[Any]) -> NDArray[np.float32]:
     top = min(top, largest)
     shares = np.maximum(colours, 0) / np.float64(top)
     return images.srgb_to_linear(shares.astype(np.float32)).astype(np.float32)
+
+
+def indices(values: NDArray[Any]) -> NDArray[np.int64]:
+    """Return numbers of vertices. Raises SceneError for what is no whole number."""
+    if values.dtype.kind == "f":
+        whole = np.abs(values) < LARGEST_INDEX  # false for nan
+        whole[whole] = values[whole] == np.trunc(values[whole])
+        if not whole.all():
+            raise SceneError(f"a face names vertex {values[np.argmin(whole)]:g}")
+    return values.astype(np.int64)
 
 
 def see_through(columns: dict[str, NDArray[Any]]) -> bool:
