@@ -113,7 +113,8 @@ def _vertices(
     if coloured:
         sizes[2] = 3 if width == sum(sizes) + 3 else 4
     stride = sum(sizes)
-    if width > stride and (np.diff(_lines(numbers, count)) == width).all():
+    lines = np.diff(_lines(numbers, count))
+    if width > stride and len(lines) == count and (lines == width).all():
         warnings.append(f"{width - stride} further numbers of each vertex left out")
         stride = width
     rows = numbers.take(stride * count, f"{count} vertices").reshape(count, stride)

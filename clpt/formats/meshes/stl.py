@@ -23,7 +23,9 @@ FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute"
 BEGINNING = 1 << 12  # bytes in which a text has its first words
 WORDS = re.compile(rb"\b(solid|facet)\b", re.IGNORECASE)
 # A name may be anything but the first line of a facet, which may stand on the same line.
-SOLID = re.compile(rb"^[ \t]*(end[ \t]*)?solid\b((?:(?!\bfacet[ \t]+normal\b)[^\n])*)", re.I | re.M)
+SOLID = re.compile(
+    rb"(?<!\S)(end[ \t]*)?solid\b((?:(?!\bfacet[ \t]+normal\b)[^\n])*)", re.IGNORECASE
+)
 ROW = (
     b"facet normal x y z outer loop vertex x y z vertex x y z vertex x y z endloop endfacet".split()
 )
