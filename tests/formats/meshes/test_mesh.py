@@ -98,9 +98,7 @@ def test_obj_material_textures(tmp_path):
     (tmp_path / "a.obj").write_text(text)
     (made,) = mesh.read_mesh(tmp_path / "a.obj").meshes
     bitmap = made.material.front.reflectance
-    assert bitmap.raw and bitmap.image.shape == (2, 2, 3)
-    # sRGB 188 of 255 is 0.503 in linear light (IEC 61966-2-1).
-    assert np.allclose(bitmap.image[0, 0], [1.0, 0.0, 0.503], atol=1e-3)
+    assert not bitmap.raw and bitmap.image == tmp_path / "t.png"
     # Without its materials, an OBJ is one mesh, however often it names another.
     (tmp_path / "a.obj").write_text(text + "usemtl b\nf 1/1 3/1 4/1\n")
     (made,) = mesh.read_mesh(tmp_path / "a.obj", materials=False).meshes
