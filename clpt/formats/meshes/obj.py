@@ -114,8 +114,8 @@ class _Reader:
     def __post_init__(self) -> None:
         if b"\r" in self.data:
             self.data = self.data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-        # Each line has a newline on both sides, and nothing but blanks is a blank.
-        self.data = b"".join((b"\n", self.data, b"\n")).translate(BLANKS)
+        # Each line has a newline on both sides, even if the last one is continued.
+        self.data = b"".join((b"\n", self.data, b"\n\n")).translate(BLANKS)
         self.lines = self.data
         if b"\\\n" in self.data:  # the same length: a place in the one is that in the other
             self.data = CONTINUED.sub(_joined, self.data)
