@@ -41,6 +41,7 @@ from clpt.scene.textures import Bitmap, Product
 from clpt.spectra import Spectrum, Tabulated
 
 WHITE, BLACK, UNSAID = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0), (0.6, 0.6, 0.6)
+ROUNDING = 1e-3  # of colours that are converted
 COAT, SMOOTHEST = 1.5, 1e-4  # index where none above 1 is given; the least alpha of microfacets
 CHANNELS = {"r": "r", "g": "g", "b": "b", "m": "a", "l": "luminance"}
 WORDS = ("-blendu", "-blendv", "-clamp", "-cc", "-imfchan", "-type", "-colorspace")
@@ -421,7 +422,7 @@ class _Maker:
         values += [values[0]] * (3 - len(values))
         if form in ("xyz", "ciexyz"):
             values = spectra.xyz_to_rgb(values[:3]).tolist()
-        if min(values[:3]) < 0.0:
+        if min(values[:3]) < -ROUNDING:
             self.remark(f"{statement.key} is below 0, which is taken as 0")
         return tuple(max(value, 0.0) for value in values[:3])
 

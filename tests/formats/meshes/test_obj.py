@@ -65,7 +65,8 @@ SAME = {
     "weights": "v 0 0 0 1\nv 1 0 0 .5\nv 1 1 0 1\nv 0 1 0 2\nf 1 2 3 4\n",
     "counted back": SQUARE + "f -4 -3 -2 -1\n",
     "counted both ways": SQUARE + "f 1 -3 3 -1\n",
-    "counted back, twice": "v 9 9 9\n" + WHOLE.replace("f 1 2 3 4", "f -4 -3 -2\nv 8 8 8\nf -5 -3 -2"),
+    "counted back, twice": "v 9 9 9\n"
+    + WHOLE.replace("f 1 2 3 4", "f -4 -3 -2\nv 8 8 8\nf -5 -3 -2"),
     "faces first": "f 1 2 3 4\n" + SQUARE,
     "empty corners": SQUARE + "f 1/ 2// 3/ 4\n",
     "groups": "o a\ng b c\ns 1\n" + WHOLE + "g\ns off\n",
@@ -226,7 +227,7 @@ FOLD = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 0 1 1\n"  # two squares a
     [(("1", "1"), True), (("1", "2"), False), (("off", "0"), False), (("1", "off"), False)],
 )
 def test_smoothing_groups(read, groups, smooth):
-    """"vertices of one group share a normal", where the file has none; Mitsuba ignores groups."""
+    """ "vertices of one group share a normal", where the file has none; Mitsuba ignores groups."""
     text = FOLD + f"s {groups[0]}\nf 1 2 3 4\ns {groups[1]}\nf 1 4 6 5\n"
     (made,) = read(text).meshes
     if groups == ("off", "0"):
@@ -339,7 +340,11 @@ def _written(draw, points, uvs, normals, faces):
             words.append("/".join(numbers).rstrip("/"))
         lines.append(blank.join(["f", *words]))
     if draw(st.booleans()):  # everything is there before its face; or only at the end
-        lines = lines if back else [*[x for x in lines if x[0] == "f"], *[x for x in lines if x[0] != "f"]]
+        lines = (
+            lines
+            if back
+            else [*[x for x in lines if x[0] == "f"], *[x for x in lines if x[0] != "f"]]
+        )
     data = end.join(lines) + end
     mark = draw(st.booleans())
     return (codecs.BOM_UTF8 if mark else b"") + data.encode()
