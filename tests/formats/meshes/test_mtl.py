@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import json
 
 import numpy as np
 import pytest
@@ -525,11 +526,10 @@ def test_without_materials_no_library_is_read(read):
 def test_in_a_scene_the_entry_comes_first(read, folder):
     """A material in scene.json replaces the file's, with its light."""
     read("Kd 1 0 0\nKe 5 5 5")
-    shape = '{"type": "mesh", "file": "a.obj"%s}'
-    own = ', "material": {"type": "diffuse"}'
-    (folder / "scene.json").write_text(
-        '{"camera": {"type": "perspective"}, "shapes": [%s, %s]}' % (shape % "", shape % own)
-    )
+    shape = {"type": "mesh", "file": "a.obj"}
+    shapes = [shape, {**shape, "material": {"type": "diffuse"}}]
+    scene = {"camera": {"type": "perspective"}, "shapes": shapes}
+    (folder / "scene.json").write_text(json.dumps(scene))
     first, second = load(folder / "scene.json").shapes
     assert rgb(leaf(first).reflectance) == [1, 0, 0] and first.emission is not None
     assert second.material.kind == "diffuse" and second.emission is None
