@@ -9,6 +9,9 @@ import codecs
 import re
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from clpt.errors import SceneError
 
 UTF_16 = {codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_UTF16_BE: "utf-16-be"}
@@ -54,3 +57,29 @@ def comma_message(line: str) -> str | None:
     if COMMA.search(line) is None:
         return None
     return f"write numbers with a decimal point, not a comma: {line.strip()[:60]!r}"
+
+
+def numbers(data: bytes, start: int = 0) -> NDArray[np.float64]:
+    """Return the numbers of a plain text from a byte on, divided by blanks and ends of lines.
+
+    Raises SceneError with the line of the first word that is none.
+    """
+    try:
+        return np.array(data[start:].split(), np.float64)
+    except ValueError:
+        first = 1 + len(data[:start].splitlines())
+        first -= start > 0 and data[start - 1] not in b"\r\n"
+        lines = data[start:].splitlines()
+        number, line = next((i, line) for i, line in enumerate(lines, first) if not _all(line))
+        shown = decode(line).strip()
+        message = comma_message(shown) or f"not all words are numbers: {shown[:60]!r}"
+        raise SceneError(message, line=number) from None
+
+
+def _all(line: bytes) -> bool:
+    """Return whether all words of a line are numbers."""
+    try:
+        np.array(line.split(), np.float64)
+    except ValueError:
+        return False
+    return True

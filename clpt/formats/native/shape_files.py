@@ -12,7 +12,7 @@ import numpy as np
 
 from clpt.formats import ies
 from clpt.formats.meshes import mesh, particles, strands
-from clpt.formats.meshes.mesh import TANGENTS
+from clpt.formats.meshes.triangles import TANGENTS
 from clpt.formats.missing import Missing
 from clpt.formats.native.cursor import Cursor
 from clpt.formats.native.spectra import find_file
