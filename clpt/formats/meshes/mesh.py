@@ -22,7 +22,7 @@ from clpt.formats.missing import Missing
 from clpt.geometry.normals import smooth_normals
 from clpt.scene.materials import Diffuse, Material, TwoSided
 from clpt.scene.shapes import Mesh
-from clpt.scene.textures import Bitmap, MeshAttribute, textures_in
+from clpt.scene.textures import Bitmap, MeshAttribute, Texture, textures_in
 
 SUFFIXES = (".obj", ".ply", ".stl", ".off")
 COLOURS = ("vertex_color", "face_color")  # attributes that show where no material is named
@@ -227,8 +227,7 @@ def _obj(path: Path, library: mtl.Library | None, warnings: list[str]) -> list[M
                 unknown.append(label)
             else:
                 material, emission = library.material(known)
-                shown = any(isinstance(one, Bitmap) for one in textures_in(material))
-                if shown and part.uvs is None:
+                if part.uvs is None and any(map(_is_image, textures_in(material))):
                     warnings.append(f"material {label!r} has images, but its faces no coordinates")
         made.append(Mesh(name=name, material=material, emission=emission, **arrays))
     if bare := sum(part.bare for part in parts):
@@ -240,6 +239,11 @@ def _obj(path: Path, library: mtl.Library | None, warnings: list[str]) -> list[M
     if library is not None:
         warnings += library.warnings()
     return made
+
+
+def _is_image(texture: Texture) -> bool:
+    """Return whether a texture is one of a file."""
+    return isinstance(texture, Bitmap) and isinstance(texture.image, Path)
 
 
 def _vertex_colours(

@@ -61,7 +61,11 @@ GLASS = (4, 6, 7, 9)
 MIRRORS = (3, 8)
 # Without a meaning where light is traced, or for a material that has no use for them.
 SILENT = {"ka", "illum", "ni", "ns", "ks", "kd", "sharpness", "pcr", "d", "tr"}
-NEUTRAL = {"tf": (WHITE, (1.0,)), "anisor": ((0.0,),)}  # values that ask for nothing
+NEUTRAL = {
+    "tf": (WHITE, (1.0,)),
+    "kt": (BLACK,),
+    "anisor": ((0.0,),),
+}  # values that ask for nothing
 
 
 @dataclass
@@ -404,6 +408,10 @@ class _Maker:
         if self.name not in names:
             names.append(self.name)
 
+    def find(self, statement: Statement, name: str) -> Path | None:
+        """Return the file of a name, beside the library or else beside the mesh."""
+        return find(statement.file.parent, name) or find(self.library.folder, name)
+
     def number(self, key: str, default: float | None) -> float | None:
         """Return the first number of a statement."""
         statement = self.take(key)
@@ -430,10 +438,10 @@ class _Maker:
         """Return a spectrum from a file, times a factor."""
         rest = uncommented(statement.rest).split(None, 1)[1:]
         name, factor = (rest or [""])[0], 1.0
-        path = find(statement.file.parent, name)
-        if path is None and len(parts := name.rsplit(None, 1)) == 2:
-            path = find(statement.file.parent, parts[0])
-            factor = statement.numbers(parts[1:])[0]
+        path = self.find(statement, name)
+        if path is None and len(words := name.rsplit(None, 1)) == 2:
+            path = self.find(statement, words[0])
+            factor = statement.numbers(words[1:])[0]
         if path is None:
             raise statement.error(f"there is no file {name!r}")
         table = spectra.read_table(path)
@@ -488,14 +496,14 @@ class _Maker:
         even: grey is a normal map that bends nothing.
         """
         name, options = _options(statement, statement.rest)
-        path = find(statement.file.parent, name)
+        path = self.find(statement, name)
         if path is None and (behind := BEHIND.search(name)):
             options |= _options(statement, name[behind.end() :])[1]
             name = name[: behind.start()]
-            path = find(statement.file.parent, name)
+            path = self.find(statement, name)
         if path is None:
             name = uncommented(name)
-            path = find(statement.file.parent, name)
+            path = self.find(statement, name)
         try:
             if path is None:
                 raise SceneError(f"there is no file {name!r}")

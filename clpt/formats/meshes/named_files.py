@@ -10,14 +10,14 @@ from pathlib import Path
 def find(folder: Path, name: str) -> Path | None:
     """Return the file that `name` means in `folder`, None where there is none.
 
-    The name may be quoted, with blanks, and its folders may be divided by backslashes. Where no
-    name is the same to the letter, the only one that differs in upper and lower case is taken; of a
-    path of another machine, the file of that name beside the mesh.
+    The name may be quoted, its blanks may follow backslashes, and these may divide its folders.
+    Where no name is the same to the letter, the only one that differs in upper and lower case is
+    taken; of a path of another machine, the file of that name in the folder.
     """
     name = name.strip()
     if len(name) > 1 and name[0] == name[-1] and name[0] in "\"'":
         name = name[1:-1].strip()
-    for known in dict.fromkeys((name, name.replace("\\", "/"))):
+    for known in dict.fromkeys((name, name.replace("\\ ", " "), name.replace("\\", "/"))):
         if known and (found := _resolved(folder, known)) is not None:
             return found
     last = name.replace("\\", "/").rpartition("/")[2]
@@ -28,8 +28,7 @@ def _resolved(folder: Path, name: str) -> Path | None:
     try:
         if (folder / name).is_file():
             return folder / name
-        at = Path(folder, name).anchor and name.startswith("/")
-        here = Path("/") if at else folder
+        here = Path("/") if name.startswith("/") else folder
         for part in [part for part in name.split("/") if part not in ("", ".")]:
             if (here / part).exists():
                 here /= part

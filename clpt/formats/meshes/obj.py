@@ -30,6 +30,7 @@ CONTINUED = re.compile(rb"#[^\n]*|(?<![\x80-\xff])\\\n")
 LINES = {VERTEX: re.compile(rb"\n[ \t]*v[ \t]"), FACE: re.compile(rb"\n[ \t]*fo?[ \t]")}
 INDEX = re.compile(rb"[+-]?\d+")
 NUMBER = re.compile(rb"[+-]?((\d+\.?\d*|\.\d+)(e[+-]?\d+)?|nan|inf(inity)?)", re.IGNORECASE)
+NOT_FINITE = re.compile(rb"[+-]?1\.#(q?nan|snan|ind|inf)\d*", re.IGNORECASE)  # of Microsoft's C
 CHANGING = {"usemtl": -1, "s": 0}  # what lines say of the faces after them, and what holds first
 SILENT = {"g", "o", "lod", "bevel", "c_interp", "d_interp", "shadow_obj", "trace_obj", "vp"}
 SILENT |= {"deg", "bmat", "step", "parm", "trim", "hole", "scrv", "sp", "end", "ctech", "stech"}
@@ -225,7 +226,7 @@ class _Reader:
         values: list[float] = []
         for start, stop in zip(lines.start[own].tolist(), lines.stop[own].tolist(), strict=True):
             line = plain[start:stop].tobytes()
-            words = line.split()
+            words = [b"nan" if NOT_FINITE.fullmatch(word) else word for word in line.split()]
             for word in words:
                 if not NUMBER.fullmatch(word):
                     message = f"{text.decode(word)[:40]!r} is not a number"

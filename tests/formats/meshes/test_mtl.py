@@ -7,6 +7,8 @@ import json
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from PIL import Image
 
 from clpt.errors import SceneError
@@ -324,6 +326,28 @@ def test_what_is_left_out_is_told(read, statement, told):
     assert read(statement)[1] == [f"left out of its materials: {told}"]
 
 
+@settings(max_examples=200, deadline=None)
+@given(
+    st.lists(
+        st.sampled_from(
+            ["newmtl a\n", "Kd ", "Ks ", "Ns ", "d ", "illum ", "map_Kd ", "map_d ", "bump ", "Pr ",
+             "red.png", "-s ", "-o ", "-mm ", "-bm ", "-imfchan ", "-clamp on ", "spectral ",
+             "xyz ", "1 ", "0 ", ".5 ", "-1 ", "7 ", "9e99 ", "nan ", "#", "\n", "\t", '"', "\\", "\0", "é"]
+        ),
+        max_size=40,
+    )
+)  # fmt: skip
+def test_no_text_crashes(tmp_path_factory, words):
+    folder = tmp_path_factory.mktemp("mtl")
+    Image.new("RGB", (2, 2), (255, 0, 0)).save(folder / "red.png")
+    (folder / "a.mtl").write_text("newmtl a\n" + "".join(words), encoding="utf-8")
+    (folder / "a.obj").write_text(f"mtllib a.mtl\n{OBJ}usemtl a\n{FACE}")
+    try:
+        mesh.read_mesh(folder / "a.obj")
+    except SceneError as error:
+        assert "\n" not in str(error)
+
+
 @pytest.mark.parametrize(
     "statement", ["map_Ka red.png\nmap_Kd red.png", "Tf 1 1 1", "Ka .2 .2 .2", "sharpness 60"]
 )
@@ -471,6 +495,7 @@ def test_names_that_differ_behind_a_hash(folder):
         r"mtllib .\a.mtl .\b.mtl",
         "mtllib a.mtl my colours.mtl",
         "mtllib my colours.mtl",
+        r"mtllib a.mtl my\ colours.mtl",
         "mtllib a.mtl\tb.mtl",
         "mtllib a.mtl \\\nb.mtl",
     ],
@@ -482,6 +507,15 @@ def test_libraries(folder, lines):
     (folder / "a.obj").write_text(f"{lines}\n{OBJ}usemtl green\n{FACE}")
     made = mesh.read_mesh(folder / "a.obj")
     assert rgb(leaf(made.meshes[0]).reflectance) == [0, 1, 0] and made.warnings == []
+
+
+def test_images_beside_the_library_or_the_mesh(folder):
+    (folder / "lib").mkdir()
+    Image.new("RGB", (1, 1)).save(folder / "lib" / "own.png")
+    for name in ("own.png", "red.png"):
+        (folder / "lib" / "a.mtl").write_text(f"newmtl a\nmap_Kd {name}\n")
+        (folder / "a.obj").write_text(f"mtllib lib\\a.mtl\n{OBJ}usemtl a\n{FACE}")
+        assert image(mesh.read_mesh(folder / "a.obj").meshes[0]).image.name == name
 
 
 def test_a_library_behind_its_use_and_one_that_is_not_there(folder):

@@ -107,7 +107,8 @@ BAD = {
     "v 0 0 1-2\n": (1, "'1-2' is not a number"),
     "v 0 0 .\n": (1, "'.' is not a number"),
     "v 0 0 1e\n": (1, "'1e' is not a number"),
-    "v 0 0 1.#QNAN\n": (1, "'1.#QNAN' is not a number"),
+    "v 0 0 0\nv 1.#QNAN 0 0\nv 0 1 0\nf 1 2 3\n": (2, "'v' is not finite"),
+    "v 0 0 0\nv -1.#IND00 0 0\nv 0 1 0\nf 1 2 3\n": (2, "'v' is not finite"),
     "v 0 0 \u22121\n": (1, "is not a number"),
     "v 0,5 0 0\n": (1, "write numbers with a decimal point, not a comma: '0,5 0 0'"),
     "# a\nvt 0,5 0,25\n": (2, "write numbers with a decimal point, not a comma"),
@@ -166,6 +167,10 @@ def test_files_without_triangles(read, content):
 
 
 TOLD = {
+    "vt 1.#QNAN 0\nf 1/1 2/1 3/1\n": [
+        "a.obj: left out texture coordinates that are not finite",
+        "2 triangles have no texture coordinates; (0, 0) stands for them",
+    ],
     "l 1 2 3\n": ["left out: lines (l)"],
     "p 1\np 2\nl 1 2\n": ["left out: points (p), lines (l)"],
     "cstype bezier\ndeg 3\ncurv 0 1 1 2 3 4\nparm u 0 1\nend\n": [
