@@ -98,9 +98,7 @@ def test_obj_material_textures(tmp_path):
     (tmp_path / "a.obj").write_text(text)
     (made,) = mesh.read_mesh(tmp_path / "a.obj").meshes
     bitmap = made.material.front.reflectance
-    assert bitmap.raw and bitmap.image.shape == (2, 2, 3)
-    # sRGB 188 of 255 is 0.503 in linear light (IEC 61966-2-1).
-    assert np.allclose(bitmap.image[0, 0], [1.0, 0.0, 0.503], atol=1e-3)
+    assert not bitmap.raw and bitmap.image == tmp_path / "t.png"
     # Without its materials, an OBJ is one mesh, however often it names another.
     (tmp_path / "a.obj").write_text(text + "usemtl b\nf 1/1 3/1 4/1\n")
     (made,) = mesh.read_mesh(tmp_path / "a.obj", materials=False).meshes
@@ -115,9 +113,9 @@ def test_zero_area_triangles_stay_and_unused_vertices_go(read):
 
 
 BAD = {
-    "empty.obj": ("", "no triangles|cannot be read"),
+    "empty.obj": ("", "no triangles: 0 vertices"),
     "points.obj": (OBJ, "no triangles"),
-    "index.obj": (OBJ + "f 1 2 9\n", "cannot be read|outside"),
+    "index.obj": (OBJ + "f 1 2 9\n", "names the .v. 9 of 4"),
     "nan.ply": (ply(rows="0 0 0\nnan 0 0\n0 1 0"), "not a finite number"),
     "inf.ply": (ply(rows="0 0 0\n1e39 0 0\n0 1 0"), "not a finite number"),
     "index.ply": (ply(last="7"), "outside 0 to 2"),
