@@ -365,7 +365,7 @@ def _typed(values: NDArray[Any], column: Property) -> NDArray[Any]:
 def _triangles(header: Header, tables: dict[str, dict[str, Any]]) -> Triangles:
     vertex, face = _plain(tables.get("vertex", {})), tables.get("face", {})
     if not all(name in vertex for name in "xyz"):
-        raise SceneError("it holds no triangles")
+        raise SceneError("it holds no triangles: it has no vertices with x, y and z")
     uvs = next((pair for pair in UVS if all(name in vertex for name in pair)), None)
     normals = NORMAL if all(name in vertex for name in NORMAL) else None
     known = {*"xyz", *(normals or ()), *(uvs or ())}
@@ -374,7 +374,8 @@ def _triangles(header: Header, tables: dict[str, dict[str, Any]]) -> Triangles:
     triangles, polygon = triangulate(vertices, counts, corners)
     strips = _strips(tables.get("tristrips", {}))
     if not (len(strips) or any(name in face for name in CORNERS)):
-        raise SceneError("it holds no triangles")
+        held = ", ".join(repr(element.name[:40]) for element in header.elements[:5])
+        raise SceneError(f"it holds no triangles: its elements are {held}")
     rows = np.r_[polygon, np.full(len(strips), len(counts))]
     made = Triangles(
         vertices=vertices,
