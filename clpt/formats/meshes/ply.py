@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
+import struct
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -102,7 +103,7 @@ def _header(data: bytes) -> Header:
                 elements.append(Element(name, int(count)))
             case ["property", type, name] if type in TYPES and elements:
                 elements[-1].properties.append(Property(name, TYPES[type]))
-            case ["property", "list", n, type, name] if {n, type} <= {*TYPES} and elements:
+            case ["property", "list", n, type, name] if _whole(n) and type in TYPES and elements:
                 elements[-1].properties.append(Property(name, TYPES[type], TYPES[n]))
             case ["comment", "TextureFile", _, *_]:
                 textures.append(text.decode(line).split(None, 2)[2].strip())
@@ -118,6 +119,11 @@ def _header(data: bytes) -> Header:
         if len(set(names)) < len(names) or (element.count and not names):
             raise SceneError(f"its element {element.name[:40]!r} has no columns, or one twice")
     return Header(order, elements, textures, found.end())
+
+
+def _whole(name: str) -> bool:
+    """Return whether a type is one of whole numbers."""
+    return TYPES.get(name, "f")[0] != "f"
 
 
 def _binary(
@@ -176,35 +182,92 @@ def _number(data: bytes, at: int, dtype: str, size: int) -> int:
     first = at + np.dtype(dtype).itemsize
     if first > len(data):
         raise SceneError("it ends too early")
-    count = np.frombuffer(data, dtype, 1, at)[0]
-    if not (0 <= count < np.inf and count == int(count)):
-        raise SceneError(f"a list has {count:g} values")
-    if int(count) * size > len(data) - first:
-        raise SceneError(f"it ends within a list of {int(count)} values")
-    return int(count)
+    count = int(np.frombuffer(data, dtype, 1, at)[0])
+    _check_length(count, size, len(data) - first)
+    return count
+
+
+def _check_length(count: int, size: int, left: int) -> None:
+    """Raise SceneError for a list that is longer than what is left of the file [bytes]."""
+    if count < 0:
+        raise SceneError(f"a list has {count} values")
+    if count * size > left:
+        raise SceneError(f"it ends within a list of {count} values")
 
 
 def _uneven_rows(
     data: bytes, element: Element, start: int, order: str
 ) -> tuple[dict[str, Any], int]:
-    """As `_even_rows`, row by row."""
-    result = _empty(element)
-    columns = [
-        (c.name, c.length and order + c.length, order + c.type, np.dtype(c.type).itemsize)
-        for c in element.properties
-    ]
-    at = start
-    for _ in range(element.count):
-        for name, length, type, size in columns:
-            count = _number(data, at, length, size) if length else 1
-            at += np.dtype(length).itemsize if length else 0
-            if at + count * size > len(data):
-                raise SceneError(f"it ends within {element.count} rows of {element.name[:40]!r}")
-            lengths, values = result[name]
-            lengths.append(count)
-            values.append(np.frombuffer(data, type, count, at))
-            at += count * size
-    return _joined(element, result), at - start
+    """As `_even_rows`, by walking from list to list, row by row; then all is gathered at once."""
+    rows = Lists(order, element.properties)
+    at, end = start, len(data)
+    begins = []
+    try:
+        for _ in range(element.count):
+            begins.append(at)
+            for before, unpack, head, size, places, lengths in rows.lists:
+                at += before
+                (count,) = unpack(data, at)
+                at += head
+                if not 0 <= count * size <= end - at:
+                    _check_length(count, size, end - at)
+                places.append(at)
+                lengths.append(count)
+                at += count * size
+            at += rows.after
+    except struct.error:
+        at = end + 1
+    if at > end:
+        raise SceneError(f"it ends within {element.count} rows of {element.name[:40]!r}")
+    return _gathered(data, element, order, rows, np.array(begins, np.int64)), at - start
+
+
+class Lists:
+    """Where the lists of an element's rows lie.
+
+    lists: for each the bytes before it, what reads its length, the bytes of that and of a value,
+    and for all rows where its values begin and how many there are. after: bytes behind the last.
+    """
+
+    def __init__(self, order: str, properties: list[Property]):
+        self.lists: list[Any] = []
+        self.after = 0
+        for column in properties:
+            size = np.dtype(column.type).itemsize
+            if not column.length:
+                self.after += size
+                continue
+            length = struct.Struct(order + np.dtype(column.length).char)
+            self.lists.append((self.after, length.unpack_from, length.size, size, [], []))
+            self.after = 0
+
+
+def _gathered(
+    data: bytes, element: Element, order: str, rows: Lists, at: NDArray[np.int64]
+) -> dict[str, Any]:
+    """Return the columns of rows that have been walked over; at: where each row begins."""
+    raw = np.frombuffer(data, np.uint8)
+    lists = iter(rows.lists)
+    made: dict[str, Any] = {}
+    for column in element.properties:
+        dtype = np.dtype(order + column.type)
+        size = dtype.itemsize
+        if column.length:
+            *_, places, lengths = next(lists)
+            first, counts = np.array(places, np.int64), np.array(lengths, np.int64)
+            total, starts = int(counts.sum()), np.cumsum(counts) - counts
+            own = np.repeat(first - size * starts, counts) + size * np.arange(total)
+            made[column.name] = counts, _at(raw, own, dtype)
+            at = first + size * counts
+        else:
+            made[column.name] = _at(raw, at, dtype)
+            at = at + size
+    return made
+
+
+def _at(raw: NDArray[np.uint8], places: NDArray[np.int64], dtype: np.dtype[Any]) -> NDArray[Any]:
+    """Return the numbers (n,) that begin at places (n,) among bytes."""
+    return raw[places[:, None] + np.arange(dtype.itemsize)].reshape(-1).view(dtype)
 
 
 def _ascii(data: bytes, elements: list[Element], start: int) -> dict[str, dict[str, Any]]:

@@ -20,12 +20,12 @@ from clpt.geometry.polygons import triangulate
 
 HEAD = 84  # bytes of a binary file before its triangles: a comment, and their number
 FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+CHUNK = 1 << 24  # bytes of a text whose words are told apart at a time
 BEGINNING = 1 << 12  # bytes in which a text has its first words
 WORDS = re.compile(rb"\b(solid|facet)\b", re.IGNORECASE)
-# A name may be anything but the first line of a facet, which may stand on the same line.
-SOLID = re.compile(
-    rb"(?<!\S)(end[ \t]*)?solid\b((?:(?!\bfacet[ \t]+normal\b)[^\n])*)", re.IGNORECASE
-)
+# "solid", or "endsolid", and a name up to the end of the line or the first facet; in lower case.
+SOLID = re.compile(rb"solid(?:(?<!\Ssolid)|(?<=endsolid))\b((?:(?!\bfacet[ \t]+normal\b)[^\n])*)")
+END = re.compile(rb"end[ \t]*\Z")
 ROW = (
     b"facet normal x y z outer loop vertex x y z vertex x y z vertex x y z endloop endfacet".split()
 )
@@ -95,36 +95,40 @@ def _colours(head: bytes, attributes: NDArray[np.uint16]) -> NDArray[np.uint8] |
 def _text(data: bytes) -> list[Triangles]:
     """Return a mesh for each solid of a text."""
     data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    heads = list(SOLID.finditer(data))
-    made = []
-    ends = [*(head.start() for head in heads), len(data)]
-    name = ""
-    for i, start in enumerate([0, *(head.end() for head in heads)]):
-        if i and not heads[i - 1][1]:
-            name = text.decode(heads[i - 1][2]).strip()
-        part = data[start : ends[i]]
-        if not part.strip():
-            continue
-        corners = _facets(part)
-        solid = _loops(part, 1 + data.count(b"\n", 0, start)) if corners is None else _soup(corners)
-        solid.name = name
-        made.append(solid)
+    lower = data.lower()
+    made, name, start = [], "", 0
+    for solid in [*SOLID.finditer(lower), None]:
+        stop = len(data) if solid is None else solid.start()
+        closes = END.search(lower[max(start, stop - 8) : stop])
+        part = slice(start, stop - (len(closes[0]) if closes else 0))
+        if lower[part].strip():
+            corners = _facets(lower[part])
+            first = 1 + data.count(b"\n", 0, start)
+            made.append(_loops(data[part], first) if corners is None else _soup(corners))
+            made[-1].name = name
+        if solid is not None:
+            start = solid.end()
+            name = name if closes else text.decode(data[slice(*solid.span(1))]).strip()
     return made
 
 
 def _facets(data: bytes) -> NDArray[np.float64] | None:
-    """Return the corners (3n, 3) of a text of whole facets; None for any other text."""
-    words = data.split()
-    if len(words) % len(ROW):
-        return None
-    rows = np.array(words).reshape(-1, len(ROW))
-    known = np.array([ROW[i] for i in KEYWORDS])
-    if (rows[:, KEYWORDS] != known).any() and (np.char.lower(rows[:, KEYWORDS]) != known).any():
-        return None
-    try:
-        return rows[:, PLACES].astype(np.float64).reshape(-1, 3)
-    except ValueError:
-        return None
+    """Return the corners (3n, 3) of a text of whole facets, in lower case; None for any other."""
+    at, found = 0, []
+    while at < len(data):
+        end = data.find(ROW[-1], at + CHUNK)
+        end = len(data) if end < 0 else end + len(ROW[-1])
+        words = data[at:end].split()
+        columns = [words[i :: len(ROW)] for i in range(len(ROW))]
+        count, at = len(columns[0]), end
+        if any(columns[i].count(ROW[i]) < count for i in KEYWORDS) or len(words) % len(ROW):
+            return None
+        try:
+            places = [np.array(columns[i], np.float64) for i in PLACES]
+        except ValueError:
+            return None
+        found.append(np.stack(places, axis=1).reshape(-1, 3))
+    return np.concatenate(found)
 
 
 def _loops(data: bytes, line: int) -> Triangles:
