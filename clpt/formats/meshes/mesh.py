@@ -201,8 +201,9 @@ def _pictured(path: Path, image: str, otherwise: Material, warnings: list[str]) 
 def _obj(path: Path, library: mtl.Library | None, warnings: list[str]) -> list[Mesh]:
     """Read an OBJ file: a mesh for each material, or all in one where there is no library."""
     contents = obj.read(path)
-    for names in contents.libraries if library is not None else ():
-        library.add(names)
+    if library is not None:
+        for names in contents.libraries:
+            library.add(names)
     parts = list(corners.parts(contents, whole=library is None))
     if not parts:
         held = f"{len(contents.vertices)} vertices (v), but no faces (f)"

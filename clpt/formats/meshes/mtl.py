@@ -176,13 +176,13 @@ class Library:
 
     def warnings(self) -> list[str]:
         """Return what was left out, in a line for each kind."""
-        told = [f"there is no library {name!r}: what it holds is left out" for name in self.absent]
+        found = [f"there is no library {name!r}: what it holds is left out" for name in self.absent]
         if self.left_out:
-            told.append(f"left out of its materials: {', '.join(self.left_out)}")
+            found.append(f"left out of its materials: {', '.join(self.left_out)}")
         for remark, names in self.remarks.items():
             more = f" and {len(names) - 1} more" if len(names) > 1 else ""
-            told.append(f"material {names[0]!r}{more}: {remark}")
-        return told
+            found.append(f"material {names[0]!r}{more}: {remark}")
+        return found
 
 
 @dataclass
@@ -526,7 +526,8 @@ def _options(statement: Statement, rest: str) -> tuple[str, Options]:
         option = match[1].lower()
         if option not in OPTIONS:
             break
-        rest, taken = rest[match.end() :], []
+        rest = rest[match.end() :]
+        taken: list[str] = []
         while len(taken) < OPTIONS[option] and (word := re.match(r"(\S+)(\s+|$)", rest)):
             if option not in WORDS and not NUMBER.fullmatch(word[1]):
                 break

@@ -151,9 +151,9 @@ class _Reader:
             warnings=[],
         )
         if self.left_out:
-            made.warnings.append(f"left out: {_told(self.left_out)}")
+            made.warnings.append(f"left out: {_listed(self.left_out)}")
         if self.unknown:
-            made.warnings.append(f"left out what OBJ does not know: {_told(self.unknown)}")
+            made.warnings.append(f"left out what OBJ does not know: {_listed(self.unknown)}")
         if short := int((made.counts < 3).sum()):
             made.warnings.append(f"left out {short} faces of fewer than three corners")
         self.check(made)
@@ -174,8 +174,8 @@ class _Reader:
             message = f"'f' names the {NAMES[kind]!r} {named[bad] + 1} of {count}"
             face = int(np.searchsorted(np.cumsum(made.counts), bad, "right"))
             self.fail(self.place(FACE, face), message)
-        finite = np.isfinite(made.vertices).all(axis=1)
-        if not finite.all() and not (good := finite[made.corners[:, 0]]).all():
+        finite: NDArray[Any] = np.asarray(np.isfinite(made.vertices).all(axis=1))
+        if not finite.all() and not (good := np.take(finite, made.corners[:, 0])).all():
             vertex = int(made.corners[np.argmin(good), 0])
             self.fail(self.place(VERTEX, vertex), "'v' is not finite")
 
@@ -327,7 +327,7 @@ def _joined(match: re.Match[bytes]) -> bytes:
     return b"  " if match[0].startswith(b"\\") else match[0]
 
 
-def _told(names: dict[str, None]) -> str:
+def _listed(names: dict[str, None]) -> str:
     more = f" and {len(names) - MOST_TOLD} more" if len(names) > MOST_TOLD else ""
     return ", ".join(islice(names, MOST_TOLD)) + more
 
@@ -372,7 +372,7 @@ def _cut(plain: Bytes, lines: _Lines, own: Integers) -> bytes:
     start, stop = lines.start[own], lines.stop[own]
     breaks = np.flatnonzero(start[1:] != stop[:-1])
     begins, ends = start[np.r_[0, breaks + 1]].tolist(), stop[np.r_[breaks, len(own) - 1]].tolist()
-    view = memoryview(plain)
+    view = plain.data
     return b"".join([view[a:b] for a, b in zip(begins, ends, strict=True)])
 
 

@@ -332,7 +332,8 @@ def test_what_is_left_out_is_told(read, statement, told):
         st.sampled_from(
             ["newmtl a\n", "Kd ", "Ks ", "Ns ", "d ", "illum ", "map_Kd ", "map_d ", "bump ", "Pr ",
              "red.png", "-s ", "-o ", "-mm ", "-bm ", "-imfchan ", "-clamp on ", "spectral ",
-             "xyz ", "1 ", "0 ", ".5 ", "-1 ", "7 ", "9e99 ", "nan ", "#", "\n", "\t", '"', "\\", "\0", "é"]
+             "xyz ", "1 ", "0 ", ".5 ", "-1 ", "7 ", "9e99 ", "nan ", "#",
+             "\n", "\t", '"', "\\", "\0", "é"]
         ),
         max_size=40,
     )
