@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 CHUNK = 1 << 18  # corners that are tested at a time: in float64 they take 200 bytes each
+CANCELLED = 1e-9  # of a polygon's triangles: a sum of their areas that has no direction
 ROUNDING = 1e-7  # of a polygon's area: a triangle that is turned over by less is a line
 
 Integers = NDArray[np.int64]
@@ -122,8 +123,10 @@ def _mend(
         crosses = np.cross(outline[fans[:, 1]], outline[fans[:, 2]])  # the first corner is at zero
         normals = np.add.reduceat(crosses, first)
         square = (normals**2).sum(axis=1)
+        whole = np.add.reduceat(np.sqrt((crosses**2).sum(axis=1)), first)
         turned = (crosses * normals[polygon]).sum(axis=1) < -ROUNDING * square[polygon]
     wrong = np.logical_or.reduceat(turned, first) & np.isfinite(square)
+    wrong &= square > (CANCELLED * whole) ** 2
     for i in np.flatnonzero(wrong & np.logical_and.reduceat(usable, begins)):
         ears = _clip(outline[begins[i] : begins[i] + counts[i]], normals[i])
         if ears is not None:

@@ -152,6 +152,21 @@ def test_a_spike_and_repeated_corners_keep_the_area():
     assert areas(made).sum() == pytest.approx(shoelace(points)) == 6
 
 
+def test_lobes_that_cancel():
+    """An eight whose areas add up to nothing but rounding: no plane to clip its ears in."""
+    lobe = [(0, 0), (1, 0.3), (1.5, 1), (0.4, 0.9)]
+    eight = np.array(lobe + [(-x, y) for x, y in lobe])
+    for seed in range(8):
+        made, _ = of(outline(eight, seed))
+        assert len(made) == 6 and areas(made).sum() > 1
+
+
+def test_a_polygon_of_very_many_corners():
+    given = star(20_000, 0.2, 1)
+    made, _ = of(outline(given))
+    assert areas(made).sum() == pytest.approx(shoelace(given))
+
+
 def test_corners_that_name_no_vertex_are_fans():
     """Who reads a file refuses them; nothing fails here."""
     vertices = outline(U)

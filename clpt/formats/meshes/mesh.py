@@ -169,23 +169,22 @@ def _plain(path: Path, made: Triangles, materials: bool, warnings: list[str]) ->
 
 
 def _by_texture(made: Triangles, warnings: list[str]) -> list[Triangles]:
-    """Return the triangles that show each image, by their column texnumber."""
+    """Return the triangles that show each image, by their column texnumber; last those of none."""
     if made.uvs is None:
         warnings.append(f"image {made.textures[0]!r} left out, as there are no texture coordinates")
         return [made]
     number = made.columns["face"].get("texnumber")
-    if len(made.textures) == 1 or number is None:
+    if number is None:
         for image in made.textures[1:]:
             warnings.append(f"image {image!r} left out, as no face names it")
         return [made]
-    number = np.clip(number.astype(np.int64), 0, len(made.textures) - 1)
     parts = []
-    for i, image in enumerate(made.textures):
-        own = number == i
+    shown = np.where((number >= 0) & (number < len(made.textures)), number, -1)
+    for i, images_ in enumerate([*([image] for image in made.textures), []]):
+        own = shown == (i if images_ else -1)
         columns = {n: values[own] for n, values in made.columns["face"].items()}
         columns = {"vertex": made.columns["vertex"], "face": columns}
-        part = replace(made, faces=made.faces[own], columns=columns, textures=[image])
-        parts.append(part)
+        parts.append(replace(made, faces=made.faces[own], columns=columns, textures=images_))
     return parts
 
 

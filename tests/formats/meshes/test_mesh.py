@@ -315,6 +315,9 @@ def test_the_images_of_a_ply(read, tmp_path):
     assert [mesh.uvs.tolist() for mesh in made.meshes] == [
         [[1, 0], [0, 1], [1, 1]], [[0, 0], [1, 0], [0, 1]],
     ]  # fmt: skip
+    made = read("a.ply", TEXTURED.format(comments=comments, more="", first=-1, second=1))
+    assert [mesh.material.front.name for mesh in made.meshes] == ["b c", "grey"]
+    assert [mesh.uvs.tolist()[0] for mesh in made.meshes] == [[1, 0], [0, 0]]
     (tmp_path / "a.png").unlink()
     made = read("a.ply", TEXTURED.format(comments=comments, more="", first=0, second=0))
     assert made.warnings == ["image 'a.png' left out, as it is not there"]
