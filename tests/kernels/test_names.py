@@ -1,4 +1,4 @@
-"""No two kernel files define a name, but those of which a program has one: so all others can meet."""
+"""No two kernel files define a name, unless a program has one of them at most."""
 
 from __future__ import annotations
 

@@ -361,7 +361,7 @@ def _mesh(self: Drawer) -> dict[str, Any]:
 
 
 def _deformation(self: Drawer, points: np.ndarray) -> Deformation | None:
-    if not self.draw(st.integers(0, 3)) == 3:
+    if self.draw(st.integers(0, 3)) != 3:
         return None
     later = points.copy()
     later[:, 0] += 0.25
@@ -390,6 +390,14 @@ def _cloud(self: Drawer) -> dict[str, Any]:
     return {"resolution": 4}
 
 
+def _sky(self: Drawer) -> dict[str, Any]:
+    """One of two skies, as each takes seconds."""
+    given = [n for n, p in params(lights.Sky).items() if p.role == "real" and "scale" not in n]
+    usual = defaults(lights.Sky)
+    low = {"sun_elevation": -5.0, "altitude": 3000.0}
+    return {**{name: usual[name] for name in given}, **self.one([{}, low]), "ground": 0.2}
+
+
 def _tabulated(self: Drawer) -> dict[str, Any]:
     return self.one(
         [
@@ -405,6 +413,7 @@ WHOLE: dict[type, Callable[[Drawer], dict[str, Any]]] = {  # parameters that dep
     shapes.Curves: _curves,
     media.Cloud: _cloud,
     media.Tabulated: _tabulated,
+    lights.Sky: _sky,
 }
 
 # Scenes --------------------------------------------------------------------------------------
