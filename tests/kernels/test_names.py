@@ -20,16 +20,18 @@ ALTERNATIVES = (  # files, of each row of which a program has one at most
     ("path/*_frame*.cl",),
     ("path/pixel_sampler*.cl",),
     ("path/shadow_ray*.cl",),
-    ("sampler/*.cl", "core/sobol.cl"),
+    ("sampler/independent.cl", "core/sobol.cl"),
     ("spectrum/density.cl", "spectrum/visible.cl", "spectrum/rgb_read.cl"),
     ("spectrum/rgb*.cl", "spectrum/spectral*.cl"),
     ("tracing/curve_others*.cl",),
     ("tracing/instances_*.cl",),
-    ("tracing/shape_rows_*.cl",),
+    ("tracing/shape_rows_m*.cl", "tracing/shape_rows_single.cl"),
+    ("tracing/shape_rows_s*.cl",),
     ("tracing/trace_*.cl",),
     ("tracing/transmittance*.cl",),
 )
 COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
+INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
 DEFINITION = re.compile(
     r"^(?:\w+ )+\*?(?P<function>\w+)\([^;{}]*\)\s*\{"
     r"|^[ \t]*#[ \t]*define[ \t]+(?P<macro>\w+)"
@@ -55,8 +57,10 @@ def files() -> dict[str, str]:
     return {path.relative_to(root).as_posix(): Path(path).read_text("utf-8") for path in paths}
 
 
-def meet(first: str, second: str) -> bool:
+def meet(first: str, second: str, texts: dict[str, str]) -> bool:
     """Whether one program may have both files."""
+    if second in INCLUDE.findall(texts[first]) or first in INCLUDE.findall(texts[second]):
+        return True
     return not any(
         all(any(fnmatch(name, pattern) for pattern in row) for name in (first, second))
         for row in ALTERNATIVES
@@ -83,8 +87,8 @@ LightSample g(Scene scene,
 
 
 def test_each_name_has_one_file() -> None:
-    where = defaultdict(list)
-    for file, text in files().items():
+    where, texts = defaultdict(list), files()
+    for file, text in texts.items():
         for name in set().union(*defined(text).values()):
             where[name].append(file)
     twice = {
@@ -92,7 +96,7 @@ def test_each_name_has_one_file() -> None:
         for name, owners in where.items()
         for i, a in enumerate(owners)
         for b in owners[i + 1 :]
-        if meet(a, b)
+        if meet(a, b, texts)
     }
     assert not twice
 

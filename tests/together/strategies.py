@@ -36,28 +36,32 @@ SIZE = 4  # pixels of a film's side
 
 
 class Drawer:
-    """Draws the parts of one scene: `draw` is Hypothesis's. Parts are used again, too."""
+    """Draws a scene by choices: `choose(n)` is a number from 0 to n. Parts are used again, too."""
 
-    def __init__(self, draw: Callable[[Any], Any]):
-        self.draw = draw
+    def __init__(self, choose: Callable[[int], int]):
+        self.choose = choose
         self.depth = 0
         self.rigid = False  # what is drawn may be turned and moved alone
         self.on_shapes: Sequence[type[Kind]] = (lights.Area,)
         self.made: dict[type, list[Any]] = {}
 
     def one(self, values: Sequence[Any]) -> Any:
-        return self.draw(st.sampled_from(values))
+        return values[self.choose(len(values) - 1)] if len(values) > 1 else values[0]
 
     def maybe(self) -> bool:
-        return self.draw(st.booleans())
+        return self.choose(1) == 1
 
-    def many(self, most: int) -> range:
-        return range(self.draw(st.integers(0, most)))
+    def some(self, values: Sequence[Any], most: int) -> list[Any]:
+        """Up to so many of the values, each once."""
+        left = list(values)
+        return [
+            left.pop(self.choose(len(left) - 1)) for _ in range(min(self.choose(most), len(left)))
+        ]
 
     def again(self, base: type, draw: Callable[[], Any]) -> Any:
         """A new part, or one that the scene has already."""
         found = self.made.setdefault(base, [])
-        number = self.draw(st.integers(0, len(found))) if found else 0
+        number = self.choose(len(found)) if found else 0
         if number:
             return found[number - 1]
         part = draw()
@@ -74,9 +78,7 @@ class Drawer:
             for name, param in declared.items()
             if name not in {**own, **given} and name not in UNDRAWN and param.form not in GEOMETRY
         ]
-        chosen: list[str] = []
-        if names:
-            chosen = self.draw(st.lists(st.sampled_from(names), unique=True, max_size=MOST_GIVEN))
+        chosen = self.some(names, MOST_GIVEN)
         self.depth += 1
         for name, param in declared.items():
             needed = param.form in NEEDED and defaults(cls)[name] is None
@@ -107,7 +109,7 @@ class Drawer:
         return self.nested(materials.Material, materials.KINDS, materials.Diffuse())
 
     def medium(self) -> Any:
-        if self.depth <= 1 and self.draw(st.integers(0, 15)) == 15:
+        if self.depth <= 1 and self.choose(15) == 15:
             return self.again(media.Medium, lambda: clear_air(4.0, 4.0, layers=3))
         return self.nested(media.Medium, media.KINDS, media.Homogeneous(sigma_t=1.0))
 
@@ -288,9 +290,7 @@ FORMS: dict[str, Callable[[Drawer, Param, Any], Any]] = {
     "integer": _integer,
     "number": _host_number,
     "text": lambda self, p, d: self.one(["a", "b"]),
-    "names": lambda self, p, d: tuple(
-        self.draw(st.lists(st.sampled_from(tuple(LAYERS)), unique=True, min_size=1, max_size=5))
-    ),
+    "names": lambda self, p, d: tuple(self.some(tuple(LAYERS), 5)),
     "vector": lambda self, p, d: self.one([(0.5, 0.25, 1.5), (-0.5, 0.0, 2.0)]),
     "direction": lambda self, p, d: self.one([(0.0, -1.0, 0.2), (1.0, 0.0, 0.0)]),
     "matrix3": lambda self, p, d: np.diag([2.0, 3.0, 1.0]),
@@ -361,7 +361,7 @@ def _mesh(self: Drawer) -> dict[str, Any]:
 
 
 def _deformation(self: Drawer, points: np.ndarray) -> Deformation | None:
-    if self.draw(st.integers(0, 3)) != 3:
+    if self.choose(3) != 3:
         return None
     later = points.copy()
     later[:, 0] += 0.25
@@ -421,23 +421,25 @@ WHOLE: dict[type, Callable[[Drawer], dict[str, Any]]] = {  # parameters that dep
 PLACED_LIGHTS = tuple(cls for cls in lights.KINDS if cls not in lights.ON_SHAPES)
 
 
-@st.composite
-def scenes(draw: Any) -> Scene:
-    """A scene of the tables' kinds. What the lowering refuses is rare, but not left out."""
-    self = Drawer(draw)
+def scene_of(choose: Callable[[int], int]) -> Scene:
+    """A scene of the tables' kinds, by choices as `Drawer` has them; of zeros alone the plainest.
+
+    What the lowering refuses is rare, but not left out.
+    """
+    self = Drawer(choose)
     integrator = self.kind(integrators.KINDS)
     traced = isinstance(integrator, integrators.ParticleTracer)
     if traced:
         self.on_shapes = lights.ON_SHAPES
     things: list[Any] = []
-    for _ in range(1 + draw(st.integers(0, 3))):
+    for _ in range(1 + choose(3)):
         shape = self.kind(shapes.KINDS)
         copies = self.one([1, 2, 17]) if isinstance(shape, shapes.Instance) else 1
         things += [shape] * copies
-    if draw(st.integers(0, 7)) == 7:
+    if choose(7) == 7:
         things = [_as_body(self, thing) for thing in things]
     self.rigid = True
-    lamps = [self.kind(PLACED_LIGHTS) for _ in self.many(3)]
+    lamps = [self.kind(PLACED_LIGHTS) for _ in range(choose(3))]
     lamps += [lights.Point(position=(0.0, 0.0, 2.0 + i)) for i in range(self.one([0, 0, 0, 20]))]
     camera = self.kind([cls for cls in cameras.KINDS if not traced or cls.kind in CONNECTED])
     plain = {} if isinstance(integrator, integrators.HAVE_LAYERS) else {"layers": ()}
@@ -462,12 +464,27 @@ def _as_body(self: Drawer, shape: Any) -> Any:
     return dataclasses.replace(shape, priority=self.one([0, 1, 2]), exterior=None)
 
 
-WAYS = st.builds(
-    Way,
-    layout=st.sampled_from(tuple(bvh.LAYOUTS)),
-    lanes=st.sampled_from((1, 8)),
-    form=st.sampled_from(FORMS_OF_PROGRAMS),
-)
+def way_of(choose: Callable[[int], int]) -> Way:
+    """How a device renders it, by choices."""
+    layouts, lanes = tuple(bvh.LAYOUTS), (1, 8)
+    return Way(
+        layouts[choose(len(layouts) - 1)],
+        lanes[choose(1)],
+        FORMS_OF_PROGRAMS[choose(len(FORMS_OF_PROGRAMS) - 1)],
+    )
+
+
+@st.composite
+def scenes(draw: Any) -> Scene:
+    """`scene_of` as a strategy."""
+    return scene_of(lambda most: draw(st.integers(0, most)))
+
+
+@st.composite
+def ways(draw: Any) -> Way:
+    """`way_of` as a strategy."""
+    return way_of(lambda most: draw(st.integers(0, most)))
+
 
 # Printing ------------------------------------------------------------------------------------
 

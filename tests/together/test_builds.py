@@ -20,7 +20,7 @@ from clpt.scene.shapes import Cube, Disk, Sphere
 from clpt.scene.textures import Checkers, Mix
 from tests.front_end import CLANG, errors
 from tests.together.builds import FORMS, Way, texts
-from tests.together.strategies import WAYS, scenes, shown
+from tests.together.strategies import scenes, shown, ways
 
 SCENES = 60
 
@@ -81,7 +81,7 @@ def test_parts_that_once_did_not_go_together(parts: str, mode: str) -> None:
     report_multiple_bugs=False,
     suppress_health_check=list(hypothesis.HealthCheck),
 )
-@hypothesis.given(scenes(), WAYS)
+@hypothesis.given(scenes(), ways())
 def test_scenes_build(scene: Scene, way: Way) -> None:
     try:
         features = lower(scene).features
