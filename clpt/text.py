@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from clpt.errors import SceneError
 
 UTF_16 = {codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_UTF16_BE: "utf-16-be"}
+FILLING = b"\0\x1a"  # what some programs write behind the end of a text
 COMMA = re.compile(r"\d,\d")
 
 

@@ -98,7 +98,8 @@ class RayMeshIntersector:
         if multiple_hits:
             order = np.lexsort((distances, rays))
             again = self._again(rays, triangles, cosines < 0, order, origins, directions)
-            rays, triangles, distances = (a[order[~again]] for a in (rays, triangles, distances))
+            order = order[~again]
+            rays, triangles, distances = rays[order], triangles[order], distances[order]
             few = np.arange(len(rays)) - np.searchsorted(rays, rays) < max_hits
             rays, triangles, distances = rays[few], triangles[few], distances[few]
         if not return_locations:
@@ -179,7 +180,7 @@ class RayMeshIntersector:
             found.append((some[there], at[there], near[there], reach[there]))
         places, at, near, reach = (np.concatenate(part) for part in zip(*found, strict=True))
         together = np.argsort(key[places], kind="stable")
-        places, at, near, reach = (a[together] for a in (places, at, near, reach))
+        places, at, near, reach = places[together], at[together], near[together], reach[together]
         for step in range(1, len(places)):
             first = np.flatnonzero(key[places[step:]] == key[places[:-step]])
             if not len(first):

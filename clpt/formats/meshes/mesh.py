@@ -175,8 +175,8 @@ def _by_texture(made: Triangles, warnings: list[str]) -> list[Triangles]:
         return [made]
     number = made.columns["face"].get("texnumber")
     if len(made.textures) == 1 or number is None:
-        told = ", ".join(map(repr, made.textures[1:4]))
-        warnings += [f"image {told} left out, as no face is said to show it"] if told else []
+        for image in made.textures[1:]:
+            warnings.append(f"image {image!r} left out, as no face names it")
         return [made]
     number = np.clip(number.astype(np.int64), 0, len(made.textures) - 1)
     parts = []

@@ -19,7 +19,7 @@ from clpt.formats.gzip_file import read_bytes
 from clpt.formats.meshes.triangles import Triangles, indices, see_through
 from clpt.geometry.polygons import triangulate
 
-HEADER = re.compile(rb"\s*((?:ST)?C?N?4?n?OFF)?(\s+BINARY\b)?")
+HEADER = re.compile(rb"\s*((?:ST)?C?N?4?n?(?:OFF|Off|off))?(\s+BINARY\b)?")
 COMMENT = re.compile(rb"#[^\r\n]*")
 COLOUR = ("red", "green", "blue", "alpha")
 GREY = (203, 0.6)  # of a mesh without colours: in bytes of sRGB, and linear
@@ -30,7 +30,7 @@ Integers = NDArray[np.int64]
 
 def read(path: Path) -> list[Triangles]:
     """Read a file. Raises SceneError with the line of what is no number."""
-    data = COMMENT.sub(b"", text.plain(read_bytes(path)))
+    data = COMMENT.sub(b"", text.plain(read_bytes(path))).rstrip(text.FILLING)
     try:
         return [_read(data)]
     except SceneError as error:

@@ -199,7 +199,7 @@ def _uneven_rows(
     data: bytes, element: Element, start: int, order: str
 ) -> tuple[dict[str, Any], int]:
     """As `_even_rows`, by walking from list to list, row by row; then all is gathered at once."""
-    rows = Lists(order, element.properties)
+    rows = _Lists(order, element.properties)
     at, end = start, len(data)
     begins = []
     try:
@@ -222,7 +222,7 @@ def _uneven_rows(
     return _gathered(data, element, order, rows, np.array(begins, np.int64)), at - start
 
 
-class Lists:
+class _Lists:
     """Where the lists of an element's rows lie.
 
     lists: for each the bytes before it, what reads its length, the bytes of that and of a value,
@@ -243,7 +243,7 @@ class Lists:
 
 
 def _gathered(
-    data: bytes, element: Element, order: str, rows: Lists, at: NDArray[np.int64]
+    data: bytes, element: Element, order: str, rows: _Lists, at: NDArray[np.int64]
 ) -> dict[str, Any]:
     """Return the columns of rows that have been walked over; at: where each row begins."""
     raw = np.frombuffer(data, np.uint8)
@@ -365,7 +365,7 @@ def _typed(values: NDArray[Any], column: Property) -> NDArray[Any]:
 def _triangles(header: Header, tables: dict[str, dict[str, Any]]) -> Triangles:
     vertex, face = _plain(tables.get("vertex", {})), tables.get("face", {})
     if not all(name in vertex for name in "xyz"):
-        raise SceneError("it holds no triangles")
+        raise SceneError("it holds no triangles: it has no vertices with x, y and z")
     uvs = next((pair for pair in UVS if all(name in vertex for name in pair)), None)
     normals = NORMAL if all(name in vertex for name in NORMAL) else None
     known = {*"xyz", *(normals or ()), *(uvs or ())}
@@ -374,7 +374,8 @@ def _triangles(header: Header, tables: dict[str, dict[str, Any]]) -> Triangles:
     triangles, polygon = triangulate(vertices, counts, corners)
     strips = _strips(tables.get("tristrips", {}))
     if not (len(strips) or any(name in face for name in CORNERS)):
-        raise SceneError("it holds no triangles")
+        held = ", ".join(repr(element.name[:40]) for element in header.elements[:5])
+        raise SceneError(f"it holds no triangles: its elements are {held}")
     rows = np.r_[polygon, np.full(len(strips), len(counts))]
     made = Triangles(
         vertices=vertices,
@@ -464,13 +465,13 @@ def _with_corner_uvs(
 
 def _left_out(tables: dict[str, dict[str, Any]]) -> list[str]:
     """Return warnings of what a file has that would be seen, and that is not read."""
-    told = [f"element {name[:40]!r} left out" for name in tables if name not in ELEMENTS]
+    found = [f"element {name[:40]!r} left out" for name in tables if name not in ELEMENTS]
     for element in ("vertex", "face"):
         columns = _plain(tables.get(element, {}))
-        told += [f"{element} {name} left out" for name in LEFT_OUT if name in columns]
+        found += [f"{element} {name} left out" for name in LEFT_OUT if name in columns]
         if see_through(columns):
-            told.append(f"{element} alpha left out")
-    return told
+            found.append(f"{element} alpha left out")
+    return found
 
 
 def _plain(table: dict[str, Any]) -> dict[str, NDArray[Any]]:

@@ -94,7 +94,7 @@ def _colours(head: bytes, attributes: NDArray[np.uint16]) -> NDArray[np.uint8] |
 
 def _text(data: bytes) -> list[Triangles]:
     """Return a mesh for each solid of a text."""
-    data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    data = data.rstrip(text.FILLING).replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     lower = data.lower()
     made, name, start = [], "", 0
     for solid in [*SOLID.finditer(lower), None]:

@@ -24,6 +24,7 @@ def read(tmp_path):
 
 FILES = {
     "plain": f"OFF\n3 1 0\n{POINTS}3 0 1 2\n",
+    "small letters": f"off\n3 1 0\n{POINTS}3 0 1 2\n\x1a",
     "no word": f"3 1 0\n{POINTS}3 0 1 2\n",
     "counts on the line": f"OFF 3 1 0\n{POINTS}3 0 1 2\n",
     "counts at the word": f"OFF3 1 0\n{POINTS}3 0 1 2\n",

@@ -304,6 +304,8 @@ FACE = ["element vertex 4", *XYZ, "element face 1", LIST.format("uchar")]
         (FACE, ROWS.replace("3 0 1 2", "3 0 1 1e300"), "a face names vertex 1e\\+300"),
         (FACE, ROWS.replace("3 0 1 2", "1e18 0 1 2"), "it ends within 1 rows of 'face'"),
         (FACE, ROWS.replace("3 0 1 2", "nan 0 1 2"), "a list has nan values"),
+        (FACE[:4], SQUARE, "it holds no triangles: its elements are 'vertex'"),
+        (FACE[4:], "3 0 1 2", "it holds no triangles: it has no vertices with x, y and z"),
         ([*FACE, "who knows"], ROWS, ":9: .*its header has the line 'who knows'"),
     ],
 )

@@ -56,6 +56,7 @@ TEXTS = {
     "tabs": solid().replace(" ", "\t"),
     "exponents": solid().replace("vertex 1 0 0", "vertex 1.0e+00 -0.0E-5 0"),
     "mark": "\ufeff" + solid(),
+    "an end of DOS": solid() + "\x1a\0\0",
     "no normals": solid().replace(" normal 0 0 1", ""),
 }
 
