@@ -134,6 +134,7 @@ class Library:
     folder: Path
     missing: Missing = "error"
     statements: dict[str, Statements] = field(default_factory=dict)
+    short: dict[str, str] = field(default_factory=dict)  # names without comments -> whole ones
     absent: list[str] = field(default_factory=list)
     left_out: dict[str, None] = field(default_factory=dict)
     remarks: dict[str, list[str]] = field(default_factory=dict)  # to the materials' names
@@ -148,6 +149,7 @@ class Library:
                 continue
             for key, statements in read(path).items():
                 self.statements.setdefault(key, statements)
+                self.short.setdefault(uncommented(key), key)
 
     def _split(self, names: str) -> list[str]:
         for whole in (names, uncommented(names)):
@@ -163,10 +165,7 @@ class Library:
         if name in self.statements:
             return name
         short = uncommented(name)
-        if short in self.statements:
-            return short
-        alike = [key for key in self.statements if uncommented(key) in (name, short)]
-        return alike[0] if alike else None
+        return short if short in self.statements else self.short.get(name, self.short.get(short))
 
     def material(self, name: str) -> tuple[Material, Area | None]:
         """Return a known material, and what it emits. Raises SceneError."""
@@ -222,10 +221,11 @@ class _Maker:
         model = self.model()
         if any(key in self.statements for key in PHYSICAL):
             return self.physical(model)
-        if model in GLASS and (index := self.index(COAT if model in (6, 7) else 1.0)) > 1.0:
-            return self.glass(index)
-        if model in (4, 9) and self.statements.get("ni") is None:
-            self.remark(f"illum {model} is glass where Ni is above 1, and Ni is not given")
+        if model in GLASS:
+            if (index := self.glass_index(model)) > 1.0:
+                return self.glass(index)
+            if model != 4 or "ni" not in self.statements:  # Maya writes 4 and Ni 1 of all materials
+                self.remark(f"illum {model} is glass where Ni is above 1, which it is not")
         if model in (0, 1):
             self.used.add("map_ks")
             gloss: Any = BLACK
@@ -279,6 +279,10 @@ class _Maker:
         given = self.number("ni", otherwise)
         return given if given is not None and 1.0 < given < math.inf else otherwise
 
+    def glass_index(self, model: int) -> float:
+        """Return the index of glass; 1 where the material is none."""
+        return self.index(COAT if model in (6, 7) and "ni" not in self.statements else 1.0)
+
     def alpha(self) -> float:
         """Return the roughness of microfacets whose highlight has the exponent Ns."""
         exponent = max(self.number("ns", 0.0) or 0.0, 0.0)
@@ -310,7 +314,7 @@ class _Maker:
     def physical(self, model: int | None) -> Material:
         """Return the material of Pr, Pm, Ps, Pc, Pcr and aniso."""
         roughness = self.share("pr", 0.5)
-        if model in GLASS and (index := self.index(COAT if model in (6, 7) else 1.0)) > 1.0:
+        if model in GLASS and (index := self.glass_index(model)) > 1.0:
             self.used |= {"map_kd", "map_ks", "map_d", *PHYSICAL}
             alpha = roughness**2 if isinstance(roughness, float) else 0.25
             if alpha <= SMOOTHEST:

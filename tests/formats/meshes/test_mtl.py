@@ -149,9 +149,11 @@ def test_glass(read, model, further):
 
 def test_glass_without_an_index(read):
     assert read("illum 7")[0].material.int_ior.value == 1.5
-    one, warnings = read("illum 9\nd .5")
-    assert leaf(one).kind == "mask"
-    assert warnings == ["material 'a': illum 9 is glass where Ni is above 1, and Ni is not given"]
+    for statements in ("illum 9", "illum 7\nNi 1.0", "illum 4", "illum 6\nNi 1"):
+        one, warnings = read(f"{statements}\nd .5")
+        assert leaf(one).kind == "mask"
+        told = f"{statements[:7]} is glass where Ni is above 1, which it is not"
+        assert warnings == [f"material 'a': {told}"]
 
 
 def test_a_mirror_keeps_its_sum(read):
