@@ -189,7 +189,7 @@ LIMITS = (  # on the page, and where the code has them
     ("| 255 |", "clpt.render.contract.custom_materials", "MOST", 255),
     ("| 32 |", "clpt.scene.textures", "MOST_OCTAVES", 32),
     ("| 1 GiB a file |", "clpt.formats.gzip_file", "LARGEST", 1 << 30),
-    ("| 65 536 bytes |", "clpt.formats.meshes.ply", "LONGEST_HEADER", 65536),
+    ("| 65 536 bytes |", "clpt.formats.meshes.ply_tables", "LONGEST_HEADER", 65536),
     ("| 65 536 corners |", "clpt.formats.meshes.ply", "MOST_CORNERS", 65536),
     ("| 1 GiB |", "clpt.formats.meshes.strands", "LARGEST", 1 << 30),
     ("| 2 GiB | `is larger than 2048 MiB`", "clpt.formats.mitsuba.serialized", "LARGEST", 1 << 31),
