@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from clpt import text
 from clpt.errors import SceneError
 from clpt.formats.gzip_file import LARGEST, read_bytes
-from clpt.formats.meshes.ply_tables import Header, Columns, read_tables
+from clpt.formats.meshes.ply_tables import Columns, Header, read_tables
 from clpt.formats.meshes.triangles import Triangles, indices, see_through
 from clpt.geometry.polygons import triangulate
 
