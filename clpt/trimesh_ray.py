@@ -120,6 +120,11 @@ class RayMeshIntersector:
 
     def contains_points(self, points: ArrayLike) -> NDArray[np.bool_]:
         """Return whether points (n, 3) are inside of a closed mesh, by rays from them."""
+        points = _floats(points, "points")
+        if points.ndim != 2 or points.shape[1] != 3:
+            raise SceneError(f"(n, 3) is wanted, not {points.shape}", where="points")
+        if not len(self.mesh.faces):
+            return np.zeros(len(points), np.bool_)
         return np.asarray(contains_points(self, points), np.bool_)
 
     @cache_decorator  # type: ignore[untyped-decorator]
@@ -205,12 +210,19 @@ class RayMeshIntersector:
 
 def _rays(origins: ArrayLike, directions: ArrayLike) -> tuple[Floats, Floats]:
     """Rays (n, 3) in float64, directions of unit length or zero. Raises SceneError."""
-    o, d = (np.asarray(part, np.float64) for part in (origins, directions))
+    o, d = _floats(origins, "rays"), _floats(directions, "rays")
     if not o.size and not d.size:
         return np.zeros((0, 3)), np.zeros((0, 3))
     if o.shape != d.shape or o.ndim != 2 or o.shape[1] != 3:
         raise SceneError(f"(n, 3) both are wanted, not {o.shape} and {d.shape}", where="rays")
     return o, unitize(d)
+
+
+def _floats(values: ArrayLike, where: str) -> Floats:
+    try:
+        return np.asarray(values, np.float64)
+    except (TypeError, ValueError):
+        raise SceneError("are not numbers, (n, 3) of them", where=where) from None
 
 
 def _borders(

@@ -64,6 +64,15 @@ def test_readers(tmp_path, name, encoding):
     assert read(tmp_path / name) == value
 
 
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "latin-1"])
+def test_xml_has_the_encoding_that_it_declares(tmp_path, encoding):
+    declared = encoding.removesuffix("-sig")
+    content = f'<?xml version="1.0" encoding="{declared}"?><scene version="3.0.0">'
+    content += '<shape type="sphere" id="größe"/></scene>'
+    (tmp_path / "a.xml").write_bytes(content.encode(encoding))
+    assert load(tmp_path / "a.xml").shapes[0].name == "größe"
+
+
 @pytest.mark.parametrize(
     ("name", "content", "line"),
     [

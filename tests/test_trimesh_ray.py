@@ -173,6 +173,12 @@ def test_no_rays_and_no_mesh():
     assert intersector.intersects_any(none, none).shape == (0,)
     empty = RayMeshIntersector(trimesh.Trimesh())
     assert empty.intersects_first([[0, 0, 0]], [[0, 0, 1]]).tolist() == [-1]
+    assert empty.contains_points([[0, 0, 0]]).tolist() == [False]
+    assert intersector.contains_points(none).shape == (0,)
+    with pytest.raises(clpt.SceneError, match=r"points: \(n, 3\) is wanted, not \(3,\)"):
+        intersector.contains_points([0, 0, 0])
+    with pytest.raises(clpt.SceneError, match="rays: are not numbers"):
+        intersector.intersects_any([[0, 0, 0], [1]], [[0, 0, 1]])
     with pytest.raises(clpt.SceneError, match=r"rays: .*\(1, 2\)"):
         intersector.intersects_any([[1, 2]], [[3, 4, 5]])
 

@@ -37,9 +37,12 @@ def triangulate(
     if (counts == 3).all():
         return np.arange(3 * len(counts), dtype=np.int32).reshape(-1, 3), _range(len(counts))
     triangles, polygon = _fans(counts, starts)
-    points = np.asarray(vertices)
-    rows = _first(counts)
-    larger = np.flatnonzero(counts > 3)
+    rows, points, corners = _first(counts), np.asarray(vertices), np.asarray(corners)
+    if not len(points):
+        return triangles, polygon
+    quads, larger = np.flatnonzero(counts == 4), np.flatnonzero(counts > 4)
+    for some in np.split(quads, range(CHUNK // 4, len(quads), CHUNK // 4)):
+        _mend_quads(triangles, points, starts[some], rows[some], corners)
     pieces = np.searchsorted(np.cumsum(counts[larger]), np.arange(0, counts[larger].sum(), CHUNK))
     for some in np.split(larger, np.unique(pieces)[1:]):
         _mend(triangles, points, counts[some], starts[some], rows[some], corners)
@@ -64,6 +67,38 @@ def _fans(counts: Integers, starts: Integers) -> tuple[NDArray[np.int32], NDArra
     return np.stack([first, first + step, first + step + 1], axis=1).astype(np.int32), polygon
 
 
+def _outlines(
+    points: NDArray[Any], corners: NDArray[Any], at: Integers
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """Return the places (k, 3) of corners, and whether each is one: there, and finite."""
+    named = corners[at]
+    there = (named >= 0) & (named < len(points))
+    places = points[np.where(there, named, 0).astype(np.int64)].astype(np.float64)
+    return places, there & np.isfinite(places).all(axis=1)
+
+
+def _mend_quads(
+    triangles: NDArray[np.int32],
+    points: NDArray[Any],
+    starts: Integers,
+    rows: Integers,
+    corners: NDArray[Any],
+) -> None:
+    """Split quadrilaterals at their other diagonal where a triangle of the fan is turned over."""
+    places, usable = _outlines(points, corners, np.add.outer(starts, range(4)).reshape(-1))
+    outline = places.reshape(-1, 4, 3)
+    with np.errstate(over="ignore", invalid="ignore"):
+        a, b, c = (outline[:, i] - outline[:, 0] for i in (1, 2, 3))
+        first, second = np.cross(a, b), np.cross(b, c)
+        normals = first + second
+        least = -ROUNDING * (normals**2).sum(axis=1)
+        turned = ((first * normals).sum(axis=1) < least) | ((second * normals).sum(axis=1) < least)
+        finite = usable.reshape(-1, 4).all(axis=1) & np.isfinite(least)
+    wrong = np.flatnonzero(turned & finite)
+    triangles[rows[wrong]] = np.add.outer(starts[wrong], (1, 2, 3))
+    triangles[rows[wrong] + 1] = np.add.outer(starts[wrong], (1, 3, 0))
+
+
 def _mend(
     triangles: NDArray[np.int32],
     points: NDArray[Any],
@@ -72,31 +107,24 @@ def _mend(
     rows: Integers,
     corners: NDArray[Any],
 ) -> None:
-    """Replace the fans that do not fit their polygons; all have more than 3 corners.
+    """Clip the ears of polygons whose fan has a triangle that is turned over.
 
     rows: (p,) the first triangle of each.
     """
-    fans, polygon = _fans(counts, np.cumsum(counts) - counts)
-    own = np.repeat(starts - np.cumsum(counts) + counts, counts) + np.arange(counts.sum())
-    named = np.asarray(corners)[own].astype(np.int64)
-    there = (named >= 0) & (named < len(points))
-    if not len(points):
+    if not len(counts):
         return
-    outline = points[np.where(there, named, 0)].astype(np.float64)
-    begins = np.cumsum(counts) - counts
+    begins, first = np.cumsum(counts) - counts, _first(counts)
+    fans, polygon = _fans(counts, begins)
+    at = np.repeat(starts - begins, counts) + np.arange(counts.sum())
+    outline, usable = _outlines(points, corners, at)
     with np.errstate(over="ignore", invalid="ignore"):
         outline -= np.repeat(outline[begins], counts, axis=0)
         crosses = np.cross(outline[fans[:, 1]], outline[fans[:, 2]])  # the first corner is at zero
-        normals = np.add.reduceat(crosses, _first(counts))
-        signed = (crosses * normals[polygon]).sum(axis=1)
-        turned = signed < -ROUNDING * (normals**2).sum(axis=1)[polygon]
-        usable = np.logical_and.reduceat(there & np.isfinite(outline).all(axis=1), begins)
-        usable &= np.isfinite(normals**2).all(axis=1)
-    wrong = np.flatnonzero(np.logical_or.reduceat(turned, _first(counts)) & usable)
-    quads = wrong[counts[wrong] == 4]
-    triangles[rows[quads]] = np.add.outer(starts[quads], (1, 2, 3))
-    triangles[rows[quads] + 1] = np.add.outer(starts[quads], (1, 3, 0))
-    for i in wrong[counts[wrong] > 4]:
+        normals = np.add.reduceat(crosses, first)
+        square = (normals**2).sum(axis=1)
+        turned = (crosses * normals[polygon]).sum(axis=1) < -ROUNDING * square[polygon]
+    wrong = np.logical_or.reduceat(turned, first) & np.isfinite(square)
+    for i in np.flatnonzero(wrong & np.logical_and.reduceat(usable, begins)):
         ears = _clip(outline[begins[i] : begins[i] + counts[i]], normals[i])
         if ears is not None:
             triangles[rows[i] : rows[i] + counts[i] - 2] = starts[i] + ears

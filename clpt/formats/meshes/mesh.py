@@ -195,7 +195,7 @@ def _pictured(path: Path, image: str, otherwise: Material, warnings: list[str]) 
     if file is None:
         warnings.append(f"image {image!r} left out, as it is not there")
         return otherwise
-    return TwoSided(front=Diffuse(reflectance=Bitmap(image=str(file)), name=file.stem))
+    return TwoSided(front=Diffuse(reflectance=Bitmap(image=file), name=file.stem))
 
 
 def _obj(path: Path, library: mtl.Library | None, warnings: list[str]) -> list[Mesh]:

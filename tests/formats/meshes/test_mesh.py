@@ -306,12 +306,12 @@ def test_the_images_of_a_ply(read, tmp_path):
     made = read("a.ply", TEXTURED.format(comments=comments, more="", first=0, second=0))
     (one,) = made.meshes
     assert made.warnings == [] and len(one.faces) == 2
-    assert one.material.front.reflectance.image == str(tmp_path / "a.png")
+    assert one.material.front.reflectance.image == tmp_path / "a.png"
     comments += "comment TextureFile b c.png\n"
     made = read("a.ply", TEXTURED.format(comments=comments, more="", first=1, second=0))
     assert made.warnings == []
     images = [mesh.material.front.reflectance.image for mesh in made.meshes]
-    assert images == [str(tmp_path / "a.png"), str(tmp_path / "b c.png")]
+    assert images == [tmp_path / "a.png", tmp_path / "b c.png"]
     assert [mesh.uvs.tolist() for mesh in made.meshes] == [
         [[1, 0], [0, 1], [1, 1]], [[0, 0], [1, 0], [0, 1]],
     ]  # fmt: skip
