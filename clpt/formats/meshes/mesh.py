@@ -311,7 +311,8 @@ def _material(visual: Any, warnings: list[str]) -> Material:
     colour, image = _base_colour(material)
     if image is None:
         return TwoSided(front=Diffuse(reflectance=tuple(colour), name=material.name or ""))
-    texels = images.from_pillow(image.convert("RGB")) * np.asarray(colour, np.float32)
+    texels = images.from_pillow(image).decoded()
+    texels = texels[..., :3] * np.asarray(colour, np.float32)
     texture = Bitmap(image=texels, raw=True)
     return TwoSided(front=Diffuse(reflectance=texture, name=material.name or ""))
 
