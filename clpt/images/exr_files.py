@@ -90,7 +90,7 @@ def read_channels(path: Path, chosen: Sequence[str] | None = None, part: int = 0
     if len(found) == 1 and set(names) < set(channel_names(found[0])):
         return _some(path, found[0], names)
     # The library reads all channels of all parts.
-    budget.take(sum(4 * _area(one) * len(channel_names(one)) for one in found), _WHAT, path)
+    budget.take(sum(_size(one, channel_names(one)) for one in found), _WHAT, path)
     with opened(path) as parts:
         channels = parts[part].channels
         return {name: np.asarray(channels[name].pixels) for name in names}
@@ -99,9 +99,13 @@ def read_channels(path: Path, chosen: Sequence[str] | None = None, part: int = 0
 _WHAT = "what its channels hold"
 
 
-def _area(header: Header) -> int:
-    x0, y0, x1, y1 = window(header, "dataWindow")
-    return (x1 - x0) * (y1 - y0)
+def _size(header: Header, names: Sequence[str]) -> int:
+    """What channels of a part take at most [bytes]: as they are stored, and made float32."""
+    areas = []
+    for name in ("dataWindow", "displayWindow"):
+        x0, y0, x1, y1 = window(header, name)
+        areas.append((x1 - x0) * (y1 - y0))
+    return 8 * max(areas) * len(names)
 
 
 def _some(path: Path, header: Header, names: Sequence[str]) -> Channels:
@@ -109,7 +113,7 @@ def _some(path: Path, header: Header, names: Sequence[str]) -> Channels:
 
     By the library's older interface, for the newer one always reads all of them.
     """
-    budget.take(4 * _area(header) * len(names), _WHAT, path)
+    budget.take(_size(header, names), _WHAT, path)
     x0, y0, x1, y1 = window(header, "dataWindow")
     file = OpenEXR.InputFile(exr_name(path))
     try:

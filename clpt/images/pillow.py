@@ -30,6 +30,7 @@ FORMATS = ("PNG", "JPEG", "TGA", "BMP", "WEBP", "GIF", "TIFF")
 SUFFIXES = (".png", ".jpg", ".jpeg", ".tga", ".bmp", ".webp", ".gif", ".tif", ".tiff")
 NAMES = {"WEBP": "WebP"}  # of formats, where people write them in another way
 ORIENTATION = 0x0112  # the tag of Exif
+PHOTOMETRIC, WHITE_IS_ZERO = 262, 0  # a tag of TIFF, and its value
 LEFT_OUT = "is left out: its pixels are taken as they are stored"
 
 Source = Path | bytes
@@ -90,7 +91,7 @@ def _opened(source: Source, formats: Sequence[str]) -> Iterator[ImageFile]:
     except UnidentifiedImageError:
         *most, last = (NAMES.get(name, name) for name in formats)
         listed = f"{', '.join(most)} or {last}" if most else last
-        raise SceneError(f"is no {listed} image", file=file) from None
+        raise SceneError(f"is no {listed} image of a kind that is read", file=file) from None
     except Image.DecompressionBombError:
         most = 2 * (Image.MAX_IMAGE_PIXELS or 0)  # Pillow's rule
         what = f"{file.suffix} images" if file else "images"
@@ -102,7 +103,7 @@ def _take(source: Source, image: ImageFile) -> None:
     """Ask for the memory that decoding takes, Pillow's own and ours."""
     deep = image.mode[0] in "IF" or _raw_mode(image).find(";16") >= 0
     samples = image.width * image.height * max(len(image.getbands()), 1)
-    budget.take(samples * (16 if deep else 4), "its pixels", _file(source))
+    budget.take(samples * (16 if deep else 8), "its pixels", _file(source))
 
 
 def _file(source: Source) -> Path | None:
@@ -115,10 +116,12 @@ def from_pillow(image: Image) -> Stored:
     if image.mode == "F":
         return Stored(np.asarray(image, np.float32)[..., None], encoded=False)
     if image.mode == "I" and getattr(image, "format", None) not in ("PNG", None):
-        message = "its whole numbers of 32 bits have no meaning as colours; save floats, or 16 bits"
-        raise SceneError(message)
+        what = "its whole numbers of 32 bits, or with a sign, have no meaning as colours"
+        raise SceneError(f"{what}; save floats, or 16 bits")
     if image.mode == "I" or image.mode.startswith("I;16"):
         wide = np.asarray(image).astype(np.uint16)[..., None]
+        if getattr(image, "tag_v2", {}).get(PHOTOMETRIC) == WHITE_IS_ZERO:
+            wide = np.uint16(65535) - wide  # which Pillow does for fewer bits alone
         return Stored(_floats(wide, (key,) if isinstance(key, int) else None), encoded=True)
     transparent = "A" in image.mode or "a" in image.mode or key is not None
     if image.mode not in ("L", "RGB", "RGBA") or (transparent and image.mode != "RGBA"):
@@ -156,9 +159,9 @@ def _sixteen_bits(
     """
     raw = _raw_mode(image)
     if raw == "LA;16B":
-        high_low = _bytes_as(image, "RGBA").astype(np.uint16)
-        grey, alpha = high_low[..., ::2] << 8 | high_low[..., 1::2]
-        return np.stack([grey, grey, grey, alpha], axis=2)
+        upper_lower = _bytes_as(image, "RGBA").astype(np.uint16)
+        grey_alpha = upper_lower[..., ::2] << np.uint16(8) | upper_lower[..., 1::2]
+        return grey_alpha[..., [0, 0, 0, 1]]
     mode, _, order = raw.partition(";16")
     if mode not in ("RGB", "RGBA") or mode != image.mode or order not in ("B", "L", "N"):
         return None

@@ -13,13 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from clpt import transforms
+from clpt import images, transforms
 from clpt.errors import SceneError, UnknownKindError
 from clpt.formats.missing import EVEN, GREY
 from clpt.formats.pbrt.map_values import map_values
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.spectra import SPECTRUM_TYPES, spectrum, value_of
 from clpt.formats.pbrt.state import Definition, State
+from clpt.images import Stored
 from clpt.scene.textures import (
     MAPPINGS,
     MOST_OCTAVES,
@@ -156,15 +157,44 @@ def _imagemap(form: str, params: Parameters, state: State) -> Any:
         channel="r" if form == "float" else "luminance",
         **_mapping(params, state),
     )
+    bilinear = params.choice("filter", "bilinear", FILTERS) in ("bilinear", "trilinear")
     encoding = params.one("encoding", "string", "sRGB")
     if (
         file is not None and file.suffix.lower() == ".png"
     ):  # pbrt ignores the encoding of other files
         made = _decoded(made, encoding)
+    if file is not None and form == "float" and bilinear:
+        made = _number(made)
     scale, invert = params.one("scale", "float", 1.0), params.one("invert", "bool", False)
     if file is None or (scale == 1.0 and not invert):
         return made
     return map_values(made, lambda v: np.maximum(1.0 - scale * v if invert else scale * v, 0.0))
+
+
+def _number(bitmap: Bitmap) -> Bitmap:
+    """An image of the number that pbrt-v4 takes between texels (MIPMap::Bilerp of a Float).
+
+    It is alpha where that is not 1 everywhere, else the mean of red, green and blue. Alpha went
+    through the transfer that colours did. Filters "point" and "ewa" take red (MIPMap::Texel).
+    """
+    image: Any = bitmap.image
+    if not isinstance(image, np.ndarray):
+        image = images.read_stored(image)
+    stored = Stored(image, encoded=False) if isinstance(image, np.ndarray) else image
+    values = stored.values
+    if values.shape[2] == 1:
+        return bitmap
+    opaque = 255 if values.dtype == np.uint8 else 1.0
+    if values.shape[2] == 4 and (values[..., 3] != opaque).any():
+        chosen = replace(stored, values=values[..., 3:])
+    elif (values[..., :3] == values[..., :1]).all():
+        chosen = replace(stored, values=values[..., :1])
+    else:
+        colours = replace(stored, values=values[..., :3]).decoded(not bitmap.raw)
+        return replace(bitmap, image=colours.mean(axis=2, keepdims=True), raw=True)
+    if values.dtype == np.uint8 and stored.gamma is None:  # bytes stay small
+        return replace(bitmap, image=chosen.values)
+    return replace(bitmap, image=chosen.decoded(not bitmap.raw), raw=True)
 
 
 def _decoded(bitmap: Bitmap, encoding: str) -> Bitmap:
