@@ -14,8 +14,10 @@ def reading(path: Path) -> Iterator[None]:
     """Turn every error inside into a SceneError about a file."""
     try:
         yield
-    except SceneError:
-        raise
+    except SceneError as error:
+        if error.file is not None:
+            raise
+        raise SceneError(error.message, file=path, where=error.where) from None
     except MemoryError:
         raise SceneError("reading it takes more memory than there is", file=path) from None
     except Exception as error:  # the libraries raise their own, from struct.error to RuntimeError

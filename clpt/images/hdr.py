@@ -84,7 +84,7 @@ def _parsed(path: Path, data: bytes) -> _Header:
         end = data.find(b"\n", at)
         if end < 0:
             raise SceneError("not a Radiance picture: its header does not end", file=path)
-        line, at = data[at:end].strip(), end + 1
+        line, at = data[at:end].rstrip(), end + 1
         if not line:
             break
         name, equals, value = line.decode("latin-1").partition("=")
@@ -204,8 +204,9 @@ def write(path: Path, pixels: Array, space: str = "rec709") -> None:
     rgbe = np.empty((*pixels.shape[:2], 4), np.uint8)
     rgbe[..., :3] = np.clip(np.round(colour * scale[..., None]), 0, 255)
     rgbe[..., 3] = np.where((mantissa > 0) & (exponent > -128), np.clip(exponent + 128, 0, 255), 0)
+    space = space if pixels.shape[2] > 1 else "rec709"
     lines = ["#?RADIANCE", f"FORMAT={XYZE if space == 'xyz' else RGBE}"]
-    if space not in ("rec709", "xyz") and pixels.shape[2] > 1:
+    if space not in ("rec709", "xyz"):
         lines.append("PRIMARIES= " + " ".join(f"{v:.7g}" for v in spaces.chromaticities(space)))
     lines += ["", f"-Y {pixels.shape[0]} +X {pixels.shape[1]}", ""]
     output_files.write(path, "\n".join(lines).encode() + rgbe.tobytes())
