@@ -48,7 +48,7 @@ def read(path: str | Path, *, linear: bool = True) -> Array:
 
 def log_notes(path: str | Path, image: Stored, *, raw: bool) -> None:
     """Warn in the log of what an image's file says that is left out."""
-    for note in image.told(raw):
+    for note in image.notes_of(raw):
         log.warning("%s: %s", path, note)
 
 

@@ -56,7 +56,7 @@ class Stored:
             return Stored(self.values, self.encoded)
         return Stored(self.decoded(), encoded=False)
 
-    def told(self, raw: bool) -> tuple[str, ...]:
+    def notes_of(self, raw: bool) -> tuple[str, ...]:
         """What is left out of what the file says, for one who takes it as data or as colours."""
         return self.notes if raw else (*self.notes, *self.colour_notes)
 

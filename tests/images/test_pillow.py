@@ -209,5 +209,5 @@ def test_gltf_has_profiles_passed_over(tmp_path):
     """glTF 2.0, section 3.8.2: gamma and profiles of images are ignored."""
     path = files.png(tmp_path / "a.png", ROWS, 8, 2, [chunk_gamma(1.0), chunk_primaries("rec2020")])
     image = images.decoded(path.read_bytes(), ("PNG",), profiled=False)
-    assert (image.is_profiled, image.told(False)) == (False, ())
+    assert (image.is_profiled, image.notes_of(False)) == (False, ())
     assert image.values[0, 0].tolist() == [128, 64, 32]

@@ -222,7 +222,7 @@ def _image(file: str, state: State) -> Any:
 
 def _read(path: Path, state: State) -> Any:
     stored = images.read_stored(path)
-    for note in stored.told(raw=False):
+    for note in stored.notes_of(raw=False):
         state.tell(f"{path}: {note}")
     return stored.decoded()
 

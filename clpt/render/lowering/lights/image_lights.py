@@ -192,7 +192,7 @@ def _loaded(image: Any, where: str, notes: list[str]) -> Array:
         raise SceneError("an image is needed: a path, or an array (h, w, 3)", where=where)
     if isinstance(image, (str, Path)):
         stored = images.read_stored(image)
-        notes += [f"{image}: {note}" for note in stored.told(raw=False)]
+        notes += [f"{image}: {note}" for note in stored.notes_of(raw=False)]
         values = stored.decoded()
     else:
         values = np.asarray(on_host(image), np.float32)

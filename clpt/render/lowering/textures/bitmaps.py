@@ -86,7 +86,7 @@ class _Pixels:
                 stored.values.dtype == np.uint8,
                 stored.encoded,
                 stored.is_profiled,
-                {raw: stored.told(raw) for raw in (False, True)},
+                {raw: stored.notes_of(raw) for raw in (False, True)},
             )
         return self._form
 
