@@ -95,6 +95,8 @@ def write(
 
 def _matrix(header: Header, choice: Choice) -> tuple[Matrix | None, tuple[str, ...]]:
     """What takes a picture's colours to Rec. 709, and what of that is left out."""
+    if choice.form == "xyz":
+        return spaces.from_xyz("rec709"), ()
     if choice.form not in ("rgb", "chroma"):
         return None, ()
     try:

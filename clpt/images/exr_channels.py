@@ -3,7 +3,7 @@
 A name is a layer, a dot and a letter; the letters of a picture are R, G, B and A, or Y, RY, BY and
 A ("Technical Introduction to OpenEXR", Channel Names), here in small letters too. The rule:
 
-1. of each part in turn, those without a layer;
+1. of each part in turn, those without a layer; X, Y and Z too, which are XYZ;
 2. else of each part in turn, those of a layer: of one whose last word is in FAVOURED, else of the
    first one;
 3. else, of the first part: its only channel; X, Y and Z of a layer; else all, which are numbers.
@@ -21,9 +21,9 @@ FAVOURED = ("combined", "beauty", "rgba", "rgb", "color", "colour")  # Blender's
 class Choice:
     """The channels of a picture.
 
-    part: which they are of; names: in the order of the image's; form: "rgb", "grey", "chroma" (of
-    luminance and chroma) or "numbers", the first three with alpha or without; note: what is to be
-    told of the choice.
+    part: which they are of; names: in the order of the image. form: "rgb", "xyz", "grey", "chroma"
+    (luminance and chroma) or "numbers"; all but the last may have alpha. note: what is to be told
+    of the choice.
     """
 
     part: int
@@ -36,7 +36,7 @@ def choose(parts: Sequence[Sequence[str]]) -> Choice:
     """Choose among the names of the channels of each part."""
     layers = [_layers(names) for names in parts]
     for number, found in enumerate(layers):
-        if made := _picture(number, found.get("", {})):
+        if made := _picture(number, found.get("", {}), whole=True):
             return made
     made = None
     others: list[str] = []
@@ -70,18 +70,20 @@ def _rank(layer: str) -> int:
     return next((i for i, one in enumerate(FAVOURED) if word == one), len(FAVOURED))
 
 
-def _picture(part: int, letters: Mapping[str, str]) -> Choice | None:
-    """The picture that the letters of a layer make."""
+def _picture(part: int, letters: Mapping[str, str], whole: bool = False) -> Choice | None:
+    """The picture that the letters of a layer make; whole: of no layer."""
     alpha = ("A",) if "A" in letters else ()
-    for form, needed in _forms(letters):
+    for form, needed in _forms(letters, whole):
         if letters.keys() >= set(needed):
             return Choice(part, tuple(letters[one] for one in (*needed, *alpha)), form)
     return None
 
 
-def _forms(letters: Mapping[str, str]) -> Iterator[tuple[str, tuple[str, ...]]]:
+def _forms(letters: Mapping[str, str], whole: bool) -> Iterator[tuple[str, tuple[str, ...]]]:
     yield "rgb", ("R", "G", "B")
     yield "chroma", ("Y", "RY", "BY")
+    if whole:
+        yield "xyz", ("X", "Y", "Z")
     if "X" not in letters:  # else it is a coordinate
         yield "grey", ("Y",)
 

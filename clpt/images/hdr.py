@@ -116,7 +116,7 @@ def _note(path: Path, made: _Header, name: str, value: str) -> None:
         needed = f"{count} numbers" if count > 1 else "a number above 0"
         raise SceneError(f"its {name} must be {needed}, not {value!r}", file=path)
     if name in ("EXPOSURE", "COLORCORR"):
-        made.divide *= np.float32(numbers)
+        made.divide *= np.array(numbers, np.float32)
     elif name == "PRIMARIES":
         made.primaries = numbers
     elif name == "PIXASPECT":

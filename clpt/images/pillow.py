@@ -89,8 +89,8 @@ def _opened(source: Source, formats: Sequence[str]) -> Iterator[ImageFile]:
         with Image.open(file or data, formats=formats) as image:  # type: ignore[arg-type]
             yield image
     except UnidentifiedImageError:
-        *most, last = (NAMES.get(name, name) for name in formats)
-        listed = f"{', '.join(most)} or {last}" if most else last
+        *first, last = (NAMES.get(name, name) for name in formats)
+        listed = f"{', '.join(first)} or {last}" if first else last
         raise SceneError(f"is no {listed} image of a kind that is read", file=file) from None
     except Image.DecompressionBombError:
         most = 2 * (Image.MAX_IMAGE_PIXELS or 0)  # Pillow's rule
@@ -177,7 +177,7 @@ def _bytes_as(image: ImageFile, raw: str) -> NDArray[np.uint8]:
     """The pixels of an image that is not decoded yet, as if it stored them in another way."""
     tile: Any = image.tile[0]
     given = tile[3]
-    changed = (*tile[:3], (raw, *given[1:]) if isinstance(given, tuple) else raw)
+    changed: Any = (*tile[:3], (raw, *given[1:]) if isinstance(given, tuple) else raw)
     image.tile = [type(tile)(*changed) if hasattr(tile, "_replace") else changed]
     return np.asarray(image)
 

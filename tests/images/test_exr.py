@@ -56,6 +56,14 @@ def test_grey_with_alpha(tmp_path):
     assert images.read(path)[0, 0].tolist() == [0.5, 0.5, 0.5, 0.25]
 
 
+def test_xyz_is_a_colour_without_a_layer(tmp_path):
+    """As Mitsuba writes and reads it; in a layer it is a position, or a normal."""
+    path = stored(tmp_path / "a.exr", {"X": flat(0.4), "Y": flat(0.2), "Z": flat(0.1)})
+    expected = spaces.from_xyz("rec709") @ [0.4, 0.2, 0.1]
+    np.testing.assert_allclose(images.read(path)[0, 0], expected, atol=1e-6)
+    np.testing.assert_allclose(images.read(path, linear=False)[0, 0], [0.4, 0.2, 0.1], rtol=1e-6)
+
+
 @pytest.mark.parametrize("kind", [np.float16, np.float32, np.uint32])
 def test_types_of_channels(tmp_path, kind):
     path = stored(tmp_path / "a.exr", {name: flat(3).astype(kind) for name in "RGBZ"})
