@@ -29,7 +29,7 @@ HALF_MAX = 65504.0
 def read(path: Path) -> Stored:
     """Read the picture of a file. Raises SceneError for deep or too large ones, else as OpenEXR."""
     found = exr_files.headers(path)
-    choice = choose([exr_files.channel_names(header) for header in found])
+    choice = choose([exr_files.flat_channels(header) for header in found])
     header = found[choice.part]
     exr_files.check(path, header)
     read_ = exr_files.read_channels(path, choice.names, choice.part)

@@ -7,6 +7,8 @@ A ("Technical Introduction to OpenEXR", Channel Names), here in small letters to
 2. else of each part in turn, those of a layer: of one whose last word is in FAVOURED, else of the
    first one;
 3. else, of the first part: its only channel; X, Y and Z of a layer; else all, which are numbers.
+
+Parts without names, which are deep ones, are passed over.
 """
 
 from __future__ import annotations
@@ -38,7 +40,7 @@ def choose(parts: Sequence[Sequence[str]]) -> Choice:
     for number, found in enumerate(layers):
         if made := _picture(number, found.get("", {}), whole=True):
             return made
-    made = None
+    made, taken = None, ""
     others: list[str] = []
     for number, found in enumerate(layers):
         named = {layer: _picture(number, letters) for layer, letters in found.items()}
@@ -49,8 +51,9 @@ def choose(parts: Sequence[Sequence[str]]) -> Choice:
             made = pictures[layer]
             taken = layer
     if made is None:
-        return _numbers(parts[0], layers[0])
-    if len(others) == 1:
+        number = next((i for i, names in enumerate(parts) if names), 0)
+        return _numbers(number, parts[number], layers[number])
+    if len(others) == 1 or _rank(taken) < len(FAVOURED):
         return made
     note = f"its picture is taken from the layer {taken!r}; others with colours are left out"
     return Choice(made.part, made.names, made.form, note)
@@ -88,13 +91,13 @@ def _forms(letters: Mapping[str, str], whole: bool) -> Iterator[tuple[str, tuple
         yield "grey", ("Y",)
 
 
-def _numbers(names: Sequence[str], layers: Mapping[str, Mapping[str, str]]) -> Choice:
+def _numbers(part: int, names: Sequence[str], layers: Mapping[str, Mapping[str, str]]) -> Choice:
     """The channels of a part without a picture."""
     if len(names) == 1:
-        return Choice(0, tuple(names), "numbers")
+        return Choice(part, tuple(names), "numbers")
     for letters in layers.values():
         if letters.keys() >= set("XYZ"):
-            return Choice(0, tuple(letters[one] for one in "XYZ"), "numbers")
+            return Choice(part, tuple(letters[one] for one in "XYZ"), "numbers")
     every = tuple(sorted(names))
     note = f"has no channels R, G and B, nor Y: {', '.join(every)} are taken as they stand"
-    return Choice(0, every, "numbers", note)
+    return Choice(part, every, "numbers", note)

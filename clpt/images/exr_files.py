@@ -60,6 +60,15 @@ def channel_names(header: Header) -> list[str]:
     return [channel.name for channel in header["channels"]]
 
 
+def flat_channels(header: Header) -> list[str]:
+    """The names of a part's channels, none if its pixels are deep."""
+    return [] if _is_deep(header) else channel_names(header)
+
+
+def _is_deep(header: Header) -> bool:
+    return getattr(header.get("type"), "name", "") in DEEP
+
+
 def window(header: Header, name: str) -> Window:
     """The "dataWindow" or the "displayWindow" of a part."""
     (x0, y0), (x1, y1) = header[name]
@@ -68,9 +77,8 @@ def window(header: Header, name: str) -> Window:
 
 def check(path: Path, header: Header) -> None:
     """Raise SceneError for a part of too many pixels, or of deep ones."""
-    kind = getattr(header.get("type"), "name", "")
-    if kind in DEEP:
-        raise SceneError(f"has deep pixels ({kind}); flatten it", file=path)
+    if _is_deep(header):
+        raise SceneError(f"has deep pixels ({header['type'].name}); flatten it", file=path)
     for name in ("dataWindow", "displayWindow"):
         x0, y0, x1, y1 = window(header, name)
         budget.check_size(path, x1 - x0, y1 - y0)

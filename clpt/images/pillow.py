@@ -103,7 +103,7 @@ def _take(source: Source, image: ImageFile) -> None:
     """Ask for the memory that decoding takes, Pillow's own and ours."""
     deep = image.mode[0] in "IF" or _raw_mode(image).find(";16") >= 0
     samples = image.width * image.height * max(len(image.getbands()), 1)
-    budget.take(samples * (16 if deep else 8), "its pixels", _file(source))
+    budget.take(samples * (12 if deep else 8), "its pixels", _file(source))
 
 
 def _file(source: Source) -> Path | None:

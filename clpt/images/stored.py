@@ -15,6 +15,8 @@ from clpt.images.transfer import srgb_to_linear
 Array = NDArray[np.float32]
 Matrix = NDArray[np.float64]
 
+BLOCK = 1 << 22  # values that are decoded at once, so that what is between takes no memory
+
 
 @dataclass(frozen=True)
 class Stored:
@@ -61,27 +63,29 @@ class Stored:
         return self.notes if raw else (*self.notes, *self.colour_notes)
 
     def _numbers(self) -> Array:
-        if self.values.dtype != np.uint8:
-            return self.values
-        return _SCALE[self.values]
+        return _SCALE[self.values] if self.values.dtype == np.uint8 else self.values
 
     def _colours(self) -> Array:
-        made = self._numbers()
-        if self.encoded:
-            made = self._without_transfer()
-        if self.matrix is None or made.shape[2] < 3:
-            return made
-        colours = made[..., :3] @ self.matrix.T.astype(np.float32)
-        return np.concatenate([colours, made[..., 3:]], axis=2)
+        if not self.encoded and self.matrix is None:
+            return self._numbers()
+        height, width, count = self.values.shape
+        made = np.empty((height, width, count), np.float32)
+        rows = max(BLOCK // max(width * count, 1), 1)
+        for first in range(0, height, rows):
+            part = slice(first, first + rows)
+            made[part] = self._linear(self.values[part])
+        return made
 
-    def _without_transfer(self) -> Array:
-        curve = self._curve()
-        if self.values.dtype != np.uint8:
-            colours = curve(self.values[..., :3])
-            return np.concatenate([colours, self.values[..., 3:]], axis=2)
-        made = curve(_SCALE)[self.values]
-        if self.values.shape[2] == 4:
-            made[..., 3] = _SCALE[self.values[..., 3]]
+    def _linear(self, values: NDArray[Any]) -> Array:
+        """Some rows as linear Rec. 709."""
+        bytes_ = values.dtype == np.uint8
+        made = _SCALE[values] if bytes_ else values
+        if self.encoded:
+            curve, made = self._curve(), made.copy()
+            made[..., :3] = curve(_SCALE)[values[..., :3]] if bytes_ else curve(values[..., :3])
+        if self.matrix is not None and made.shape[2] >= 3:
+            colours = made[..., :3] @ self.matrix.T.astype(np.float32)
+            made = np.concatenate([colours, made[..., 3:]], axis=2)
         return made
 
     def _curve(self) -> Callable[[Array], Array]:

@@ -11,6 +11,7 @@ import pytest
 
 from clpt import images
 from clpt.errors import SceneError
+from clpt.images.exr_channels import Choice, choose
 from clpt.spectra import spaces
 from tests.images import files
 
@@ -54,6 +55,18 @@ def test_channels_are_chosen_by_their_names(tmp_path, names, chosen):
 def test_grey_with_alpha(tmp_path):
     path = stored(tmp_path / "a.exr", {"Y": flat(0.5), "A": flat(0.25)})
     assert images.read(path)[0, 0].tolist() == [0.5, 0.5, 0.5, 0.25]
+
+
+def test_deep_parts_are_passed_over_where_there_are_others():
+    assert choose([[], ["a.R", "a.G", "a.B"]]) == Choice(1, ("a.R", "a.G", "a.B"), "rgb")
+    assert choose([[], ["u", "v"]]).names == ("u", "v")
+    assert choose([["Z"], ["R", "G", "B"], ["Y"]]).part == 1
+    assert choose([["x.R", "x.G", "x.B"], ["R", "G", "B"]]).part == 1
+
+
+def test_layers_that_are_pictures_by_name_need_no_word():
+    names = [f"V.{layer}.{letter}" for layer in ("Albedo", "Combined") for letter in "RGB"]
+    assert choose([names]) == Choice(0, ("V.Combined.R", "V.Combined.G", "V.Combined.B"), "rgb")
 
 
 def test_xyz_is_a_colour_without_a_layer(tmp_path):

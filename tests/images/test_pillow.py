@@ -12,6 +12,7 @@ from PIL import Image, ImageCms
 
 from clpt import images
 from clpt.errors import SceneError
+from clpt.images import stored
 from clpt.spectra import spaces
 from tests.images import files
 
@@ -142,6 +143,21 @@ def test_profiles_of_a_texture(tmp_path):
         else:
             texel = words[row["first"] :][:3].view(np.float32)
             np.testing.assert_allclose(texel, np.maximum(images.read(path)[0, 0], 0), rtol=1e-5)
+
+
+@pytest.mark.parametrize("block", [1, 7, 1 << 22])
+@pytest.mark.parametrize("kind", [np.uint8, np.float32])
+@pytest.mark.parametrize("gamma", [None, 0.5])
+def test_decoding_by_blocks(monkeypatch, block, kind, gamma):
+    monkeypatch.setattr(stored, "BLOCK", block)
+    codes = np.random.default_rng(4).integers(0, 256, (5, 3, 4)).astype(np.uint8)
+    matrix = spaces.between("rec2020", "rec709")
+    numbers = codes / np.float32(255)
+    image = images.Stored(codes if kind == np.uint8 else numbers, True, gamma, matrix)
+    linear = images.srgb_to_linear(numbers) if gamma is None else numbers**2
+    np.testing.assert_allclose(image.decoded()[..., :3], linear[..., :3] @ matrix.T, atol=1e-6)
+    np.testing.assert_array_equal(image.decoded()[..., 3], numbers[..., 3])
+    np.testing.assert_array_equal(image.decoded(linear=False), numbers)
 
 
 def test_what_files_say_of_colours_and_is_left_out(tmp_path, caplog):
