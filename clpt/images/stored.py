@@ -78,14 +78,19 @@ class Stored:
 
     def _linear(self, values: NDArray[Any]) -> Array:
         """Some rows as linear Rec. 709."""
-        bytes_ = values.dtype == np.uint8
-        made = _SCALE[values] if bytes_ else values
-        if self.encoded:
-            curve, made = self._curve(), made.copy()
-            made[..., :3] = curve(_SCALE)[values[..., :3]] if bytes_ else curve(values[..., :3])
+        made = self._without_transfer(values)
         if self.matrix is not None and made.shape[2] >= 3:
             colours = made[..., :3] @ self.matrix.T.astype(np.float32)
             made = np.concatenate([colours, made[..., 3:]], axis=2)
+        return made
+
+    def _without_transfer(self, values: NDArray[Any]) -> Array:
+        is_bytes, curve = values.dtype == np.uint8, self._curve()
+        if not self.encoded:
+            return _SCALE[values] if is_bytes else values
+        made = curve(_SCALE)[values] if is_bytes else curve(values)
+        if values.shape[2] == 4:
+            made[..., 3] = _SCALE[values[..., 3]] if is_bytes else values[..., 3]
         return made
 
     def _curve(self) -> Callable[[Array], Array]:
