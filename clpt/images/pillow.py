@@ -69,8 +69,13 @@ def decoded(
         return replace(made, notes=notes, colour_notes=colour_notes)
     with BytesIO(source) if isinstance(source, bytes) else source.open("rb") as file:
         said = png_files.profile(file)
-    gamma, matrix = said.gamma, said.matrix
-    return replace(made, gamma=gamma, matrix=matrix, notes=notes, colour_notes=said.notes)
+    return replace(
+        made,
+        gamma=said.gamma,
+        matrix=said.matrix,
+        notes=notes,
+        colour_notes=(*said.notes, *colour_notes),
+    )
 
 
 def texts(path: Path) -> dict[str, str]:

@@ -37,18 +37,11 @@ class Profile:
 
 
 def profile(file: BinaryIO) -> Profile:
-    """What the chunks before the pixels say of colours."""
+    """What the chunks before the pixels say of colours; of iCCP Pillow tells."""
     chunks = dict(_chunks(file))
     if b"cICP" in chunks and chunks[b"cICP"] != SRGB_CICP:
         return Profile(notes=("its cICP chunk is left out: its colours are taken as sRGB",))
-    if b"iCCP" in chunks:
-        name, _, _ = chunks[b"iCCP"].partition(b"\0")
-        said = name.decode("latin-1")
-        if "srgb" in said.lower():
-            return Profile()
-        note = f"its colour profile {said!r} is left out: its colours are taken as sRGB"
-        return Profile(notes=(note,))
-    if b"sRGB" in chunks or b"cICP" in chunks:
+    if any(name in chunks for name in (b"cICP", b"iCCP", b"sRGB")):
         return Profile()
     return _stated(chunks)
 

@@ -171,7 +171,8 @@ def test_what_files_say_of_colours_and_is_left_out(tmp_path, caplog):
     pixels.save(tmp_path / "turned.jpg", exif=exif)
     pixels.convert("CMYK").save(tmp_path / "cmyk.jpg")
     pixels.save(tmp_path / "two.gif", save_all=True, append_images=[Image.new("RGB", (4, 4))])
-    files.png(tmp_path / "named.png", ROWS, 8, 2, [(b"iCCP", b"Display P3\0\0x")])
+    pixels.save(tmp_path / "srgb.png", icc_profile=srgb)
+    pixels.save(tmp_path / "other.png", icc_profile=other)
     files.png(tmp_path / "pq.png", ROWS, 8, 2, [(b"cICP", b"\x09\x10\0\1")])
     told = {}
     for path in sorted(tmp_path.iterdir()):
@@ -183,13 +184,13 @@ def test_what_files_say_of_colours_and_is_left_out(tmp_path, caplog):
         told[path.name] = told[path.name], "; ".join(caplog.messages[told[path.name] :])
         if path.suffix == ".jpg":
             np.testing.assert_allclose(image[0, 0], [0.502, 0.251, 0.125], atol=0.02)
-    assert told.pop("srgb.jpg") == (0, "")
+    assert told.pop("srgb.jpg") == told.pop("srgb.png") == (0, "")
     for name, (of_data, of_colours) in {
         "other.jpg": (0, "colour profile is left out"),
         "turned.jpg": (1, "its Exif orientation 6 is left out"),
         "cmyk.jpg": (0, "CMYK"),
         "two.gif": (1, "its first picture of 2 is taken"),
-        "named.png": (0, "colour profile 'Display P3' is left out"),
+        "other.png": (0, "colour profile is left out"),
         "pq.png": (0, "cICP chunk is left out"),
     }.items():
         assert of_colours in told[name][1]
