@@ -33,12 +33,14 @@ def read(path: Path) -> Stored:
     header = found[choice.part]
     exr_files.check(path, header)
     read_ = exr_files.read_channels(path, choice.names, choice.part)
-    planes = {name: _whole(read_[name], window(header, "dataWindow")) for name in choice.names}
-    channels = [placed(planes[name], header) for name in choice.names]
+    names = choice.names
+    if choice.form == "grey" and len(names) == 2:
+        names = (names[0],) * 3 + names[1:]
+    x0, y0, x1, y1 = window(header, "displayWindow")
+    values = np.empty((y1 - y0, x1 - x0, len(names)), np.float32)
+    for index, name in enumerate(names):
+        values[..., index] = placed(_whole(read_[name], window(header, "dataWindow")), header)
     matrix, notes = _matrix(header, choice)
-    if choice.form == "grey" and len(channels) == 2:
-        channels = [channels[0]] * 3 + channels[1:]
-    values = np.stack(channels, axis=2)
     if choice.form == "chroma":
         values[..., :3] = _from_chroma(values[..., :3], _weights(header))
     return Stored(values, False, matrix=matrix, notes=_notes(header, choice), colour_notes=notes)
