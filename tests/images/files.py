@@ -83,27 +83,49 @@ def attribute(name: str, kind: str, value: bytes) -> bytes:
     return f"{name}\0{kind}\0".encode() + struct.pack("<i", len(value)) + value
 
 
+ADAM7 = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2),
+         (0, 1, 1, 2))  # fmt: skip
+
+
 def png(
     path: Path,
     rows: np.ndarray,
     depth: int,
     colour: int,
     chunks: Sequence[tuple[bytes, bytes]] = (),
+    filtered: int = 0,
+    interlaced: bool = False,
 ) -> Path:
-    """Write rows (h, w) or (h, w, c) of `depth` bits a sample; colour: the type of IHDR."""
+    """Write rows (h, w) or (h, w, c) of `depth` bits a sample; colour: the type of IHDR.
+
+    filtered: the filter of all rows, 0 none, 1 to the left, 2 up; interlaced: by Adam7.
+    """
     height, width = rows.shape[:2]
+    passes = ADAM7 if interlaced else ((0, 0, 1, 1),)
+    parts = [rows[y::dy, x::dx] for x, y, dx, dy in passes]
+    data = b"".join(_filtered(part, depth, filtered) for part in parts if part.size)
+    head = struct.pack(">2I5B", width, height, depth, colour, 0, 0, interlaced)
+    whole = [(b"IHDR", head), *chunks, (b"IDAT", zlib.compress(data)), (b"IEND", b"")]
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(*part) for part in whole))
+    return path
+
+
+def _filtered(rows: np.ndarray, depth: int, filtered: int) -> bytes:
+    height = len(rows)
     if depth == 16:
-        lines = rows.astype(">u2").reshape(height, -1).view(np.uint8)
+        lines = np.ascontiguousarray(rows, ">u2").reshape(height, -1).view(np.uint8)
     elif depth == 8:
         lines = rows.astype(np.uint8).reshape(height, -1)
     else:
         bits = (rows.astype(np.uint8)[..., None] >> np.arange(depth - 1, -1, -1)) & 1
         lines = np.packbits(bits.reshape(height, -1), axis=1)
-    data = b"".join(b"\0" + line.tobytes() for line in lines)
-    head = struct.pack(">2I5B", width, height, depth, colour, 0, 0, 0)
-    parts = [(b"IHDR", head), *chunks, (b"IDAT", zlib.compress(data)), (b"IEND", b"")]
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(*part) for part in parts))
-    return path
+    step = max(depth * int(np.prod(rows.shape[2:])) // 8, 1)
+    before = np.zeros_like(lines)
+    if filtered == 1:
+        before[:, step:] = lines[:, :-step]
+    elif filtered == 2:
+        before[1:] = lines[:-1]
+    return b"".join(bytes([filtered]) + line.tobytes() for line in lines - before)
 
 
 def _chunk(name: bytes, data: bytes) -> bytes:

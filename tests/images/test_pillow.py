@@ -48,6 +48,17 @@ def test_sixteen_bits_of_colour_are_kept(tmp_path, colour, count):
     np.testing.assert_allclose(colours[3:], expected[3:], rtol=1e-6)  # alpha
 
 
+@pytest.mark.parametrize("interlaced", [False, True])
+@pytest.mark.parametrize("filtered", [0, 1, 2])
+@pytest.mark.parametrize(("colour", "count"), [(2, 3), (6, 4), (4, 2), (0, 1)])
+def test_sixteen_bits_through_filters(tmp_path, colour, count, filtered, interlaced):
+    codes = np.random.default_rng(8).integers(0, 1 << 16, (9, 11, count))
+    path = files.png(tmp_path / "a.png", codes, 16, colour, (), filtered, interlaced)
+    expected = codes[..., [0, 0, 0, 1]] if colour == 4 else codes
+    back = images.read(path, linear=False)
+    np.testing.assert_array_equal(np.round(back * 65535), expected)
+
+
 @pytest.mark.parametrize("order", "<>")
 @pytest.mark.parametrize(("count", "photometric"), [(3, 2), (4, 2), (1, 1), (1, 0)])
 def test_sixteen_bits_of_tiff(tmp_path, order, count, photometric):
@@ -223,7 +234,7 @@ def test_only_named_formats_are_opened(tmp_path, suffix, monkeypatch):
 
 
 def test_gltf_has_profiles_passed_over(tmp_path):
-    """glTF 2.0, section 3.8.2: gamma and profiles of images are ignored."""
+    """glTF 2.0, Images: gamma and profiles of images are ignored."""
     path = files.png(tmp_path / "a.png", ROWS, 8, 2, [chunk_gamma(1.0), chunk_primaries("rec2020")])
     image = images.decoded(path.read_bytes(), ("PNG",), profiled=False)
     assert (image.is_profiled, image.notes_of(False)) == (False, ())
