@@ -19,7 +19,9 @@ from clpt import device
 from clpt.errors import SceneError
 from clpt.rays import Accel
 
-SAME = 1e-6  # of the mesh's scale: hits nearer to each other, of one facing, are one surface
+ROUNDING = 1e-6  # of the reach, by which a ray may miss an edge and still meet what shares it
+SAME = 1e-10  # of the reach, by which points of edges differ that are one
+CHUNK = 1 << 17  # hits compared at a time: they take 1 kB each
 GRAZING = 1e-9  # cosine below which the plane of a triangle does not locate a hit
 
 Floats = NDArray[np.float64]
@@ -41,9 +43,15 @@ class RayMeshIntersector:
     queue: a `pyopencl.CommandQueue` to run on; by default that of the first device that works. The
     tree is built on first use, and again when the mesh has changed. The mesh is translated to the
     origin in float64 first, so that its coordinates may be large; hits are located in float64.
+    scale_to_box: a parameter of trimesh's intersector, without effect.
+
+    Raises SceneError for what is no Trimesh. A copy of the mesh has trimesh's own intersector.
     """
 
-    def __init__(self, geometry: Any, queue: Any = None):
+    def __init__(self, geometry: Any, queue: Any = None, *, scale_to_box: bool = True):
+        if not (hasattr(geometry, "faces") and hasattr(geometry, "vertices")):
+            message = f"must be a trimesh.Trimesh, not {type(geometry).__name__}; "
+            raise SceneError(message + "a trimesh.Scene gives one by its to_mesh()", where="mesh")
         self.mesh = geometry
         self.queue = queue
         self._cache = Cache(id_function=geometry.__hash__)
@@ -72,7 +80,7 @@ class RayMeshIntersector:
 
         ray_origins, ray_directions: (n, 3), directions of any length. multiple_hits: all hits of a
         ray, up to max_hits, ray by ray in the order of their distance; else the first. A ray
-        through an edge between two triangles that face it alike meets one of them.
+        through an edge or a corner meets one of the triangles there that face it alike.
 
         Raises SceneError for arrays of other shapes.
         """
@@ -88,8 +96,12 @@ class RayMeshIntersector:
         if multiple_hits or return_locations:
             cosines, distances = self._planes(triangles, origins[rays], directions[rays], t)
         if multiple_hits:
-            distinct = _distinct(rays, cosines < 0, distances, SAME * self.mesh.scale, max_hits)
-            rays, triangles, distances = rays[distinct], triangles[distinct], distances[distinct]
+            order = np.lexsort((distances, rays))
+            again = self._again(rays, triangles, cosines < 0, order, origins, directions)
+            order = order[~again]
+            rays, triangles, distances = rays[order], triangles[order], distances[order]
+            few = np.arange(len(rays)) - np.searchsorted(rays, rays) < max_hits
+            rays, triangles, distances = rays[few], triangles[few], distances[few]
         if not return_locations:
             return triangles, rays
         return triangles, rays, origins[rays] + distances[:, None] * directions[rays]
@@ -138,6 +150,48 @@ class RayMeshIntersector:
         )
         return cosines, distances
 
+    def _again(
+        self,
+        rays: Integers,
+        triangles: Integers,
+        facing: NDArray[np.bool_],
+        order: Integers,
+        origins: Floats,
+        directions: Floats,
+    ) -> NDArray[np.bool_]:
+        """Return for each hit in `order` whether a hit before it is at the same edge or corner.
+
+        The device finds all triangles that share an edge or a corner which the ray meets: of those
+        that face it alike the first counts. Triangles are not compared by their distance, for other
+        surfaces may be as near.
+        """
+        again = np.zeros(len(order), np.bool_)
+        key = 2 * rays[order] + facing[order]
+        _, inverse, counts = np.unique(key, return_inverse=True, return_counts=True)
+        places = np.flatnonzero(counts[inverse] > 1)
+        found = []
+        for some in np.split(places, range(CHUNK, len(places), CHUNK)):
+            hits = order[some]
+            o, d = origins[rays[hits]], directions[rays[hits]]
+            reach = self.mesh.scale + np.linalg.norm(o - self._on_device.centre, axis=1)
+            corners = np.asarray(self.mesh.vertices)[np.asarray(self.mesh.faces)[triangles[hits]]]
+            at, near = _borders(corners - o[:, None], d, ROUNDING * reach)
+            there = near.any(axis=1)
+            found.append((some[there], at[there], near[there], reach[there]))
+        places, at, near, reach = (np.concatenate(part) for part in zip(*found, strict=True))
+        together = np.argsort(key[places], kind="stable")
+        places, at, near, reach = places[together], at[together], near[together], reach[together]
+        for step in range(1, len(places)):
+            first = np.flatnonzero(key[places[step:]] == key[places[:-step]])
+            if not len(first):
+                break
+            second = first + step
+            apart = np.linalg.norm(at[first, :, None] - at[second, None], axis=3)
+            both = near[first, :, None] & near[second, None]
+            same = (both & (apart < SAME * reach[first, None, None])).any(axis=(1, 2))
+            again[places[second[same]]] = True
+        return again
+
     def __getstate__(self) -> dict[str, Any]:
         """Only the mesh: an unpickled intersector has the default queue."""
         return {"mesh": self.mesh}
@@ -159,17 +213,22 @@ def _rays(origins: ArrayLike, directions: ArrayLike) -> tuple[Floats, Floats]:
     return o, unitize(d)
 
 
-def _distinct(
-    rays: Integers, facing: NDArray[np.bool_], distances: Floats, same: float, most: int
-) -> Integers:
-    """Indices of distinct hits by ray and distance: of equal ones that face alike the first.
+def _borders(
+    corners: Floats, directions: Floats, rounding: Floats
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """Where rays pass the edges of triangles: the points (n, 3, 3), and whether within rounding.
 
-    rays: sorted; same: distance below which hits are equal; most: of each ray.
+    corners: (n, 3, 3) relative to the rays' origins; directions: (n, 3) unit; rounding: (n,). A
+    point within rounding of a corner is that corner.
     """
-    order = np.lexsort((distances, rays))
-    ray, face, distance = rays[order], facing[order], distances[order]
-    new = np.ones(len(ray), np.bool_)
-    new[1:] = (np.diff(ray) > 0) | (np.diff(distance) > same) | (face[1:] != face[:-1])
-    order, ray = order[new], ray[new]
-    rank = np.arange(len(ray)) - np.searchsorted(ray, ray)
-    return order[rank < most]
+    edges = np.roll(corners, -1, axis=1) - corners
+    d = directions[:, None]
+    across = corners - (corners * d).sum(axis=2, keepdims=True) * d
+    along = edges - (edges * d).sum(axis=2, keepdims=True) * d
+    square = (along**2).sum(axis=2)
+    share = -(across * along).sum(axis=2) / np.where(square > 0.0, square, 1.0)
+    snap = rounding[:, None] / np.sqrt(np.where(square > 0.0, square, 1.0))
+    share = np.where(share < snap, 0.0, np.where(share > 1.0 - snap, 1.0, share))[..., None]
+    missed = np.linalg.norm(across + share * along, axis=2)
+    points = np.where(share == 1.0, np.roll(corners, -1, axis=1), corners + share * edges)
+    return points, missed <= rounding[:, None]

@@ -17,13 +17,14 @@ PACKAGE, KERNELS = ROOT / "clpt", ROOT / "kernels"
 
 BASE = {
     "colour", "errors", "layout", "measured", "records", "transforms", "images",
-    "output_files", "spectra",
+    "output_files", "spectra", "text",
     "spectral_exr", "tev", "version",
 }  # fmt: skip
 # What a part may import of the others; itself always.
 MAY_IMPORT = {
     **dict.fromkeys(BASE, BASE),
     "lenses": BASE,
+    "geometry": BASE,
     "scene": BASE | {"lenses"},
     "device": BASE,
     "bvh": BASE | {"device"},
@@ -31,7 +32,7 @@ MAY_IMPORT = {
     "rays": BASE | {"device", "bvh"},
     "trimesh_ray": BASE | {"device", "rays"},
     "render": BASE | {"lenses", "scene", "device", "bvh", "denoise"},
-    "formats": BASE | {"lenses", "scene"},
+    "formats": BASE | {"lenses", "geometry", "scene"},
     "mie": BASE | {"scene"},
     "view": BASE | {"scene", "device", "denoise", "render", "formats"},
     "benchmark": BASE | {"scene", "device", "bvh", "rays", "render", "formats"},
@@ -161,7 +162,17 @@ def test_who_imports_pyopencl(path: Path) -> None:
 
 @pytest.mark.parametrize(
     "name",
-    ["scene", "lenses", "formats", "spectra", "layout", "transforms", "images", "spectral_exr"],
+    [
+        "scene",
+        "lenses",
+        "geometry",
+        "formats",
+        "spectra",
+        "layout",
+        "transforms",
+        "images",
+        "spectral_exr",
+    ],
 )
 def test_data_does_not_need_opencl(name: str) -> None:
     """No chain of imports leads from plain data to pyopencl."""

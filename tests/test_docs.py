@@ -190,7 +190,7 @@ LIMITS = (  # on the page, and where the code has them
     ("| 32 |", "clpt.scene.textures", "MOST_OCTAVES", 32),
     ("| 1 GiB a file |", "clpt.formats.gzip_file", "LARGEST", 1 << 30),
     ("| 65 536 bytes |", "clpt.formats.meshes.ply", "LONGEST_HEADER", 65536),
-    ("| 4096 corners |", "clpt.formats.meshes.ply", "MOST_CORNERS", 4096),
+    ("| 65 536 corners |", "clpt.formats.meshes.ply", "MOST_CORNERS", 65536),
     ("| 1 GiB |", "clpt.formats.meshes.strands", "LARGEST", 1 << 30),
     ("| 2 GiB | `is larger than 2048 MiB`", "clpt.formats.mitsuba.serialized", "LARGEST", 1 << 31),
     ("2^29 pixels", "clpt.images.budget", "PIXELS", 1 << 29),

@@ -91,6 +91,70 @@ def test_an_edge_is_met_once():
     np.testing.assert_allclose(at[:, 2], [-0.5, 0.5] * 3)
 
 
+def joined(*meshes):
+    return RayMeshIntersector(trimesh.util.concatenate(list(meshes)))
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("gap", [1e-3, 5e-7, 1.5e-7])
+def test_near_skins_are_met_each(scale, gap):
+    """Two boxes, one inside of the other: through faces and through the edges within them."""
+    boxes = [trimesh.creation.box(extents=[scale * (1 - 2 * g)] * 3) for g in (0, gap)]
+    ray = joined(*boxes)
+    o = scale * np.array([[-1.0, 0.1, 0.13], [-1, 0, 0], [-1, 0.25, 0.25], [-1, 0.25, -0.25]])
+    at, index, _ = ray.intersects_location(o, np.tile([1.0, 0, 0], (4, 1)))
+    assert np.bincount(index).tolist() == [4] * 4
+    places = np.array([-0.5, -0.5 + gap, 0.5 - gap, 0.5])
+    np.testing.assert_allclose(at[:, 0].reshape(4, 4), scale * np.tile(places, (4, 1)), rtol=1e-12)
+    inside = ray.contains_points(scale * np.array([[0.01, 0.02, 0.03], [0, 0, 0]]))
+    assert inside.tolist() == [False, False]  # the skins have one inside between them
+
+
+def test_sheets_are_met_each():
+    """Twenty squares of two triangles, 1e-7 of their size apart; also through their diagonals."""
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+    sheets = [
+        trimesh.Trimesh(np.add(square, [0, 0, 2.5e-7 * i]), [[0, 1, 2], [0, 2, 3]], process=False)
+        for i in range(20)
+    ]
+    o = np.array([[0.3, 0.2, -1], [0.5, 0.5, -1], [0.7, 0.1, 1], [0.25, 0.25, 1]])
+    d = np.array([[0, 0, 1.0]] * 2 + [[0, 0, -1.0]] * 2)
+    index = joined(*sheets).intersects_id(o, d)[1]
+    assert np.bincount(index).tolist() == [20] * 4
+
+
+@pytest.mark.parametrize("merged", [True, False])
+def test_corners_and_edges_are_met_once(merged):
+    """Rays at every corner and the middle of every edge of a ball, from near and far."""
+    mesh = trimesh.creation.icosphere(2)
+    if not merged:
+        mesh = trimesh.Trimesh(
+            mesh.triangles.reshape(-1, 3), np.arange(960).reshape(-1, 3), process=False
+        )
+    ball = trimesh.creation.icosphere(2)
+    aims = np.concatenate([ball.vertices, ball.vertices[ball.edges_unique].mean(axis=1)])
+    for far in (2.0, 50.0):
+        start = aims * far + np.random.default_rng(2).normal(size=aims.shape) * 0.1
+        index = RayMeshIntersector(mesh).intersects_id(start, aims - start)[1]
+        assert (np.bincount(index, minlength=len(aims)) == 2).all()
+
+
+def test_an_edge_whose_corner_is_on_another_edge():
+    """A triangle beside two others that meet in the middle of its edge."""
+    vertices = [[0, 0, 0], [2, 0, 0], [1, 1, 0], [1, -1, 0], [1, 0, 0]]
+    mesh = trimesh.Trimesh(vertices, [[0, 1, 2], [0, 3, 4], [4, 3, 1]], process=False)
+    o = np.array([[0.5, 0, 3], [1, 0, 3], [1.25, 0, 3.0]])
+    index = RayMeshIntersector(mesh).intersects_id(o, np.tile([0, 0, -1.0], (3, 1)))[1]
+    assert index.tolist() == [0, 1, 2]
+
+
+def test_what_is_no_mesh():
+    box = trimesh.creation.box()
+    with pytest.raises(clpt.SceneError, match=r"must be a trimesh\.Trimesh, not Scene; .*to_mesh"):
+        RayMeshIntersector(trimesh.Scene(box))
+    assert RayMeshIntersector(box, scale_to_box=False).intersects_any([[0, 0, -5]], [[0, 0, 1]])
+
+
 def test_follows_the_mesh_and_is_copied():
     mesh = trimesh.creation.icosphere(1)
     intersector = RayMeshIntersector(mesh)

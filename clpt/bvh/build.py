@@ -203,7 +203,8 @@ def _check(vertices: Array, faces: Array, tags: Array | None) -> int:
         if faces.ndim != 2 or faces.shape[1] != 3:
             raise SceneError(f"faces are (m, 3), not {faces.shape}")
         if faces.min() < 0 or faces.max() >= top:
-            raise SceneError(f"a face names vertex {faces.max()} of {top}")
+            face, corner = np.argwhere((faces < 0) | (faces >= top))[0]
+            raise SceneError(f"face {face} names vertex {faces[face, corner]} of {top}")
     if isinstance(vertices, np.ndarray):
         _check_reach(vertices, "a vertex")
     if isinstance(tags, np.ndarray) and len(tags) != count:
@@ -212,5 +213,6 @@ def _check(vertices: Array, faces: Array, tags: Array | None) -> int:
 
 
 def _check_reach(corners: NDArray, what: str) -> None:
-    if corners.size and not (np.abs(corners).max() < _REACH):  # NaN fails the comparison
+    # As Python's numbers, which hold the limit, and more than the least of a type of integers.
+    if corners.size and not max(-float(corners.min()), float(corners.max())) < _REACH:
         raise SceneError(f"{what} has a coordinate that is not finite, or beyond {_REACH:g}")

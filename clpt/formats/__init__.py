@@ -79,6 +79,8 @@ def load(
         return loader(path, progress, missing_textures)
     if kind in WITH_VARIABLES:
         return loader(path, missing_textures, **variables)
+    if kind == "meshes.framing":
+        return loader(path, missing_textures)
     return loader(path)
 
 

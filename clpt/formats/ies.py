@@ -15,6 +15,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt import text as text_files
 from clpt.errors import SceneError
 from clpt.scene.textures import Bitmap
 
@@ -103,7 +104,7 @@ class _Reader:
         try:
             if path.stat().st_size > MOST_BYTES:
                 self.fail(f"is larger than the {MOST_BYTES >> 20} MiB that are read")
-            self.lines = path.read_text("latin-1").splitlines()
+            self.lines = text_files.read(path).splitlines()
         except OSError as error:
             raise SceneError(f"cannot be read: {error.strerror}", file=path) from None
 

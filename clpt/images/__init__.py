@@ -9,7 +9,7 @@ from clpt.images.exr import matrix_of
 from clpt.images.exr_files import attributes, part_names, write_channels
 from clpt.images.layers import read_channels, read_layers
 from clpt.images.npy import write as write_npy
-from clpt.images.pillow import decoded, from_pillow
+from clpt.images.pillow import decoded
 from clpt.images.pillow import texts as png_text
 from clpt.images.png_files import png
 from clpt.images.reading import READERS, check_input, log_notes, read, read_stored
@@ -33,7 +33,6 @@ __all__ = [
     "check_input",
     "check_output",
     "decoded",
-    "from_pillow",
     "linear_to_srgb",
     "log_notes",
     "matrix_of",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
+from clpt import text
 from clpt.errors import SceneError, UnknownKindError
 from clpt.lenses import optical_bench, pbrt_rows, zemax
 from clpt.lenses.prescription import Prescription
@@ -41,15 +42,5 @@ def read(path: str | Path, aperture: float | None = None) -> Prescription:
         raise SceneError(f"cannot be read: {error.strerror}", file=path) from None
     if len(data) > LARGEST:
         raise SceneError("is too large for a lens", file=path)
-    lens = READERS[path.suffix.lower()](_text(data), path)
+    lens = READERS[path.suffix.lower()](text.decode(data), path)
     return lens if aperture is None else lens.with_stop(0.5 * aperture)
-
-
-def _text(data: bytes) -> str:
-    """Zemax writes UTF-16, older versions of it Latin 1."""
-    for encoding in ("utf-16",) * data.startswith((b"\xff\xfe", b"\xfe\xff")) + ("utf-8-sig",):
-        try:
-            return data.decode(encoding)
-        except UnicodeDecodeError:
-            continue
-    return data.decode("latin-1")

@@ -124,7 +124,8 @@ class Accel(Queries):
             array = np.asarray(values)
             if array.size == 0:
                 return np.zeros((0, 3), kinds[0]), 0
-            if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in "fiu":
+            numbers = "fiu" if np.float32 in kinds else "iu"
+            if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in numbers:
                 wanted = f"(n, 3) {np.dtype(kinds[0])}"
                 found = f"{array.shape} {array.dtype}"
                 raise SceneError(f"{wanted} is wanted, not {found}", where=name)

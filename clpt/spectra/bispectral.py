@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt import text as text_files
 from clpt.errors import SceneError
-from clpt.spectra.files import _text, fields_of
+from clpt.spectra.files import fields_of
 from clpt.spectra.reradiation import Donaldson
 from clpt.spectra.spectrum import Tabulated, _floats
 
@@ -75,7 +76,7 @@ def _matrix(path: str | Path) -> tuple[Values, Values, Values]:
 def _lines(path: str | Path) -> list[tuple[int, list[str]]]:
     """Line numbers and fields of the lines that hold any; `;` begins a line of remarks."""
     found = []
-    for number, line in enumerate(_text(path).splitlines(), 1):
+    for number, line in enumerate(text_files.read(path).splitlines(), 1):
         fields = [] if line.startswith(";") else fields_of(line, path, number)
         if fields:
             found.append((number, fields))

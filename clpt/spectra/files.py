@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt import text as text_files
 from clpt.errors import SceneError
 from clpt.spectra.dispersion import MICROMETRE, from_formula
 from clpt.spectra.spectrum import (
@@ -29,7 +30,7 @@ def read_table(path: str | Path, outside: Outside = "zero") -> Tabulated:
 
     `#` starts a comment; one line of column titles is allowed. Raises SceneError with the line.
     """
-    (rows,) = _tables(path, _text(path), (2,)).values()
+    (rows,) = _tables(path, text_files.read(path), (2,)).values()
     return _tabulated(path, rows, 1, outside)
 
 
@@ -38,7 +39,7 @@ def read_columns(path: str | Path, count: int) -> tuple[Tabulated, ...]:
 
     Each column of values is a spectrum, zero outside. Raises SceneError with the line.
     """
-    (rows,) = _tables(path, _text(path), (1 + count,)).values()
+    (rows,) = _tables(path, text_files.read(path), (1 + count,)).values()
     return tuple(_tabulated(path, rows, column, "zero") for column in range(1, 1 + count))
 
 
@@ -47,7 +48,7 @@ def read_index(path: str | Path, part: Literal["eta", "k"] = "eta") -> Spectrum:
 
     Raises SceneError.
     """
-    text = _text(path)
+    text = text_files.read(path)
     if (values := _two_columns(path, text)) is not None:
         return values
     eta, k = _read_parts(path, text)
@@ -61,7 +62,7 @@ def read_absorption(path: str | Path) -> Spectrum:
 
     A table has two columns, wavelength [nm] and coefficient. Raises SceneError.
     """
-    text = _text(path)
+    text = text_files.read(path)
     values = _two_columns(path, text)
     return absorption(_read_parts(path, text)[1]) if values is None else values
 
@@ -82,7 +83,7 @@ def read_refractive_index(path: str | Path) -> tuple[Spectrum, Spectrum]:
     of n and k, the CSV that the site gives (columns `wl,n` and `wl,k` [um], one after the other),
     or a table of wavelength [nm], eta and perhaps k. Raises SceneError with the line.
     """
-    eta, k = _read_parts(path, _text(path))
+    eta, k = _read_parts(path, text_files.read(path))
     if eta is None:
         raise SceneError("no refractive index in this file", file=path)
     return eta, k
@@ -147,9 +148,9 @@ def fields_of(line: str, path: str | Path, number: int) -> list[str]:
     otherwise: it would begin another field.
     """
     text = line.split("#")[0]
-    if re.search(r"\d,\d", text) and re.search(r";|[^\s,;]\s+[^\s,;]", text.strip()):
-        message = f"write numbers with a decimal point, not a comma: {line.strip()!r}"
-        raise SceneError(message, file=path, line=number)
+    comma = text_files.comma_message(text)
+    if comma and re.search(r";|[^\s,;]\s+[^\s,;]", text.strip()):
+        raise SceneError(comma, file=path, line=number)
     return [f for f in re.split(r"[\s,;]+", text) if f]
 
 
@@ -231,10 +232,3 @@ def _is_number(field: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _text(path: str | Path) -> str:
-    try:
-        return Path(path).read_text("utf-8-sig")
-    except (OSError, ValueError) as error:  # ValueError: no UTF-8, or no name of a file
-        raise SceneError(f"cannot be read: {error}", file=path) from None

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any, cast
 
+from clpt import text
 from clpt.errors import SceneError, UnknownKindError
 from clpt.scene import Scene, kinds
 from clpt.scene.cameras import Camera
@@ -55,9 +56,8 @@ def request(document: Any) -> Request:
 
 def load(path: Path) -> Request:
     """Return the command that opens the view of a file. Raises SceneError."""
+    content = text.read(path)
     try:
-        return request(json.loads(path.read_text(encoding="utf-8")))
-    except OSError as error:
-        raise SceneError(f"cannot be read: {error.strerror}", file=path) from error
+        return request(json.loads(content))
     except (ValueError, CommandError) as error:
         raise SceneError(f"is no view: {error}", file=path) from error

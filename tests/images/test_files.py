@@ -9,6 +9,7 @@ from PIL import Image
 from clpt import images, spectral_exr
 from clpt.errors import SceneError
 from clpt.images import budget
+from clpt.images.pillow import from_pillow
 from clpt.spectra import spaces
 
 rng = np.random.default_rng(1)
@@ -116,7 +117,7 @@ def test_eight_bit_formats(tmp_path, suffix):
 
 @pytest.mark.parametrize(("mode", "channels"), [("1", 1), ("L", 1), ("P", 3), ("LA", 4)])
 def test_pillow_modes(mode, channels):
-    image = images.from_pillow(Image.new("RGB", (3, 2), (255, 255, 255)).convert(mode)).decoded()
+    image = from_pillow(Image.new("RGB", (3, 2), (255, 255, 255)).convert(mode)).decoded()
     assert image.shape == (2, 3, channels)
     assert (image == 1).all()
 

@@ -169,13 +169,27 @@ def test_odd_meshes(queue, layout):
         assert hit.primitive[0] in met
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+@pytest.mark.parametrize("dtype", [np.float16, np.float64, np.int8, np.int64])
+def test_numbers_of_other_types(queue, dtype):
+    vertices = np.array([[0, 0, 0], [100, 0, 0], [0, 100, -128]], dtype)
+    ray = np.array([[1.0, 1, 9]]), np.array([[0, 0, -1.0]])
+    assert clpt.Accel(queue, vertices, [[0, 1, 2]]).intersect(*ray).primitive[0] == 0
+    if np.dtype(dtype).kind == "f":
+        vertices[1, 1] = np.inf
+        with pytest.raises(clpt.SceneError, match="not finite"):
+            clpt.Accel(queue, vertices, [[0, 1, 2]])
+
+
 def test_what_is_refused(queue, soup, rays):
     vertices, faces = soup
     o, d = rays
     other = cl.CommandQueue(cl.Context([queue.device]))
     for arguments, message in (
         ((vertices[:, :2], faces), r"vertices: .*\(900, 2\)"),
-        ((vertices, faces + 1), "a face names vertex 900 of 900"),
+        ((vertices, faces + 1), r"face \d+ names vertex 900 of 900"),
+        ((vertices, faces.astype(int) - 1), r"face \d+ names vertex -1 of 900"),
+        ((vertices, faces + 0.5), r"faces: \(n, 3\) uint32 is wanted, not \(300, 3\) float64"),
         ((vertices, to_device(queue, faces.astype(np.uint64))), "faces: .*uint64"),
         ((to_device(other, vertices), faces), "vertices: .*another context"),
     ):

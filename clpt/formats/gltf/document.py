@@ -16,6 +16,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any, NoReturn, TypeVar
 from urllib.parse import unquote, unquote_to_bytes
 
+from clpt import text
 from clpt.errors import SceneError
 from clpt.formats.missing import Missing
 
@@ -286,12 +287,12 @@ def _read(file: Path) -> bytes:
         raise SceneError(f"cannot be read: {error.strerror}", file=file) from None
 
 
-def _parsed(file: Path, text: bytes) -> Any:
+def _parsed(file: Path, data: bytes) -> Any:
     def refuse(constant: str) -> NoReturn:
         raise ValueError(f"{constant} is no number")
 
     try:
-        value = json.loads(text, parse_constant=refuse)
+        value = json.loads(text.decode(data), parse_constant=refuse)
     except (ValueError, RecursionError) as error:
         reason = str(error).splitlines()[0][:80]
         raise SceneError(f"is not glTF: {reason}", file=file) from None
@@ -323,6 +324,8 @@ def _split(file: Path, data: bytes) -> tuple[bytes, bytes | None]:
         at += 8 + size
     if not chunks or chunks[0][0] != JSON_CHUNK:
         raise SceneError("is no binary glTF: its first chunk is not JSON", file=file)
+    if chunks[0][1].endswith(b"\0"):
+        raise SceneError("is no binary glTF: its JSON is padded with zeros, not spaces", file=file)
     binary = chunks[1][1] if len(chunks) > 1 and chunks[1][0] == BIN_CHUNK else None
     return chunks[0][1], binary
 

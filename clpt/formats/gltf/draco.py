@@ -8,7 +8,7 @@ import numpy as np
 
 from clpt.formats.gltf import accessors
 from clpt.formats.gltf.document import Element
-from clpt.formats.gltf.geometry import Geometry, attribute, types
+from clpt.formats.gltf.geometry import Geometry, attribute, types, warn_of_whole_numbers
 
 NAME = "KHR_draco_mesh_compression"
 HEADER = b"DRACO"
@@ -30,6 +30,7 @@ def attributes(primitive: Element, compressed: Element) -> Geometry:
         accessor = declared.entry(name, "accessors")
         if accessor is None:
             continue
+        warn_of_whole_numbers(name, accessor)
         if name not in ids:
             arrays[name] = accessors.floats(accessor, types(name))
             continue

@@ -16,6 +16,8 @@ TYPES = {  # of the accessors of an attribute, by what its name begins with
     "POSITION": ("VEC3",), "NORMAL": ("VEC3",), "TANGENT": ("VEC4",), "TEXCOORD": ("VEC2",),
     "COLOR": ("VEC3", "VEC4"), "JOINTS": ("VEC4",), "WEIGHTS": ("VEC4",),
 }  # fmt: skip
+FLOAT = 5126
+SHARES = ("COLOR_", "WEIGHTS_")  # attributes between 0 and 1
 
 
 @dataclass
@@ -43,3 +45,10 @@ def target_types(name: str) -> tuple[str, ...]:
 def attribute(name: str, values: NDArray[Any], accessor: Element) -> NDArray[Any]:
     """Return an attribute's stored values as floats; joints stay whole numbers."""
     return values if name.startswith("JOINTS_") else normalised(values, accessor)
+
+
+def warn_of_whole_numbers(name: str, accessor: Element) -> None:
+    """Warn of colours and weights that are whole numbers, and not normalized (glTF 3.7.2.1)."""
+    whole = name.startswith(SHARES) and accessor.integer("componentType") != FLOAT
+    if whole and not accessor.flag("normalized"):
+        accessor.warn(f"{name} of whole numbers must be normalized; taken as it is")

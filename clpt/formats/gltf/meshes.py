@@ -16,7 +16,8 @@ from clpt.formats.gltf.document import Element
 from clpt.formats.gltf.geometry import Geometry
 from clpt.formats.gltf.nodes import Graph, Matrix, compose
 from clpt.formats.gltf.primitives import geometry
-from clpt.formats.meshes.mesh import TANGENTS, checked
+from clpt.formats.meshes.mesh import checked
+from clpt.formats.meshes.triangles import TANGENTS
 from clpt.scene.lights import Area
 from clpt.scene.materials import Material, NormalMap
 from clpt.scene.media import Medium

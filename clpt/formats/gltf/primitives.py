@@ -10,7 +10,13 @@ from numpy.typing import NDArray
 from clpt.formats.gltf import draco
 from clpt.formats.gltf.accessors import COMPONENTS, floats, integers, stored
 from clpt.formats.gltf.document import Element
-from clpt.formats.gltf.geometry import Floats, Geometry, target_types, types
+from clpt.formats.gltf.geometry import (
+    Floats,
+    Geometry,
+    target_types,
+    types,
+    warn_of_whole_numbers,
+)
 
 POINTS, TRIANGLES, STRIP, FAN = 0, 4, 5, 6
 NOT_DRAWN = {0: "points", 1: "lines", 2: "a line loop", 3: "a line strip"}
@@ -62,6 +68,7 @@ def _plain(attributes: Element) -> Geometry:
         accessor = attributes.entry(name, "accessors")
         if accessor is None:
             continue
+        warn_of_whole_numbers(name, accessor)
         if name.startswith("JOINTS_"):
             if COMPONENTS.get(accessor.integer("componentType"), np.dtype("f4")).kind != "u":
                 raise accessor.error("joints must be unsigned integers", "componentType")

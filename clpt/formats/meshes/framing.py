@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.errors import SceneError
 from clpt.formats.meshes import mesh
+from clpt.formats.missing import Missing
 from clpt.scene import Scene, cameras, integrators, lights, shapes
 from clpt.scene.cameras import Perspective
 from clpt.scene.materials import Diffuse
@@ -30,9 +31,12 @@ KEY_FROM = (-0.8, 1.3, 0.7)  # the key light, likewise
 Z_UP = transforms.rotate([1.0, 0.0, 0.0], 90.0)
 
 
-def load(path: Path) -> Scene:
-    """Read a bare mesh and put it into the studio, whatever its size and position."""
-    file = mesh.read_mesh(path)
+def load(path: Path, missing: Missing = "error") -> Scene:
+    """Read a bare mesh and put it into the studio, whatever its size and position.
+
+    missing: see clpt.load.
+    """
+    file = mesh.read_mesh(path, missing=missing)
     if not any(mesh.has_area(part) for part in file.meshes):
         raise SceneError("none of its triangles has an area", file=path)
     scene = show(file.meshes, file=path, up=up_of(_format(path)))

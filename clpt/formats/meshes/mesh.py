@@ -1,39 +1,38 @@
-"""Triangle meshes from .ply, and through trimesh from .obj, .stl and .off files.
+"""Triangle meshes from .obj, .ply, .stl and .off files.
 
-Normals and texture coordinates are kept where the file has them. Of a material only the base colour
-is read.
+Normals and texture coordinates are kept where the file has them.
 """
 
 from __future__ import annotations
 
-import io
-import re
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from clpt import images, transforms
 from clpt.errors import SceneError
-from clpt.formats.meshes import ply
+from clpt.formats.meshes import corners, mtl, obj, off, ply, stl
+from clpt.formats.meshes.named_files import find
+from clpt.formats.meshes.triangles import TANGENTS, Triangles, attributes
+from clpt.formats.missing import Missing
+from clpt.geometry.normals import smooth_normals
 from clpt.scene.materials import Diffuse, Material, TwoSided
 from clpt.scene.shapes import Mesh
-from clpt.scene.textures import Bitmap, MeshAttribute
-
-if TYPE_CHECKING:
-    import trimesh  # imported where it is used: it takes a second, which scenes without files save
+from clpt.scene.textures import Bitmap, MeshAttribute, Texture, textures_in
 
 SUFFIXES = (".obj", ".ply", ".stl", ".off")
-TANGENTS = "vertex tangents"  # among attributes, while a mesh is read
-TANGENT_COLUMNS = ("tx", "ty", "tz", "tw")  # of a PLY file that clpt has written
 COLOURS = ("vertex_color", "face_color")  # attributes that show where no material is named
-DUMMIES = (None, (2, 2))  # sizes of the image in trimesh's default material
-SUMMED = 1 << 20  # triangles whose normals are summed at a time
 CHUNK = 1 << 14  # triangles that are checked at a time: in float64 they take 400 bytes each
-USEMTL = re.compile(rb"(?m)^[ \t]*usemtl[^\n]*")
+MOST_TOLD = 6  # materials that a warning names
+READERS: dict[str, Callable[[Path], list[Triangles]]] = {
+    ".ply": lambda path: [ply.read(path)],
+    ".stl": stl.read,
+    ".off": off.read,
+}
 GREY = TwoSided(front=Diffuse(reflectance=0.6, name="grey"))
 
 
@@ -45,21 +44,24 @@ class MeshFile:
     warnings: list[str] = field(default_factory=list)
 
 
-def read_mesh(path: Path, *, materials: bool = True) -> MeshFile:
-    """Read all meshes of a file, with the file's base colours if `materials`.
+def read_mesh(path: Path, *, materials: bool = True, missing: Missing = "error") -> MeshFile:
+    """Read all meshes of a file, with the file's materials if `materials`.
+
+    missing: of images, see clpt.load.
 
     Raises SceneError for a file that is missing, broken or without triangles, for vertices that are
     not finite and for faces that name vertices which are not there.
     """
     warnings: list[str] = []
-    if path.suffix.lower() == ".ply":
-        return MeshFile([_ply(path, materials, warnings)], warnings)
-    scene = _open(path, materials)
-    parts = [_mesh(path, key, part, materials, warnings) for key, part in scene.geometry.items()]
-    meshes = [mesh for mesh in parts if mesh is not None]
-    if not meshes:
+    if path.suffix.lower() == ".obj":
+        library = mtl.Library(path.parent, missing) if materials else None
+        made = _obj(path, library, warnings)
+    else:
+        found = READERS[path.suffix.lower()](path)
+        made = [mesh for part in found for mesh in _meshes(path, part, materials, warnings)]
+    if not made:
         raise SceneError("holds no triangles", file=path)
-    return MeshFile(meshes, list(dict.fromkeys(warnings)))
+    return MeshFile(made, list(dict.fromkeys(warnings)))
 
 
 def join(meshes: list[Mesh]) -> Mesh:
@@ -95,26 +97,6 @@ def has_area(mesh: Mesh) -> bool:
         if np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).any():
             return True
     return False
-
-
-def smooth_normals(vertices: NDArray[Any], faces: NDArray[Any]) -> NDArray[np.float32]:
-    """Return vertex normals (n, 3): of the faces, weighted by angle (Thuermer, Wuethrich 1998)."""
-    total = np.zeros((len(vertices), 3))
-    for first in range(0, len(faces), SUMMED):
-        _add_normals(total, vertices, faces[first : first + SUMMED])
-    return _unit(total).astype(np.float32)
-
-
-def _add_normals(total: NDArray[Any], vertices: NDArray[Any], faces: NDArray[Any]) -> None:
-    corners = vertices[faces].astype(np.float64)
-    normals = _unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    for i in range(3):
-        a = _unit(corners[:, (i + 1) % 3] - corners[:, i])
-        b = _unit(corners[:, (i + 2) % 3] - corners[:, i])
-        angles = np.arccos(np.clip((a * b).sum(axis=1), -1.0, 1.0))
-        for axis in range(3):
-            weights = angles * normals[:, axis]
-            total[:, axis] += np.bincount(faces[:, i], weights, len(vertices))
 
 
 def checked(
@@ -164,114 +146,117 @@ def checked(
     return whole if attributes is None else {**whole, "attributes": own}
 
 
-def _open(path: Path, materials: bool) -> trimesh.Scene:
-    import trimesh
-
-    suffix = path.suffix.lower()
-    try:
-        if suffix == ".stl":
-            _check_stl(path.read_bytes())
-        with np.errstate(all="ignore"):
-            if suffix == ".obj" and not materials:
-                # In one piece: trimesh cuts the mesh, and its normals, where the material changes.
-                text = io.BytesIO(USEMTL.sub(b"", path.read_bytes()))
-                return trimesh.load_scene(text, "obj", process=False, skip_materials=True)
-            return trimesh.load_scene(path, process=False)
-    except Exception as error:  # trimesh's readers raise whatever their parsing runs into
-        reason = str(error).splitlines()[0][:100] if str(error) else type(error).__name__
-        raise SceneError(f"cannot be read as a {suffix} mesh: {reason}", file=path) from None
+def _meshes(path: Path, made: Triangles, materials: bool, warnings: list[str]) -> list[Mesh]:
+    """Return the triangles that a reader has found, a mesh for each image that they show."""
+    warnings += made.warnings
+    if not materials or not made.textures:
+        parts = [_plain(path, made, materials, warnings)]
+    else:
+        parts = [_plain(path, part, True, warnings) for part in _by_texture(made, warnings)]
+    return [mesh for mesh in parts if mesh is not None]
 
 
-def _check_stl(data: bytes) -> None:
-    """Raise ValueError for a binary file that is cut off, which trimesh would take for a text."""
-    if data.lstrip().startswith(b"solid") and b"\0" not in data[:1024]:
-        return
-    if len(data) < 84:
-        raise ValueError("it ends within its header")
-    count, held = int.from_bytes(data[80:84], "little"), (len(data) - 84) // 50
-    if held < count:
-        raise ValueError(f"it ends early: it holds {held} of {count} triangles")
-
-
-def _ply(path: Path, materials: bool, warnings: list[str]) -> Mesh:
-    """Read a PLY file; trimesh would take ten times as long."""
-    triangles = ply.read(path)
-    warnings += triangles.warnings
-    own = _attributes(triangles)
-    arrays = checked(
-        path,
-        path.name,
-        triangles.vertices,
-        triangles.faces,
-        triangles.normals,
-        triangles.uvs,
-        warnings,
-        own,
-    )
+def _plain(path: Path, made: Triangles, materials: bool, warnings: list[str]) -> Mesh | None:
+    name, own = made.name or path.name, attributes(made)
+    arrays = checked(path, name, made.vertices, made.faces, made.normals, made.uvs, warnings, own)
     if not len(arrays["faces"]):
-        raise SceneError("holds no triangles", file=path)
+        return None
+    material = _coloured(own) if materials else GREY
+    if materials and made.textures and made.uvs is not None:
+        material = _pictured(path, made.textures[0], material, warnings)
     arrays["tangents"] = arrays["attributes"].pop(TANGENTS, None)
-    return Mesh(name=path.name, material=_coloured(own) if materials else GREY, **arrays)
-
-
-def _mesh(
-    path: Path, name: str, geometry: Any, materials: bool, warnings: list[str]
-) -> Mesh | None:
-    from trimesh import Trimesh
-
-    if not isinstance(geometry, Trimesh):
-        warnings.append(f"{name}: left out, since it has no triangles")
-        return None
-    vertices = np.asarray(geometry.vertices).reshape(-1, 3)
-    faces = np.asarray(geometry.faces, np.int64).reshape(-1, 3)
-    # Asking for `vertex_normals` would compute them; the file's own wait in the cache.
-    normals = _per_vertex(geometry._cache.cache.get("vertex_normals"), vertices, 3)
-    uvs = _per_vertex(getattr(geometry.visual, "uv", None), vertices, 2)
-    arrays = checked(path, name, vertices, faces, normals, uvs, warnings)
-    if not len(arrays["faces"]):
-        return None
-    material = _material(geometry.visual, warnings) if materials else GREY
     return Mesh(name=name, material=material, **arrays)
 
 
-def _attributes(triangles: ply.Triangles) -> dict[str, NDArray[np.float32]]:
-    """Return colours and other numbers of a PLY file per vertex and face, by Mitsuba's names.
-
-    r, g, b or red, green, blue are vertex_color or face_color, bytes decoded from sRGB; x_0, x_1,
-    x_2 or x_r, x_g, x_b are vertex_x.
-    """
-    attributes: dict[str, NDArray[np.float32]] = {}
-    for element in ("vertex", "face"):
-        for name, parts in _grouped(triangles.columns[element]).items():
-            values = np.column_stack(parts)
-            if values.shape[1] in (1, 3):
-                scaled = values.dtype == np.uint8
-                linear = images.srgb_to_linear(values / np.float32(255.0)) if scaled else values
-                attributes[f"{element}_{name}"] = linear.astype(np.float32)
-    vertex = triangles.columns["vertex"]
-    if all(name in vertex for name in TANGENT_COLUMNS):
-        columns = [vertex[name] for name in TANGENT_COLUMNS]
-        attributes[TANGENTS] = np.column_stack(columns).astype(np.float32)
-    return attributes
-
-
-def _grouped(columns: dict[str, NDArray[Any]]) -> dict[str, list[NDArray[Any]]]:
-    """Return the columns of each attribute by its name."""
-    groups: dict[str, list[NDArray[Any]]] = {}
-    for name, values in columns.items():
-        head, _, tail = name.rpartition("_")
-        letter = {"red": "r", "green": "g", "blue": "b"}.get(name, name)
-        if letter in ("r", "g", "b"):
-            groups.setdefault("color", []).append(values)
-        elif head and tail in (*"rgbxyz", *"012"):
-            groups.setdefault(head, []).append(values)
-    return groups
+def _by_texture(made: Triangles, warnings: list[str]) -> list[Triangles]:
+    """Return the triangles that show each image, by their column texnumber."""
+    if made.uvs is None:
+        warnings.append(f"image {made.textures[0]!r} left out, as there are no texture coordinates")
+        return [made]
+    number = made.columns["face"].get("texnumber")
+    if len(made.textures) == 1 or number is None:
+        for image in made.textures[1:]:
+            warnings.append(f"image {image!r} left out, as no face names it")
+        return [made]
+    number = np.clip(number.astype(np.int64), 0, len(made.textures) - 1)
+    parts = []
+    for i, image in enumerate(made.textures):
+        own = number == i
+        columns = {n: values[own] for n, values in made.columns["face"].items()}
+        columns = {"vertex": made.columns["vertex"], "face": columns}
+        part = replace(made, faces=made.faces[own], columns=columns, textures=[image])
+        parts.append(part)
+    return parts
 
 
-def _per_vertex(values: Any, vertices: NDArray[Any], width: int) -> NDArray[np.float32] | None:
-    if values is None or np.shape(values) != (len(vertices), width):
-        return None
-    return np.ascontiguousarray(values, np.float32)
+def _pictured(path: Path, image: str, otherwise: Material, warnings: list[str]) -> Material:
+    """Return the material that shows an image beside a file, the other where there is none."""
+    file = find(path.parent, image)
+    if file is None:
+        warnings.append(f"image {image!r} left out, as it is not there")
+        return otherwise
+    return TwoSided(front=Diffuse(reflectance=Bitmap(image=str(file)), name=file.stem))
+
+
+def _obj(path: Path, library: mtl.Library | None, warnings: list[str]) -> list[Mesh]:
+    """Read an OBJ file: a mesh for each material, or all in one where there is no library."""
+    contents = obj.read(path)
+    if library is not None:
+        for names in contents.libraries:
+            library.add(names)
+    parts = list(corners.parts(contents, whole=library is None))
+    if not parts:
+        held = f"{len(contents.vertices)} vertices (v), but no faces (f)"
+        message = "; ".join([f"holds no triangles: {held}", *contents.warnings])
+        raise SceneError(message, file=path)
+    warnings += contents.warnings
+    scale = 1.0
+    if contents.colours is not None:
+        scale = 255.0 if np.nanmax(contents.colours, initial=0.0) > 1.0 else 1.0
+    unknown: list[str] = []
+    made: list[Mesh] = []
+    for part in parts:
+        label = contents.materials[part.material] if part.material >= 0 else ""
+        own = _vertex_colours(part.colours, scale, warnings)
+        name = label if label and len(parts) > 1 else path.name
+        arrays = checked(
+            path, name, part.vertices, part.faces, part.normals, part.uvs, warnings, own
+        )
+        material, emission = _coloured(own) if library is not None else GREY, None
+        if library is not None and label:
+            if (known := library.known(label)) is None:
+                unknown.append(label)
+            else:
+                material, emission = library.material(known)
+                if part.uvs is None and any(map(_is_image, textures_in(material))):
+                    warnings.append(f"material {label!r} has images, but its faces no coordinates")
+        made.append(Mesh(name=name, material=material, emission=emission, **arrays))
+    if bare := sum(part.bare for part in parts):
+        warnings.append(f"{bare} triangles have no texture coordinates; (0, 0) stands for them")
+    if unknown:
+        names = ", ".join(map(repr, unknown[:MOST_TOLD]))
+        more = f" and {len(unknown) - MOST_TOLD} more" if len(unknown) > MOST_TOLD else ""
+        warnings.append(f"no library holds the material {names}{more}; grey stands for it")
+    if library is not None:
+        warnings += library.warnings()
+    return made
+
+
+def _is_image(texture: Texture) -> bool:
+    """Return whether a texture is one of a file."""
+    return isinstance(texture, Bitmap) and isinstance(texture.image, Path)
+
+
+def _vertex_colours(
+    colours: NDArray[np.float32] | None, scale: float, warnings: list[str]
+) -> dict[str, NDArray[np.float32]]:
+    """Return sRGB colours of vertices up to `scale` as an attribute, linear; none where no one."""
+    if colours is None or np.isnan(colours).all():
+        return {}
+    if np.isnan(colours).any():
+        warnings.append("vertices without a colour beside others with one are white")
+        colours = np.where(np.isnan(colours), np.float32(scale), colours)
+    return {"vertex_color": images.srgb_to_linear(colours / np.float32(scale))}
 
 
 def _usable_normals(
@@ -289,45 +274,9 @@ def _usable_normals(
     return unit.astype(np.float32)
 
 
-def _unit(vectors: NDArray[Any]) -> NDArray[Any]:
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return vectors / np.where(length > 0.0, length, 1.0)
-
-
 def _coloured(attributes: Mapping[str, Any]) -> Material:
     """Return the material that shows the colours of a file without materials."""
     name = next((name for name in COLOURS if name in attributes), None)
     if name is None:
         return GREY
     return TwoSided(front=Diffuse(reflectance=MeshAttribute(name=name), name=name))
-
-
-def _material(visual: Any, warnings: list[str]) -> Material:
-    material = getattr(visual, "material", None)
-    if material is None or _is_default(material):
-        if getattr(visual, "kind", None) in ("vertex", "face"):
-            warnings.append("vertex colours left out")
-        return GREY
-    colour, image = _base_colour(material)
-    if image is None:
-        return TwoSided(front=Diffuse(reflectance=tuple(colour), name=material.name or ""))
-    texels = images.from_pillow(image).decoded()
-    texels = texels[..., :3] * np.asarray(colour, np.float32)
-    texture = Bitmap(image=texels, raw=True)
-    return TwoSided(front=Diffuse(reflectance=texture, name=material.name or ""))
-
-
-def _is_default(material: Any) -> bool:
-    """Return whether trimesh made this material, for uv of a file that names no material."""
-    from trimesh.visual.material import SimpleMaterial
-
-    simple = isinstance(material, SimpleMaterial)
-    return simple and not material.kwargs and getattr(material.image, "size", None) in DUMMIES
-
-
-def _base_colour(material: Any) -> tuple[list[float], Any]:
-    """Return linear r, g, b of a trimesh material, and its image or None."""
-    factor, image = getattr(material, "diffuse", None), getattr(material, "image", None)
-    if factor is None or image is not None:
-        return [1.0, 1.0, 1.0], image
-    return [float(value) / 255.0 for value in np.asarray(factor).reshape(-1)[:3]], image

@@ -1,12 +1,14 @@
 """Triangle meshes from PLY files (Turk 1994): ascii and binary of both byte orders, also gzip's.
 
-Rows of the same length are read in one go; polygons become fans.
+Rows of the same length are read in one go. Polygons and strips become triangles; corners of faces
+may have texture coordinates of their own, as photogrammetry has them.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import re
+import struct
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,8 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt import text
 from clpt.errors import SceneError
 from clpt.formats.gzip_file import LARGEST, read_bytes
+from clpt.formats.meshes.triangles import Triangles, indices, see_through
+from clpt.geometry.polygons import triangulate
 
 TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2",
@@ -26,8 +31,16 @@ FORMATS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 NORMAL = ("nx", "ny", "nz")
 UVS = (("u", "v"), ("s", "t"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
 CORNERS = ("vertex_indices", "vertex_index")
+ELEMENTS = ("vertex", "face", "tristrips")
+RESTART = -1  # between the strips of a list
+LEFT_OUT = ("material_index", "ambient_red", "specular_red", "specular_power")
+HEADER = re.compile(
+    rb"ply[ \t]*(\r\n|\n|\r).*?(?P<end>(?<=[\r\n])[ \t]*end_header[ \t]*(?:\1|\r\n|\n|\r|\Z))",
+    re.DOTALL,
+)
 LONGEST_HEADER = 1 << 16
-MOST_CORNERS = 1 << 12  # of one polygon
+MOST_CORNERS = 1 << 16  # of one polygon
+EVEN = 1 << 12  # values of a list whose rows are read in one go
 
 
 @dataclass
@@ -49,19 +62,13 @@ class Element:
 
 
 @dataclass
-class Triangles:
-    """vertices (n, 3), faces (m, 3) int64, normals (n, 3) or None, uvs (n, 2) or None.
+class Header:
+    """order: of bytes, "" for ascii; textures: names of image files; length [bytes]."""
 
-    columns: further numbers of each "vertex" and "face" by name; a polygon's are those of all its
-    triangles.
-    """
-
-    vertices: NDArray[np.float32]
-    faces: NDArray[np.int64]
-    normals: NDArray[np.float32] | None
-    uvs: NDArray[np.float32] | None
-    columns: dict[str, dict[str, NDArray[Any]]]
-    warnings: list[str] = field(default_factory=list)
+    order: str
+    elements: list[Element]
+    textures: list[str]
+    length: int
 
 
 def read(path: Path, largest: int = LARGEST) -> Triangles:
@@ -69,44 +76,54 @@ def read(path: Path, largest: int = LARGEST) -> Triangles:
 
     Raises SceneError for one that is larger, broken, or has no vertices or faces.
     """
-    data = read_bytes(path, largest)
+    data = text.plain(read_bytes(path, largest))
     try:
-        order, elements, start = _header(data)
-        if not order:
-            return _triangles(_ascii(data, elements, start))
-        return _triangles(_binary(data, elements, start, order))
+        header = _header(data)
+        if header.order:
+            tables = _binary(data, header.elements, header.length, header.order)
+        else:
+            tables = _ascii(data, header.elements, header.length)
+        return _triangles(header, tables)
     except SceneError as error:
-        raise SceneError(f"cannot be read as a .ply mesh: {error.message}", file=path) from None
+        message = f"cannot be read as a .ply mesh: {error.message}"
+        raise SceneError(message, file=path, line=error.line) from None
 
 
-def _header(data: bytes) -> tuple[str, list[Element], int]:
-    end = data.find(b"end_header", 0, LONGEST_HEADER)
-    line_end = re.match(rb"ply[ \t]*(\r\n|\n|\r)", data)
-    if line_end is None or end < 0:
+def _header(data: bytes) -> Header:
+    found = HEADER.match(data[:LONGEST_HEADER])
+    if found is None:
         raise SceneError("it has no header")
-    stop = data.find(line_end[1], end)
-    order, elements = None, []
-    for line in data[:end].decode("latin-1").splitlines()[1:]:
-        match line.split():
+    order, elements, textures = None, [], []
+    for number, line in enumerate(data[: found.start("end")].splitlines()[1:], 2):
+        words = text.decode(line).split()
+        match words:
             case ["format", name, _] if name in FORMATS:
                 order = FORMATS[name]
             case ["element", name, count] if count.isdecimal() and len(count) < 12:
                 elements.append(Element(name, int(count)))
             case ["property", type, name] if type in TYPES and elements:
                 elements[-1].properties.append(Property(name, TYPES[type]))
-            case ["property", "list", n, type, name] if {n, type} <= {*TYPES} and elements:
+            case ["property", "list", n, type, name] if _whole(n) and type in TYPES and elements:
                 elements[-1].properties.append(Property(name, TYPES[type], TYPES[n]))
+            case ["comment", "TextureFile", _, *_]:
+                textures.append(text.decode(line).split(None, 2)[2].strip())
             case [] | ["comment" | "obj_info", *_]:
                 pass
             case _:
-                raise SceneError(f"its header has the line {line[:60]!r}")
+                shown = text.decode(line)[:60]
+                raise SceneError(f"its header has the line {shown!r}", line=number)
     if order is None:
         raise SceneError("its header names no format")
     for element in elements:
         names = [column.name for column in element.properties]
         if len(set(names)) < len(names) or (element.count and not names):
             raise SceneError(f"its element {element.name[:40]!r} has no columns, or one twice")
-    return order, elements, stop + len(line_end[1]) if stop >= 0 else len(data)
+    return Header(order, elements, textures, found.end())
+
+
+def _whole(name: str) -> bool:
+    """Return whether a type is one of whole numbers."""
+    return TYPES.get(name, "f")[0] != "f"
 
 
 def _binary(
@@ -133,7 +150,11 @@ def _even_rows(
         if not column.length:
             fields.append((column.name, order + column.type))
         else:
-            count = _number(data, at, order + column.length) if element.count else 0
+            count = 0
+            if element.count:
+                count = _number(data, at, order + column.length, np.dtype(column.type).itemsize)
+            if count > EVEN:
+                return None, 0
             fields.append((f"{column.name} n", order + column.length))
             fields.append((column.name, order + column.type, (count,)))
         at = start + np.dtype(fields).itemsize
@@ -156,36 +177,97 @@ def _even_rows(
     return result, size
 
 
-def _number(data: bytes, at: int, dtype: str) -> int:
-    if at + np.dtype(dtype).itemsize > len(data):
+def _number(data: bytes, at: int, dtype: str, size: int) -> int:
+    """Return how many values a list has; size: bytes of one, all of which must be in the file."""
+    first = at + np.dtype(dtype).itemsize
+    if first > len(data):
         raise SceneError("it ends too early")
     count = int(np.frombuffer(data, dtype, 1, at)[0])
-    if not 0 <= count <= MOST_CORNERS:
-        raise SceneError(f"a list has {count} values")
+    _check_length(count, size, len(data) - first)
     return count
+
+
+def _check_length(count: int, size: int, left: int) -> None:
+    """Raise SceneError for a list that is longer than what is left of the file [bytes]."""
+    if count < 0:
+        raise SceneError(f"a list has {count} values")
+    if count * size > left:
+        raise SceneError(f"it ends within a list of {count} values")
 
 
 def _uneven_rows(
     data: bytes, element: Element, start: int, order: str
 ) -> tuple[dict[str, Any], int]:
-    """As `_even_rows`, row by row."""
-    result = _empty(element)
-    columns = [
-        (c.name, c.length and order + c.length, order + c.type, np.dtype(c.type).itemsize)
-        for c in element.properties
-    ]
-    at = start
-    for _ in range(element.count):
-        for name, length, type, size in columns:
-            count = _number(data, at, length) if length else 1
-            at += np.dtype(length).itemsize if length else 0
-            if at + count * size > len(data):
-                raise SceneError(f"it ends within {element.count} rows of {element.name[:40]!r}")
-            lengths, values = result[name]
-            lengths.append(count)
-            values.append(np.frombuffer(data, type, count, at))
-            at += count * size
-    return _joined(element, result), at - start
+    """As `_even_rows`, by walking from list to list, row by row; then all is gathered at once."""
+    rows = _Lists(order, element.properties)
+    at, end = start, len(data)
+    begins = []
+    try:
+        for _ in range(element.count):
+            begins.append(at)
+            for before, unpack, head, size, places, lengths in rows.lists:
+                at += before
+                (count,) = unpack(data, at)
+                at += head
+                if not 0 <= count * size <= end - at:
+                    _check_length(count, size, end - at)
+                places.append(at)
+                lengths.append(count)
+                at += count * size
+            at += rows.after
+    except struct.error:
+        at = end + 1
+    if at > end:
+        raise SceneError(f"it ends within {element.count} rows of {element.name[:40]!r}")
+    return _gathered(data, element, order, rows, np.array(begins, np.int64)), at - start
+
+
+class _Lists:
+    """Where the lists of an element's rows lie.
+
+    lists: for each the bytes before it, what reads its length, the bytes of that and of a value,
+    and for all rows where its values begin and how many there are. after: bytes behind the last.
+    """
+
+    def __init__(self, order: str, properties: list[Property]):
+        self.lists: list[Any] = []
+        self.after = 0
+        for column in properties:
+            size = np.dtype(column.type).itemsize
+            if not column.length:
+                self.after += size
+                continue
+            length = struct.Struct(order + np.dtype(column.length).char)
+            self.lists.append((self.after, length.unpack_from, length.size, size, [], []))
+            self.after = 0
+
+
+def _gathered(
+    data: bytes, element: Element, order: str, rows: _Lists, at: NDArray[np.int64]
+) -> dict[str, Any]:
+    """Return the columns of rows that have been walked over; at: where each row begins."""
+    raw = np.frombuffer(data, np.uint8)
+    lists = iter(rows.lists)
+    made: dict[str, Any] = {}
+    for column in element.properties:
+        dtype = np.dtype(order + column.type)
+        size = dtype.itemsize
+        if column.length:
+            *_, places, lengths = next(lists)
+            first, counts = np.array(places, np.int64), np.array(lengths, np.int64)
+            total, starts = int(counts.sum()), np.cumsum(counts) - counts
+            own = np.repeat(first - size * starts, counts) + size * np.arange(total)
+            made[column.name] = counts, _at(raw, own, dtype)
+            at = first + size * counts
+        else:
+            made[column.name] = _at(raw, at, dtype)
+            at = at + size
+    return made
+
+
+def _at(raw: NDArray[np.uint8], places: NDArray[np.int64], dtype: np.dtype[Any]) -> NDArray[Any]:
+    """Return the numbers (n,) that begin at places (n,) among bytes."""
+    return raw[places[:, None] + np.arange(dtype.itemsize)].reshape(-1).view(dtype)
 
 
 def _ascii(data: bytes, elements: list[Element], start: int) -> dict[str, dict[str, Any]]:
@@ -193,10 +275,7 @@ def _ascii(data: bytes, elements: list[Element], start: int) -> dict[str, dict[s
 
     Rows may have more words than the header tells, if each row is a line; the first words count.
     """
-    try:
-        words = np.array(data[start:].split(), np.float64)
-    except ValueError:
-        raise SceneError("it holds words that are no numbers") from None
+    words = text.numbers(data, start)
     lines = [line for line in data[start:].splitlines() if line.strip()]
     if len(lines) != sum(element.count for element in elements):
         return _ascii_tables(words, elements)
@@ -246,8 +325,10 @@ def _ascii_rows(words: NDArray[np.float64], element: Element) -> tuple[dict[str,
             if at >= len(words):
                 raise short
             count = words[at] if column.length else 1
-            if not (0 <= count <= MOST_CORNERS and count == int(count)):
+            if not (0 <= count < np.inf and count == int(count)):
                 raise SceneError(f"a list has {count:g} values")
+            if count > len(words) - at:
+                raise short
             at += 1 if column.length else 0
             result[column.name][0].append(int(count))
             result[column.name][1].append(words[at : at + int(count)])
@@ -273,31 +354,124 @@ def _joined(element: Element, rows: dict[str, Any]) -> dict[str, Any]:
 
 
 def _typed(values: NDArray[Any], column: Property) -> NDArray[Any]:
-    """Return values of the type uchar as bytes: as colours they mean other values than floats."""
-    if column.type != "u1" or values.dtype == np.uint8:
+    """Return whole numbers in their type: as colours they mean other values than floats."""
+    dtype = np.dtype(column.type)
+    if dtype.kind == "f" or values.dtype.kind != "f":
         return values
-    return np.clip(np.nan_to_num(values), 0, 255).astype(np.uint8)
+    limits = np.iinfo(dtype)
+    return np.clip(np.nan_to_num(values), limits.min, limits.max).astype(dtype)
 
 
-def _triangles(tables: dict[str, dict[str, Any]]) -> Triangles:
+def _triangles(header: Header, tables: dict[str, dict[str, Any]]) -> Triangles:
     vertex, face = _plain(tables.get("vertex", {})), tables.get("face", {})
     if not all(name in vertex for name in "xyz"):
-        raise SceneError("it holds no triangles")
-    corners = next((face[name] for name in CORNERS if name in face), None)
-    if not isinstance(corners, tuple):
-        raise SceneError("it holds no triangles")
+        raise SceneError("it holds no triangles: it has no vertices with x, y and z")
     uvs = next((pair for pair in UVS if all(name in vertex for name in pair)), None)
     normals = NORMAL if all(name in vertex for name in NORMAL) else None
     known = {*"xyz", *(normals or ()), *(uvs or ())}
-    further = {name: values for name, values in vertex.items() if name not in known}
-    return Triangles(
-        vertices=_columns(vertex, "xyz"),
-        faces=_fans(*corners),
+    counts, corners = _corners(face)
+    vertices = _columns(vertex, "xyz")
+    triangles, polygon = triangulate(vertices, counts, corners)
+    strips = _strips(tables.get("tristrips", {}))
+    if not (len(strips) or any(name in face for name in CORNERS)):
+        held = ", ".join(repr(element.name[:40]) for element in header.elements[:5])
+        raise SceneError(f"it holds no triangles: its elements are {held}")
+    rows = np.r_[polygon, np.full(len(strips), len(counts))]
+    made = Triangles(
+        vertices=vertices,
+        faces=np.concatenate([corners[triangles], strips]),
         normals=None if normals is None else _columns(vertex, normals),
         uvs=None if uvs is None else _columns(vertex, uvs),
-        columns={"vertex": further, "face": _per_triangle(face, corners[0])},
-        warnings=["texture coordinates of faces left out"] if "texcoord" in face else [],
+        columns={
+            "vertex": {name: values for name, values in vertex.items() if name not in known},
+            "face": {name: _of_faces(values)[rows] for name, values in _plain(face).items()},
+        },
+        textures=header.textures,
+        warnings=_left_out(tables),
     )
+    if "texcoord" in face and (uvs is None or header.textures):
+        _with_corner_uvs(made, counts, face["texcoord"], triangles, len(strips))
+    return made
+
+
+def _of_faces(values: NDArray[Any]) -> NDArray[Any]:
+    """Return a column of polygons with a zero more, which is that of strips."""
+    return np.append(values, np.zeros(1, values.dtype))
+
+
+def _corners(face: dict[str, Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return how many corners each polygon has, and the vertices of all."""
+    found = next((face[name] for name in CORNERS if name in face), None)
+    if not isinstance(found, tuple):
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    counts = found[0].astype(np.int64)
+    if len(counts) and counts.max() > MOST_CORNERS:
+        raise SceneError(f"a polygon has {counts.max()} corners, more than {MOST_CORNERS}")
+    return counts, indices(found[1])
+
+
+def _strips(table: dict[str, Any]) -> NDArray[np.int64]:
+    """Return the triangles (m, 3) of lists of strips: each vertex makes one with the two before it.
+
+    -1 begins another strip; triangles that name a vertex twice only join two parts.
+    """
+    found = next((table[name] for name in CORNERS if name in table), None)
+    if not isinstance(found, tuple) or not len(found[1]):
+        return np.zeros((0, 3), np.int64)
+    values = indices(found[1])
+    begins = np.zeros(len(values), np.bool_)
+    begins[(np.cumsum(found[0]) - found[0]).astype(np.int64)[found[0] > 0]] = True
+    begins[1:] |= values[:-1] == RESTART
+    at = np.arange(len(values))
+    place = at - np.maximum.accumulate(np.where(begins, at, 0))  # in the strip
+    last = np.flatnonzero((place >= 2) & (values != RESTART))
+    odd = place[last] % 2 == 1
+    a, b, c = values[last - 2], values[last - 1], values[last]
+    made = np.stack([np.where(odd, b, a), np.where(odd, a, b), c], axis=1)
+    return made[(a != b) & (b != c) & (c != a)]
+
+
+def _with_corner_uvs(
+    made: Triangles,
+    counts: NDArray[np.int64],
+    texcoord: Any,
+    triangles: NDArray[np.int32],
+    strips: int,
+) -> None:
+    """Give a mesh the uvs that its faces list for their corners; split vertices with several."""
+    lengths, values = texcoord
+    given = (lengths == 2 * counts) & (counts > 0)
+    if (~given & (counts > 2)).any() or strips:
+        made.warnings.append("faces without texture coordinates have those of one point")
+    if not given.any():
+        return
+    uvs = np.zeros((int(counts.sum()), 2), np.float32)
+    with np.errstate(over="ignore", invalid="ignore"):
+        own = values[np.repeat(given, lengths)].reshape(-1, 2).astype(np.float32)
+    uvs[np.repeat(given, counts)] = own
+    uvs = np.concatenate([uvs[triangles.reshape(-1)], np.zeros((3 * strips, 2), np.float32)])
+    _, uv = np.unique(np.ascontiguousarray(uvs).view(np.uint64), return_inverse=True)
+    vertex = made.faces.reshape(-1)
+    if len(vertex) and (vertex.min() < 0 or vertex.max() >= len(made.vertices)):
+        return  # refused later, by its number
+    _, first, faces = np.unique(
+        vertex * (uv.max(initial=0) + 1) + uv.reshape(-1), return_index=True, return_inverse=True
+    )
+    named = vertex[first]
+    made.vertices, made.faces, made.uvs = made.vertices[named], faces.reshape(-1, 3), uvs[first]
+    made.normals = None if made.normals is None else made.normals[named]
+    made.columns["vertex"] = {n: column[named] for n, column in made.columns["vertex"].items()}
+
+
+def _left_out(tables: dict[str, dict[str, Any]]) -> list[str]:
+    """Return warnings of what a file has that would be seen, and that is not read."""
+    found = [f"element {name[:40]!r} left out" for name in tables if name not in ELEMENTS]
+    for element in ("vertex", "face"):
+        columns = _plain(tables.get(element, {}))
+        found += [f"{element} {name} left out" for name in LEFT_OUT if name in columns]
+        if see_through(columns):
+            found.append(f"{element} alpha left out")
+    return found
 
 
 def _plain(table: dict[str, Any]) -> dict[str, NDArray[Any]]:
@@ -305,24 +479,6 @@ def _plain(table: dict[str, Any]) -> dict[str, NDArray[Any]]:
     return {name: values for name, values in table.items() if isinstance(values, np.ndarray)}
 
 
-def _per_triangle(face: dict[str, Any], lengths: NDArray[Any]) -> dict[str, NDArray[Any]]:
-    """Return the columns of polygons, for each triangle of their fans."""
-    counts = np.maximum(lengths.astype(np.int64) - 2, 0)
-    return {name: np.repeat(values, counts) for name, values in _plain(face).items()}
-
-
 def _columns(table: dict[str, Any], names: Any) -> NDArray[np.float32]:
     with np.errstate(over="ignore", invalid="ignore"):
         return np.stack([np.asarray(table[name], np.float32) for name in names], axis=1)
-
-
-def _fans(lengths: NDArray[Any], corners: NDArray[Any]) -> NDArray[np.int64]:
-    """Return polygons as triangles around their first corners."""
-    lengths, corners = lengths.astype(np.int64), corners.astype(np.int64)
-    if len(lengths) and (lengths == 3).all():
-        return corners.reshape(-1, 3)
-    starts = np.cumsum(lengths) - lengths
-    count = np.maximum(lengths - 2, 0)
-    first = np.repeat(starts, count)
-    step = np.arange(int(count.sum())) - np.repeat(np.cumsum(count) - count, count)
-    return corners[np.stack([first, first + step + 1, first + step + 2], axis=1)]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from clpt import output_files
+from clpt import output_files, text
 from clpt.errors import SceneError
 
 LARGEST = 1 << 30  # [bytes] of a file
@@ -21,7 +21,7 @@ def read(path: Path) -> dict[str, Any]:
     try:
         if path.stat().st_size > LARGEST:
             raise SceneError(f"is larger than {LARGEST >> 30} GiB", file=path)
-        rows = [line.split() for line in path.read_bytes().split(b"\n")]
+        rows = [line.split() for line in text.plain(path.read_bytes()).split(b"\n")]
     except OSError as error:
         raise SceneError(f"cannot be read: {error.strerror}", file=path) from None
     columns = np.array([len(row) for row in rows])
@@ -36,7 +36,9 @@ def read(path: Path) -> dict[str, Any]:
     try:
         points = np.array(words).astype(np.float64).reshape(-1, 4)
     except ValueError:
-        raise SceneError("is not all numbers", file=path, line=_wrong(rows)) from None
+        line = _wrong(rows)
+        comma = text.comma_message(text.decode(b" ".join(rows[line - 1])))
+        raise SceneError(comma or "is not all numbers", file=path, line=line) from None
     starts = np.flatnonzero(given & ~np.r_[False, given[:-1]])
     ends = np.flatnonzero(given & ~np.r_[given[1:], False])
     with np.errstate(over="ignore"):  # lowering refuses what is not finite

@@ -20,6 +20,7 @@ from clpt.formats.mitsuba.emitters import area
 from clpt.formats.mitsuba.media import side
 from clpt.formats.mitsuba.properties import Context, NoArea, Properties, unknown
 from clpt.formats.mitsuba.xml import Element
+from clpt.geometry.normals import smooth_normals
 from clpt.scene import shapes
 from clpt.scene.materials import Diffuse
 from clpt.scene.shapes import Group, Instance, Shape
@@ -214,7 +215,7 @@ def _mesh(props: Properties, suffix: str, *, flip_v: bool) -> Parameters:
         uvs = np.column_stack([uvs[:, 0], 1.0 - uvs[:, 1]]).astype(np.float32)
     normals, faces = None, whole.faces
     if not flat and whole.normals is None:
-        normals = mesh.smooth_normals(vertices, faces)
+        normals = smooth_normals(vertices, faces)
     elif not flat:
         normals = transforms.transform_normals(to_world, whole.normals).astype(np.float32)
         if transforms.flips_handedness(to_world):

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from clpt import text as text_files
 from clpt.errors import SceneError, UnusedParameterError
 from clpt.formats.located import Located
 
@@ -121,13 +122,11 @@ def parse(path: Path, confined: bool = False) -> Cursor:
     confined: whether it can name only files of its own folder. Raises SceneError with the line for
     what is not JSON.
     """
+    text = text_files.read(path)
     try:
-        text = path.read_text("utf-8-sig")
         value = json.loads(text, object_pairs_hook=_object)
     except json.JSONDecodeError as error:
         raise SceneError(f"is not JSON: {error.msg}", file=path, line=error.lineno) from None
-    except OSError as error:
-        raise SceneError(f"cannot be read: {error.strerror}", file=path) from None
     except RecursionError:
         raise SceneError("is nested too deeply", file=path) from None
     except ValueError as error:

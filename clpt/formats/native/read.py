@@ -272,7 +272,7 @@ class _Reader:
         with file.locating():
             if (read := shape_files.FILES[cls].read) is not None:
                 return [dataclasses.replace(shape, **read(path))]
-            contents = shape_files.read_meshes(path)
+            contents = shape_files.read_meshes(path, self.missing)
         self.warnings += [f"{file.value}: {warning}" for warning in contents.warnings]
         own_material, several = "material" in cursor.value, len(contents.meshes) > 1
         return [_merged(part, shape, own_material, several) for part in contents.meshes]

@@ -12,7 +12,8 @@ import numpy as np
 
 from clpt.formats import ies
 from clpt.formats.meshes import mesh, particles, strands
-from clpt.formats.meshes.mesh import TANGENTS
+from clpt.formats.meshes.triangles import TANGENTS
+from clpt.formats.missing import Missing
 from clpt.formats.native.cursor import Cursor
 from clpt.formats.native.spectra import find_file
 from clpt.formats.volumes import distances
@@ -84,10 +85,10 @@ def check_only_in_file(cursor: Cursor, cls: type[Kind]) -> None:
             raise cursor.at(key).error("stands in the 'file' already; give either")
 
 
-def read_meshes(path: Path) -> mesh.MeshFile:
-    """Read a file of meshes, glTF included. Raises SceneError."""
+def read_meshes(path: Path, missing: Missing) -> mesh.MeshFile:
+    """Read a file of meshes, glTF included; missing: see clpt.load. Raises SceneError."""
     if path.suffix.lower() not in (".glb", ".gltf"):
-        return mesh.read_mesh(path)
+        return mesh.read_mesh(path, missing=missing)
     from clpt.formats import gltf  # here: most scenes have no use for it
 
     return gltf.read_mesh(path)

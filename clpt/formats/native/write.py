@@ -18,7 +18,7 @@ import numpy as np
 from clpt import images, measured, output_files, spectral_exr
 from clpt.errors import SceneError
 from clpt.formats.meshes import particles, strands
-from clpt.formats.meshes.mesh import TANGENT_COLUMNS
+from clpt.formats.meshes.triangles import TANGENT_COLUMNS
 from clpt.formats.native import forms, motion
 from clpt.formats.native.shape_files import MESH_ARRAYS, in_file
 from clpt.scene import Scene, kinds, materials, shapes

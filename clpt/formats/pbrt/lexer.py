@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt import text
 from clpt.errors import SceneError
 from clpt.formats.gzip_file import read_bytes
 from clpt.formats.pbrt.params import ALIASES, TYPES, Parameter
@@ -30,7 +31,7 @@ class Lexer:
     """
 
     def __init__(self, path: Path):
-        self.path, self.data = path, read_bytes(path)
+        self.path, self.data = path, text.plain(read_bytes(path))
         self.at = 0  # after the blanks before the next word
         self._ahead: bytes | None = None
         self._counted, self._line = 0, 1
@@ -70,7 +71,7 @@ class Lexer:
         word = self.next(what)
         if not word.startswith(b'"'):
             raise self.error(f"{what} must stand in quotes, not {_shown(word)}")
-        return _text(word[1:-1])
+        return text.decode(word[1:-1])
 
     def numbers(self, count: int, what: str) -> NDArray[np.float64]:
         """Take `count` finite numbers, which may stand in brackets."""
@@ -134,7 +135,7 @@ class Lexer:
         if words and words[0].startswith(b'"'):
             if not all(word.startswith(b'"') for word in words):
                 raise self.error("strings and other values are mixed")
-            return [_text(word[1:-1]) for word in words]
+            return [text.decode(word[1:-1]) for word in words]
         if words and all(word in (b"true", b"false") for word in words):
             return [word == b"true" for word in words]
         return np.array([self._number(word) for word in words], np.float64)
@@ -143,20 +144,17 @@ class Lexer:
         try:
             return float(word)
         except ValueError:
-            raise self.error(f"expected a number, found {_shown(word)}") from None
+            comma = text.comma_message(text.decode(word))
+            raise self.error(comma or f"expected a number, found {_shown(word)}") from None
 
 
-def _floats(text: bytes) -> NDArray[np.float64] | None:
+def _floats(inside: bytes) -> NDArray[np.float64] | None:
     """The numbers of a text, or None where it holds anything else."""
     try:
-        return np.array(text.split(), np.float64)
+        return np.array(inside.split(), np.float64)
     except ValueError:
         return None
 
 
-def _text(word: bytes) -> str:
-    return word.decode("utf-8", "replace")
-
-
 def _shown(word: bytes) -> str:
-    return repr(_text(word[:40]))
+    return repr(text.decode(word[:40]))

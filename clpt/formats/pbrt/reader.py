@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from clpt import transforms
+from clpt import text, transforms
 from clpt.errors import SceneError, UnknownKindError
 from clpt.formats.pbrt.files import Contents
 from clpt.formats.pbrt.lexer import UPGRADE
@@ -48,7 +48,7 @@ class _Reader(TransformDirectives):
 
     def directive(self) -> None:
         """Take the next directive and do what it says."""
-        self.name = self.lexer.next("a directive").decode("utf-8", "replace")
+        self.name = text.decode(self.lexer.next("a directive"))
         action = DIRECTIVES.get(self.name)
         if action is None:
             raise self._unknown()

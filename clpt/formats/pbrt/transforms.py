@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from clpt import transforms
+from clpt import text, transforms
 from clpt.errors import SceneError
 from clpt.formats.pbrt.files import Files
 from clpt.formats.pbrt.state import nearest
@@ -67,7 +67,7 @@ class TransformDirectives(Files):
         self._set(*systems[name])
 
     def active_transform(self) -> None:
-        which = self.lexer.next("All, StartTime or EndTime").decode("utf-8", "replace")
+        which = text.decode(self.lexer.next("All, StartTime or EndTime"))
         if which not in ("All", "StartTime", "EndTime"):
             raise SceneError(f"{which[:40]!r} is none of All, StartTime, EndTime")
         self.state.active = which != "EndTime", which != "StartTime"

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from clpt import bvh, device
 from clpt.errors import SceneError
+from clpt.render.contract.features import Features
 from clpt.render.lowering.scene import Lowered
 
 BRUTE_SHAPES = 32  # analytic shapes up to which a ray tests all of them
@@ -83,15 +84,23 @@ def _queued(on: device.Device, lowered: Lowered, wanted: bool | None) -> bool:
     return on.lanes == 1 and (several if wanted is None else wanted)
 
 
+def can_interleave(features: Features, layout: str, lanes: int) -> bool:
+    """Return whether a work-item can have several rays in flight: through `wide8`, among nothing
+    but triangles, or curves that stand still."""
+    if layout != "wide8" or lanes == 1 or features.instances:
+        return False
+    moves = {"shapes", "instances", "vertices", "spheres"} & set(features.moving)
+    curves = "curves" in features.analytic and "spheres" not in features.analytic and not moves
+    return curves or not features.analytic
+
+
 def _interleaved(on: device.Device, lowered: Lowered, layout: str) -> bool:
     """Whether interleaved rays pay: in trees of nothing but triangles that are larger than the
     caches, and where there are many pieces of curves, and of other shapes than triangles few."""
     features, count = lowered.features, len(lowered.faces)
-    if "curves" in features.analytic and "spheres" not in features.analytic:
+    if not can_interleave(features, layout, on.lanes):
+        return False
+    if features.analytic:
         others = int(lowered.settings["single_count"])
-        still = not {"shapes", "instances", "vertices", "spheres"} & set(features.moving)
-        many = others <= FEW_OTHERS and len(lowered.boxes) - others >= INTERLEAVED_PIECES
-        return layout == "wide8" and on.lanes > 1 and many and still and not features.instances
-    only_triangles = not (features.instances or features.analytic)
-    large = count >= INTERLEAVED_TRIANGLES and bvh.outgrows_caches(on, layout, count)
-    return only_triangles and large
+        return others <= FEW_OTHERS and len(lowered.boxes) - others >= INTERLEAVED_PIECES
+    return count >= INTERLEAVED_TRIANGLES and bvh.outgrows_caches(on, layout, count)

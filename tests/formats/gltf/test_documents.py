@@ -115,6 +115,28 @@ def test_indices_and_numbers_out_of_range(read, build):
         read(made.mesh(attributes={"NORMAL": normals}))
 
 
+def test_json_padded_by_zeros_is_named(read, build):
+    """Spaces must pad it (glTF 4.4.3.2)."""
+    data = build().mesh().glb()
+    length = int.from_bytes(data[12:16], "little")
+    text = data[20 : 20 + length].rstrip()
+    padded = text + b" " * (-(len(text) + 1) % 4) + b"\0"
+    head = data[:8] + (len(data) - length + len(padded)).to_bytes(4, "little")
+    head += len(padded).to_bytes(4, "little") + data[16:20]
+    with pytest.raises(SceneError, match="its JSON is padded with zeros, not spaces"):
+        read(head + padded + data[20 + length :], "a.glb")
+
+
+@pytest.mark.parametrize("dtype", ["u1", "u2"])
+def test_colours_that_are_not_normalized_are_told(read, build, dtype):
+    made = build()
+    colours = made.accessor([[1, 0, 0]] * 3, dtype)
+    scene = read(made.mesh(attributes={"COLOR_0": colours}))
+    assert scene.warnings == [
+        "accessors[0]: COLOR_0 of whole numbers must be normalized; taken as it is"
+    ]
+
+
 def test_binary_files(read, build):
     whole = build().mesh().glb()
     assert len(read(whole, "a.glb").shapes[0].faces) == 1

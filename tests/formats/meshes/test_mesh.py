@@ -98,9 +98,7 @@ def test_obj_material_textures(tmp_path):
     (tmp_path / "a.obj").write_text(text)
     (made,) = mesh.read_mesh(tmp_path / "a.obj").meshes
     bitmap = made.material.front.reflectance
-    assert bitmap.raw and bitmap.image.shape == (2, 2, 3)
-    # sRGB 188 of 255 is 0.503 in linear light (IEC 61966-2-1).
-    assert np.allclose(bitmap.image[0, 0], [1.0, 0.0, 0.503], atol=1e-3)
+    assert not bitmap.raw and bitmap.image == tmp_path / "t.png"
     # Without its materials, an OBJ is one mesh, however often it names another.
     (tmp_path / "a.obj").write_text(text + "usemtl b\nf 1/1 3/1 4/1\n")
     (made,) = mesh.read_mesh(tmp_path / "a.obj", materials=False).meshes
@@ -115,9 +113,9 @@ def test_zero_area_triangles_stay_and_unused_vertices_go(read):
 
 
 BAD = {
-    "empty.obj": ("", "no triangles|cannot be read"),
+    "empty.obj": ("", "no triangles: 0 vertices"),
     "points.obj": (OBJ, "no triangles"),
-    "index.obj": (OBJ + "f 1 2 9\n", "cannot be read|outside"),
+    "index.obj": (OBJ + "f 1 2 9\n", "names the .v. 9 of 4"),
     "nan.ply": (ply(rows="0 0 0\nnan 0 0\n0 1 0"), "not a finite number"),
     "inf.ply": (ply(rows="0 0 0\n1e39 0 0\n0 1 0"), "not a finite number"),
     "index.ply": (ply(last="7"), "outside 0 to 2"),
@@ -276,3 +274,57 @@ def test_stl_files_that_are_cut_off(tmp_path, data, message):
     path.write_bytes(data)
     with pytest.raises(SceneError, match=message):
         load(path)
+
+
+TEXTURED = """ply
+format ascii 1.0
+{comments}element vertex 4
+property float x
+property float y
+property float z
+{more}element face 2
+property list uchar int vertex_indices
+property list uchar float texcoord
+property int texnumber
+end_header
+0 0 0
+1 0 0
+0 1 0
+1 1 0
+3 0 1 2 6 0 0 1 0 0 1 {first}
+3 2 1 3 6 0 1 1 0 1 1 {second}
+"""
+
+
+def test_the_images_of_a_ply(read, tmp_path):
+    """Each image is shown by the faces that name it; one that is not there is told."""
+    from PIL import Image
+
+    for name in ("a.png", "b c.png"):
+        Image.new("RGB", (2, 2), (255, 0, 188)).save(tmp_path / name)
+    comments = "comment TextureFile a.png\n"
+    made = read("a.ply", TEXTURED.format(comments=comments, more="", first=0, second=0))
+    (one,) = made.meshes
+    assert made.warnings == [] and len(one.faces) == 2
+    assert one.material.front.reflectance.image == str(tmp_path / "a.png")
+    comments += "comment TextureFile b c.png\n"
+    made = read("a.ply", TEXTURED.format(comments=comments, more="", first=1, second=0))
+    assert made.warnings == []
+    images = [mesh.material.front.reflectance.image for mesh in made.meshes]
+    assert images == [str(tmp_path / "a.png"), str(tmp_path / "b c.png")]
+    assert [mesh.uvs.tolist() for mesh in made.meshes] == [
+        [[1, 0], [0, 1], [1, 1]], [[0, 0], [1, 0], [0, 1]],
+    ]  # fmt: skip
+    (tmp_path / "a.png").unlink()
+    made = read("a.ply", TEXTURED.format(comments=comments, more="", first=0, second=0))
+    assert made.warnings == ["image 'a.png' left out, as it is not there"]
+    assert made.meshes[0].material.front.reflectance.value == 0.6
+    plain = mesh.read_mesh(tmp_path / "a.ply", materials=False)
+    assert plain.warnings == [] and len(plain.meshes) == 1
+
+
+def test_an_image_without_coordinates_is_told(read):
+    made = read(
+        "a.ply", ply().replace("element vertex", "comment TextureFile x.png\nelement vertex")
+    )
+    assert made.warnings == ["image 'x.png' left out, as there are no texture coordinates"]

@@ -1,0 +1,169 @@
+"""Polygons as triangles that keep their shape, whether they are convex or not.
+
+A fan around the first corner fits a polygon of one outline if none of its triangles is turned
+over: their signed areas add up to the polygon's, so they cover it once. That holds for all convex
+ones and is tested in bulk. Quadrilaterals that fail are split at their other diagonal; ears of the
+rest are clipped, by mapbox_earcut, in the plane of the polygon's vector area (Newell's normal).
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import mapbox_earcut
+import numpy as np
+from numpy.typing import NDArray
+
+CHUNK = 1 << 18  # corners that are tested at a time: in float64 they take 200 bytes each
+ROUNDING = 1e-7  # of a polygon's area: a triangle that is turned over by less is a line
+
+Integers = NDArray[np.int64]
+Floats = NDArray[np.float64]
+
+
+def triangulate(
+    vertices: NDArray[Any], counts: NDArray[Any], corners: NDArray[Any]
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Return triangles (t, 3), as positions in `corners`, and the polygon of each, (t,).
+
+    vertices: (n, 3); counts: (p,) how many corners each polygon has; corners: (sum of counts,)
+    their vertices, one polygon after the other. A polygon of n corners gives n - 2 triangles, one
+    of fewer than 3 none; triangles turn as their polygon does. A polygon whose corners name no
+    vertex, or one that is not finite, is a fan.
+    """
+    counts = np.asarray(counts, np.int64)
+    starts = np.cumsum(counts) - counts
+    if (counts == 3).all():
+        return np.arange(3 * len(counts), dtype=np.int32).reshape(-1, 3), _range(len(counts))
+    triangles, polygon = _fans(counts, starts)
+    points = np.asarray(vertices)
+    rows = _first(counts)
+    larger = np.flatnonzero(counts > 3)
+    pieces = np.searchsorted(np.cumsum(counts[larger]), np.arange(0, counts[larger].sum(), CHUNK))
+    for some in np.split(larger, np.unique(pieces)[1:]):
+        _mend(triangles, points, counts[some], starts[some], rows[some], corners)
+    return triangles, polygon
+
+
+def _range(count: int) -> NDArray[np.int32]:
+    return np.arange(count, dtype=np.int32)
+
+
+def _first(counts: Integers) -> Integers:
+    """Return the row of each polygon's first triangle, (p,)."""
+    made = np.maximum(counts - 2, 0)
+    return np.cumsum(made) - made
+
+
+def _fans(counts: Integers, starts: Integers) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Return all polygons as triangles around their first corners, and the polygon of each."""
+    polygon = np.repeat(_range(len(counts)), np.maximum(counts - 2, 0))
+    step = np.arange(len(polygon)) - _first(counts)[polygon] + 1
+    first = starts[polygon]
+    return np.stack([first, first + step, first + step + 1], axis=1).astype(np.int32), polygon
+
+
+def _mend(
+    triangles: NDArray[np.int32],
+    points: NDArray[Any],
+    counts: Integers,
+    starts: Integers,
+    rows: Integers,
+    corners: NDArray[Any],
+) -> None:
+    """Replace the fans that do not fit their polygons; all have more than 3 corners.
+
+    rows: (p,) the first triangle of each.
+    """
+    fans, polygon = _fans(counts, np.cumsum(counts) - counts)
+    own = np.repeat(starts - np.cumsum(counts) + counts, counts) + np.arange(counts.sum())
+    named = np.asarray(corners)[own].astype(np.int64)
+    there = (named >= 0) & (named < len(points))
+    if not len(points):
+        return
+    outline = points[np.where(there, named, 0)].astype(np.float64)
+    begins = np.cumsum(counts) - counts
+    with np.errstate(over="ignore", invalid="ignore"):
+        outline -= np.repeat(outline[begins], counts, axis=0)
+        crosses = np.cross(outline[fans[:, 1]], outline[fans[:, 2]])  # the first corner is at zero
+        normals = np.add.reduceat(crosses, _first(counts))
+        signed = (crosses * normals[polygon]).sum(axis=1)
+        turned = signed < -ROUNDING * (normals**2).sum(axis=1)[polygon]
+        usable = np.logical_and.reduceat(there & np.isfinite(outline).all(axis=1), begins)
+        usable &= np.isfinite(normals**2).all(axis=1)
+    wrong = np.flatnonzero(np.logical_or.reduceat(turned, _first(counts)) & usable)
+    quads = wrong[counts[wrong] == 4]
+    triangles[rows[quads]] = np.add.outer(starts[quads], (1, 2, 3))
+    triangles[rows[quads] + 1] = np.add.outer(starts[quads], (1, 3, 0))
+    for i in wrong[counts[wrong] > 4]:
+        ears = _clip(outline[begins[i] : begins[i] + counts[i]], normals[i])
+        if ears is not None:
+            triangles[rows[i] : rows[i] + counts[i] - 2] = starts[i] + ears
+
+
+def _clip(outline: Floats, normal: Floats) -> Integers | None:
+    """Return a polygon (n, 3) as n - 2 triangles of its corners; None where they cannot be found.
+
+    Corners in a straight line that the ears leave out are put back, so that neighbours which share
+    them still meet the polygon without a gap. What is missing then are triangles without an area.
+    """
+    kept = _without_spikes(outline)
+    flat = outline - (outline @ normal / (normal @ normal))[:, None] * normal
+    flat = np.delete(flat, int(np.argmax(np.abs(normal))), axis=1)[kept]
+    flat = np.ascontiguousarray(flat / np.abs(flat).max())
+    found = mapbox_earcut.triangulate_float64(flat, np.array([len(flat)], np.uint32))
+    ears = np.asarray(found, np.int64).reshape(-1, 3)
+    if not len(ears):
+        return None
+    made = _turned_alike(outline[kept], normal, ears)
+    _put_back(made, outline[kept])
+    missing = len(outline) - 2 - len(made)
+    return np.array([*kept[np.array(made)].tolist(), *[(0, 0, 0)] * missing])
+
+
+def _without_spikes(outline: Floats) -> Integers:
+    """Return the corners without repeated ones and without edges that go there and back."""
+    points = [tuple(point) for point in outline.tolist()]
+    kept: list[int] = []
+    for corner, point in enumerate(points):
+        kept.append(corner)
+        while len(kept) > 1 and points[kept[-2]] == point:
+            kept.pop()
+        if len(kept) > 2 and points[kept[-3]] == point:
+            del kept[-2:]
+    while len(kept) > 1 and points[kept[0]] == points[kept[-1]]:
+        kept.pop()
+    return np.array(kept)
+
+
+def _turned_alike(outline: Floats, normal: Floats, ears: Integers) -> list[Any]:
+    """Return triangles that all turn about the normal."""
+    a, b, c = outline[ears.T]
+    about = np.cross(b - a, c - a) @ normal
+    return np.where(about[:, None] < 0, ears[:, [0, 2, 1]], ears).tolist()
+
+
+def _put_back(ears: list[Any], outline: Floats) -> None:
+    """Split the edge between the neighbours of each corner on it that no triangle has."""
+    count = len(outline)
+    used = {corner for ear in ears for corner in ear}
+    if len(used) == count:
+        return
+    edges = {(ear[i - 1], ear[i]): row for row, ear in enumerate(ears) for i in range(3)}
+    start = min(used)
+    around = [*range(start, count), *range(start + 1)]
+    kept = [at for at, corner in enumerate(around) if corner in used]
+    for first, last in pairwise(kept):
+        before, after = around[first], around[last]
+        for corner in around[first + 1 : last]:
+            row = edges.pop((before, after), None)
+            there, on = outline[corner] - outline[before], outline[after] - outline[corner]
+            if row is None or there @ on < 0.0:
+                break
+            apex = next(i for i in ears[row] if i not in (before, after))
+            ears[row] = [before, corner, apex]
+            ears.append([corner, after, apex])
+            edges[before, corner] = row
+            edges[corner, after] = edges[after, apex] = len(ears) - 1
+            before = corner
