@@ -567,7 +567,7 @@ def _placed(path: Path, options: Options, raw: bool) -> Bitmap:
 def _pixels(map_: Bitmap) -> NDArray[np.float32]:
     """Return what an image holds, (h, w, c), from 0 to 1 where it has 8 bits."""
     if isinstance(map_.image, Path):
-        return images.read(map_.image, linear=False)
+        return images.read_stored(map_.image).decoded(linear=False)
     return np.asarray(map_.image, np.float32)
 
 
