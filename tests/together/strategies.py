@@ -303,7 +303,7 @@ FORMS: dict[str, Callable[[Drawer, Param, Any], Any]] = {
     "filter": lambda self, p, d: self.kind(integrators.FILTERS),
     "area_light": _area_light,
     "group": _group,
-    "grid": lambda self, p, d: d,
+    "grid": lambda self, p, d: d[::2, ::2, ::2],
     "image": _image,
     "volume": _volume,
     "colour_volume": _colours,
@@ -322,7 +322,6 @@ NAMED: dict[str, Sequence[Any]] = {  # parameters that few values suit
     "bits": (16, 8),
     "bands": (0, 3),
     "octaves": (8, 1, 3),
-    "pieces": (1, 2),
     "resolution": (4,),
     "photon_memory": (1,),
     "subdivision": (1,),
@@ -386,6 +385,10 @@ def _curves(self: Drawer) -> dict[str, Any]:
     }
 
 
+def _sdf_grid(self: Drawer) -> dict[str, Any]:
+    return {"values": defaults(shapes.SdfGrid)["values"][::2, ::2, ::2], "pieces": self.one([1, 2])}
+
+
 def _cloud(self: Drawer) -> dict[str, Any]:
     return {"resolution": 4}
 
@@ -411,6 +414,7 @@ WHOLE: dict[type, Callable[[Drawer], dict[str, Any]]] = {  # parameters that dep
     shapes.Mesh: _mesh,
     shapes.Spheres: _spheres,
     shapes.Curves: _curves,
+    shapes.SdfGrid: _sdf_grid,
     media.Cloud: _cloud,
     media.Tabulated: _tabulated,
     lights.Sky: _sky,
@@ -440,7 +444,7 @@ def scene_of(choose: Callable[[int], int]) -> Scene:
         things = [_as_body(self, thing) for thing in things]
     self.rigid = True
     lamps = [self.kind(PLACED_LIGHTS) for _ in range(choose(3))]
-    lamps += [lights.Point(position=(0.0, 0.0, 2.0 + i)) for i in range(self.one([0, 0, 0, 20]))]
+    lamps += [lights.Point(position=(0.0, 0.0, 2.0 + i)) for i in range(self.one([0] * 7 + [17]))]
     camera = self.kind([cls for cls in cameras.KINDS if not traced or cls.kind in CONNECTED])
     plain = {} if isinstance(integrator, integrators.HAVE_LAYERS) else {"layers": ()}
     return Scene(
