@@ -8,6 +8,8 @@ from fnmatch import fnmatch
 from pathlib import Path
 
 from clpt.device.source import kernels_folder
+from clpt.render.codegen import flags, programs
+from clpt.scene import KINDS
 
 ALTERNATIVES = (  # files, of each row of which a program has one at most
     ("bvh/*_keyed.cl",),
@@ -107,3 +109,15 @@ def test_no_name_is_a_function_and_a_macro() -> None:
     assert not {
         f: d["function"] & d["macro"] for f, d in both.items() if d["function"] & d["macro"]
     }
+
+
+def test_flags_have_names_of_their_own() -> None:
+    """None is what a kernel file, or a generated text, calls something else."""
+    own = {name for text in files().values() for name in set().union(*defined(text).values())}
+    codegen = Path(programs.__file__).parent.glob("*.py")
+    texts = [path.read_text("utf-8") for path in codegen]
+    generated = {name for text in texts for name in re.findall(r"#define ([A-Z]\w*)[ (]", text)}
+    generated |= {f"{cls.kind.upper()}_WORDS" for row in KINDS.values() for cls in row}
+    assert "LAYER_WORDS" in generated  # of a thin film
+    chosen = {name.partition("(")[0] for name in {**flags.SCENE, **flags.MATERIAL}}
+    assert not chosen & (own | generated)

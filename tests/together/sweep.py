@@ -30,7 +30,7 @@ from tests.together.builds import Way, texts
 from tests.together.strategies import scene_of, shown, way_of
 
 BLOCK = 200  # scenes
-TRIES = 300  # scenes that are tried for a smaller one
+TRIES = 120  # scenes that are tried for a smaller one
 
 
 class Choices:
