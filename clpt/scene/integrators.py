@@ -60,6 +60,9 @@ class Path(Integrator):
         "paths from lights for each sample, weighed against it; 0: none; auto: as suits the scene",
         form="number_or_auto",
     )
+    free_panes: bool = flag(
+        False, "what goes straight through thin glass adds nothing to depths, as a null surface"
+    )
     guiding: bool = host(
         False, "directions are learned from light paths before the first sample; without others"
     )

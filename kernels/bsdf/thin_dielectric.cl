@@ -33,7 +33,7 @@ BsdfSample thin_dielectric_sample(ThinDielectric m, vec3 wo, vec3 u)
     s.wi = sel3(reflected, reflect_z(wo), neg3(wo));
     s.pdf = sel(reflected, p, 1.0f - p);
     s.weight = spectrum_scale(spectrum_sel(reflected, r, t), 1.0f / s.pdf);
-    s.lobe = sel_i(reflected, (integer)(LOBE_REFLECT), (integer)(LOBE_TRANSMIT)) | LOBE_DELTA;
+    s.lobe = sel_i(reflected, (integer)(LOBE_REFLECT), (integer)(LOBE_TRANSMIT | LOBE_NULL)) | LOBE_DELTA;
     return s;
 }
 

@@ -51,7 +51,7 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
 #endif
     }
 #endif
-    mask met = active & !hidden, next = met & vertex_continues(scene, v);
+    mask met = active & !hidden, next = met & vertex_continues(scene, v, (integer)(LOBE_NULL));
 
     Sampler sampler = pixel_sampler(settings, load_path_pixel_key(path, at), load_path_sample(path, at));
     Scattering scatter = vertex_scattering(scene, path, at, met, v, sampler);
@@ -143,12 +143,15 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
 #endif
 #endif
     next = next & (bs.pdf > 0.0f);
+#if BSDF_IS_PANE
+    next = next & vertex_continues(scene, v, bs.lobe);
+#endif
     vec3 onward = normalize3(to_world(frame, bs.wi));
     beta = spectrum_scale(spectrum_mul(beta, bs.weight), shading_frame_share(scatter.shading, onward));
     real eta = load_path_eta(path, at) * bs.eta;
 
 #if !BSDF_IS_NULL /* Russian roulette. */
-    mask play = depth + 1 >= settings->rr_depth;
+    mask play = v.steps + 1 >= settings->rr_depth;
     real strength = spectrum_max(beta);
     next = next & (strength > 0.0f);
 #if BSDF_GUIDED
@@ -188,7 +191,7 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
 #endif
     store_path_eta(path, at, next, eta);
     hero_keep(path, at, next, ratio);
-    vertex_end(path, at, met, next, state);
+    vertex_end(scene, path, at, met, next, v, bs.lobe, state);
 }
 
 #if !SHADES_BOTH

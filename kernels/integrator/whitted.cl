@@ -51,7 +51,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     mask next = active & (bs.pdf > 0.0f);
     hero_keep(path, at, next, ratio);
 #endif
-    next = next & vertex_continues(scene, v);
+    next = next & vertex_continues(scene, v, (integer)(0));
     vec3 onward = normalize3(to_world(frame, wi));
     beta = spectrum_scale(beta, shading_frame_share(scatter.shading, onward));
     store_path_radiance(path, at, active, radiance);
@@ -62,5 +62,5 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
 #if !BSDF_IS_NULL
     store_path_pdf(path, at, next, (real)(-1.0f));
 #endif
-    vertex_end(path, at, active, next, state);
+    vertex_end(scene, path, at, active, next, v, (integer)(0), state);
 }

@@ -9,6 +9,7 @@ typedef struct {
     Spectrum beta;        /* throughput, here */
     integer state, depth; /* see path/path_state.cl */
     integer met;          /* surfaces so far, with the null ones, which are no depth */
+    integer steps;        /* and without panes that are free, which `depth` counts: the limits hold for these */
     Surface s;
     mask front;           /* the front was hit */
     integer row;          /* of the material */
@@ -58,6 +59,7 @@ inline Vertex vertex_load(Scene scene, Slab path, Slab hit, uint at, mask active
     v.state = load_path_state(path, at);
     v.depth = v.state & PATH_DEPTH;
     v.met = v.depth + path_nulls(path, at);
+    v.steps = v.depth - path_panes(path, at);
 #if BSDF_IS_PHASE
     v.s = surface_of_point(madd3(v.d, v.t, v.o));
     v.front = mask_of(1);
@@ -199,13 +201,24 @@ inline Spectrum vertex_beyond(Scene scene, Vertex v, vec3 w, real t, Wavelengths
     return value;
 }
 
-/* Whether paths may be longer than to this vertex. */
-inline mask vertex_continues(Scene scene, Vertex v)
+/* Whether a path that leaves by such a lobe passes a pane that is no step of it. */
+inline mask vertex_is_free(Scene scene, Vertex v, integer lobe)
+{
+#if BSDF_IS_PANE
+    mask room = (v.depth - v.steps < MOST_NULL_SURFACES) & (v.depth + 1 < PATH_DEPTH);
+    return ((lobe & LOBE_NULL) != 0) & room & mask_of(scene.settings->free_panes != 0);
+#else
+    return mask_of(0);
+#endif
+}
+
+/* Whether paths may be longer than to this vertex, where they leave it by such a lobe. */
+inline mask vertex_continues(Scene scene, Vertex v, integer lobe)
 {
 #if BSDF_IS_NULL
     return v.met - v.depth < MOST_NULL_SURFACES;
 #else
-    return v.depth + 1 < scene.settings->max_depth;
+    return vertex_is_free(scene, v, lobe) | (v.steps + 1 < scene.settings->max_depth);
 #endif
 }
 
@@ -230,8 +243,12 @@ inline void vertex_leave(Slab path, uint at, mask next, Vertex v, vec3 d, Spectr
 }
 
 /* The `active` paths are a vertex longer, if it is not a null surface; those that do not go on are no longer alive. */
-inline void vertex_end(Slab path, uint at, mask active, mask next, integer state)
+inline void vertex_end(Scene scene, Slab path, uint at, mask active, mask next, Vertex v, integer lobe, integer state)
 {
+#if BSDF_IS_PANE
+    mask free = next & vertex_is_free(scene, v, lobe);
+    store_path_nulls(path, at, free, load_path_nulls(path, at) + PATH_PANE);
+#endif
     state = sel_i(next, state, state - (state & PATH_ALIVE));
 #if BSDF_IS_NULL
     store_path_nulls(path, at, active, load_path_nulls(path, at) + 1);

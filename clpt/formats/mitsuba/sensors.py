@@ -376,9 +376,9 @@ def _particle_tracer(props: Properties) -> Integrator:
 
 
 def _volume_path(props: Properties) -> Integrator:
-    """The path integrator follows light through media too."""
+    """The path integrator follows light through media too; what is null there is no depth."""
     props.ignore("use_spectral_mis")
-    return _path(props)
+    return integrators.Path(**_depths(props), light_paths=_light_paths(props), free_panes=True)
 
 
 def _aov(props: Properties) -> Integrator:

@@ -187,6 +187,7 @@ MATERIAL: dict[str, Callable[[Features, type[Scatterer]], str | int]] = {
     "BSDF_BETWEEN_BODIES": lambda f, cls: f.bodies and cls.kind in BETWEEN_BODIES,
     "BSDF_COAT_APART": lambda f, cls: _has_lobe(f, cls, "clearcoat_apart"),
     "BSDF_IS_NULL": lambda f, cls: cls.is_null and f.null_surfaces,
+    "BSDF_IS_PANE": lambda f, cls: cls.is_pane and f.null_surfaces,
     "STOCHASTIC_FILTERING": filters_at_random,
     "USES_CHOICE": lambda f, cls: cls.uses_lobe_sample or cls.fluoresces or f.many_lights,
 }

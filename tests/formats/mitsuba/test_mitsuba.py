@@ -216,7 +216,9 @@ def test_integrators(scene):
     made = scene(f'<integrator type="aov">{others}</integrator>')
     assert made.film.layers == () and "dp_du are left out" in made.warnings[0]
     for name in ("volpath", "volpathmis"):
-        assert scene(f'<integrator type="{name}"/>').integrator.kind == "path"
+        made = scene(f'<integrator type="{name}"/>').integrator
+        assert made.kind == "path" and made.free_panes
+    assert not scene('<integrator type="path"/>').integrator.free_panes
 
 
 def test_shapes(scene):
