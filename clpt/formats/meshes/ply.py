@@ -53,7 +53,7 @@ class Triangles:
     """vertices (n, 3), faces (m, 3) int64, normals (n, 3) or None, uvs (n, 2) or None.
 
     columns: further numbers of each "vertex" and "face" by name; a polygon's are those of all its
-    triangles.
+    triangles. polygons: the number of the polygon of each triangle, (m,).
     """
 
     vertices: NDArray[np.float32]
@@ -61,6 +61,7 @@ class Triangles:
     normals: NDArray[np.float32] | None
     uvs: NDArray[np.float32] | None
     columns: dict[str, dict[str, NDArray[Any]]]
+    polygons: NDArray[np.int64]
     warnings: list[str] = field(default_factory=list)
 
 
@@ -296,6 +297,7 @@ def _triangles(tables: dict[str, dict[str, Any]]) -> Triangles:
         normals=None if normals is None else _columns(vertex, normals),
         uvs=None if uvs is None else _columns(vertex, uvs),
         columns={"vertex": further, "face": _per_triangle(face, corners[0])},
+        polygons=np.repeat(np.arange(len(corners[0])), _triangle_counts(corners[0])),
         warnings=["texture coordinates of faces left out"] if "texcoord" in face else [],
     )
 
@@ -307,8 +309,12 @@ def _plain(table: dict[str, Any]) -> dict[str, NDArray[Any]]:
 
 def _per_triangle(face: dict[str, Any], lengths: NDArray[Any]) -> dict[str, NDArray[Any]]:
     """Return the columns of polygons, for each triangle of their fans."""
-    counts = np.maximum(lengths.astype(np.int64) - 2, 0)
+    counts = _triangle_counts(lengths)
     return {name: np.repeat(values, counts) for name, values in _plain(face).items()}
+
+
+def _triangle_counts(lengths: NDArray[Any]) -> NDArray[np.int64]:
+    return np.maximum(lengths.astype(np.int64) - 2, 0)
 
 
 def _columns(table: dict[str, Any], names: Any) -> NDArray[np.float32]:
