@@ -12,8 +12,8 @@
 /* A null surface (a hole of a mask, a boundary that neither bends nor scatters) is no step of a path: it adds nothing
  * to the depth. A path crosses this many of them, and then ends; a shadow ray that meets more is blocked. */
 #define MOST_NULL_SURFACES 1024
-/* What goes straight through a pane of thin glass has met a surface, which counts in PATH_DEPTH. Where Settings.free_panes
- * says that it is no step either, Path.nulls holds the number of these panes in the bits from PATH_PANE on. */
+/* What goes straight through a pane of thin glass has met a surface, which counts in PATH_DEPTH. Where free_panes in
+ * Settings says that it is no step either, Path.nulls holds the number of these panes in the bits from PATH_PANE on. */
 #define PATH_PANE 0x10000
 #if USES_NULL_SURFACES
 #define path_nulls(path, at) (load_path_nulls(path, at) & (PATH_PANE - 1))

@@ -48,15 +48,16 @@ def _one_channel(element: Element, context: Context) -> Volume:
 
 
 def colours(element: Element, context: Context) -> Volume:
-    """Return three numbers up to 1 at each point of a grid, (nx, ny, nz, 3)."""
+    """Return an albedo at each point of a grid, (nx, ny, nz, 3), clamped to 1 with a warning."""
     return _kept("colours", element, context, _colours)
 
 
 def _colours(element: Element, context: Context) -> Volume:
     made = channels(element, context)
     if made.values.max() > 1.0:
-        raise element.error("an albedo cannot exceed 1")
-    return Volume(np.repeat(made.values, 3 // made.values.shape[3], axis=3), made.to_world)
+        context.warn(element, "its albedo exceeds 1 somewhere; it is clamped")
+    values = np.minimum(made.values, np.float32(1.0))
+    return Volume(np.repeat(values, 3 // values.shape[3], axis=3), made.to_world)
 
 
 def channels(element: Element, context: Context) -> Volume:

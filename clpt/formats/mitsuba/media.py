@@ -9,6 +9,7 @@ import numpy as np
 
 from clpt.formats.mitsuba import grids, spectra
 from clpt.formats.mitsuba.fluorescence import dye, fluorescent
+from clpt.formats.mitsuba.limits import within
 from clpt.formats.mitsuba.properties import Context, Properties, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene import media
@@ -63,20 +64,18 @@ def _homogeneous(props: Properties) -> Medium:
         raise density.error('a density on a grid needs a medium of the type "heterogeneous"')
     albedo, weight = grids.grid(props, "albedo"), _weight(props)
     medium = _even(props)
-    given = [volume for volume in (albedo, weight) if volume is not None]
-    room = props.context.rooms.get(id(props.element))
-    if not given or room is None:
-        if given:  # it is made again when the shapes that it fills are known
-            props.context.endless[id(props.element)] = medium
+    if albedo is None and weight is None:
         return medium
-    if albedo is not None:
-        tint = grids.spread(grids.colours(albedo, props.context), room, albedo)
-        even = grids.ones(tint.to_world, tint.values.shape[:3])
-        return _on_grid(medium, {"sigma_t": medium.sigma_t, "density": even}, tint, weight, props)
-    assert weight is not None
-    share = grids.spread(grids.one_channel(weight, props.context), room, weight)
-    even = grids.ones(share.to_world, share.values.shape)
-    return _on_grid(medium, {"sigma_t": medium.sigma_t, "density": even}, None, weight, props)
+    room = props.context.rooms.get(id(props.element))
+    if room is None:  # it is made again when the shapes that it fills are known
+        props.context.endless[id(props.element)] = medium
+        return medium
+    beside = [
+        None if one is None else grids.spread(read(one, props.context), room, one)
+        for one, read in ((albedo, grids.colours), (weight, grids.one_channel))
+    ]
+    box = next(one for one in beside if one is not None).to_world
+    return _on_grid(medium, {"sigma_t": medium.sigma_t, "density": grids.ones(box)}, *beside)
 
 
 def _even(props: Properties) -> Homogeneous:
@@ -85,14 +84,16 @@ def _even(props: Properties) -> Homogeneous:
     blend = _blend_on_grid(props)
     child = props.object("phase")
     found = media.Isotropic() if child is None else blend or phase(child, props.context)
-    return Homogeneous(
-        sigma_t=spectra.coefficient(props, "sigma_t", 1.0),
-        albedo=spectra.reflectance(props, "albedo", 0.75),
-        scale=props.number("scale", 1.0),
-        phase=found,
-        name=props.element.attributes.get("id", ""),
-        **({"emission": spectra.emission(props, "emission")} if "emission" in props.named else {}),
-    )
+    given = {
+        "sigma_t": spectra.coefficient(props, "sigma_t", 1.0),
+        "albedo": spectra.reflectance(props, "albedo", 0.75),
+        "scale": props.number("scale", 1.0),
+        "phase": found,
+        "name": props.element.attributes.get("id", ""),
+    }
+    if "emission" in props.named:
+        given["emission"] = spectra.emission(props, "emission")
+    return Homogeneous(**within(Homogeneous, given, props))
 
 
 def _weight(props: Properties) -> Element | None:
@@ -124,12 +125,10 @@ def _on_grid(
     medium: Homogeneous,
     given: dict[str, Any],
     tint: Volume | None,
-    weight: Element | None,
-    props: Properties,
+    share: Volume | None,
     **more: Any,
 ) -> Medium:
     """A medium whose density is on a grid, and perhaps its albedo, or the share of its phases."""
-    share = None if weight is None else grids.one_channel(weight, props.context)
     beside = [one for one in (tint, share) if one is not None]
     made = dict(given)
     colours = made.get("colour_grid")
@@ -205,6 +204,7 @@ def _heterogeneous(props: Properties) -> Medium:
     sigma_t, weight = grids.grid(props, "sigma_t"), _weight(props)
     albedo = grids.grid(props, "albedo")
     tint = None if albedo is None else grids.colours(albedo, context)
+    share = None if weight is None else grids.one_channel(weight, context)
     lit = next((one for one in more.values() if isinstance(one, Volume)), None)
     if sigma_t is not None:
         factor, density, colours = grids.density(sigma_t, context)
@@ -218,7 +218,7 @@ def _heterogeneous(props: Properties) -> Medium:
         "density": density,
         "colour_grid": colours,
     }
-    return _on_grid(medium, given, tint, weight, props, **more)
+    return _on_grid(medium, given, tint, share, **more)
 
 
 def _soot(props: Properties) -> media.Soot:

@@ -217,7 +217,10 @@ def test_integrators(scene):
     assert made.film.layers == () and "dp_du are left out" in made.warnings[0]
     for name in ("volpath", "volpathmis"):
         made = scene(f'<integrator type="{name}"/>').integrator
-        assert made.kind == "path" and made.free_panes
+        assert made.kind == "path" and made.free_panes and made.max_depth == -1
+    made = scene('<integrator type="prbvolpath"/>').integrator
+    assert made.free_panes and made.max_depth == 6
+    assert not scene('<integrator type="prb"/>').integrator.free_panes
     assert not scene('<integrator type="path"/>').integrator.free_panes
 
 

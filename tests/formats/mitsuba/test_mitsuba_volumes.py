@@ -138,6 +138,21 @@ def test_an_albedo_goes_on_beyond_its_box(medium):
     np.testing.assert_allclose(made.to_world @ [1, 1, 1, 1], [1, 1, 1, 1], atol=1e-6)
 
 
+def test_what_is_beyond_its_limits_is_clamped_with_a_warning(written, tmp_path):
+    for inner in (
+        '<float name="albedo" value="1.5"/>',
+        '<float name="scale" value="-1"/>',
+        grid("albedo", "bright.vol"),
+    ):
+        write_grid(tmp_path / "bright.vol", 2.0 * NUMBERS)
+        scene = clpt.load(written("homogeneous", inner))
+        assert "clamped" in scene.warnings[0]
+        made = scene.shapes[0].interior
+        assert made.scale >= 0.0
+        if "grid" in inner:
+            assert made.albedo_grid.max() == 1.0
+
+
 def test_a_blend_on_a_grid_is_a_mixture(medium):
     made = medium("homogeneous", blend(grid("weight", "a.vol")))
     assert isinstance(made, media.Mixture)
