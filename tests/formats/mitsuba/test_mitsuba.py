@@ -601,8 +601,8 @@ ERRORS = {
     '<shape type="cube"><medium type="homogeneous" name="inside"/></shape>': "cannot stand in",
     '<phase type="hg" id="m"/><shape type="cube"><ref name="interior" id="m"/></shape>':
         "<ref name=.interior.>: .*must be a <medium>",
-    '<shape type="cube"><medium type="homogeneous" name="interior"><float name="albedo" value="2"/>'
-    '</medium></shape>': "<medium type=.homogeneous.>: homogeneous.albedo: 2",
+    '<shape type="cube"><medium type="homogeneous" name="interior"><texture name="sigma_t"'
+    ' type="checkerboard"/></medium></shape>': "<medium type=.homogeneous.>: 'sigma_t' cannot be",
     '<shape type="cube"><medium type="homogeneous" name="interior"><phase type="hg">'
     '<float name="g" value="1.5"/></phase></medium></shape>': "<phase type=.hg.>: .*outside",
     '<phase type="sggx" id="p"/><shape type="cube"><medium type="homogeneous" name="interior">'
