@@ -30,10 +30,7 @@ PATH = Record(
         "real",
         "distance from the point where d was chosen to o, through null surfaces [m]",
     ),
-    nulls=(
-        "integer",
-        "null surfaces that the path has crossed, and free panes: kernels/path/path_state.cl",
-    ),
+    nulls=("integer", "null surfaces that the path has crossed"),
     ratio=("spectrum", "density of the path at each wavelength, over the mean of the four"),
     eta=("real", "product of the relative indices so far, for Russian roulette"),
     weight=("real", "sample's weight by the pixel filter; from a light, 1 over its first beta"),
@@ -117,7 +114,6 @@ SETTINGS = Record(
     max_depth=("integer", "most surfaces of a path, that of the light counted"),
     rr_depth=("integer", "depth from which Russian roulette is played"),
     hide_lights=("integer", "1: the camera does not see lights"),
-    free_panes=("integer", "1: what goes straight through thin glass is no step of a path"),
     alpha=("integer", "1: the film has a channel of what is covered; the camera sees no sky"),
     light_paths=(
         "real",

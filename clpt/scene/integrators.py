@@ -61,7 +61,7 @@ class Path(Integrator):
         form="number_or_auto",
     )
     free_panes: bool = flag(
-        False, "what goes straight through thin glass adds nothing to depths, as a null surface"
+        False, "thin glass is as a null surface where light goes straight through it: no depth"
     )
     guiding: bool = host(
         False, "directions are learned from light paths before the first sample; without others"

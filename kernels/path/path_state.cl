@@ -9,18 +9,13 @@
 #define PATH_SEEN 0x10000000 /* layers for denoisers have the path, see path/layers.cl */
 #define PATH_GHOST 0x20000000 /* of a lens's samples, of light that two of its surfaces have reflected */
 
-/* A null surface (a hole of a mask, a boundary that neither bends nor scatters) is no step of a path: it adds nothing
- * to the depth. A path crosses this many of them, and then ends; a shadow ray that meets more is blocked. */
+/* A null surface (a hole of a mask, a boundary that neither bends nor scatters, with FREE_PANES thin glass where light
+ * goes straight through it) is no step of a path: it adds nothing to the depth. A path crosses this many of them, and then ends; a shadow ray that meets more is blocked. */
 #define MOST_NULL_SURFACES 1024
-/* What goes straight through a pane of thin glass has met a surface, which counts in PATH_DEPTH. Where free_panes in
- * Settings says that it is no step either, Path.nulls holds the number of these panes in the bits from PATH_PANE on. */
-#define PATH_PANE 0x10000
 #if USES_NULL_SURFACES
-#define path_nulls(path, at) (load_path_nulls(path, at) & (PATH_PANE - 1))
-#define path_panes(path, at) (load_path_nulls(path, at) >> 16)
+#define path_nulls(path, at) load_path_nulls(path, at)
 #else
 #define path_nulls(path, at) ((integer)(0))
-#define path_panes(path, at) ((integer)(0))
 #endif
 
 /* Dimensions of a sample, in pairs: film, lens, wavelength and time, then DIMENSIONS_A_VERTEX per surface that is met,

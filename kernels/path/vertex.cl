@@ -9,7 +9,6 @@ typedef struct {
     Spectrum beta;        /* throughput, here */
     integer state, depth; /* see path/path_state.cl */
     integer met;          /* surfaces so far, with the null ones, which are no depth */
-    integer steps;        /* and without panes that are free, which `depth` counts: the limits hold for these */
     Surface s;
     mask front;           /* the front was hit */
     integer row;          /* of the material */
@@ -59,7 +58,6 @@ inline Vertex vertex_load(Scene scene, Slab path, Slab hit, uint at, mask active
     v.state = load_path_state(path, at);
     v.depth = v.state & PATH_DEPTH;
     v.met = v.depth + path_nulls(path, at);
-    v.steps = v.depth - path_panes(path, at);
 #if BSDF_IS_PHASE
     v.s = surface_of_point(madd3(v.d, v.t, v.o));
     v.front = mask_of(1);
@@ -201,34 +199,39 @@ inline Spectrum vertex_beyond(Scene scene, Vertex v, vec3 w, real t, Wavelengths
     return value;
 }
 
-/* Whether a path that leaves by such a lobe passes a pane that is no step of it. */
-inline mask vertex_is_free(Scene scene, Vertex v, integer lobe)
+/* Whether what leaves by such a lobe has met a null surface. */
+inline mask vertex_is_null(integer lobe)
 {
-#if BSDF_IS_PANE
-    mask room = (v.depth - v.steps < MOST_NULL_SURFACES) & (v.depth + 1 < PATH_DEPTH);
-    return ((lobe & LOBE_NULL) != 0) & room & mask_of(scene.settings->free_panes != 0);
+#if BSDF_IS_NULL
+    return mask_of(1);
+#elif BSDF_IS_PANE
+    return (lobe & LOBE_NULL) != 0;
 #else
     return mask_of(0);
 #endif
 }
 
-/* Whether paths may be longer than to this vertex, where they leave it by such a lobe. */
-inline mask vertex_continues(Scene scene, Vertex v, integer lobe)
+/* Whether paths may be longer than to this vertex; null: those that it does not count for. */
+inline mask vertex_continues(Scene scene, Vertex v, mask null)
 {
 #if BSDF_IS_NULL
     return v.met - v.depth < MOST_NULL_SURFACES;
 #else
-    return vertex_is_free(scene, v, lobe) | (v.steps + 1 < scene.settings->max_depth);
+    mask more = v.depth + 1 < scene.settings->max_depth;
+#if BSDF_IS_PANE
+    more = sel_i(null, v.met - v.depth < MOST_NULL_SURFACES, more);
+#endif
+    return more;
 #endif
 }
 
-/* The `next` paths go on from here, along d. */
-inline void vertex_leave(Slab path, uint at, mask next, Vertex v, vec3 d, Spectrum beta)
+/* The `next` paths go on from here, along d; null: for which nothing has happened, as the surface is none. */
+inline void vertex_leave(Slab path, uint at, mask next, mask null, Vertex v, vec3 d, Spectrum beta)
 {
-#if BSDF_IS_NULL /* nothing has happened: the camera's ray has its end, and lights are weighed by what was before */
+#if BSDF_IS_NULL || BSDF_IS_PANE /* the camera's ray has its end, and lights are weighed by what was before */
     real pdf = load_path_pdf(path, at), onward = v.t + surface_lead(v.s, d);
-    store_path_pdf(path, at, next & (v.depth == 0), pdf + onward);
-    store_path_null_distance(path, at, next, load_path_null_distance(path, at) + onward);
+    store_path_pdf(path, at, next & null & (v.depth == 0), pdf + onward);
+    store_path_null_distance(path, at, next & null, load_path_null_distance(path, at) + onward);
 #endif
     store_path_o(path, at, next, surface_offset(v.s, d));
     store_path_d(path, at, next, d);
@@ -243,17 +246,15 @@ inline void vertex_leave(Slab path, uint at, mask next, Vertex v, vec3 d, Spectr
 }
 
 /* The `active` paths are a vertex longer, if it is not a null surface; those that do not go on are no longer alive. */
-inline void vertex_end(Scene scene, Slab path, uint at, mask active, mask next, Vertex v, integer lobe, integer state)
+inline void vertex_end(Slab path, uint at, mask active, mask next, mask null, integer state)
 {
-#if BSDF_IS_PANE
-    mask free = next & vertex_is_free(scene, v, lobe);
-    store_path_nulls(path, at, free, load_path_nulls(path, at) + PATH_PANE);
-#endif
     state = sel_i(next, state, state - (state & PATH_ALIVE));
+#if BSDF_IS_NULL || BSDF_IS_PANE
+    store_path_nulls(path, at, active & null, load_path_nulls(path, at) + 1);
+#endif
 #if BSDF_IS_NULL
-    store_path_nulls(path, at, active, load_path_nulls(path, at) + 1);
     store_path_state(path, at, active, state);
 #else
-    store_path_state(path, at, active, state + 1);
+    store_path_state(path, at, active, sel_i(null, state, state + 1));
 #endif
 }

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
@@ -14,7 +16,14 @@ from clpt.scene.integrators import Path
 from clpt.scene.lights import Constant, Point
 from clpt.scene.shapes import Rectangle
 from tests.renders.builders import ALBEDO, facing_down
-from tests.renders.support import assert_mean, exposures, mitsubas, with_film, with_path
+from tests.renders.support import (
+    assert_agree,
+    assert_mean,
+    exposures,
+    mitsubas,
+    with_film,
+    with_path,
+)
 
 PANE = m.ThinDielectric(int_ior=1.5, ext_ior=1.0)
 FRESNEL = (0.5 / 2.5) ** 2
@@ -60,27 +69,63 @@ def test_no_pane_is_free_by_itself() -> None:
     assert not Path().free_panes
 
 
-def test_a_point_light_above_a_pane() -> None:
-    """Light paths alone find it, as short ones as without the pane."""
-    scene = Scene(
-        camera=Perspective(to_world=tf.look_at([0, 0, 0.5], [0, 0, 0], [0, 1, 0]), fov=20.0),
+def passed(cosine: np.ndarray) -> np.ndarray:
+    """What a pane lets through, by Fresnel's equations in both polarisations."""
+    behind = np.sqrt(1.0 - (1.0 - cosine**2) / 1.5**2)
+    across = ((cosine - 1.5 * behind) / (cosine + 1.5 * behind)) ** 2
+    along = ((1.5 * cosine - behind) / (1.5 * cosine + behind)) ** 2
+    return 1.0 - across / (1.0 + across) - along / (1.0 + along)
+
+
+def grounded(light_paths: float, tint: Sequence[float], opacity: float, **lights: float) -> Scene:
+    """The ground under a pane of which a part is cut out; `sky`, `lamp`: how bright both are.
+
+    One set of programs serves all that have light paths, and one all others.
+    """
+    sky, lamp = (float(lights.get(name, 0.0)) for name in ("sky", "lamp"))
+    stained = m.ThinDielectric(int_ior=1.5, ext_ior=1.0, specular_transmittance=tuple(tint))
+    place = tf.translate([0, 0, 0.2]) @ tf.scale(4000.0)
+    return Scene(
+        camera=Perspective(to_world=tf.look_at([0, 0, 0.1], [0, 0, 0], [0, 1, 0]), fov=20.0),
         shapes=[
-            Rectangle(material=m.Diffuse(reflectance=ALBEDO), to_world=tf.scale(0.1)),
-            Rectangle(material=PANE, to_world=tf.translate([0, 0, 1.0]) @ tf.scale(0.1)),
+            Rectangle(material=m.Diffuse(reflectance=ALBEDO), to_world=tf.scale(40.0)),
+            Rectangle(material=m.Mask(material=stained, opacity=opacity), to_world=place),
         ],
-        lights=[Point(position=(0.0, 0.0, 2.0), intensity=(4.0, 4.0, 4.0))],
-        integrator=Path(max_depth=2, free_panes=True, light_paths=1),
+        lights=[
+            Constant(radiance=(sky, sky, sky)),
+            Point(position=(0.0, 0.0, 2.0), intensity=(lamp, lamp, lamp)),
+        ],
+        integrator=Path(max_depth=2, free_panes=True, light_paths=light_paths),
         film=Film(width=4, height=4, mode="rgb"),
     )
-    images = exposures(scene, 16, 1024)
-    places = (np.arange(64) - 31.5) / 32.0 * 0.5 * np.tan(np.radians(10.0))
-    r2 = places[:, None] ** 2 + places[None] ** 2 + 4.0
-    lit = float((ALBEDO / np.pi * 4.0 / r2 * 2.0 / np.sqrt(r2)).mean())
-    assert_mean(images, [lit * (1.0 - REFLECTED)] * 3, 0.03, 2e-3)
+
+
+@pytest.mark.parametrize("light_paths", [0, 1])
+def test_a_point_light_through_coloured_panes(light_paths: float) -> None:
+    """Shadow rays find it, and light paths that are joined to the camera; never both."""
+    tint = np.array([0.5, 0.8, 0.2])
+    images = exposures(grounded(light_paths, tint, 0.5, lamp=4.0), 16, 256)
+    through = 0.5 + 0.5 * tint * (1.0 - REFLECTED)
+    assert_mean(images, ALBEDO / np.pi * through, 0.02, 2e-3)
+
+
+@pytest.mark.parametrize("light_paths", [0, 1])
+def test_even_light_through_a_pane(light_paths: float) -> None:
+    """Both, or all three, ways to find it together as one alone would."""
+    images = exposures(grounded(light_paths, (1.0, 1.0, 1.0), 1.0, sky=1.0), 16, 256)
+    cosine = (np.arange(100_000) + 0.5) / 100_000
+    through = float((2.0 * cosine * passed(cosine)).mean())
+    assert_mean(images, [ALBEDO * through] * 3, 0.02, 2e-3)
+
+
+def test_lights_behind_panes_are_hidden_as_behind_holes() -> None:
+    hidden = stack(Path(max_depth=1, free_panes=True, light_paths=0, hide_lights=True))
+    assert not exposures(hidden, 1, 16).any()
 
 
 VOLPATH = """<scene version="3.0.0">
 <integrator type="volpath"><integer name="max_depth" value="DEPTH"/></integrator>
+<emitter type="point"><point name="position" value="0.3, 0.2, 2"/></emitter>
 <sensor type="orthographic"><transform name="to_world"><scale value="0.2"/>
 <lookat origin="0,0,5" target="0,0,0" up="0,1,0"/></transform>
 <film type="hdrfilm"><integer name="width" value="4"/><integer name="height" value="4"/>
@@ -96,6 +141,25 @@ VOLPATH = """<scene version="3.0.0">
 <bsdf type="mask"><float name="opacity" value="0.5"/><bsdf type="thindielectric">
 <rgb name="specular_transmittance" value="0.5, 0.8, 0.2"/></bsdf></bsdf></shape>
 </scene>"""
+
+
+FOG = """<shape type="cube"><transform name="to_world"><scale value="0.1"/>
+<translate z="0.2"/></transform><bsdf type="thindielectric"/>
+<medium name="interior" type="homogeneous"><rgb name="sigma_t" value=".9, .6, .3"/>
+<float name="scale" value="10"/></medium></shape>
+</scene>"""
+
+
+@pytest.mark.slow
+@pytest.mark.peers
+@pytest.mark.parametrize("depth", [2, 3, 8])
+def test_fog_behind_panes_is_mitsubas(tmp_path, depth: int) -> None:
+    """What fills a box of thin glass under the panes is lit through them and through its sides."""
+    path = tmp_path / "scene.xml"
+    path.write_text(VOLPATH.replace("DEPTH", str(depth)).replace("</scene>", FOG))
+    scene = with_path(with_film(clpt.load(path), mode="rgb"), light_paths=0)
+    theirs = mitsubas(path, 16, 512)
+    assert_agree(exposures(scene, 16, 1024), theirs, "fog", 0.01)
 
 
 @pytest.mark.peers

@@ -72,7 +72,8 @@ def features_of(
         tangents=tangents,
         mixtures=materials.mixture_depth,
         normal_mapped=index.normal_mapped,
-        null_surfaces=_passes_on(index),
+        null_surfaces=index.free_panes or any(cls.is_null for cls in index.leaves),
+        free_panes=index.free_panes,
         infinite=lights.infinite > 0,
         light_paths=index.light_paths,
         weighed=index.weighed > 0,
@@ -116,12 +117,6 @@ def features_of(
         spectra_step=encoder.spectra.step,
         sources=sources,
     )
-
-
-def _passes_on(index: SceneIndex) -> bool:
-    """Whether some surface lets light through that is no step of its path."""
-    free = getattr(index.scene.integrator, "free_panes", False)
-    return any(cls.is_null or (free and cls.is_pane) for cls in index.leaves)
 
 
 def _few(index: SceneIndex, geometry: Geometry) -> int:

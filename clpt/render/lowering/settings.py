@@ -56,7 +56,6 @@ def settings_of(
     settings["max_depth"] = DEEPEST if depth < 0 else min(depth, DEEPEST)
     settings["rr_depth"] = min(getattr(integrator, "rr_depth", DEEPEST), DEEPEST)
     settings["hide_lights"] = getattr(integrator, "hide_lights", False)
-    settings["free_panes"] = getattr(integrator, "free_panes", False)
     settings["alpha"] = index.alpha
     settings["light_paths"] = index.weighed
     if index.merged:
