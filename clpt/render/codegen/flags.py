@@ -98,6 +98,7 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "MOTION_SCALES": lambda f: f.motion_scales,
     "MOTION_ROW": lambda f: bool(f.moving) and f.motion_row,
     "USES_NULL_SURFACES": lambda f: f.null_surfaces,
+    "FREE_PANES": lambda f: f.free_panes,
     "USES_ABSORPTION": lambda f: f.absorption or f.media,
     "USES_MEDIA": lambda f: f.media,
     "MEDIA_EMIT": lambda f: f.emissive_media,
@@ -187,6 +188,7 @@ MATERIAL: dict[str, Callable[[Features, type[Scatterer]], str | int]] = {
     "BSDF_BETWEEN_BODIES": lambda f, cls: f.bodies and cls.kind in BETWEEN_BODIES,
     "BSDF_COAT_APART": lambda f, cls: _has_lobe(f, cls, "clearcoat_apart"),
     "BSDF_IS_NULL": lambda f, cls: cls.is_null and f.null_surfaces,
+    "BSDF_IS_PANE": lambda f, cls: cls.is_pane and f.free_panes,
     "STOCHASTIC_FILTERING": filters_at_random,
     "USES_CHOICE": lambda f, cls: cls.uses_lobe_sample or cls.fluoresces or f.many_lights,
 }
