@@ -16,11 +16,12 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
-import OpenEXR
 from numpy.typing import NDArray
 
 from clpt import images
 from clpt.errors import SceneError
+from clpt.images import exr, exr_files
+from clpt.images.failures import reading
 from clpt.spectra import Tabulated, cie
 from clpt.spectra.spectrum import d65
 
@@ -113,11 +114,10 @@ def is_spectral(path: str | Path) -> bool:
     if Path(path).suffix.lower() != ".exr" or not Path(path).is_file():
         return False
     try:
-        with OpenEXR.File(images.exr_name(path), header_only=True) as file:
-            names = [channel.name for channel in file.header()["channels"]]
+        names = exr_files.channel_names(images.attributes(Path(path)))
     except Exception:  # whoever reads it tells what is wrong
         return False
-    return any(_CHANNEL.fullmatch(name) or _RERADIATION.fullmatch(name) for name in names)
+    return any(map(_is_spectral, names))
 
 
 def read(path: str | Path, *, emissive: bool | None = None) -> SpectralImage:
@@ -203,19 +203,18 @@ def _fail(path: Path | None, message: str) -> NoReturn:
 
 
 def _contents(path: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-    """Attributes and channels of an EXR file. Raises SceneError."""
+    """Attributes and channels of an EXR file, in its display window. Raises SceneError."""
     if not path.is_file():
         _fail(path, "no such image file")
-    try:
-        images.check_exr(path)
-        with OpenEXR.File(images.exr_name(path), separate_channels=True) as file:
-            header = dict(file.header())  # a copy: closing the file empties it
-            return header, {name: channel.pixels for name, channel in file.channels().items()}
-    except SceneError:
-        raise
-    except Exception as error:  # the library raises its own, from RuntimeError to MemoryError
-        message = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise SceneError(f"not a readable image: {message}", file=path) from error
+    with reading(path):
+        header = images.attributes(path)
+        names = [n for n in exr_files.channel_names(header) if _is_spectral(n)]
+        found = exr_files.read_channels(path, names)
+        return header, {name: exr.placed(found[name], header) for name in names}
+
+
+def _is_spectral(name: str) -> bool:
+    return bool(_CHANNEL.fullmatch(name) or _RERADIATION.fullmatch(name))
 
 
 def _parts(path: Path, names: Iterable[str]) -> dict[str, list[tuple[float, str]]]:
@@ -233,8 +232,7 @@ def _parts(path: Path, names: Iterable[str]) -> dict[str, list[tuple[float, str]
 
 def layer_names(path: str | Path) -> tuple[str, ...]:
     """Return the channels that a spectral EXR file has beside its bands and its preview."""
-    with OpenEXR.File(images.exr_name(path), header_only=True) as file:
-        names = [channel.name for channel in file.header()["channels"]]
+    names = exr_files.channel_names(images.attributes(Path(path)))
     return tuple(n for n in names if not _CHANNEL.fullmatch(n) and n not in ("R", "G", "B", "A"))
 
 

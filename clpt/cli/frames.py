@@ -305,7 +305,7 @@ def _fingerprint_of(path: Path) -> str | None:
     try:
         if path.suffix.lower() not in KEPT or not path.is_file():
             return None
-        images.read(path)  # all of it: a file may be cut off
+        images.read_stored(path)  # all of it: a file may be cut off
         found = read(path).get("fingerprint")
     except (SceneError, OSError, RuntimeError, ValueError, SyntaxError):
         return None

@@ -134,6 +134,10 @@ def _read(path: Path) -> ImageContents:
         count = values.shape[2]
         labels = tuple(LETTERS.get(count, ())) or tuple(str(i) for i in range(count))
     colours = values[..., :3] if labels[:3] == tuple("RGB") else None
+    if colours is not None and path.suffix.lower() == ".exr":
+        with contextlib.suppress(SceneError):  # chromaticities that span no colours
+            matrix = images.matrix_of(images.attributes(path))
+            colours = colours if matrix is None else colours @ matrix.T.astype(np.float32)
     if labels[0] == "Y":
         colours = np.repeat(values[..., :1], 3, axis=2)
     facts = {"size": size_text(values), "channels": ", ".join(labels), **more}

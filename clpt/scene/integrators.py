@@ -60,6 +60,9 @@ class Path(Integrator):
         "paths from lights for each sample, weighed against it; 0: none; auto: as suits the scene",
         form="number_or_auto",
     )
+    free_panes: bool = flag(
+        False, "thin glass is as a null surface where light goes straight through it: no depth"
+    )
     guiding: bool = host(
         False, "directions are learned from light paths before the first sample; without others"
     )

@@ -136,6 +136,7 @@ class ThinDielectric(Material):
 
     delta = True
     uses_lobe_sample = True
+    is_pane = True
 
     int_ior: IndexLike = index(1.5046, "index of the slab")
     ext_ior: IndexLike = index(1.000277, "index around it")

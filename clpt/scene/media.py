@@ -555,6 +555,9 @@ class Grid(Lattice, Homogeneous):
         None, "colours (nx, ny, nz, 3) that multiply what is scattered; the rest is absorbed",
         form="colour_volume",
     )  # fmt: skip
+    albedo_with_density: bool = host(
+        False, "whether what is scattered, density times `albedo_grid`, is trilinear; else each is"
+    )
     colour_grid: Any = host(
         None, "colours (nx, ny, nz, 3) up to 1 that multiply the extinction",
         form="colour_volume",

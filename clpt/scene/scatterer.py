@@ -23,6 +23,7 @@ class Scatterer(Kind):
     refracts: ClassVar[bool] = False  # they do so where a parameter of the role index does
     fluoresces: ClassVar[bool] = False  # light may leave at another wavelength: it has `shift`
     is_null: ClassVar[bool] = False  # light goes on as if nothing were there, to lights as well
+    is_pane: ClassVar[bool] = False  # what it lets through goes straight on: `free_panes`
     no_back: ClassVar[bool] = False  # its back is not there
     absorbs: ClassVar[bool] = False  # all light, where its albedo is 0: none is sought there
     guided: ClassVar[bool] = False  # light goes to all of a hemisphere: its directions are learned

@@ -48,12 +48,17 @@ def check_volume(values: Any, where: str, colours: bool = False) -> None:
 
 
 def resampled(
-    values: NDArray[Any], to_world: Matrix4, shape: tuple[int, ...], onto: Matrix4
+    values: NDArray[Any],
+    to_world: Matrix4,
+    shape: tuple[int, ...],
+    onto: Matrix4,
+    *,
+    hold: bool = False,
 ) -> NDArray[np.float32]:
     """Return the numbers of a grid at the points of another: (*shape, ...) float32.
 
     values: (nx, ny, nz, ...) in the box of `to_world`, trilinear between the centres of cells;
-    shape, onto: of the other grid. Beyond the box there is 0.
+    shape, onto: of the other grid. Beyond the box there is 0, or, to hold, what is at its ends.
     """
     size = np.array(values.shape[:3])
     axes = [(np.arange(n) + 0.5) / n for n in shape]
@@ -62,7 +67,7 @@ def resampled(
     y, z = (axis.ravel() for axis in np.meshgrid(axes[1], axes[2], indexing="ij"))
     for i, x in enumerate(axes[0]):  # a slice at a time: grids may be large
         unit = np.stack([np.full_like(y, x), y, z], axis=1) @ matrix[:3, :3].T + matrix[:3, 3]
-        inside = ((unit >= -1e-9) & (unit <= 1.0 + 1e-9)).all(axis=1)
+        inside = ((unit >= -1e-9) & (unit <= 1.0 + 1e-9)).all(axis=1) | hold
         at = np.clip(unit * size - 0.5, 0.0, size - 1.0)
         low = np.minimum(at.astype(int), np.maximum(size - 2, 0))
         share = at - low

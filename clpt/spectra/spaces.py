@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt.errors import UnknownKindError
+from clpt.errors import SceneError, UnknownKindError
 from clpt.spectra import cie
 from clpt.spectra.emission import Blackbody
 
@@ -86,6 +86,43 @@ def chromaticities(space: str) -> tuple[float, ...]:
     x, y, z = white(space)
     pairs = (*PRIMARIES[space], (x / (x + y + z), y / (x + y + z)))
     return tuple(float(value) for pair in pairs for value in pair)
+
+
+def to_rec709(stated: ArrayLike) -> Matrix | None:
+    """The matrix (3, 3) from colours of stated chromaticities to Rec. 709, None for those of it.
+
+    stated: as of `chromaticities`, of any primaries and white, which is adapted by Bradford's
+    transform; XYZ stays as it is. Raises SceneError where they span no colours.
+    """
+    if _is_near(stated, "rec709"):
+        return None
+    matrix, whole = stated_to_xyz(stated)
+    return cie.XYZ_TO_REC709 @ bradford(whole, cie.D65_WHITE) @ matrix
+
+
+def stated_to_xyz(stated: ArrayLike) -> tuple[Matrix, Matrix]:
+    """The matrix (3, 3) from colours of stated chromaticities to XYZ, and XYZ (3,) of their white.
+
+    Raises SceneError where they span no colours.
+    """
+    for space in SPACES:
+        if _is_near(stated, space):
+            return to_xyz(space), white(space)
+    given = np.asarray(stated, np.float64).reshape(-1)
+    if given.shape != (8,) or not np.isfinite(given).all() or given[7] <= 0.0:
+        raise SceneError(f"the chromaticities {given.tolist()} span no colours")
+    xy, whole = given[:6].reshape(3, 2).T, xyz_of(given[6:])
+    primaries = np.vstack([xy, 1.0 - xy.sum(axis=0)])
+    if abs(np.linalg.det(primaries)) < 1e-6:
+        raise SceneError(f"the chromaticities {given.tolist()} span no colours")
+    return primaries * np.linalg.solve(primaries, whole), whole
+
+
+def _is_near(stated: ArrayLike, space: str) -> bool:
+    """Whether stated chromaticities are those of a space, to four digits."""
+    given = np.asarray(stated, np.float64).reshape(-1)
+    known = chromaticities(space)
+    return given.shape == (8,) and np.allclose(given, known, rtol=0.0, atol=1e-4)
 
 
 def xyz_of(xy: ArrayLike) -> Matrix:

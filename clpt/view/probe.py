@@ -80,8 +80,8 @@ def plain(integrator: Any) -> tuple[Any, str]:
     """Return an integrator that renders one pixel well, and what to say if it is another."""
     if isinstance(integrator, (Direct, Whitted)):
         return integrator, ""
-    shared = {name: getattr(integrator, name) for name in ("max_depth", "rr_depth", "hide_lights")
-              if hasattr(integrator, name)}  # fmt: skip
+    names = ("max_depth", "rr_depth", "hide_lights", "free_panes")
+    shared = {name: getattr(integrator, name) for name in names if hasattr(integrator, name)}
     alone = isinstance(integrator, Path) and integrator.light_paths == 0
     return Path(**shared, light_paths=0), "" if alone else "by paths from the camera alone"
 

@@ -163,8 +163,4 @@ class Widget(anywidget.AnyWidget):
 
 
 def _as_png(jpeg: bytes) -> bytes:
-    from io import BytesIO
-
-    from PIL import Image
-
-    return images.png(np.asarray(Image.open(BytesIO(jpeg)).convert("RGB")))
+    return images.png(images.decoded(jpeg, ("JPEG",)).values)

@@ -64,7 +64,7 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
     /* The next direction. */
     vec2 uv = sampler_pair(sampler, scatter.dimension + DIMENSION_BSDF);
     BsdfSample bs = hero_sample(m, wo, v3(uv.x, uv.y, scatter.choice.y), &ratio);
-    mask next = active & (bs.pdf > 0.0f) & vertex_continues(scene, v);
+    mask null = vertex_is_null(bs.lobe), next = active & (bs.pdf > 0.0f) & vertex_continues(scene, v, null);
     vec3 onward = normalize3(to_world(frame, bs.wi));
     real leaves = VERTEX_COSINE(s.n, onward) * arrives;
 #if BSDF_IS_PHASE
@@ -81,7 +81,7 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
     beta = spectrum_scale(spectrum_mul(beta, carried), shading_frame_share(scatter.shading, neg3(v.d)));
 
 #if !BSDF_IS_NULL /* Russian roulette, on what is left of what the light gave. */
-    mask play = depth >= settings->rr_depth;
+    mask play = !null & (depth >= settings->rr_depth);
     real strength = spectrum_max(beta) * load_path_weight(path, at);
     next = next & (strength > 0.0f);
     if (any(next & play)) {
@@ -94,15 +94,18 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
     next = next & !rival_ends(scene, v);
     mask delta = (bs.lobe & LOBE_DELTA) != 0;
     real p = rival_pdf(m, wo, bs.wi), p_back = rival_pdf(m, bs.wi, wo);
-    store_path_rival(path, at, next, rival_to_camera(rival, s, onward, delta, p, p_back));
+    store_path_rival(path, at, next & !null, rival_to_camera(rival, s, onward, delta, p, p_back));
 #if MERGES
-    store_path_pending(path, at, next, rival_merged(rival, s, onward, delta, p, p_back));
-    state = state | sel_i(rival_sharp(delta, p, p_back), (integer)(PATH_SHARP), (integer)(0));
+    store_path_pending(path, at, next & !null, rival_merged(rival, s, onward, delta, p, p_back));
+    state = state | sel_i(!null & rival_sharp(delta, p, p_back), (integer)(PATH_SHARP), (integer)(0));
 #endif
 #endif
-    vertex_leave(path, at, next, v, onward, beta);
+#if BSDF_IS_PANE
+    path_scattered(path, at, next & !null);
+#endif
+    vertex_leave(path, at, next, null, v, onward, beta);
     hero_keep(path, at, next, ratio);
-    vertex_end(path, at, active, next, state);
+    vertex_end(path, at, active, next, null, state);
 }
 
 #if !SHADES_BOTH

@@ -51,14 +51,17 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
 #endif
     }
 #endif
-    mask met = active & !hidden, next = met & vertex_continues(scene, v);
+    mask met = active & !hidden, next = met;
+#if !BSDF_IS_PANE /* of which the lobe tells */
+    next = next & vertex_continues(scene, v, vertex_is_null((integer)(0)));
+#endif
 
     Sampler sampler = pixel_sampler(settings, load_path_pixel_key(path, at), load_path_sample(path, at));
     Scattering scatter = vertex_scattering(scene, path, at, met, v, sampler);
     Bsdf m = scatter.bsdf;
     Frame frame = scatter.shading.frame;
     vec3 wo = scatter.wo;
-#if USES_LAYERS && !BSDF_IS_NULL
+#if USES_LAYERS && !BSDF_IS_NULL && !BSDF_IS_PANE
     state = layers_record(scene, path, at, LAYER_PASSED, met, v, scatter, state);
 #endif
 #if BSDF_ABSORBS /* as the surfaces of lights mostly do */
@@ -142,13 +145,20 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
 #endif
 #endif
 #endif
+    mask null = vertex_is_null(bs.lobe);
     next = next & (bs.pdf > 0.0f);
+#if BSDF_IS_PANE
+    next = next & vertex_continues(scene, v, null);
+#if USES_LAYERS
+    state = layers_record(scene, path, at, LAYER_PASSED, met & !null, v, scatter, state);
+#endif
+#endif
     vec3 onward = normalize3(to_world(frame, bs.wi));
     beta = spectrum_scale(spectrum_mul(beta, bs.weight), shading_frame_share(scatter.shading, onward));
     real eta = load_path_eta(path, at) * bs.eta;
 
 #if !BSDF_IS_NULL /* Russian roulette. */
-    mask play = depth + 1 >= settings->rr_depth;
+    mask play = !null & (depth + 1 >= settings->rr_depth);
     real strength = spectrum_max(beta);
     next = next & (strength > 0.0f);
 #if BSDF_GUIDED
@@ -162,12 +172,13 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     }
 #endif
 
-    vertex_leave(path, at, next, v, onward, beta);
+    vertex_leave(path, at, next, null, v, onward, beta);
 #if USES_MIPS
     store_path_cone(path, at, next, cone_scattered(v.cone, bs.pdf, (bs.lobe & LOBE_DELTA) != 0));
 #endif
 #if !BSDF_IS_NULL
-    path_scattered(path, at, next);
+    mask scatters = next & !null;
+    path_scattered(path, at, scatters);
     mask delta = (bs.lobe & LOBE_DELTA) != 0;
 #if USES_LIGHTS && BSDF_IS_PHASE && SEALED_MEDIA /* light that is met has its whole weight */
     delta = delta | sealed;
@@ -175,20 +186,20 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
 #if WEIGHS_LIGHT_PATHS
     bs.pdf = rival_pdf(m, wo, bs.wi);
     real p_back = rival_pdf(m, bs.wi, wo);
-    store_path_rival(path, at, next, rival_to_light(rival, s, onward, delta, bs.pdf, p_back));
+    store_path_rival(path, at, scatters, rival_to_light(rival, s, onward, delta, bs.pdf, p_back));
 #if MERGES
     state -= sel_i(rival_sharp(delta, bs.pdf, p_back), (integer)(0), state & PATH_SHARP);
-    store_path_pending(path, at, next, rival_pending(rival, s, onward, delta, bs.pdf, p_back));
+    store_path_pending(path, at, scatters, rival_pending(rival, s, onward, delta, bs.pdf, p_back));
 #endif
 #endif
-    store_path_pdf(path, at, next, sel(delta, (real)(-1.0f), bs.pdf));
+    store_path_pdf(path, at, scatters, sel(delta, (real)(-1.0f), bs.pdf));
 #if USES_HEMISPHERE && !BSDF_DELTA
     store_path_sampled_hemisphere(path, at, next, hemisphere);
 #endif
 #endif
     store_path_eta(path, at, next, eta);
     hero_keep(path, at, next, ratio);
-    vertex_end(path, at, met, next, state);
+    vertex_end(path, at, met, next, null, state);
 }
 
 #if !SHADES_BOTH

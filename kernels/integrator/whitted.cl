@@ -51,16 +51,17 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     mask next = active & (bs.pdf > 0.0f);
     hero_keep(path, at, next, ratio);
 #endif
-    next = next & vertex_continues(scene, v);
+    mask null = vertex_is_null((integer)(0));
+    next = next & vertex_continues(scene, v, null);
     vec3 onward = normalize3(to_world(frame, wi));
     beta = spectrum_scale(beta, shading_frame_share(scatter.shading, onward));
     store_path_radiance(path, at, active, radiance);
-    vertex_leave(path, at, next, v, onward, beta);
+    vertex_leave(path, at, next, null, v, onward, beta);
 #if USES_MIPS
     store_path_cone(path, at, next, cone_word(v.cone));
 #endif
 #if !BSDF_IS_NULL
     store_path_pdf(path, at, next, (real)(-1.0f));
 #endif
-    vertex_end(path, at, active, next, state);
+    vertex_end(path, at, active, next, null, state);
 }

@@ -22,7 +22,7 @@
 #define LOBE_TRANSMIT 2
 #define LOBE_DELTA 4    /* a direction out of finitely many; pdf is then a probability */
 #define LOBE_DISPERSE 8 /* the direction holds for the hero wavelength only */
-#define LOBE_NULL 16    /* it goes on as if nothing were there */
+#define LOBE_NULL 16    /* it goes on as if nothing were there, but for its weight */
 
 typedef struct {
     vec3 wi;

@@ -161,11 +161,14 @@ inline real grid_length(natural bits) { return -log_r(1.0f - unit_interval(bits)
 #endif
 /* The colour at the point that `bits` choose, of those that word `at` of a medium's row tells; 1 where there are none.
  * In `images` each brick has a word, where its points begin from the first one on, and a point three: a colour, or the
- * coefficients of its curve. */
+ * coefficients of its curve. The word is below 0 where colours and density are trilinear each by itself: these bits
+ * choose the density's point, and others that of the colour. Else it is their product that is trilinear. */
 inline Spectrum grid_tint(Scene scene, integer name, int at, GridWalk w, mask active, natural bits, Wavelengths lambdas)
 {
     integer first = gather_i(scene.materials, sel_i(active, MEDIUM_ROW(name) + at, (integer)(0)));
     active = active & (first != 0);
+    bits = sel_n(first < 0, hash_natural(bits ^ 0x94d049bbu), bits);
+    first = sel_i(first < 0, -first, first);
     integer brick = (w.z * w.ny + w.y) * w.nx + w.x;
     integer points = first + gather_i(scene.images, sel_i(active, first + brick, (integer)(0)));
     integer point = sel_i(active, points + 3 * grid_corner(w, bits), (integer)(0));

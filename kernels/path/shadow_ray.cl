@@ -1,10 +1,11 @@
 /* The ray that waits in the shadow slab of a path: to a light, or, from a light, to the camera. */
 #include "interface/shape.cl"
 #include "generated/trace.cl"
+#include "tracing/passage.cl"
 #include "generated/transmittance.cl"
 
 /* How much of the light between the two points of each active ray passes, 0 to 1. The rays wait no longer. */
-inline real shadow_ray_transmittance(TRACE_ARGS, Scene scene, Slab path, Slab shadow, uint at, real t, mask active)
+inline Passage shadow_ray_transmittance(TRACE_ARGS, Scene scene, Slab path, Slab shadow, uint at, real t, mask active)
 {
     vec3 o = load_shadow_o(shadow, at), d = load_shadow_d(shadow, at);
     store_shadow_t(shadow, at, active, (real)(-1.0f));

@@ -199,23 +199,39 @@ inline Spectrum vertex_beyond(Scene scene, Vertex v, vec3 w, real t, Wavelengths
     return value;
 }
 
-/* Whether paths may be longer than to this vertex. */
-inline mask vertex_continues(Scene scene, Vertex v)
+/* Whether what leaves by such a lobe has met a null surface. */
+inline mask vertex_is_null(integer lobe)
+{
+#if BSDF_IS_NULL
+    return mask_of(1);
+#elif BSDF_IS_PANE
+    return (lobe & LOBE_NULL) != 0;
+#else
+    return mask_of(0);
+#endif
+}
+
+/* Whether paths may be longer than to this vertex; null: those that it does not count for. */
+inline mask vertex_continues(Scene scene, Vertex v, mask null)
 {
 #if BSDF_IS_NULL
     return v.met - v.depth < MOST_NULL_SURFACES;
 #else
-    return v.depth + 1 < scene.settings->max_depth;
+    mask more = v.depth + 1 < scene.settings->max_depth;
+#if BSDF_IS_PANE
+    more = sel_i(null, v.met - v.depth < MOST_NULL_SURFACES, more);
+#endif
+    return more;
 #endif
 }
 
-/* The `next` paths go on from here, along d. */
-inline void vertex_leave(Slab path, uint at, mask next, Vertex v, vec3 d, Spectrum beta)
+/* The `next` paths go on from here, along d; null: for which nothing has happened, as the surface is none. */
+inline void vertex_leave(Slab path, uint at, mask next, mask null, Vertex v, vec3 d, Spectrum beta)
 {
-#if BSDF_IS_NULL /* nothing has happened: the camera's ray has its end, and lights are weighed by what was before */
+#if BSDF_IS_NULL || BSDF_IS_PANE /* the camera's ray has its end, and lights are weighed by what was before */
     real pdf = load_path_pdf(path, at), onward = v.t + surface_lead(v.s, d);
-    store_path_pdf(path, at, next & (v.depth == 0), pdf + onward);
-    store_path_null_distance(path, at, next, load_path_null_distance(path, at) + onward);
+    store_path_pdf(path, at, next & null & (v.depth == 0), pdf + onward);
+    store_path_null_distance(path, at, next & null, load_path_null_distance(path, at) + onward);
 #endif
     store_path_o(path, at, next, surface_offset(v.s, d));
     store_path_d(path, at, next, d);
@@ -230,13 +246,15 @@ inline void vertex_leave(Slab path, uint at, mask next, Vertex v, vec3 d, Spectr
 }
 
 /* The `active` paths are a vertex longer, if it is not a null surface; those that do not go on are no longer alive. */
-inline void vertex_end(Slab path, uint at, mask active, mask next, integer state)
+inline void vertex_end(Slab path, uint at, mask active, mask next, mask null, integer state)
 {
     state = sel_i(next, state, state - (state & PATH_ALIVE));
+#if BSDF_IS_NULL || BSDF_IS_PANE
+    store_path_nulls(path, at, active & null, load_path_nulls(path, at) + 1);
+#endif
 #if BSDF_IS_NULL
-    store_path_nulls(path, at, active, load_path_nulls(path, at) + 1);
     store_path_state(path, at, active, state);
 #else
-    store_path_state(path, at, active, state + 1);
+    store_path_state(path, at, active, sel_i(null, state, state + 1));
 #endif
 }

@@ -19,7 +19,7 @@ STAGE(splat)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)
 #if USES_MOTION
         scene.time = load_path_time(path, at);
 #endif
-#if SHADOW_MEDIA
+#if SHADOW_MEDIA || FREE_PANES
         Spectrum passes = shadow_ray_transmittance(TRACE_PASSED, scene, path, shadow, at, t, active);
         mask arrives = active & (spectrum_max(passes) > 0.0f);
         Wavelengths lambdas = load_path_lambdas(path, at);

@@ -1,3 +1,4 @@
+/* Primitives without a row of their own, where these are of one kind. */
 #include "tracing/shape_rows_search.cl"
 
 /* A row with which the primitive is met at the same distance: spheres differ in it only by what their uv

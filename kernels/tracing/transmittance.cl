@@ -5,11 +5,12 @@
 #include "generated/mixture.cl"
 #include "generated/shapes.cl"
 #include "path/surface.cl"
+#include "tracing/passage.cl"
 #include "generated/null_transmittance.cl"
 
-inline real trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real t, Wavelengths lambdas, mask active)
+inline Passage trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real t, Wavelengths lambdas, mask active)
 {
-    real transmittance = 1.0f;
+    Passage transmittance = passage_of(1.0f);
     int surfaces = 0;
     while (any(active)) {
         TraceHit h = trace_closest(TRACE_PASSED, scene, o, d, t, active);
@@ -19,10 +20,10 @@ inline real trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real t,
             mask front;
             Surface s = surface_at(scene, h, active, o, d, &front);
             integer word = sel_i(active, sel_i(front, shape.front, shape.back), (integer)(0));
-            real own = null_transmittance(scene, word, surface_texture_point(s), lambdas) *
-                       (surfaces < MOST_NULL_SURFACES ? 1.0f : 0.0f);
-            transmittance = sel(active, transmittance * own, transmittance);
-            active = active & (own > 0.0f);
+            Passage own = null_transmittance(scene, word, surface_texture_point(s), lambdas, fabs(dot3(s.ns, d)));
+            own = passage_scale(own, (real)(surfaces < MOST_NULL_SURFACES ? 1.0f : 0.0f));
+            transmittance = passage_sel(active, passage_mul(transmittance, own), transmittance);
+            active = active & (passage_most(own) > 0.0f);
             /* On along d: beside it, the ray would miss its end, and a round light would shade itself. */
             real on = h.t * (1.0f + SURFACE_ROUNDING) + surface_lead(s, d);
             o = sel3(active, madd3(d, on, o), o);

@@ -7,6 +7,7 @@
 #include "generated/shapes.cl"
 #include "path/surface.cl"
 #include "generated/medium.cl"
+#include "tracing/passage.cl"
 #include "generated/null_transmittance.cl"
 
 inline Spectrum trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real t, integer medium,
@@ -43,15 +44,15 @@ inline Spectrum trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, rea
             mask front;
             Surface s = surface_at(scene, h, active, o, d, &front);
             integer word = sel_i(active, sel_i(front, shape.front, shape.back), (integer)(0));
-            real own = null_transmittance(scene, word, surface_texture_point(s), lambdas) *
-                       (surfaces < MOST_NULL_SURFACES ? 1.0f : 0.0f);
+            Passage own = null_transmittance(scene, word, surface_texture_point(s), lambdas, fabs(dot3(s.ns, d)));
+            own = passage_scale(own, (real)(surfaces < MOST_NULL_SURFACES ? 1.0f : 0.0f));
 #if USES_BODIES
             BodyBoundary boundary = body_boundary(scene, row, bodies, front);
-            own = sel(boundary.hidden & mask_of(surfaces < MOST_NULL_SURFACES), (real)(1.0f), own);
+            own = passage_sel(boundary.hidden & mask_of(surfaces < MOST_NULL_SURFACES), passage_of(1.0f), own);
             bodies = bodies_beyond(boundary, front);
 #endif
-            passes = spectrum_sel(active, spectrum_scale(passes, own), passes);
-            active = active & (own > 0.0f);
+            passes = spectrum_sel(active, passage_dims(passes, own), passes);
+            active = active & (passage_most(own) > 0.0f);
 #if USES_BODIES
             medium = body_medium(scene, bodies_top(sel_i(active, bodies, (integer)(0))));
 #else

@@ -221,3 +221,19 @@ def test_a_film_is_an_image_too(here, capsys, name, film):
         assert told["channels"] == labels and len(values) == len(labels)
     assert run(["info", name]) == 0
     assert "depth" in capsys.readouterr().out
+
+
+def test_colours_are_those_of_the_file_s_space(tmp_path):
+    """The same colour in two spaces is shown alike; a space of no colours is passed over."""
+    from clpt.cli.image_contents import read_contents
+    from clpt.spectra import spaces
+
+    rgb = np.array([0.5, 0.3, 0.2])
+    images.write(tmp_path / "a.exr", np.full((2, 2, 3), rgb))
+    other = spaces.between("rec709", "acescg") @ rgb
+    images.write(tmp_path / "b.exr", np.full((2, 2, 3), other), space="acescg")
+    shown = {read_contents(tmp_path / f"{name}.exr").hex_colour((0, 0)) for name in "ab"}
+    assert shown == {"#bc957c"}
+    none = {"chromaticities": (0.5,) * 8}
+    images.write(tmp_path / "c.exr", np.full((2, 2, 3), rgb), metadata=none)
+    assert read_contents(tmp_path / "c.exr").hex_colour((0, 0)) == "#bc957c"

@@ -8,6 +8,8 @@ from fnmatch import fnmatch
 from pathlib import Path
 
 from clpt.device.source import kernels_folder
+from clpt.render.codegen import flags, programs
+from clpt.scene import KINDS
 
 ALTERNATIVES = (  # files, of each row of which a program has one at most
     ("bvh/*_keyed.cl",),
@@ -30,6 +32,7 @@ ALTERNATIVES = (  # files, of each row of which a program has one at most
     ("tracing/trace_*.cl",),
     ("tracing/transmittance*.cl",),
 )
+DEFAULTS = ("FEW_LIGHTS", "FILM_GROUP", "FILM_WORDS")  # flags that files define where none is set
 COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
 INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
 DEFINITION = re.compile(
@@ -107,3 +110,15 @@ def test_no_name_is_a_function_and_a_macro() -> None:
     assert not {
         f: d["function"] & d["macro"] for f, d in both.items() if d["function"] & d["macro"]
     }
+
+
+def test_flags_have_names_of_their_own() -> None:
+    """None is what a kernel file, or a generated text, calls something else."""
+    own = {name for text in files().values() for name in set().union(*defined(text).values())}
+    codegen = Path(programs.__file__).parent.glob("*.py")
+    texts = [path.read_text("utf-8") for path in codegen]
+    generated = {name for text in texts for name in re.findall(r"#define ([A-Z]\w*)[ (]", text)}
+    generated |= {f"{cls.kind.upper()}_WORDS" for row in KINDS.values() for cls in row}
+    assert "LAYER_WORDS" in generated  # of a thin film
+    chosen = {name.partition("(")[0] for name in {**flags.SCENE, **flags.MATERIAL}}
+    assert chosen & (own | generated) == set(DEFAULTS)

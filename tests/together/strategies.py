@@ -8,7 +8,7 @@ choice is always the plainest, so that a scene shrinks to what a failure needs.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from typing import Any
 
@@ -51,12 +51,19 @@ class Drawer:
     def maybe(self) -> bool:
         return self.choose(1) == 1
 
+    def several(self, most: int, least: int = 0) -> Iterator[int]:
+        """Numbers from 0. A choice before each tells whether it is there, so that all that follows
+        from one can be left out by itself."""
+        for number in range(most):
+            if number >= least and self.choose(2) == 0:
+                return
+            yield number
+
     def some(self, values: Sequence[Any], most: int) -> list[Any]:
         """Up to so many of the values, each once."""
         left = list(values)
-        return [
-            left.pop(self.choose(len(left) - 1)) for _ in range(min(self.choose(most), len(left)))
-        ]
+        found = self.several(min(most, len(left)))
+        return [left.pop(self.choose(len(left) - 1)) for _ in found]
 
     def again(self, base: type, draw: Callable[[], Any]) -> Any:
         """A new part, or one that the scene has already."""
@@ -175,7 +182,7 @@ def _dyes() -> tuple[Any, ...]:
 
 
 def _layers(self: Drawer, param: Param, default: Any) -> Any:
-    return tuple(self.kind((materials.Layer,)) for _ in range(self.one([1, 2])))
+    return tuple(self.kind((materials.Layer,)) for _ in self.several(2, 1))
 
 
 ROLES: dict[str, Callable[[Drawer, Param, Any], Any]] = {
@@ -280,7 +287,7 @@ def _area_light(self: Drawer, *_: Any) -> Any:
 def _group(self: Drawer, *_: Any) -> Any:
     def draw() -> Any:
         inner = [cls for cls in shapes.KINDS if cls is not shapes.Instance]
-        return shapes.Group(tuple(self.kind(inner, motion=None) for _ in range(self.one([1, 2]))))
+        return shapes.Group(tuple(self.kind(inner, motion=None) for _ in self.several(2, 1)))
 
     return self.again(shapes.Group, draw)
 
@@ -297,13 +304,13 @@ FORMS: dict[str, Callable[[Drawer, Param, Any], Any]] = {
     "matrix4": _matrix,
     "material": lambda self, p, d: self.material(),
     "medium": lambda self, p, d: self.medium(),
-    "media": lambda self, p, d: tuple(self.medium() for _ in range(self.one([1, 2]))),
+    "media": lambda self, p, d: tuple(self.medium() for _ in self.several(2, 1)),
     "phase": lambda self, p, d: self.nested(media.Phase, media.PHASES, media.Isotropic()),
     "texture": lambda self, p, d: self.texture((textures.Bitmap,)),
     "filter": lambda self, p, d: self.kind(integrators.FILTERS),
     "area_light": _area_light,
     "group": _group,
-    "grid": lambda self, p, d: d,
+    "grid": lambda self, p, d: d[::2, ::2, ::2],
     "image": _image,
     "volume": _volume,
     "colour_volume": _colours,
@@ -322,7 +329,6 @@ NAMED: dict[str, Sequence[Any]] = {  # parameters that few values suit
     "bits": (16, 8),
     "bands": (0, 3),
     "octaves": (8, 1, 3),
-    "pieces": (1, 2),
     "resolution": (4,),
     "photon_memory": (1,),
     "subdivision": (1,),
@@ -386,6 +392,10 @@ def _curves(self: Drawer) -> dict[str, Any]:
     }
 
 
+def _sdf_grid(self: Drawer) -> dict[str, Any]:
+    return {"values": defaults(shapes.SdfGrid)["values"][::2, ::2, ::2], "pieces": self.one([1, 2])}
+
+
 def _cloud(self: Drawer) -> dict[str, Any]:
     return {"resolution": 4}
 
@@ -411,6 +421,7 @@ WHOLE: dict[type, Callable[[Drawer], dict[str, Any]]] = {  # parameters that dep
     shapes.Mesh: _mesh,
     shapes.Spheres: _spheres,
     shapes.Curves: _curves,
+    shapes.SdfGrid: _sdf_grid,
     media.Cloud: _cloud,
     media.Tabulated: _tabulated,
     lights.Sky: _sky,
@@ -432,15 +443,15 @@ def scene_of(choose: Callable[[int], int]) -> Scene:
     if traced:
         self.on_shapes = lights.ON_SHAPES
     things: list[Any] = []
-    for _ in range(1 + choose(3)):
+    for _ in self.several(4, 1):
         shape = self.kind(shapes.KINDS)
         copies = self.one([1, 2, 17]) if isinstance(shape, shapes.Instance) else 1
         things += [shape] * copies
     if choose(7) == 7:
         things = [_as_body(self, thing) for thing in things]
     self.rigid = True
-    lamps = [self.kind(PLACED_LIGHTS) for _ in range(choose(3))]
-    lamps += [lights.Point(position=(0.0, 0.0, 2.0 + i)) for i in range(self.one([0, 0, 0, 20]))]
+    lamps = [self.kind(PLACED_LIGHTS) for _ in self.several(3)]
+    lamps += [lights.Point(position=(0.0, 0.0, 2.0 + i)) for i in range(self.one([0] * 7 + [17]))]
     camera = self.kind([cls for cls in cameras.KINDS if not traced or cls.kind in CONNECTED])
     plain = {} if isinstance(integrator, integrators.HAVE_LAYERS) else {"layers": ()}
     return Scene(

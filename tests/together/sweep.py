@@ -82,31 +82,38 @@ def kinds_of(scene: Scene, way: Way) -> set[str]:
 
 def smallest(choices: list[int], what: str) -> list[int]:
     """Choices as small as they get, of a scene that still fails in that way."""
-    left, size = TRIES, len(choices)
-    while size and left > 0:
-        at = 0
-        while at < len(choices) and left > 0:
-            end = at + size
-            for shorter in (
-                [*choices[:at], *choices[end:]],
-                [*choices[:at], *[0] * len(choices[at:end]), *choices[end:]],
-            ):
-                if shorter == choices:
-                    continue
-                left -= 1
-                made = Choices(shorter)
-                try:
-                    still = what in kinds_of(*drawn(made))
-                except SceneError:  # a part that no one can draw
-                    still = False
-                if still:
-                    choices = made.made
-                    while choices and choices[-1] == 0:
-                        choices.pop()
-                    break
-            else:
-                at += size
-        size //= 2
+    tried: set[tuple[int, ...]] = set()
+
+    def smaller(given: list[int]) -> list[int]:
+        """What a scene of these choices is made of if it fails, nothing if not or if tried."""
+        if tuple(given) in tried or len(tried) >= TRIES:
+            return []
+        tried.add(tuple(given))
+        made = Choices(given)
+        try:
+            fails = what in kinds_of(*drawn(made))
+        except SceneError:  # of a part that nobody can make
+            return []
+        found = made.made
+        while found and found[-1] == 0:
+            found.pop()
+        return found if fails and (len(found), found) < (len(choices), choices) else []
+
+    before: list[int] = []
+    while before != choices:
+        before = choices
+        for size in (64, 32, 16, 8, 4, 2, 1):
+            at = 0
+            while at < len(choices):
+                head, span, tail = choices[:at], choices[at : at + size], choices[at + size :]
+                zeros, lower = [0] * len(span), [max(n - 1, 0) for n in span]
+                for instead in ([], zeros, lower):
+                    found = smaller([*head, *instead, *tail])
+                    if found:
+                        choices = found
+                        break
+                else:
+                    at += size
     return choices
 
 

@@ -48,6 +48,10 @@ MET: dict[str, dict[str, Any]] = {  # parts that once could not be in one scene
     "phases that depend on colours": {
         "shapes": within(Homogeneous(sigma_s=1.0, phase=HenyeyGreenstein(g=(0.1, 0.2, 0.3))))
     },
+    "layers of a film, and of a coat": {
+        "shapes": [Sphere(material=COATED)],
+        "film": {"layers": ("depth", "albedo")},
+    },
     "textures of textures": {
         "shapes": [Sphere(material=Diffuse(reflectance=Mix(first=0.2, second=Checkers())))],
         "lights": [Point(position=(0.0, 0.0, 3.0))],
@@ -67,7 +71,8 @@ MET: dict[str, dict[str, Any]] = {  # parts that once could not be in one scene
 @pytest.mark.parametrize("parts", MET)
 def test_parts_that_once_did_not_go_together(parts: str, mode: str) -> None:
     given = {"camera": Perspective(), **MET[parts]}
-    features = lower(Scene(film=Film(width=4, height=4, mode=mode), **given)).features
+    film = Film(width=4, height=4, mode=mode, **given.pop("film", {}))
+    features = lower(Scene(film=film, **given)).features
     made = [text for form in FORMS[:2] for text in texts(features, Way(lanes=8, form=form))]
     assert errors(dict.fromkeys(made)) == [""] * len(dict.fromkeys(made))
 

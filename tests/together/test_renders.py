@@ -7,8 +7,8 @@ import random
 import numpy as np
 import pytest
 
+from clpt import Renderer
 from clpt.errors import SceneError
-from clpt.render import Renderer
 from tests.together.strategies import scene_of, shown
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("one_context")]

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import io
 import math
 import os
 from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
 from threading import Lock
 from typing import Any
 
@@ -114,21 +114,14 @@ class _Budget:
 
 
 def _decoded(source: Element, budget: _Budget) -> images.Stored:
-    from PIL import Image, UnidentifiedImageError  # not imported before there is an image
-
+    """The image of a source; glTF has what the image says of its colours passed over."""
     inside = "uri" not in source
     data = bytes(accessors.view(source)[0]) if inside else source.document.resource(source)
     try:
-        with Image.open(io.BytesIO(data), formats=FORMATS) as image:
-            budget.spend(source, image.width, image.height)
-            return images.stored_from_pillow(image)
-    except SceneError:
-        raise
-    except (Image.DecompressionBombError, Image.DecompressionBombWarning):
-        raise source.error(f"has more than the {PIXELS} pixels that are read") from None
-    except UnidentifiedImageError:
-        raise source.error("is no PNG, JPEG or WebP image") from None
-    except (OSError, ValueError, SyntaxError, MemoryError, EOFError) as error:
+        return images.decoded(data, FORMATS, partial(budget.spend, source), profiled=False)
+    except SceneError as error:
+        raise error if error.where else source.error(error.message) from None
+    except Exception as error:  # Pillow raises its own, from struct.error to SyntaxError
         reason = str(error).splitlines()[0][:80] if str(error) else type(error).__name__
         raise source.error(f"is a broken image: {reason}") from None
 

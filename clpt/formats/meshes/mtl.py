@@ -61,11 +61,10 @@ GLASS = (4, 6, 7, 9)
 MIRRORS = (3, 8)
 # Without a meaning where light is traced, or for a material that has no use for them.
 SILENT = {"ka", "illum", "ni", "ns", "ks", "kd", "sharpness", "pcr", "d", "tr"}
-NEUTRAL = {
-    "tf": (WHITE, (1.0,)),
-    "kt": (BLACK,),
-    "anisor": ((0.0,),),
-}  # values that ask for nothing
+NEUTRAL = {  # values that ask for nothing
+    "tf": (WHITE, (1.0,)), "kt": (BLACK,),
+    **dict.fromkeys(("anisor", "aniso", "pm", "ps", "pc"), ((0.0,),)),
+}  # fmt: skip
 
 
 @dataclass
@@ -290,11 +289,8 @@ class _Maker:
 
     def glass(self, index: float) -> Material:
         """Return a boundary that Tf colours; Kd, d and Ks do not count."""
-        self.used |= {"map_kd", "map_ks", "map_d"}
-        filter_ = self.reflectance("tf", None, WHITE)
-        return Dielectric(
-            int_ior=index, ext_ior=1.0, specular_transmittance=filter_, name=self.name
-        )
+        passed = self.reflectance("tf", None, WHITE)
+        return Dielectric(int_ior=index, ext_ior=1.0, specular_transmittance=passed, name=self.name)
 
     def mirror(self, diffuse: Any, gloss: Any) -> Material:
         """Return Kd scattered and Ks mirrored; what exceeds 1 in sum is taken off Kd."""
@@ -315,10 +311,11 @@ class _Maker:
         """Return the material of Pr, Pm, Ps, Pc, Pcr and aniso."""
         roughness = self.share("pr", 0.5)
         if model in GLASS and (index := self.glass_index(model)) > 1.0:
-            self.used |= {"map_kd", "map_ks", "map_d", *PHYSICAL}
-            alpha = roughness**2 if isinstance(roughness, float) else 0.25
-            if alpha <= SMOOTHEST:
+            if roughness == 0.0:
                 return self.glass(index)
+            alpha: Any = Product(first=roughness, second=roughness)
+            if isinstance(roughness, float):
+                alpha = max(roughness**2, SMOOTHEST)
             return RoughDielectric(
                 int_ior=index,
                 ext_ior=1.0,
@@ -352,7 +349,7 @@ class _Maker:
         scale = options.get("-bm", (1.0,))[0]
         if map_.image is GREY:
             return surface
-        if _is_normal_map(_pixels(map_)):
+        if "-imfchan" not in options and _is_normal_map(_pixels(map_)):
             self.remark(f"{statement.key} looks like a normal map, and is read as one")
             return NormalMap(material=surface, map=map_, scale=scale)
         return BumpMap(material=surface, height=map_, scale=scale)
@@ -570,7 +567,7 @@ def _placed(path: Path, options: Options, raw: bool) -> Bitmap:
 def _pixels(map_: Bitmap) -> NDArray[np.float32]:
     """Return what an image holds, (h, w, c), from 0 to 1 where it has 8 bits."""
     if isinstance(map_.image, Path):
-        return images.read(map_.image, linear=False)
+        return images.read_stored(map_.image).decoded(linear=False)
     return np.asarray(map_.image, np.float32)
 
 

@@ -65,6 +65,7 @@ def _triangles(header: Header, tables: Columns) -> Triangles:
             "vertex": {name: values for name, values in vertex.items() if name not in known},
             "face": {name: _of_faces(values)[rows] for name, values in _plain(face).items()},
         },
+        polygons=np.r_[polygon, len(counts) + np.arange(len(strips))],
         textures=header.textures,
         warnings=_left_out(tables),
     )

@@ -28,8 +28,9 @@ class Triangles:
     """vertices (n, 3), faces (m, 3) int64, normals (n, 3) or None, uvs (n, 2) or None.
 
     columns: further numbers of each "vertex" and "face" by name; a polygon's are those of all its
-    triangles. textures: names of image files; where there are several, the column texnumber of
-    "face" says which.
+    triangles. polygons: of a PLY, the number of the polygon of each triangle, (m,).
+    textures: names of image files; where there are several, the column texnumber of "face" says
+    which.
     """
 
     vertices: NDArray[Any]
@@ -38,6 +39,7 @@ class Triangles:
     uvs: NDArray[np.float32] | None = None
     columns: dict[str, dict[str, NDArray[Any]]] = field(default_factory=dict)
     name: str = ""
+    polygons: NDArray[np.int64] | None = None
     textures: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
 

@@ -9,18 +9,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-from clpt.formats.meshes.framing import framing_camera
+from clpt.formats.meshes.framing import framing_camera, world_bounds
 from clpt.formats.missing import Missing
 from clpt.formats.mitsuba import sensors
 from clpt.formats.mitsuba.bsdfs import bsdf
 from clpt.formats.mitsuba.emitters import emitter
+from clpt.formats.mitsuba.grids import Bounds
 from clpt.formats.mitsuba.properties import Context, Properties
 from clpt.formats.mitsuba.sensors import sensor
 from clpt.formats.mitsuba.shapes import shapes_of
 from clpt.formats.mitsuba.spectra import texture
 from clpt.formats.mitsuba.xml import Document, Element, parse
 from clpt.scene import Scene, integrators
+from clpt.scene.media import Medium
+from clpt.scene.shapes import Instance, Shape
 
 __all__ = ["load"]
 
@@ -37,6 +41,31 @@ def load(path: Path, missing: Missing = "error", /, **variables: object) -> Scen
     """
     document = parse(path, variables)
     context = Context(document, missing)
+    scene = _scene(path, document, context)
+    if not context.endless:
+        return scene
+    rooms = {key: _room(medium, scene) for key, medium in context.endless.items()}
+    return _scene(path, document, Context(document, missing, rooms))
+
+
+def _room(medium: Medium, scene: Scene) -> Bounds:
+    """The box that a medium fills: that of the shapes it is in, or of all if it is around them."""
+    camera: Any = scene.camera
+    around = camera.medium is medium or any(_is_around(one, medium) for one in scene.shapes)
+    return world_bounds(
+        [one for one in scene.shapes if around or any(p.interior is medium for p in _parts(one))]
+    )
+
+
+def _is_around(shape: Shape, medium: Medium) -> bool:
+    return any(part.exterior is medium for part in _parts(shape))
+
+
+def _parts(shape: Shape) -> tuple[Shape, ...]:
+    return shape.group.shapes if isinstance(shape, Instance) else (shape,)
+
+
+def _scene(path: Path, document: Document, context: Context) -> Scene:
     props = Properties(document.root, context)
     shapes = shapes_of(props.objects("shape"), context)
     emitters = [emitter(element, context) for element in props.objects("emitter")]

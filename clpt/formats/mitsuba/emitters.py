@@ -121,7 +121,7 @@ def _aspect(image: Any) -> float:
     if not isinstance(image, Bitmap):
         return 1.0
     given: Any = image.image
-    values = images.read(given) if isinstance(given, (str, Path)) else given
+    values = images.read_stored(given).values if isinstance(given, (str, Path)) else given
     height, width = np.shape(values)[:2]
     return width / height
 

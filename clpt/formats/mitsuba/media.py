@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from clpt.formats import volumes
-from clpt.formats.mitsuba import spectra
+from clpt.formats.mitsuba import grids, spectra
 from clpt.formats.mitsuba.fluorescence import dye, fluorescent
+from clpt.formats.mitsuba.limits import within
 from clpt.formats.mitsuba.properties import Context, Properties, unknown
 from clpt.formats.mitsuba.xml import Element
-from clpt.formats.volumes import vol
 from clpt.scene import media
 from clpt.scene.media import Grid, Homogeneous, Medium, Phase
+from clpt.scene.textures import Texture
 from clpt.scene.volumes import Volume
 
 
@@ -58,17 +58,103 @@ def _made(element: Element, context: Context, plugins: dict[str, Any]) -> Any:
     return made
 
 
-def _homogeneous(props: Properties) -> Homogeneous:
+def _homogeneous(props: Properties) -> Medium:
+    """A medium that is the same everywhere, but for what grids say of its albedo or scattering."""
+    if (density := grids.grid(props, "sigma_t")) is not None:
+        raise density.error('a density on a grid needs a medium of the type "heterogeneous"')
+    albedo, weight = grids.grid(props, "albedo"), _weight(props)
+    medium = _even(props)
+    if albedo is None and weight is None:
+        return medium
+    room = props.context.rooms.get(id(props.element))
+    if room is None:  # it is made again when the shapes that it fills are known
+        props.context.endless[id(props.element)] = medium
+        return medium
+    beside = [
+        None if one is None else grids.spread(read(one, props.context), room, one)
+        for one, read in ((albedo, grids.colours), (weight, grids.one_channel))
+    ]
+    box = next(one for one in beside if one is not None).to_world
+    return _on_grid(medium, {"sigma_t": medium.sigma_t, "density": grids.ones(box)}, *beside)
+
+
+def _even(props: Properties) -> Homogeneous:
+    """The medium without what is on grids."""
     props.ignore("has_spectral_extinction", "sample_emitters")  # both are found
+    blend = _blend_on_grid(props)
     child = props.object("phase")
-    return Homogeneous(
-        sigma_t=spectra.coefficient(props, "sigma_t", 1.0),
-        albedo=spectra.reflectance(props, "albedo", 0.75),
-        scale=props.number("scale", 1.0),
-        phase=media.Isotropic() if child is None else phase(child, props.context),
-        name=props.element.attributes.get("id", ""),
-        **({"emission": spectra.emission(props, "emission")} if "emission" in props.named else {}),
-    )
+    found = media.Isotropic() if child is None else blend or phase(child, props.context)
+    given = {
+        "sigma_t": spectra.coefficient(props, "sigma_t", 1.0),
+        "albedo": spectra.reflectance(props, "albedo", 0.75),
+        "scale": props.number("scale", 1.0),
+        "phase": found,
+        "name": props.element.attributes.get("id", ""),
+    }
+    if "emission" in props.named:
+        given["emission"] = spectra.emission(props, "emission")
+    return Homogeneous(**within(Homogeneous, given, props))
+
+
+def _weight(props: Properties) -> Element | None:
+    """The grid that is the weight of the medium's `blendphase`, if it is one."""
+    blend = _own_blend(props)
+    return None if blend is None else grids.grid(Properties(blend, props.context), "weight")
+
+
+def _own_blend(props: Properties) -> Element | None:
+    children = [props.context.resolve(one) for one in (*props.nested, *props.named.values())]
+    blends = [one for one in children if one.tag == "phase" and one.type == "blendphase"]
+    return blends[0] if len(blends) == 1 else None
+
+
+def _blend_on_grid(props: Properties) -> media.Blend | None:
+    """The medium's `blendphase` without its weight, if that is a grid."""
+    element = _own_blend(props)
+    if element is None:
+        return None
+    own = Properties(element, props.context)
+    if grids.grid(own, "weight") is None:
+        return None
+    first, second = _halves(own)
+    own.finish()
+    return media.Blend(first=first, second=second)
+
+
+def _on_grid(
+    medium: Homogeneous,
+    given: dict[str, Any],
+    tint: Volume | None,
+    share: Volume | None,
+    **more: Any,
+) -> Medium:
+    """A medium whose density is on a grid, and perhaps its albedo, or the share of its phases."""
+    beside = [one for one in (tint, share) if one is not None]
+    made = dict(given)
+    colours = made.get("colour_grid")
+    if beside:
+        found = grids.together(made["density"], *beside, *([] if colours is None else [colours]))
+        made["density"] = found[0]
+        if colours is not None:
+            made["colour_grid"] = found[-1]
+        tint = None if tint is None else found[1]
+        share = None if share is None else found[len(beside)]
+    if tint is not None:
+        made |= {"albedo": 1.0, "albedo_grid": tint}
+    made = {
+        "albedo": medium.albedo, "scale": medium.scale, "phase": medium.phase,
+        "emission": medium.emission, "name": medium.name, **made, **more,
+    }  # fmt: skip
+    if share is None:
+        return Grid(**made)
+    blend: Any = medium.phase
+    second = np.clip(share.values, 0.0, 1.0)
+    parts = [
+        Grid(**{**made, "density": Volume(made["density"].values * part, share.to_world),
+                "phase": one, "name": ""})
+        for one, part in ((blend.first, 1.0 - second), (blend.second, second))
+    ]  # fmt: skip
+    return media.Mixture(parts=tuple(parts), name=medium.name)
 
 
 def _tabulated(props: Properties) -> Phase:
@@ -85,13 +171,21 @@ def _tabulated(props: Properties) -> Phase:
 
 
 def _blend(props: Properties) -> Phase:
+    first, second = _halves(props)
+    if grids.grid(props, "weight") is not None:
+        message = "its 'weight' is a grid, as only that of a medium's own blendphase may be"
+        raise props.element.error(message)
+    share = spectra.real(props, "weight", 0.5)
+    if isinstance(share, Texture):
+        raise props.element.error("'weight' must be a number or a <volume>")
+    return media.Blend(weight=min(max(share, 0.0), 1.0), first=first, second=second)
+
+
+def _halves(props: Properties) -> list[Phase]:
     parts = [phase(one, props.context) for one in props.objects("phase")]
     if len(parts) != 2:
         raise props.element.error(f"must hold two phase functions, not {len(parts)}")
-    if any(one.name == "weight" for one in props.nested):
-        raise props.element.error("'weight' must be a number: grids are not read here")
-    weight = props.number("weight", 0.5)
-    return media.Blend(weight=weight, first=parts[0], second=parts[1])
+    return parts
 
 
 def _sggx(props: Properties) -> Phase:
@@ -101,40 +195,38 @@ def _sggx(props: Properties) -> Phase:
     )
 
 
-def _heterogeneous(props: Properties) -> Homogeneous:
-    """A medium of numbers on grids; where none is, one that is the same everywhere.
+def _heterogeneous(props: Properties) -> Medium:
+    """A medium in the box of its `sigma_t`, which is on a grid or the same in all of the box.
 
-    A grid of an albedo, or of light, may stand in a density that is one number everywhere.
+    Where light of ours is on a grid, and `sigma_t` is no <volume>, the box is that of the light.
     """
-    more = _more(props)
-    volume = _grid(props, "sigma_t")
-    given: dict[str, Any] = {}
-    if volume is not None:
-        given = props.context.once(volume, lambda one: _grid_volume(one, props.context))
-    medium = _homogeneous(props)
-    boxes = [one for one in more.values() if isinstance(one, Volume)]
-    if volume is None and not boxes:  # constvolume, or a number
-        return medium
-    if volume is None:
-        box = boxes[0]
-        even = Volume(np.ones(box.values.shape[:3], np.float32), box.to_world)
-        given = {"sigma_t": medium.sigma_t, "density": even}
-    return Grid(
-        **given,
-        **{"albedo": medium.albedo, **more},
-        scale=medium.scale,
-        phase=medium.phase,
-        emission=medium.emission,
-        name=medium.name,
-    )
+    context, more = props.context, _more(props)
+    sigma_t, weight = grids.grid(props, "sigma_t"), _weight(props)
+    albedo = grids.grid(props, "albedo")
+    tint = None if albedo is None else grids.colours(albedo, context)
+    share = None if weight is None else grids.one_channel(weight, context)
+    lit = next((one for one in more.values() if isinstance(one, Volume)), None)
+    if sigma_t is not None:
+        factor, density, colours = grids.density(sigma_t, context)
+    elif lit is not None and props.named.get("sigma_t") is None:
+        density, colours = grids.ones(lit.to_world, lit.values.shape), None
+    else:
+        density, colours = grids.ones(grids.even_box(props, "sigma_t")), None
+    medium = _even(props)
+    given = {
+        "sigma_t": medium.sigma_t if sigma_t is None else factor,
+        "density": density,
+        "colour_grid": colours,
+    }
+    return _on_grid(medium, given, tint, share, **more)
 
 
 def _soot(props: Properties) -> media.Soot:
     """The soot of a flame, a plugin of our own."""
     more = _more(props)
-    volume = _grid(props, "density")
+    volume = grids.grid(props, "density")
     if volume is not None:
-        more["density"] = _one_channel(volume, props.context)
+        more["density"] = grids.one_channel(volume, props.context)
     return media.Soot(
         share=props.number("share", 1e-6),
         scale=props.number("scale", 1.0),
@@ -185,71 +277,17 @@ def _plain(props: Properties) -> dict[str, Any]:
 
 
 def _more(props: Properties) -> dict[str, Any]:
-    """Take what a grid has beside its density: `bits`, an albedo, and light (ours) on grids."""
+    """Take what is ours: `bits`, and light on grids."""
     found: dict[str, Any] = {}
-    albedo = _grid(props, "albedo")
-    if albedo is not None:
-        values, to_world = props.context.once(albedo, lambda one: _grid_values(one, props.context))
-        if values.max() > 1.0:
-            raise albedo.error("an albedo cannot exceed 1")
-        colours = np.repeat(values, 3 // values.shape[3], axis=3)
-        found |= {"albedo": 1.0, "albedo_grid": Volume(colours, to_world)}
     for name in ("emission_grid", "temperature"):
-        if (volume := _grid(props, name)) is not None:
-            found[name] = _one_channel(volume, props.context)
+        if (volume := grids.grid(props, name)) is not None:
+            found[name] = grids.one_channel(volume, props.context)
     if "temperature" in found:
         found["brightness"] = props.number("brightness", 1.0)
         found["normalised"] = props.flag("normalised", False)
     if "bits" in props.named:
         found["bits"] = props.integer("bits", 16)
     return found
-
-
-def _grid(props: Properties, name: str) -> Element | None:
-    """Take a <volume> of the type `gridvolume`, if that is what a parameter is."""
-    child = props.named.get(name)
-    volume = None if child is None else props.context.resolve(child)
-    if volume is None or volume.tag != "volume" or volume.type != "gridvolume":
-        return None
-    props.take(name)
-    return volume
-
-
-def _one_channel(element: Element, context: Context) -> Volume:
-    """The numbers of a <volume type="gridvolume">."""
-    values, to_world = context.once(element, lambda one: _grid_values(one, context))
-    if values.shape[3] != 1:
-        raise element.error(f"its file has {values.shape[3]} channels; read is 1")
-    return Volume(values[..., 0], to_world)
-
-
-def _grid_volume(element: Element, context: Context) -> dict[str, Any]:
-    """What a <volume type="gridvolume"> has: a density, one colour or some on the grid."""
-    values, to_world = _grid_values(element, context)
-    if values.shape[3] == 1:
-        return {"sigma_t": 1.0, "density": Volume(values[..., 0], to_world)}
-    sigma_t, density, colours = volumes.factored(values)
-    placed = None if colours is None else Volume(colours, to_world)
-    return {"sigma_t": sigma_t, "density": Volume(density, to_world), "colour_grid": placed}
-
-
-def _grid_values(element: Element, context: Context) -> tuple[Any, Any]:
-    """The numbers of a grid, of one channel or three, and where its box is."""
-    props = Properties(element, context)
-    props.ignore("raw", "accel")
-    path, to_world = props.file(), props.placement()
-    with element.locating():
-        values, box = vol.read_channels(path)
-    if props.flag("use_grid_bbox", False):
-        to_world = to_world @ box
-    if props.text("wrap_mode", "clamp", ("clamp", "repeat", "mirror")) != "clamp":
-        context.warn(element, "at its ends the grid goes on as 'clamp'")
-    if props.text("filter_type", "trilinear", ("trilinear", "nearest")) != "trilinear":
-        context.warn(element, "the grid is trilinear, not 'nearest'")
-    props.finish()
-    if values.shape[3] not in (1, 3):
-        raise element.error(f"its file has {values.shape[3]} channels; read are 1 and 3")
-    return values, to_world
 
 
 MEDIA: dict[str, Callable[[Properties], Medium]] = {

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -39,11 +40,20 @@ MAX_PARTS = 1000  # of one material or texture
 class Context:
     """What all parts of the loader share: the document, its ids, the objects made, warnings.
 
-    layers: of the film, which integrators ask for.
+    layers: of the film, which integrators ask for; rooms: the corners of the box that each endless
+    medium fills, by the id of its element; endless: media of which that is still to be known;
+    volumes: what was read of grids.
     """
 
-    def __init__(self, document: Document, missing: Missing = "error"):
-        self.document, self.missing = document, missing
+    def __init__(
+        self,
+        document: Document,
+        missing: Missing = "error",
+        rooms: Mapping[int, tuple[NDArray[Any], NDArray[Any]]] = MappingProxyType({}),
+    ):
+        self.document, self.missing, self.rooms = document, missing, rooms
+        self.endless: dict[int, Any] = {}
+        self.volumes: dict[tuple[str, int], Any] = {}
         self.warnings: list[str] = []
         self.layers: dict[str, None] = {}
         self.ids: dict[str, Element] = {}

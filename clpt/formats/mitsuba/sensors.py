@@ -30,6 +30,7 @@ LENS_CHOICES = {
 }  # fmt: skip
 FILMS = ("hdrfilm", "clptfilm")
 SAMPLERS = ("independent", "stratified", "multijitter", "orthogonal", "ldsampler")
+REPLAYED_DEPTH = 6  # default of what differentiates
 DEFAULT_SAMPLER = "independent"
 LAYERS = {  # of the values that the integrator aov names
     "depth": "depth",
@@ -325,8 +326,8 @@ def _integrator(element: Element, context: Context) -> Integrator:
     return made
 
 
-def _depths(props: Properties) -> dict[str, Any]:
-    depth = props.integer("max_depth", -1, -1)
+def _depths(props: Properties, usual: int = -1) -> dict[str, Any]:
+    depth = props.integer("max_depth", usual, -1)
     if depth == 0:
         props.context.warn(props.element, "max_depth of 0: black in Mitsuba, lights are seen here")
     return {
@@ -376,9 +377,19 @@ def _particle_tracer(props: Properties) -> Integrator:
 
 
 def _volume_path(props: Properties) -> Integrator:
-    """The path integrator follows light through media too."""
+    """The path integrator follows light through media too; what is null there is no depth."""
     props.ignore("use_spectral_mis")
-    return _path(props)
+    return integrators.Path(**_depths(props), light_paths=_light_paths(props), free_panes=True)
+
+
+def _replayed(free_panes: bool) -> Callable[[Properties], Integrator]:
+    """What differentiates in Mitsuba: its picture is that of `path`, or of `volpath`."""
+
+    def read(props: Properties) -> Integrator:
+        depths = _depths(props, REPLAYED_DEPTH)
+        return integrators.Path(**depths, light_paths=_light_paths(props), free_panes=free_panes)
+
+    return read
 
 
 def _aov(props: Properties) -> Integrator:
@@ -424,4 +435,7 @@ INTEGRATORS: dict[str, Callable[[Properties], Integrator]] = {
     "moment": _moment,
     "volpath": _volume_path,
     "volpathmis": _volume_path,
+    "prb": _replayed(free_panes=False),
+    "prb_basic": _replayed(free_panes=False),
+    "prbvolpath": _replayed(free_panes=True),
 }

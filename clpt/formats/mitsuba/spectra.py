@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from clpt import spectra
+from clpt.errors import UnknownKindError
 from clpt.formats.colour import colour
 from clpt.formats.mitsuba.properties import (
     Context,
@@ -38,6 +39,7 @@ from clpt.spectra import (
 )
 
 LUMINANCE = (0.212671, 0.715160, 0.072169)  # of Rec. 709, as Mitsuba has it
+VOLUMES = ("constvolume", "gridvolume")
 TOP_DOWN = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
 
 
@@ -116,22 +118,35 @@ def _take(props: Properties, name: str, role: str, default: Any) -> Any:
 
 def _value(element: Element, role: str, props: Properties, name: str) -> Any:
     """Make a colour, a spectrum or a texture; Mitsuba writes the last two alike."""
-    if element.type == "volume":
+    if element.tag == "volume":
         return _volume(element, role, props.context)
+    if element.type == "volume":
+        return _held(element, role, props.context)
     if element.type in TEXTURES or (element.tag == "texture" and element.type not in PLUGINS):
         return texture(element, props)
     return _spectrum(element, role, props, name)
 
 
-def _volume(element: Element, role: str, context: Context) -> Any:
-    """Make the value of a constant volume."""
+def _held(element: Element, role: str, context: Context) -> Any:
+    """Make the value of the volume that a <texture type="volume"> holds."""
     outer = Properties(element, context)
     child = outer.take("volume")
     outer.finish()
-    volume = element if child is None else context.resolve(child)
-    if volume.type != "constvolume":
-        raise volume.error("only a <volume> of the type 'constvolume' is supported")
-    props = Properties(volume, context)
+    if child is None:
+        raise element.error("needs the parameter 'volume'")
+    volume = context.resolve(child)
+    if volume.tag != "volume":
+        raise volume.error("must be a <volume>")
+    return _volume(volume, role, context)
+
+
+def _volume(element: Element, role: str, context: Context) -> Any:
+    """Make the value of a constant volume."""
+    if element.type == "gridvolume":
+        raise element.error("a grid cannot stand here: only that of a medium is read")
+    if element.type != "constvolume":
+        raise UnknownKindError("volume", element.type, VOLUMES, **element.location())
+    props = Properties(element, context)
     props.placement()
     value = props.take("value")
     props.finish()

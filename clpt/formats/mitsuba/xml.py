@@ -7,7 +7,7 @@ the loader sees objects and values only. Document types are refused, and with th
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -111,14 +111,22 @@ def parse(path: Path, variables: Mapping[str, object]) -> Document:
 
 
 def _find(element: Element, name: str, folders: list[Path]) -> Path:
-    for folder in [*folders[:0:-1], element.file.parent, folders[0]]:
-        candidate = folder / name
+    places = [*folders[:0:-1], element.file.parent, folders[0]]
+    return _first(element, name, places, "file", Path.is_file)
+
+
+def _first(
+    element: Element, name: str, places: list[Path], what: str, is_one: Callable[[Path], bool]
+) -> Path:
+    """Return the first of the places joined with a name that is a file, or a folder."""
+    for place in places:
+        candidate = place / name
         try:
-            if candidate.is_file():
+            if is_one(candidate):
                 return candidate
         except (OSError, ValueError):
             break
-    raise element.error(f"there is no file {name!r}")
+    raise element.error(f"there is no {what} {name!r}")
 
 
 def _read(path: Path) -> Element:
@@ -208,14 +216,10 @@ class _Expander:
         self.values.setdefault(name, element.attribute("value"))
 
     def add_folder(self, element: Element) -> None:
-        folder = element.file.parent / element.attribute("value")
-        try:
-            exists = folder.is_dir()
-        except (OSError, ValueError):
-            exists = False
-        if not exists:
-            raise element.error(f"there is no folder {element.attribute('value')!r}")
-        self.folders.append(folder)
+        """Add a folder that lies beside the file, or else in one of the folders so far."""
+        places = [element.file.parent, *self.folders[::-1]]
+        name = element.attribute("value")
+        self.folders.append(_first(element, name, places, "folder", Path.is_dir))
 
     def include(self, element: Element, depth: int) -> list[Element]:
         if depth > MAX_INCLUDES:

@@ -22,13 +22,15 @@ from clpt.formats.pbrt.shapes import Geometry, displaced, geometry, with_uvs
 from clpt.formats.pbrt.state import Definition, State, nearest
 from clpt.formats.pbrt.textures import textured
 from clpt.scene.lights import Light
-from clpt.scene.materials import Diffuse, Mask, Material, TwoSided
+from clpt.scene.materials import Diffuse, Mask, Material, Null, TwoSided
 from clpt.scene.media import Medium
 from clpt.scene.params import Kind
 from clpt.scene.params import params as declared_params
 from clpt.scene.shapes import Curves, Group, Instance, Shape
+from clpt.scene.textures import MeshAttribute, Product
 
 Progress = Callable[[float, str], None]
+SHARES = "face_power"  # the attribute of a mesh whose parts shine unequally
 GREY = TwoSided(front=Diffuse(reflectance=0.5))
 
 
@@ -92,6 +94,9 @@ def _shape(definition: Definition, form: Geometry | None) -> Shape | None:
         state.warn(params, warning)
     surface = _material(params, state)
     emission = _emission(state, form)
+    if emission is not None and isinstance(surface, Null):
+        state.warn(params, "its light is left out, as of all that is of the material 'interface'")
+        emission = None
     if not isinstance(opacity, float) or opacity < 1.0:
         surface = Mask(material=surface, opacity=opacity)
         if emission is not None:
@@ -164,7 +169,8 @@ def _emission(state: State, form: Geometry) -> Light | None:
     if definition is None:
         return None
     kind, params, defined_in = definition.kind, definition.params, definition.state
-    area = form.area() if "power" in params else 0.0
+    powerful = "power" in params and params.one("power", "float", -1.0) > 0.0
+    area = float(form.areas().mean()) if powerful else 0.0
 
     def make() -> Light:
         made = area_light(kind, params, defined_in, area)
@@ -172,7 +178,12 @@ def _emission(state: State, form: Geometry) -> Light | None:
         return made
 
     made: Light = state.shared.once((definition, area), params, make)
-    return made
+    shares = form.shares() if powerful else None
+    if shares is None:
+        return made
+    form.parts["attributes"] = {SHARES: shares[:, None]}
+    radiance = Product(first=made.radiance, second=MeshAttribute(name=SHARES))
+    return replace(made, radiance=radiance)
 
 
 def lights(contents: Contents) -> list[Light]:

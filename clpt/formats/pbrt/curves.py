@@ -31,7 +31,6 @@ def curve(params: Parameters) -> tuple[type[Shape] | None, Parts]:
     if min(ends) < 0.0 or max(ends) <= 0.0:
         raise SceneError("the widths must be positive")
     normals = params.several("N", "normal")
-    params.ignore("splitdepth")
     share = np.linspace(0.0, 1.0, len(bezier))[:, None]
     widths = ends[0] + (ends[1] - ends[0]) * share
     if kind == "ribbon":
@@ -97,6 +96,23 @@ def _ribbon(bezier: NDArray[Any], widths: NDArray[Any], normals: Any) -> Parts:
         "normals": np.repeat(np.cross(along, across), 2, axis=0),
         "uvs": uvs.reshape(-1, 2),
     }
+
+
+def areas(parts: Parts) -> NDArray[np.float64]:
+    """Return the area of each cubic of a curve, seen flat: length times mean width [m^2]."""
+    points, cubics = parts["points"].astype(np.float64), len(parts["points"]) // 3
+    matrix = np.asarray(parts["to_world"])[:3, :3]
+    t = np.linspace(0.0, 1.0, PIECES + 1)[:, None]
+    found = []
+    for i in range(cubics):
+        span = [points[3 * i + k, :3] @ matrix.T for k in range(4)]
+        while len(span) > 1:
+            span = [a + (b - a) * t for a, b in pairwise(span)]
+        length = np.linalg.norm(np.diff(span[0], axis=0), axis=1).sum()
+        scale = abs(np.linalg.det(matrix)) ** (1.0 / 3.0)
+        width = scale * (points[3 * i, 3] + points[3 * i + 3, 3])
+        found.append(length * width)
+    return np.array(found)
 
 
 def _unit(v: NDArray[Any]) -> NDArray[Any]:

@@ -8,6 +8,7 @@ space, so that any transform, mirrored ones included, is right.
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -210,13 +211,20 @@ def _projection(params: Parameters, state: State) -> Light:
 def _image(file: str, state: State) -> Any:
     """The colours (h, w, 3) float32 of a light's image, none of them negative."""
     path = state.image(file)
-    image = GREY if path is None else images.read(path)
+    image = GREY if path is None else _read(path, state)
     if not np.isfinite(image).all():
         raise SceneError(f"{file!r} has values that are not finite, so it cannot be a light")
     if image.shape[2] not in (1, 3, 4):
         raise SceneError(f"{file!r} has {image.shape[2]} channels; a light needs R, G and B")
     colours = np.broadcast_to(image[..., :3], (*image.shape[:2], 3))
     return np.maximum(colours, 0.0).astype(np.float32)
+
+
+def _read(path: Path, state: State) -> Any:
+    stored = images.read_stored(path)
+    for note in stored.notes_of(raw=False):
+        state.tell(f"{path}: {note}")
+    return stored.decoded()
 
 
 def _square(file: str, state: State) -> Any:

@@ -51,9 +51,11 @@ def _bitmap(bitmap: Bitmap, function: Callable[[Any], Any], bytes_stay: bool) ->
     image = bitmap.image
     if isinstance(image, (str, Path)):
         stored = images.read_stored(image)
+        images.log_notes(image, stored, raw=bitmap.raw)
     else:
         values = np.asarray(image)
         stored = images.Stored(values, encoded=values.dtype == np.uint8)
+    stored = stored.meant(raw=bitmap.raw)
     values = stored.values
     if bytes_stay and values.dtype == np.uint8 and stored.encoded and not bitmap.raw:
         levels = images.srgb_to_linear(np.arange(256, dtype=np.float32) / np.float32(255.0))

@@ -131,6 +131,7 @@ def _coloured(params: Parameters, state: State) -> dict[str, Any]:
         "colour_grid": None if colours is None else Volume(colours, found.to_world),
         "sigma_t": sigma_t,
         "albedo_grid": Volume(np.clip(albedo, 0.0, 1.0).astype(np.float32), found.to_world),
+        "albedo_with_density": True,  # as pbrt interpolates sigma_s
     }
 
 

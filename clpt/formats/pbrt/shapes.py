@@ -29,6 +29,9 @@ from clpt.scene.textures import Bitmap
 Parts = dict[str, Any]
 QUADRICS = ("cylinder", "disk", "sphere")
 OLD = ("cone", "hyperboloid", "paraboloid", "heightfield", "nurbs")
+ALIKE = 1e-3  # relative difference of areas that is none
+MOST_SPLITS = 10  # of a curve, each in two
+LEAST = 1e-6  # of the largest area: what is smaller has no light of its own
 PATCH = 8  # pieces of a bilinear patch's sides, where it is no parallelogram
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])  # uv of a triangle without any, in pbrt
 DEEPEST = 10  # levels of subdivision
@@ -36,21 +39,42 @@ DEEPEST = 10  # levels of subdivision
 
 @dataclass(eq=False)
 class Geometry:
-    """A kind of ours, its parameters but for material and light, and warnings."""
+    """A kind of ours, its parameters but for material and light, and warnings.
+
+    pieces: for each triangle of a mesh the number of the shape, and so of the light, that pbrt
+    makes of it: a triangle, or a patch; None: all are one. split: lights that pbrt makes of each
+    piece of a curve.
+    """
 
     kind: type[Shape]
     parts: Parts
     warnings: list[str] = field(default_factory=list)
+    pieces: NDArray[np.int64] | None = None
+    split: int = 1
 
-    def area(self) -> float:
-        """The mean area of a mesh's triangles, else the whole [m^2], in the world."""
+    def areas(self) -> NDArray[np.float64]:
+        """The area of each of pbrt's lights, in the world [m^2]."""
         if self.kind is shapes.Curves:
-            raise SceneError("a curve's light cannot have a 'power'; give its 'scale'")
+            return curves.areas(self.parts) / self.split
         if self.kind is not shapes.Mesh:
-            return surfaces.area(self.kind, self.parts)
+            return np.array([surfaces.area(self.kind, self.parts)])
         points = transforms.transform_points(self.parts["to_world"], self.parts["vertices"])
         a, b, c = (points[self.parts["faces"][:, i]] for i in range(3))
-        return float(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).mean())
+        triangles = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        if self.pieces is None:
+            return np.array([triangles.sum()])
+        return np.bincount(self.pieces, triangles) / self.split
+
+    def shares(self) -> NDArray[np.float32] | None:
+        """How much brighter each triangle shines than by the mean area, None where all are alike.
+
+        Each of pbrt's lights has the whole power, so that small ones are the brighter.
+        """
+        areas = self.areas()
+        if self.pieces is None or np.ptp(areas) <= ALIKE * areas.max():
+            return None
+        least = LEAST * areas.max()
+        return (areas.mean() / np.maximum(areas, least))[self.pieces].astype(np.float32)
 
     def made(self, **more: Any) -> Shape:
         """The shape, with its material and emission."""
@@ -89,7 +113,7 @@ def _triangles(params: Parameters, state: State) -> Geometry | None:
         raise SceneError(f"{len(faces)} indices make no triangles")
     params.ignore("S", "faceIndices")
     normals, uvs = _per_vertex(params, "N", "normal", points), _uvs(params, points)
-    return _mesh(points, faces.reshape(-1, 3), normals, uvs)
+    return _with_pieces(_mesh(points, faces.reshape(-1, 3), normals, uvs))
 
 
 def _uvs(params: Parameters, points: NDArray[Any]) -> Any:
@@ -118,6 +142,14 @@ def _mesh(
     if arrays["normals"] is not None:
         arrays["faces"] = _toward_normals(arrays)
     return Geometry(shapes.Mesh, arrays, warnings)
+
+
+def _with_pieces(made: Geometry | None, pieces: Any = None, split: int = 1) -> Geometry | None:
+    """The mesh with the numbers of pbrt's shapes (m,), by default a triangle each."""
+    if made is None:
+        return None
+    numbers = np.arange(len(made.parts["faces"])) if pieces is None else pieces
+    return replace(made, pieces=numbers, split=split)
 
 
 def _toward_normals(arrays: Parts) -> NDArray[np.uint32]:
@@ -159,6 +191,7 @@ def _ply(params: Parameters, state: State) -> Geometry | None:
     try:
         arrays = ply.read(path)
         made = _mesh(arrays.vertices, arrays.faces, arrays.normals, arrays.uvs, arrays.warnings)
+        made = _with_pieces(made, arrays.polygons)
         params.ignore("displacement", "edgelength", "uvscale")  # see displaced
         return made
     except SceneError as error:
@@ -194,7 +227,7 @@ def _loop(params: Parameters, state: State) -> Geometry | None:
         return None
     coarse = arrays["vertices"].astype(np.float64), arrays["faces"].astype(np.int64)
     limit, finer, normals = subdivision.loop(*coarse, levels)
-    return _mesh(limit, finer, normals, None)
+    return _with_pieces(_mesh(limit, finer, normals, None))
 
 
 def _patches(params: Parameters, state: State) -> Geometry | None:
@@ -215,7 +248,8 @@ def _patches(params: Parameters, state: State) -> Geometry | None:
     twist = points[corners[:, 0]] - points[corners[:, 1]] - points[corners[:, 2]]
     plain = bool((np.abs(twist + points[corners[:, 3]]) <= tolerance).all())
     u, v, faces = surfaces.grid(*([1, 1] if plain else [PATCH, PATCH]))
-    return _mesh(*_over_patches(u, v, faces, corners, (points, normals, uvs), plain))
+    made = _mesh(*_over_patches(u, v, faces, corners, (points, normals, uvs), plain))
+    return _with_pieces(made, np.repeat(np.arange(len(corners)), len(faces)))
 
 
 def _over_patches(
@@ -278,14 +312,17 @@ def _cylinder(params: Parameters, state: State) -> Geometry | None:
 
 def _curve(params: Parameters, state: State) -> Geometry | None:
     kind, parts = curves.curve(params)
+    split = 2 ** min(max(params.one("splitdepth", "integer", 3), 0), MOST_SPLITS)
     if kind is None:
-        return _mesh(parts["points"], parts["faces"], parts["normals"], parts["uvs"])
+        made = _mesh(parts["points"], parts["faces"], parts["normals"], parts["uvs"])
+        cubics = np.arange(len(parts["faces"])) // (2 * curves.PIECES)
+        return _with_pieces(made, cubics, split)
     current = state.material
     material = state.shared.materials.get(current) if isinstance(current, str) else current
     flat = params.one("type", "string", "flat") == "flat"
     if not flat or (material is not None and material.kind == "hair"):  # there is no difference
-        return Geometry(kind, parts)
-    return Geometry(kind, parts, ["a flat curve is shaded as a round one"])
+        return Geometry(kind, parts, split=split)
+    return Geometry(kind, parts, ["a flat curve is shaded as a round one"], split=split)
 
 
 SHAPES: dict[str, Callable[[Parameters, State], Geometry | None]] = {

@@ -98,6 +98,11 @@ class State:
         where = source.location()["where"]
         self.shared.warnings.append(f"{source.file.name}:{source.line}: {where}: {text}")
 
+    def tell(self, text: str) -> None:
+        """Warn of what a file beside the scene has that is left out, once."""
+        if text not in self.shared.warnings:
+            self.shared.warnings.append(text)
+
     def file(self, name: str) -> Path:
         """Return the path that a file name means: beside the scene, else beside the naming file.
 

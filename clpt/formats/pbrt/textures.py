@@ -9,17 +9,19 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from clpt import transforms
+from clpt import images, transforms
 from clpt.errors import SceneError, UnknownKindError
 from clpt.formats.missing import EVEN, GREY
 from clpt.formats.pbrt.map_values import map_values
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.spectra import SPECTRUM_TYPES, spectrum, value_of
 from clpt.formats.pbrt.state import Definition, State
+from clpt.images import Stored
 from clpt.scene.textures import (
     MAPPINGS,
     MOST_OCTAVES,
@@ -37,6 +39,7 @@ from clpt.spectra import Spectrum
 
 IDENTITY_UV = np.eye(3)
 WRAPS = {"repeat": "repeat", "black": "zero", "clamp": "clamp", "octahedralsphere": "clamp"}
+FLOATS = (".exr", ".hdr", ".pfm")  # whose numbers are no colours where a float is asked for
 FILTERS = {"point": "nearest", "bilinear": "bilinear", "trilinear": "trilinear", "ewa": "trilinear"}
 
 
@@ -154,17 +157,49 @@ def _imagemap(form: str, params: Parameters, state: State) -> Any:
         filter=FILTERS[params.choice("filter", "bilinear", FILTERS)],
         wrap=WRAPS[wrap],
         channel="r" if form == "float" else "luminance",
+        raw=form == "float" and file is not None and file.suffix.lower() in FLOATS,
         **_mapping(params, state),
     )
+    bilinear = params.choice("filter", "bilinear", FILTERS) in ("bilinear", "trilinear")
     encoding = params.one("encoding", "string", "sRGB")
     if (
         file is not None and file.suffix.lower() == ".png"
     ):  # pbrt ignores the encoding of other files
         made = _decoded(made, encoding)
+    if file is not None and form == "float" and bilinear:
+        made = _number(made, state)
     scale, invert = params.one("scale", "float", 1.0), params.one("invert", "bool", False)
     if file is None or (scale == 1.0 and not invert):
         return made
     return map_values(made, lambda v: np.maximum(1.0 - scale * v if invert else scale * v, 0.0))
+
+
+def _number(bitmap: Bitmap, state: State) -> Bitmap:
+    """An image of the number that pbrt-v4 takes between texels (MIPMap::Bilerp of a Float).
+
+    It is alpha where that is not 1 everywhere, else the mean of red, green and blue. Alpha went
+    through the transfer that colours did. Filters "point" and "ewa" take red (MIPMap::Texel).
+    """
+    if isinstance(bitmap.image, np.ndarray):
+        stored = Stored(bitmap.image, encoded=False)
+    else:
+        stored = images.read_stored(Path(str(bitmap.image)))
+    values = stored.values
+    if values.shape[2] == 1:
+        return bitmap
+    for note in stored.notes_of(bitmap.raw):
+        state.tell(f"{bitmap.image}: {note}")
+    opaque = 255 if values.dtype == np.uint8 else 1.0
+    if values.shape[2] == 4 and (values[..., 3] != opaque).any():
+        chosen = replace(stored, values=values[..., 3:])
+    elif (values[..., :3] == values[..., :1]).all():
+        chosen = replace(stored, values=values[..., :1])
+    else:
+        colours = replace(stored, values=values[..., :3]).decoded(not bitmap.raw)
+        return replace(bitmap, image=colours.mean(axis=2, keepdims=True), raw=True)
+    if values.dtype == np.uint8 and stored.gamma is None:  # bytes stay small
+        return replace(bitmap, image=chosen.values)
+    return replace(bitmap, image=chosen.decoded(not bitmap.raw), raw=True)
 
 
 def _decoded(bitmap: Bitmap, encoding: str) -> Bitmap:

@@ -140,25 +140,50 @@ def null_transmittance_text(features: Features) -> str:
 
     A mixture's children are one level below it, since kernels cannot call themselves.
     """
-    leaves = enumerate(features.leaves)
+    leaves = [*enumerate(features.leaves)]
     passing = [f"(MATERIAL_KIND(word) == {i})" for i, cls in leaves if cls.is_null]
-    arguments = "(Scene scene, integer word, TexturePoint point, Wavelengths lambdas)"
+    arguments = "(Scene scene, integer word, TexturePoint point, Wavelengths lambdas, real c)"
     passes = f"sel({' | '.join(passing) or 'mask_of(0)'}, (real)(1.0f), (real)(0.0f))"
-    parts = [function(f"real null_transmittance_0{arguments}", f"return {passes};")]
+    of = "Spectrum" if features.free_panes else "real"
+    parts, cases = [], []
+    for i, cls in leaves if features.free_panes else ():
+        if cls.is_pane:
+            parts += _pane_text(features, cls)
+            load = f"{cls.__name__} r = {cls.kind}_load"
+            row = active("MATERIAL_ROW(word)")
+            cases.append(
+                Case(
+                    f"MATERIAL_KIND(word) == {i}",
+                    "thin_slab_passed(c, r.int_ior, r.ext_ior, r.specular_transmittance)",
+                    (f"{load}(scene, {row}, point, lambdas);",),
+                )
+            )
+    first = Function(f"{of} null_transmittance_0{arguments}", f"passage_of({passes})", cases)
+    parts.append(first.text())
     for level in range(1, features.mixtures + 1):
         below = f"null_transmittance_{level - 1}"
         children = (
             f"integer row = {active('MATERIAL_ROW(word)')};",
             "real w = mixture_weight(scene, row, point, lambdas);",
-            f"real first = {below}(scene, gather_i(scene.mixtures, row + 2), point, lambdas);",
-            f"real second = {below}(scene, gather_i(scene.mixtures, row + 3), point, lambdas);",
+            f"{of} first = {below}(scene, gather_i(scene.mixtures, row + 2), point, lambdas, c);",
+            f"{of} second = {below}(scene, gather_i(scene.mixtures, row + 3), point, lambdas, c);",
         )
-        mixed = Case(
-            f"MATERIAL_KIND(word) == {MIXTURE:#x}", "first + w * (second - first)", children
-        )
-        leaf = f"{below}(scene, word, point, lambdas)"
-        parts.append(Function(f"real null_transmittance_{level}{arguments}", leaf, [mixed]).text())
+        lerp = "spectrum_add(first, spectrum_scale(spectrum_sub(second, first), w))"
+        value = lerp if features.free_panes else "first + w * (second - first)"
+        mixed = Case(f"MATERIAL_KIND(word) == {MIXTURE:#x}", value, children)
+        leaf = f"{below}(scene, word, point, lambdas, c)"
+        parts.append(Function(f"{of} null_transmittance_{level}{arguments}", leaf, [mixed]).text())
     return "".join([*parts, f"#define null_transmittance null_transmittance_{features.mixtures}\n"])
+
+
+def _pane_text(features: Features, cls: type[Scatterer]) -> list[str]:
+    """The struct and the loader of thin glass."""
+    sources = features.sources_of(cls.kind)
+    return [
+        '#include "optics/thin_slab.cl"\n',
+        parameters.struct_text(cls, sources),
+        parameters.load_text(cls, sources, "materials"),
+    ]
 
 
 # of the roles whose values are tables: what kernels read of them

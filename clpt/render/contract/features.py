@@ -80,6 +80,7 @@ class Features:
     mixtures: int = 0  # how deep masks and blends nest
     normal_mapped: bool = False  # some material has a normal or a bump map
     null_surfaces: bool = False  # some surface lets light through as if it were not there
+    free_panes: bool = False  # thin glass does, where light goes straight through; among them
     infinite: bool = False
     light_paths: bool = False  # paths start at lights
     weighed: bool = False  # light paths have sums of the film beside those of the camera's paths

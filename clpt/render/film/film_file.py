@@ -22,8 +22,9 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
-from clpt import images, output_files
+from clpt import output_files
 from clpt.errors import SceneError
+from clpt.images import exr_files
 from clpt.render.contract.layer_names import LayerNames
 from clpt.render.film.host_picture import HostPicture
 from clpt.render.film.saved_film import Origin, PictureForm, SavedFilm, Session
@@ -55,7 +56,7 @@ def write(path: str | Path, saved: SavedFilm) -> None:
     with output_files.replacing(path) as partial:
         parts = [_picture(saved), *_words(saved), *_arrays(saved)]
         try:
-            OpenEXR.File(parts).write(images.exr_name(partial))
+            exr_files.write_parts(partial, parts)
         except RuntimeError as error:
             raise OSError(f"cannot be written: {error}") from error
         with partial.open("r+b") as file:
@@ -81,11 +82,11 @@ def _read(path: Path, made: Callable[[dict[str, Any], _Parts], _T], **options: b
     """What is made of a file's header and its parts, whose seal is whole. Raises SceneError."""
     _check_seal(path)
     try:
-        with OpenEXR.File(images.exr_name(path), separate_channels=True, **options) as file:
-            header = _header(path, file.parts[0].header.get(ATTRIBUTE))
+        with exr_files.opened(path, **options) as stored:
+            header = _header(path, stored[0].header.get(ATTRIBUTE))
             parts = {
                 part.name(): {name: channel.pixels for name, channel in part.channels.items()}
-                for part in file.parts[1:]
+                for part in stored[1:]
             }
         return made(header, parts)
     except SceneError:

@@ -92,6 +92,12 @@ class SceneIndex:
         return any(isinstance(medium, Lattice) for medium in self.emitting)
 
     @property
+    def free_panes(self) -> bool:
+        """Whether there is thin glass that is no step of a path."""
+        free = getattr(self.scene.integrator, "free_panes", False)
+        return free and any(cls.is_pane for cls in self.leaves)
+
+    @property
     def tinted(self) -> bool:
         """Whether some medium has an albedo on a grid."""
         return any(getattr(medium, "albedo_grid", None) is not None for medium in self.media)

@@ -142,7 +142,8 @@ class MediumWords:
             return np.zeros(1, np.uint32)
         given = (medium.density, colours, self._index.spectral)
         first = self._encoder.store.append("images", self._encoder.cache(grids.colours, *given))
-        return np.array([first], np.uint32)
+        apart = name == "albedo_grid" and not medium.albedo_with_density
+        return np.array([-first if apart else first], np.int32).view(np.uint32)
 
     def _glow(self, medium: Lattice, word: int, absorbs: Spectrum) -> Words:
         """What stands behind the row of a grid: what its bricks emit, and which lights they are."""

@@ -39,7 +39,7 @@ def sealed_media(index: SceneIndex, cached: Callable[..., Any] | None = None) ->
     found = set()
     for medium, bodies in inside.items():
         leaves = {leaf for shape in bodies for leaf in leaves_of(shape.material)}
-        stops = not any(leaf.is_null for leaf in leaves)
+        stops = not any(leaf.is_null or (leaf.is_pane and index.free_panes) for leaf in leaves)
         alone = medium.scatters and medium not in around and medium not in index.emitting
         alone = alone and len(lamps) <= MOST_LAMPS
         if stops and alone and not any(_overlap(bodies, lamp, cached) for lamp in lamps):

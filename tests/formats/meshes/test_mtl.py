@@ -136,7 +136,7 @@ def test_illumination_models(read, statements):
 
 
 @pytest.mark.parametrize("model", [4, 6, 7, 9])
-@pytest.mark.parametrize("further", ["", "d .3\nKs 0 0 0\nKd .8 .8 .8", "map_Kd no.png"])
+@pytest.mark.parametrize("further", ["", "d .3\nKs 0 0 0\nKd .8 .8 .8"])
 def test_glass(read, model, further):
     one, warnings = read(f"illum {model}\nNi 1.45\nTf 1 .5 1\n{further}")
     glass = one.material
@@ -145,6 +145,11 @@ def test_glass(read, model, further):
     one, _ = read(f"illum {model}\nNi 1.45\nPr .4")
     assert one.material.kind == "rough_dielectric"
     assert one.material.alpha_u == pytest.approx(0.16)
+    one, warnings = read(f"illum {model}\nNi 1.45\nmap_Pr grey.png\nPm 0\nmap_Kd red.png")
+    squared = one.material.alpha_u
+    assert squared.kind == "product" and squared.first is squared.second
+    assert warnings == ["left out of its materials: map_Kd"]
+    assert read(f"illum {model}\nNi 1.45\nPr 0")[0].material.kind == "dielectric"
 
 
 def test_glass_without_an_index(read):

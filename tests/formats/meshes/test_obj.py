@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import itertools
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clpt.errors import SceneError
-from clpt.formats.meshes import mesh, obj
+from clpt.formats.meshes import corners, mesh, obj
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 UVS = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
@@ -285,7 +286,7 @@ def test_vertices_with_and_without_colours(read):
 
 
 @pytest.mark.parametrize(
-    ("corners", "size"),
+    ("outline", "size"),
     [
         ("0 0 3 0 3 3 2 3 2 1 1 1 1 3 0 3", 7.0),  # the letter U
         ("-1 -1 1 -1 1 1 0 -.5 -1 1", 2.5),  # V
@@ -296,8 +297,8 @@ def test_vertices_with_and_without_colours(read):
     ],
 )
 @pytest.mark.parametrize("reversed_", [False, True])
-def test_polygons_keep_their_shape(read, corners, size, reversed_):
-    points = np.array(corners.split(), float).reshape(-1, 2)
+def test_polygons_keep_their_shape(read, outline, size, reversed_):
+    points = np.array(outline.split(), float).reshape(-1, 2)
     points = points[::-1] if reversed_ else points
     turn = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
     placed = np.column_stack([points, np.full(len(points), 5.0)]) @ turn
@@ -372,7 +373,9 @@ def test_a_random_mesh_in_any_style_is_read_back(tmp_path_factory, data):
         faces.append(list(zip(vertex.tolist(), uv, normal, strict=False)))
     path = tmp_path_factory.mktemp("obj") / "a.obj"
     path.write_bytes(_written(draw, points, uvs, normals, faces))
-    made = mesh.read_mesh(path)
+    piece, dense = draw(st.sampled_from([2, 64, obj.PIECE])), draw(st.sampled_from([0, 8]))
+    with mock.patch.object(obj, "PIECE", piece), mock.patch.object(corners, "DENSE", dense):
+        made = mesh.read_mesh(path)
     (one,) = made.meshes
     assert made.warnings == []
     named = np.array([[corner[0] for corner in face] for face in faces])

@@ -216,7 +216,12 @@ def test_integrators(scene):
     made = scene(f'<integrator type="aov">{others}</integrator>')
     assert made.film.layers == () and "dp_du are left out" in made.warnings[0]
     for name in ("volpath", "volpathmis"):
-        assert scene(f'<integrator type="{name}"/>').integrator.kind == "path"
+        made = scene(f'<integrator type="{name}"/>').integrator
+        assert made.kind == "path" and made.free_panes and made.max_depth == -1
+    made = scene('<integrator type="prbvolpath"/>').integrator
+    assert made.free_panes and made.max_depth == 6
+    assert not scene('<integrator type="prb"/>').integrator.free_panes
+    assert not scene('<integrator type="path"/>').integrator.free_panes
 
 
 def test_shapes(scene):
@@ -596,8 +601,8 @@ ERRORS = {
     '<shape type="cube"><medium type="homogeneous" name="inside"/></shape>': "cannot stand in",
     '<phase type="hg" id="m"/><shape type="cube"><ref name="interior" id="m"/></shape>':
         "<ref name=.interior.>: .*must be a <medium>",
-    '<shape type="cube"><medium type="homogeneous" name="interior"><float name="albedo" value="2"/>'
-    '</medium></shape>': "<medium type=.homogeneous.>: homogeneous.albedo: 2",
+    '<shape type="cube"><medium type="homogeneous" name="interior"><texture name="sigma_t"'
+    ' type="checkerboard"/></medium></shape>': "<medium type=.homogeneous.>: 'sigma_t' cannot be",
     '<shape type="cube"><medium type="homogeneous" name="interior"><phase type="hg">'
     '<float name="g" value="1.5"/></phase></medium></shape>': "<phase type=.hg.>: .*outside",
     '<phase type="sggx" id="p"/><shape type="cube"><medium type="homogeneous" name="interior">'
@@ -613,7 +618,7 @@ ERRORS = {
     '<shape type="cube"><bsdf type="normalmap"><texture type="checkerboard" name="normalmap"/>'
     '<bsdf type="diffuse"/></bsdf></shape>': "must be a bitmap, or one colour",
     '<bsdf type="diffuse"><texture type="volume" name="reflectance"><volume type="gridvolume" '
-    'name="volume"/></texture></bsdf>': "<volume type=.gridvolume.>: only a <volume>",
+    'name="volume"/></texture></bsdf>': "<volume type=.gridvolume.>: a grid cannot stand",
     '<bsdf type="roughconductor"><spectrum name="alpha" value="400:0, 500:0.1"/></bsdf>':
         "must be a number or a texture",
     '<float value="1"/>': "needs the attribute 'name'",

@@ -289,3 +289,23 @@ def test_a_batch_of_sensors(tmp_path):
     assert any("no row" in warning for warning in scene.warnings)
     with pytest.raises(SceneError, match=r"a\.xml:1.*multiple of its sensors"):
         load(written(127))
+
+
+def test_a_path_in_an_included_file_lies_beside_it_or_beside_the_scene(read, tmp_path):
+    """Mitsuba looks beside the file that names a folder, then in all folders so far."""
+    for folder in ("shared", "parts/own", "shared/deep"):
+        (tmp_path / folder).mkdir(parents=True)
+    triangle = "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3\n"
+    for folder, file in (("shared", "a"), ("parts/own", "b"), ("shared/deep", "c")):
+        (tmp_path / folder / f"{file}.obj").write_text(triangle)
+    names = "".join(
+        f'<shape type="obj"><string name="filename" value="{name}.obj"/></shape>' for name in "abc"
+    )
+    part = tmp_path / "parts" / "part.xml"
+    paths = '<path value="shared"/><path value="own"/><path value="deep"/>'
+    part.write_text(f'<scene version="3.0.0">{paths}{names}</scene>')
+    scene = '<path value="shared"/><include filename="parts/part.xml"/>'
+    assert [one.kind for one in read(scene).shapes] == ["mesh"] * 3
+    part.write_text('<scene version="3.0.0"><path value="none"/></scene>')
+    with pytest.raises(SceneError, match=r"part.xml:1: <path>: there is no folder 'none'"):
+        read(scene)

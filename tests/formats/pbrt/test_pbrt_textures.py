@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import clpt
 from clpt import transforms
 from clpt.errors import SceneError
 from clpt.formats.pbrt.map_values import map_values
 from clpt.formats.pbrt.textures import textured
+from clpt.render.lowering.textures.texels import pixels
 from clpt.scene.textures import Bitmap, Checkerboard, Checkers, Dots, Mix, Noise, Product
 from tests.formats.pbrt.directives import define, params, state
 
@@ -94,6 +96,40 @@ def test_images(images):
         filter = {} if given is None else {"filter": ("string", given)}
         made, warnings = make("imagemap", folder=images, filename=("string", "a.tga"), **filter)
         assert made.filter == expected and not warnings
+
+
+def test_numbers_between_texels_are_alpha_or_a_mean(tmp_path):
+    """pbrt-v4's MIPMap: Bilerp<Float> takes alpha, or the mean; Texel<Float>, of others, red."""
+
+    def number(pixel, suffix=".png", **given):
+        path = tmp_path / f"a{suffix}"
+        if suffix == ".png":
+            Image.fromarray(np.full((2, 2, len(pixel)), pixel, np.uint8)).save(path)
+        else:
+            clpt.write_image(path, np.full((2, 2, len(pixel)), pixel), half=False, space="acescg")
+        given = {name: ("string", value) for name, value in given.items()}
+        made, warnings = make(
+            "imagemap", "float", tmp_path, filename=("string", path.name), **given
+        )
+        assert not warnings
+        return float(pixels(made, "real")[0, 0, 0])
+
+    linear = srgb(np.array([200, 100, 50, 128]) / 255.0)
+    for filter in ("bilinear", "trilinear"):
+        assert number((200, 100, 50, 128), filter=filter) == pytest.approx(linear[3])
+        assert number((200, 100, 50, 0), filter=filter) == 0.0
+        assert number((200, 100, 50, 255), filter=filter) == pytest.approx(linear[:3].mean())
+        assert number((200, 100, 50), filter=filter) == pytest.approx(linear[:3].mean())
+    for filter in ("point", "ewa"):
+        assert number((200, 100, 50, 128), filter=filter) == pytest.approx(linear[0])
+    assert number((100, 100, 100)) == pytest.approx(linear[1])
+    assert number((200, 100, 50, 128), encoding="linear") == pytest.approx(128 / 255)
+    assert number((200, 100, 50), encoding="linear") == pytest.approx(350 / 3 / 255)
+    of_gamma = (np.array([200, 100, 50]) / 255) ** 2.0
+    assert number((200, 100, 50), encoding="gamma 2") == pytest.approx(of_gamma.mean())
+    assert number((0.2, 0.5, 1.1, 0.25), ".exr") == pytest.approx(0.25)
+    assert number((0.2, 0.5, 1.1), ".exr") == pytest.approx(0.6)  # whatever its chromaticities
+    assert number((0.2, 0.5, 1.1), ".exr", filter="point") == pytest.approx(0.2)
 
 
 def test_encodings_scale_and_invert(images):

@@ -86,7 +86,8 @@ def decided(lit: Lit, former: Integrator | None = None) -> tuple[SceneIndex, str
         chosen, reason = Path(light_paths=chosen.light_paths), "photons do not know their group"
     if getattr(given, "guiding", False):
         chosen, reason = Path(light_paths=0, guiding=True), "directions are guided"
-    own = {name: getattr(given, name) for name in ("max_depth", "rr_depth", "hide_lights")}
+    shared = ("max_depth", "rr_depth", "hide_lights", "free_panes")
+    own = {name: getattr(given, name) for name in shared if hasattr(given, name)}
     chosen = replace(chosen, **own)
     return replace(index, scene=replace(index.scene, integrator=chosen)), reason
 
@@ -99,7 +100,9 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
         return without, index.lit_media
     if not cameras.is_connected(scene.camera, scene.film.mode):
         return without, "points cannot be joined to this camera"
-    if 0 <= scene.integrator.max_depth < FEWEST:  # type: ignore[attr-defined]
+    integrator: Any = scene.integrator
+    fewest = FEWEST - getattr(integrator, "free_panes", False)
+    if 0 <= integrator.max_depth < fewest:
         return without, "the longest path is too short for a caustic"
     in_fog = _in_fog(lit)
     if in_fog is not None:

@@ -41,7 +41,8 @@ class _Content(NamedTuple):
     """What an image light is made of: texels, and cells to choose among by their mean weights.
 
     grid: how blocks of cells and the cells in them are chosen; bands, number: of texels that are
-    spectra: how many values they have, which one by wavelength.
+    spectra: how many values they have, which one by wavelength; notes: what files say that is left
+    out.
     """
 
     width: int
@@ -51,6 +52,7 @@ class _Content(NamedTuple):
     grid: block_grids.BlockGrid
     bands: int = 0
     number: Tabulated | None = None
+    notes: tuple[str, ...] = ()
 
 
 def lower_image(lamp: Envmap | CubeMap, encoder: Encoder) -> tuple[dict[str, ArrayLike], float]:
@@ -60,6 +62,7 @@ def lower_image(lamp: Envmap | CubeMap, encoder: Encoder) -> tuple[dict[str, Arr
     that is more than a rotation.
     """
     axes, made = axes_of(lamp), _content(lamp, encoder)
+    encoder.warnings.update(made.notes)
     if isinstance(lamp, Envmap):
         cell = np.pi / (made.height - 1) * 2.0 * np.pi / made.width
     else:
@@ -120,7 +123,8 @@ def _sphere(given: Any, scale: float, spectral: bool, lo: float, hi: float) -> _
     """An image in latitude and longitude, its spectra from lo to hi [nm]."""
     where = "envmap.image"
     found = spectral_exr.find(given, emissive=True)
-    image = _loaded(given if found is None else found.to_rgb(), where)
+    notes: list[str] = []
+    image = _loaded(given if found is None else found.to_rgb(), where, notes)
     image = _at_least_two_rows(image * np.float32(scale))
     height, width, _ = image.shape
     if found is None or not spectral:
@@ -132,6 +136,7 @@ def _sphere(given: Any, scale: float, spectral: bool, lo: float, hi: float) -> _
             values,
             corners,
             block_grids.of(corners, partial(sphere_directions, width)),
+            notes=tuple(notes),
         )
     found = _scaled(found, scale, where)
     corners = _latitude_weights(luminance(image) + UNSEEN * _brightness(found.values))[None]
@@ -142,11 +147,13 @@ def _sphere(given: Any, scale: float, spectral: bool, lo: float, hi: float) -> _
 
 def _cube(given: Any, scale: float, spectral: bool) -> _Content:
     """The faces of a cube, with their borders."""
-    faces = _faces(given, "cube_map.image") * np.float32(scale)
+    notes: list[str] = []
+    faces = _faces(given, "cube_map.image", notes) * np.float32(scale)
     image, size = _bordered(faces), faces.shape[1]
     corners = _cube_weights(_brightness(image))
     values = texels(image.reshape(1, -1, 3), "emission", spectral)
-    return _Content(size, size, values, corners, block_grids.of(corners, cube_directions))
+    grid = block_grids.of(corners, cube_directions)
+    return _Content(size, size, values, corners, grid, notes=tuple(notes))
 
 
 def axes_of(lamp: Envmap | CubeMap | Sky) -> NDArray[np.float64]:
@@ -174,14 +181,21 @@ def _scaled(image: SpectralImage, scale: float, where: str) -> SpectralImage:
     return dataclasses.replace(image, values=np.maximum(values, np.float32(0.0)))
 
 
-def _loaded(image: Any, where: str) -> Array:
-    """An image as (h, w, 3) float32 without negative values. Raises SceneError."""
+def _loaded(image: Any, where: str, notes: list[str]) -> Array:
+    """An image as (h, w, 3) float32 without negative values. Raises SceneError.
+
+    notes: gets what its file says that is left out.
+    """
     if spectral_exr.find(image, emissive=True) is not None:
         raise SceneError("spectral images can be an envmap only", where=where)
     if image is None:
         raise SceneError("an image is needed: a path, or an array (h, w, 3)", where=where)
-    named = isinstance(image, (str, Path))
-    values = images.read(image) if named else np.asarray(on_host(image), np.float32)
+    if isinstance(image, (str, Path)):
+        stored = images.read_stored(image)
+        notes += [f"{image}: {note}" for note in stored.notes_of(raw=False)]
+        values = stored.decoded()
+    else:
+        values = np.asarray(on_host(image), np.float32)
     if values.ndim == 2:
         values = values[..., None]
     if values.ndim != 3 or values.shape[2] not in (1, 3, 4) or 0 in values.shape:
@@ -192,14 +206,14 @@ def _loaded(image: Any, where: str) -> Array:
     return np.maximum(values, np.float32(0.0))
 
 
-def _faces(image: Any, where: str) -> Array:
-    """The six faces of a cube map (6, n, n, 3), in the order of FACES."""
+def _faces(image: Any, where: str, notes: list[str]) -> Array:
+    """The six faces of a cube map (6, n, n, 3), in the order of FACES; notes: as of `_loaded`."""
     if isinstance(image, (list, tuple)) or (isinstance(image, np.ndarray) and image.ndim == 4):
         if len(image) != 6:
             raise SceneError(f"six faces are needed ({FACES}), found {len(image)}", where=where)
-        faces = [_loaded(face, where) for face in image]
+        faces = [_loaded(face, where, notes) for face in image]
     else:
-        cross = _loaded(image, where)
+        cross = _loaded(image, where, notes)
         height, width, _ = cross.shape
         if width * 3 == height * 4:
             n, places = width // 4, _WIDE

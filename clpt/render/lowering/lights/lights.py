@@ -24,8 +24,10 @@ from clpt.render.lowering.lights.brick_lights import BrickLights
 from clpt.render.lowering.lights.non_shape_lights import blank_row, brightness, lower_lamp
 from clpt.render.lowering.lights.triangle_means import triangle_means
 from clpt.render.lowering.lowering_cache import content
+from clpt.render.lowering.textures.textures import per_face
 from clpt.scene.lights import DirectionalArea, Light
 from clpt.scene.shapes import Shape
+from clpt.scene.textures import MeshAttribute, textures_in
 
 PLACED_LIGHT_WEIGHT = (
     6  # triangles that a light at a place of its own counts as, where a tree is thought of
@@ -217,9 +219,19 @@ def _emitter_block(emitter: Emitter, encoder: Encoder) -> Block:
     rows = _block(count, "triangle", at, radiance, emitter.shape_row)
     rows["emission_mode"] = emission_mode
     bounds = cache(_triangle_bounds, *corners, emission_mode == BOTH)
-    bright = cache(triangle_means, value, emitter.uvs, emitter.faces)
+    by_face = _face_attributes(shape, value)
+    if by_face:
+        bright = triangle_means(value, emitter.uvs, emitter.faces, by_face)
+    else:
+        bright = cache(triangle_means, value, emitter.uvs, emitter.faces)
     areas = cache(_triangle_areas, *corners)
     return Block(rows, strength * areas * bright, bounds)
+
+
+def _face_attributes(shape: Shape, value: Any) -> dict[str, NDArray[np.float32]]:
+    """What an emission reads of each triangle."""
+    names = {one.name for one in textures_in(value) if isinstance(one, MeshAttribute)}
+    return {name: triangles.attribute(shape, name) for name in names if per_face(name)}
 
 
 def _triangle_rows(vertices: shapes.Points, faces: shapes.Faces, keys: int) -> NDArray[np.uint32]:

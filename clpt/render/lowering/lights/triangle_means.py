@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -9,7 +11,7 @@ from numpy.typing import NDArray
 
 from clpt.render.lowering.lights.non_shape_lights import brightness
 from clpt.render.lowering.textures.texels import pixels
-from clpt.scene.textures import Bitmap, Checkerboard, Mix, Product
+from clpt.scene.textures import Bitmap, Checkerboard, MeshAttribute, Mix, Product
 
 Floats = NDArray[np.float64]
 
@@ -19,10 +21,16 @@ LEAST = 0.02  # of the texture's mean: a triangle that looks dark may yet hold a
 _GOLDEN = np.array([0.7548776662466927, 0.5698402909980532])  # Roberts' sequence R2 (2018)
 
 
-def triangle_means(value: Any, uvs: NDArray[np.float32] | None, faces: NDArray[Any]) -> Floats:
+def triangle_means(
+    value: Any,
+    uvs: NDArray[np.float32] | None,
+    faces: NDArray[Any],
+    attributes: Mapping[str, NDArray[np.float32]] = MappingProxyType({}),
+) -> Floats:
     """Return the mean brightness of an emission over triangles (m, 3), as (m,).
 
     uvs (n, 2): of the vertices; None: the barycentrics stand for them, as in kernels/light/area.cl.
+    attributes: the values (m, k) of each triangle, of those that the emission reads by face.
     """
     mean = brightness(value)
     if not getattr(value, "is_texture", False):
@@ -36,20 +44,26 @@ def triangle_means(value: Any, uvs: NDArray[np.float32] | None, faces: NDArray[A
     places = np.einsum("kc,mcd->mkd", weights, given)
     edges = given[:, 1:] - given[:, :1]
     area = 0.5 * np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
-    found = looked_up(value, places, area / count).mean(axis=1)
+    found = looked_up(value, places, area / count, attributes).mean(axis=1)
     return np.maximum(found, LEAST * mean)
 
 
-def looked_up(value: Any, uv: Floats, area: Floats) -> Floats:
+def looked_up(
+    value: Any, uv: Floats, area: Floats, attributes: Mapping[str, NDArray[np.float32]]
+) -> Floats:
     """Return the brightness of a value at uv (m, k, 2); area (m,): of uv that a look stands for.
 
     A kind of texture that is not known here has its mean everywhere.
     """
+    if isinstance(value, MeshAttribute) and value.name in attributes:
+        means = attributes[value.name].mean(axis=1, dtype=np.float64)
+        return np.broadcast_to(np.maximum(means, 0.0)[:, None], uv.shape[:2])
     if isinstance(value, Product):
-        return looked_up(value.first, uv, area) * looked_up(value.second, uv, area)
+        first, second = (looked_up(v, uv, area, attributes) for v in (value.first, value.second))
+        return first * second
     if isinstance(value, Mix):
-        share = looked_up(value.amount, uv, area)
-        first, second = (looked_up(v, uv, area) for v in (value.first, value.second))
+        share = looked_up(value.amount, uv, area, attributes)
+        first, second = (looked_up(v, uv, area, attributes) for v in (value.first, value.second))
         return (1.0 - share) * first + share * second
     if isinstance(value, (Bitmap, Checkerboard)):
         matrix = value.to_uv / value.to_uv[2, 2]
@@ -57,7 +71,7 @@ def looked_up(value: Any, uv: Floats, area: Floats) -> Floats:
         if isinstance(value, Bitmap):
             return _bitmap(value, there, area * abs(np.linalg.det(matrix[:2, :2])))
         same = np.equal(*np.moveaxis(there % 1.0 < 0.5, -1, 0))
-        first, second = (looked_up(v, uv, area) for v in (value.color0, value.color1))
+        first, second = (looked_up(v, uv, area, attributes) for v in (value.color0, value.color1))
         return np.where(same, first, second)
     known = value if isinstance(value, (int, float)) else brightness(value)
     return np.full(uv.shape[:2], float(known))

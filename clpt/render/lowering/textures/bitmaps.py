@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import os
 from collections import defaultdict
+from collections.abc import Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -37,11 +38,16 @@ THREADS = 8
 
 @dataclass
 class _Form:
-    """What an image is, without its pixels: (h, w, c), whether of bytes, and `Stored.encoded`."""
+    """What an image is, without its pixels: (h, w, c), whether of bytes, and `Stored.encoded`.
+
+    profiled: its colours are floats, of no transfer; notes: of whoever takes it as colours, or raw.
+    """
 
     shape: tuple[int, ...]
     bytes: bool
     encoded: bool
+    profiled: bool
+    notes: dict[bool, tuple[str, ...]]
 
 
 class _Pixels:
@@ -74,8 +80,14 @@ class _Pixels:
     def form(self) -> _Form:
         """What is known of it even after `let_go`. Raises SceneError."""
         if self._form is None:
-            values, encoded = self.stored.values, self.stored.encoded
-            self._form = _Form(values.shape, values.dtype == np.uint8, encoded)
+            stored = self.stored
+            self._form = _Form(
+                stored.values.shape,
+                stored.values.dtype == np.uint8,
+                stored.encoded,
+                stored.is_profiled,
+                {raw: stored.notes_of(raw) for raw in (False, True)},
+            )
         return self._form
 
     def let_go(self) -> None:
@@ -109,6 +121,14 @@ class _Image:
     @property
     def has_levels(self) -> bool:
         return has_levels(self.texture, self.role)
+
+    @property
+    def form(self) -> _Form:
+        """What the image is as the texture means it: as data, or as colours."""
+        form = self.pixels.form
+        if self.texture.raw or not form.profiled:
+            return form
+        return replace(form, bytes=False, encoded=False)
 
 
 class Images:
@@ -147,9 +167,9 @@ class Images:
         read.
         """
         wanted, self._wanted = list(self._wanted.values()), {}
-        notes = self._fit(wanted)
+        notes = [*_left_out(wanted), *self._fit(wanted)]
         for image in wanted:
-            form = image.pixels.form
+            form = image.form
             bytes_ = _packs(form, image, self.spectral)
             texture, halvings = image.texture, image.halvings
             by = (
@@ -194,8 +214,8 @@ class Images:
 
     def _words(self, image: _Image) -> _Packed:
         """The words of an image, level by level, of each row by row from the top."""
-        texture, stored = image.texture, image.pixels.stored
-        packs = _packs(image.pixels.form, image, self.spectral)
+        texture, stored = image.texture, image.pixels.stored.meant(image.texture.raw)
+        packs = _packs(image.form, image, self.spectral)
         values, curved = _shaped(stored.values), stored.encoded and not texture.raw
         if image.halvings:
             values = _halved(values, curved, image.halvings)
@@ -307,7 +327,7 @@ def _packs(form: _Form, image: _Image, spectral: bool) -> bool:
 
 def _size(image: _Image, spectral: bool) -> int:
     """Bytes on the device."""
-    form = image.pixels.form
+    form = image.form
     height, width = (max(1, -(-n >> image.halvings)) for n in form.shape[:2])
     packed = _packs(form, image, spectral)
     if image.role == "real":
@@ -318,6 +338,16 @@ def _size(image: _Image, spectral: bool) -> int:
         texel = 16 if spectral else 12
     sizes = _level_sizes(height, width) if image.has_levels else [(height, width)]
     return sum(h * w for h, w in sizes) * texel
+
+
+def _left_out(wanted: Iterable[_Image]) -> list[str]:
+    """What the files of images say that is left out, each once."""
+    said = [
+        f"{image.texture.image}: {note}"
+        for image in wanted
+        for note in image.pixels.form.notes[image.texture.raw]
+    ]
+    return list(dict.fromkeys(said))
 
 
 def _note(image: _Image) -> str:

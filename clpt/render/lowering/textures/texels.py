@@ -36,7 +36,7 @@ def pixels(texture: Bitmap, role: str) -> Floats:
     spectral = spectral_image(texture, role)
     image = texture.image if spectral is None else spectral.to_rgb()
     if isinstance(image, (str, Path)):
-        image = images.read(image, linear=not texture.raw)
+        image = images.read_stored(image).decoded(not texture.raw)
     image = np.asarray(on_host(image))
     image = image[..., None] if image.ndim == 2 else image
     if image.dtype == np.uint8 and image.ndim == 3:

@@ -8,6 +8,8 @@ from PIL import Image
 
 from clpt import images, spectral_exr
 from clpt.errors import SceneError
+from clpt.images import budget
+from clpt.images.pillow import from_pillow
 from clpt.spectra import spaces
 
 rng = np.random.default_rng(1)
@@ -115,7 +117,7 @@ def test_eight_bit_formats(tmp_path, suffix):
 
 @pytest.mark.parametrize(("mode", "channels"), [("1", 1), ("L", 1), ("P", 3), ("LA", 4)])
 def test_pillow_modes(mode, channels):
-    image = images.from_pillow(Image.new("RGB", (3, 2), (255, 255, 255)).convert(mode))
+    image = from_pillow(Image.new("RGB", (3, 2), (255, 255, 255)).convert(mode)).decoded()
     assert image.shape == (2, 3, channels)
     assert (image == 1).all()
 
@@ -242,9 +244,9 @@ def test_images_of_too_many_pixels(tmp_path, monkeypatch):
         images.write(path, whole)
     spectral = tmp_path / "bands.exr"
     spectral_exr.write(spectral, spectral_exr.SpectralImage(whole, [400.0, 500.0, 600.0], True))
-    monkeypatch.setattr(images, "LARGEST", 600)
+    monkeypatch.setattr(budget, "PIXELS", 600)
     assert all(images.read(path).shape == whole.shape for path in paths)
-    monkeypatch.setattr(images, "LARGEST", 599)
+    monkeypatch.setattr(budget, "PIXELS", 599)
     for path in [*paths, spectral]:
         with pytest.raises(SceneError, match=r"has 30x20 pixels, more than the 599 that") as raised:
             (spectral_exr if path == spectral else images).read(path)

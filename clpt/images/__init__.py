@@ -1,0 +1,56 @@
+"""Files of pictures as (h, w, c) float32 arrays, and back; row 0 is the top.
+
+Every picture that clpt takes comes in through `read` or `read_stored`, or through `decoded` where
+its bytes stand in another file. What a file says of its numbers is heeded: colours are linear Rec.
+709 unless data is asked for. docs/images.md has a table of what is honoured in which format.
+"""
+
+from clpt.images.exr import matrix_of
+from clpt.images.exr_files import attributes, part_names, write_channels
+from clpt.images.layers import read_channels, read_layers
+from clpt.images.npy import write as write_npy
+from clpt.images.pillow import decoded
+from clpt.images.pillow import texts as png_text
+from clpt.images.png_files import png
+from clpt.images.reading import READERS, check_input, log_notes, read, read_stored
+from clpt.images.stored import Stored
+from clpt.images.transfer import (
+    linear_to_srgb,
+    srgb8_steps,
+    srgb_to_linear,
+    straight,
+    to_codes,
+    to_rec709,
+    to_srgb8,
+)
+from clpt.images.writing import WRITABLE, check_output, write, write_stored
+
+__all__ = [
+    "READERS",
+    "WRITABLE",
+    "Stored",
+    "attributes",
+    "check_input",
+    "check_output",
+    "decoded",
+    "linear_to_srgb",
+    "log_notes",
+    "matrix_of",
+    "part_names",
+    "png",
+    "png_text",
+    "read",
+    "read_channels",
+    "read_layers",
+    "read_stored",
+    "srgb8_steps",
+    "srgb_to_linear",
+    "straight",
+    "to_codes",
+    "to_rec709",
+    "to_srgb8",
+    "write",
+    "write_channels",
+    "write_npy",
+    "write_stored",
+]

@@ -1,0 +1,169 @@
+"""OpenEXR files as pictures, by what their attributes mean.
+
+Attributes as in "Technical Introduction to OpenEXR" and "OpenEXR File Layout": a picture is its
+display window; pixels outside of the data window are zero. Colours are of the primaries and the
+white in `chromaticities`, else of Rec. 709. Colours are multiplied by alpha, and stay so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clpt.errors import SceneError
+from clpt.images import exr_files
+from clpt.images.exr_channels import Choice, choose
+from clpt.images.exr_files import Header, Window, window
+from clpt.images.stored import Matrix, Stored
+from clpt.spectra import spaces
+
+Array = NDArray[np.float32]
+
+HALF_MAX = 65504.0
+
+
+def read(path: Path) -> Stored:
+    """Read the picture of a file. Raises SceneError for deep or too large ones, else as OpenEXR."""
+    found = exr_files.headers(path)
+    choice = choose([exr_files.flat_channels(header) for header in found])
+    header = found[choice.part]
+    exr_files.check(path, header)
+    read_ = exr_files.read_channels(path, choice.names, choice.part)
+    names = choice.names
+    if choice.form == "grey" and len(names) == 2:
+        names = (names[0],) * 3 + names[1:]
+    x0, y0, x1, y1 = window(header, "displayWindow")
+    values = np.empty((y1 - y0, x1 - x0, len(names)), np.float32)
+    for index, name in enumerate(names):
+        values[..., index] = placed(_whole(read_[name], window(header, "dataWindow")), header)
+    matrix, notes = _matrix(header, choice)
+    if choice.form == "chroma":
+        values[..., :3] = _from_chroma(values[..., :3], _weights(header))
+    return Stored(values, False, matrix=matrix, notes=_notes(header, choice), colour_notes=notes)
+
+
+def placed(plane: NDArray[Any], header: Header) -> NDArray[Any]:
+    """A channel (h, w) of the data window as one of the display window: zero outside, or cut."""
+    data, shown = window(header, "dataWindow"), window(header, "displayWindow")
+    if data == shown:
+        return plane
+    made = np.zeros((shown[3] - shown[1], shown[2] - shown[0]), plane.dtype)
+    x0, y0, x1, y1 = common = _common(data, shown)
+    if x0 < x1 and y0 < y1:
+        made[_part(common, shown)] = plane[_part(common, data)]
+    return made
+
+
+def matrix_of(header: Header) -> Matrix | None:
+    """From the colours of a part to linear Rec. 709, None where they are that or say nothing.
+
+    Raises SceneError for chromaticities that span no colours.
+    """
+    stated = header.get("chromaticities")
+    return None if stated is None else spaces.to_rec709(stated)
+
+
+def write(
+    path: Path,
+    pixels: Array,
+    half: bool,
+    metadata: Mapping[str, Any],
+    layers: Mapping[str, ArrayLike],
+    prefix: str,
+) -> None:
+    """Write an image and its layers, see `clpt.images.write`. Raises SceneError for shapes."""
+    channels = {}
+    letters_of = {1: "Y", 3: "RGB", 4: "RGBA"}[pixels.shape[2]]
+    parts = [("", tuple(prefix + letter for letter in letters_of), pixels)]
+    for name, given in layers.items():
+        layer = np.asarray(given, np.float32)
+        layer = layer[..., None] if layer.ndim == 2 else layer
+        if layer.shape[:2] != pixels.shape[:2] or layer.shape[2] not in (1, 3, 4):
+            message = f"layer {name!r} has shape {layer.shape}, the image {pixels.shape}"
+            raise SceneError(message, file=path)
+        letters = (".R", ".G", ".B", ".A")[: layer.shape[2]] if layer.shape[2] > 1 else ("",)
+        parts.append((name, letters, layer))
+    for name, letters, layer in parts:
+        narrow = half and not name
+        stored = np.clip(layer, -HALF_MAX, HALF_MAX).astype(np.float16) if narrow else layer
+        for index, letter in enumerate(letters):
+            channels[name + letter] = np.ascontiguousarray(stored[..., index])
+    exr_files.write_channels(path, metadata, channels)
+
+
+def _matrix(header: Header, choice: Choice) -> tuple[Matrix | None, tuple[str, ...]]:
+    """What takes a picture's colours to Rec. 709, and what of that is left out."""
+    if choice.form == "xyz":
+        return spaces.from_xyz("rec709"), ()
+    if choice.form not in ("rgb", "chroma"):
+        return None, ()
+    try:
+        return matrix_of(header), ()
+    except SceneError as error:
+        return None, (f"{error.message}: left out, its colours are taken as Rec. 709",)
+
+
+def _notes(header: Header, choice: Choice) -> tuple[str, ...]:
+    """What a picture's attributes say that is left out."""
+    made = [choice.note] if choice.note else []
+    aspect = float(header.get("pixelAspectRatio", 1.0))
+    if aspect != 1.0:
+        made.append(f"its pixelAspectRatio of {aspect:g} is left out: its pixels are square")
+    if getattr(header.get("envmap"), "name", "") == "ENVMAP_CUBE":
+        made.append("its envmap attribute says that it is a cube, which is left out")
+    return tuple(made)
+
+
+def _common(a: Window, b: Window) -> Window:
+    return max(a[0], b[0]), max(a[1], b[1]), min(a[2], b[2]), min(a[3], b[3])
+
+
+def _part(part: Window, of: Window) -> tuple[slice, slice]:
+    """Rows and columns of a part of a window."""
+    rows = slice(part[1] - of[1], part[3] - of[1])
+    return rows, slice(part[0] - of[0], part[2] - of[0])
+
+
+def _whole(plane: NDArray[Any], data: Window) -> Array:
+    """A channel with a value for each pixel, where it is subsampled by linear interpolation."""
+    made = np.asarray(plane, np.float32)
+    for axis, wanted in ((0, data[3] - data[1]), (1, data[2] - data[0])):
+        count = made.shape[axis]
+        if count != wanted:
+            made = _finer(made, wanted // count, axis)
+    return made
+
+
+def _finer(values: Array, times: int, axis: int) -> Array:
+    """Values at `times` as many places along an axis, the last ones held."""
+    after = np.roll(values, -1, axis)
+    last = [slice(None)] * 2
+    last[axis] = slice(-1, None)
+    after[tuple(last)] = values[tuple(last)]
+    share = np.arange(times, dtype=np.float32) / np.float32(times)
+    made = [values + one * (after - values) for one in share]
+    shape = list(values.shape)
+    shape[axis] *= times
+    return np.stack(made, axis + 1).reshape(shape)
+
+
+def _weights(header: Header) -> NDArray[np.float64]:
+    """The shares of red, green and blue in luminance, (3,), by a part's chromaticities."""
+    stated = header.get("chromaticities", spaces.chromaticities("rec709"))
+    try:
+        matrix, _ = spaces.stated_to_xyz(stated)
+    except SceneError:
+        matrix = spaces.to_xyz("rec709")
+    return np.asarray(matrix[1], np.float64)
+
+
+def _from_chroma(values: Array, weights: NDArray[np.float64]) -> Array:
+    """Red, green and blue of Y, RY = (R - Y) / Y and BY = (B - Y) / Y, (h, w, 3)."""
+    y, ry, by = np.moveaxis(values, 2, 0)
+    red, blue = (ry + 1.0) * y, (by + 1.0) * y
+    green = (y - red * np.float32(weights[0]) - blue * np.float32(weights[2])) / weights[1]
+    return np.stack([red, green.astype(np.float32), blue], axis=2)

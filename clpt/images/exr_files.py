@@ -1,0 +1,150 @@
+"""OpenEXR files through the library: the only module that opens them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenEXR
+from numpy.typing import NDArray
+
+from clpt import output_files
+from clpt.errors import SceneError
+from clpt.images import budget
+
+Channels = Mapping[str, NDArray[Any]]
+Header = Mapping[str, Any]
+Window = tuple[int, int, int, int]  # first x and y, and those behind the last
+
+DEEP = ("deepscanline", "deeptile")
+
+
+def exr_name(path: str | Path) -> str:
+    """A path as OpenEXR takes it: bytes of UTF-8, whatever the locale. Raises ValueError."""
+    return os.fsencode(path).decode("utf-8")
+
+
+@contextmanager
+def opened(path: Path, header_only: bool = False) -> Iterator[Sequence[Any]]:
+    """The parts of a file, whose `header` and `channels` are those of the library.
+
+    Raises what the library does, from RuntimeError to MemoryError.
+    """
+    with OpenEXR.File(exr_name(path), separate_channels=True, header_only=header_only) as file:
+        yield file.parts
+
+
+def headers(path: Path) -> list[dict[str, Any]]:
+    """The attributes of each part by name. Raises as `opened` does."""
+    with opened(path, header_only=True) as parts:
+        return [dict(part.header) for part in parts]  # copies: closing the file empties them
+
+
+def attributes(path: Path) -> dict[str, Any]:
+    """The attributes of the first part by name. Raises as `opened` does."""
+    return headers(path)[0]
+
+
+def part_names(path: Path) -> list[str]:
+    """The names of the parts; their numbers where they have none. Raises as `opened` does."""
+    with opened(path, header_only=True) as parts:
+        return [part.name() or str(i) for i, part in enumerate(parts)]
+
+
+def channel_names(header: Header) -> list[str]:
+    """The names of a part's channels, in the order of the file."""
+    return [channel.name for channel in header["channels"]]
+
+
+def flat_channels(header: Header) -> list[str]:
+    """The names of a part's channels, none if its pixels are deep."""
+    return [] if _is_deep(header) else channel_names(header)
+
+
+def _is_deep(header: Header) -> bool:
+    return getattr(header.get("type"), "name", "") in DEEP
+
+
+def window(header: Header, name: str) -> Window:
+    """The "dataWindow" or the "displayWindow" of a part."""
+    (x0, y0), (x1, y1) = header[name]
+    return int(x0), int(y0), int(x1) + 1, int(y1) + 1
+
+
+def check(path: Path, header: Header) -> None:
+    """Raise SceneError for a part of too many pixels, or of deep ones."""
+    if _is_deep(header):
+        raise SceneError(f"has deep pixels ({header['type'].name}); flatten it", file=path)
+    for name in ("dataWindow", "displayWindow"):
+        x0, y0, x1, y1 = window(header, name)
+        budget.check_size(path, x1 - x0, y1 - y0)
+
+
+def read_channels(path: Path, chosen: Sequence[str] | None = None, part: int = 0) -> Channels:
+    """Channels of a part by name, as they are stored: float16, float32 or uint32.
+
+    (h, w) of the data window, less where they are subsampled. chosen: which; all if None. Raises
+    SceneError where they take too much memory, else as `opened` does.
+    """
+    found = headers(path)
+    check(path, found[part])
+    names = channel_names(found[part]) if chosen is None else chosen
+    if not names:
+        return {}
+    if len(found) == 1 and set(names) < set(channel_names(found[0])):
+        return _some(path, found[0], names)
+    # The library reads all channels of all parts.
+    budget.take(sum(_size(one, channel_names(one)) for one in found), _WHAT, path)
+    with opened(path) as parts:
+        channels = parts[part].channels
+        return {name: np.asarray(channels[name].pixels) for name in names}
+
+
+_WHAT = "what its channels hold"
+
+
+def _size(header: Header, names: Sequence[str]) -> int:
+    """What channels of a part take at most [bytes]: as they are stored, and made float32."""
+    areas = []
+    for name in ("dataWindow", "displayWindow"):
+        x0, y0, x1, y1 = window(header, name)
+        areas.append((x1 - x0) * (y1 - y0))
+    return 8 * max(areas) * len(names)
+
+
+def _some(path: Path, header: Header, names: Sequence[str]) -> Channels:
+    """Some channels of a file of one part: only they are kept.
+
+    By the library's older interface, for the newer one always reads all of them.
+    """
+    budget.take(_size(header, names), _WHAT, path)
+    x0, y0, x1, y1 = window(header, "dataWindow")
+    file = OpenEXR.InputFile(exr_name(path))
+    try:
+        about = file.header()["channels"]
+        kinds = {0: np.uint32, 1: np.float16, 2: np.float32}  # by the number of a pixel type
+        read = file.channels(list(names))
+    finally:
+        file.close()
+    made = {}
+    for name, data in zip(names, read, strict=True):
+        one = about[name]
+        shape = (y1 - y0) // one.ySampling, (x1 - x0) // one.xSampling
+        made[name] = np.frombuffer(data, kinds[one.type.v]).reshape(shape)
+    return made
+
+
+def write_parts(path: Path, parts: Sequence[Any]) -> None:
+    """Write parts of the library's own class. Raises RuntimeError where it cannot."""
+    OpenEXR.File(list(parts)).write(exr_name(path))
+
+
+def write_channels(path: Path, metadata: Mapping[str, Any], channels: Channels) -> None:
+    """Write channels (h, w) by name, and attributes, as an .exr."""
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    with output_files.replacing(path) as partial:
+        OpenEXR.File({**metadata, **header}, dict(channels)).write(exr_name(partial))

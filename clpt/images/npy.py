@@ -1,0 +1,33 @@
+"""NumPy's arrays as images: numbers as they are, rows from the top."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import output_files
+from clpt.errors import SceneError
+from clpt.images import budget
+from clpt.images.stored import Stored
+
+
+def read(path: Path) -> Stored:
+    """Read (h, w) or (h, w, c) of any number. Raises SceneError for other arrays."""
+    array = np.load(path, "r" if path.stat().st_size > 4096 else None, allow_pickle=False)
+    if array.ndim > 1:
+        budget.check_size(path, *array.shape[1::-1])
+    if array.ndim not in (2, 3) or array.dtype.kind not in "fiu":
+        message = f"not an image: an array of {array.dtype}, shape {array.shape}"
+        raise SceneError(message, file=path)
+    budget.take(4 * array.size, "its array", path)
+    values = np.array(array if array.ndim == 3 else array[..., None], np.float32)
+    return Stored(values, encoded=False)
+
+
+def write(path: Path, array: NDArray[Any]) -> None:
+    """Write an array of any shape as .npy."""
+    with output_files.replacing(path) as partial, partial.open("wb") as file:
+        np.save(file, array)

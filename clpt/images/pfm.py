@@ -1,0 +1,67 @@
+"""Portable float maps: a text header, then floats, rows from the bottom (Debevec's description).
+
+The scale's sign says the order of bytes, its absolute value is a factor. "PF4", of four channels,
+is an extension of ImageMagick and others.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import output_files
+from clpt.errors import SceneError
+from clpt.images import budget
+from clpt.images.stored import Stored
+
+Array = NDArray[np.float32]
+
+HEADER = re.compile(rb"(P[Ff]|PF4)\s+(\d+)\s+(\d+)\s+([-+]?[.\deE+-]+)\s")
+HEADER_BYTES = 256
+CHANNELS = {b"Pf": 1, b"PF": 3, b"PF4": 4}
+
+
+def read(path: Path) -> Stored:
+    """Read a file. Raises SceneError for what is no PFM, or ends early."""
+    with path.open("rb") as file:
+        header = HEADER.match(file.read(HEADER_BYTES))
+    if header is None:
+        message = "not a PFM image: its header is not 'PF' or 'Pf', width, height, scale"
+        raise SceneError(message, file=path)
+    width, height, channels = int(header[2]), int(header[3]), CHANNELS[header[1]]
+    scale = _scale(path, header[4])
+    budget.check_size(path, width, height)
+    count = width * height * channels
+    budget.take(8 * count, "its pixels", path)
+    begin, size = header.end(), path.stat().st_size
+    if size - begin == 4 * count + 1 and header[0].endswith(b"\r"):
+        begin += 1  # a header of Windows's lines
+    if size - begin < 4 * count:
+        message = f"the file ends early: {width}x{height} pixels are announced"
+        raise SceneError(message, file=path)
+    values = np.fromfile(path, "<f4" if scale < 0.0 else ">f4", count, offset=begin)
+    rows = values.reshape(height, width, channels)[::-1].astype(np.float32)
+    return Stored(rows if abs(scale) == 1.0 else rows * np.float32(abs(scale)), encoded=False)
+
+
+def _scale(path: Path, text: bytes) -> float:
+    try:
+        scale = float(text)
+    except ValueError:
+        scale = math.nan
+    if not math.isfinite(scale) or scale == 0.0:
+        said = text.decode("ascii", "replace")
+        raise SceneError(f"its scale must be a number other than 0, not {said!r}", file=path)
+    return scale
+
+
+def write(path: Path, pixels: Array) -> None:
+    """Write (h, w, 1, 3 or 4), without alpha."""
+    pixels = pixels[..., :3]
+    kind = "PF" if pixels.shape[2] == 3 else "Pf"
+    head = f"{kind}\n{pixels.shape[1]} {pixels.shape[0]}\n-1.0\n"
+    output_files.write(path, head.encode() + pixels[::-1].astype("<f4").tobytes())

@@ -1,0 +1,103 @@
+"""An image as its file has it, with what the file says that its numbers mean."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.errors import SceneError
+from clpt.images.transfer import srgb_to_linear
+
+Array = NDArray[np.float32]
+Matrix = NDArray[np.float64]
+
+BLOCK = 1 << 22  # values that are decoded at once, so that what is between takes no memory
+
+
+@dataclass(frozen=True)
+class Stored:
+    """An image as its file has it: (h, w, c) uint8, or float32 where it has not 8 bits.
+
+    encoded: its colours, but not alpha, went through a transfer: that of sRGB, or light to the
+    power of `gamma`. matrix: (3, 3) from its linear colours to Rec. 709, None where they are that.
+    notes: what the file says that is left out; colour_notes: of that, what concerns colours alone.
+    """
+
+    values: NDArray[Any]
+    encoded: bool
+    gamma: float | None = None
+    matrix: Matrix | None = None
+    notes: tuple[str, ...] = ()
+    colour_notes: tuple[str, ...] = ()
+
+    @property
+    def is_profiled(self) -> bool:
+        """Whether its colours are others than sRGB or linear Rec. 709."""
+        return self.gamma is not None or self.matrix is not None
+
+    def decoded(self, linear: bool = True) -> Array:
+        """(h, w, c) float32; linear: as linear Rec. 709, else the numbers as they are stored.
+
+        Raises SceneError where memory does not suffice.
+        """
+        try:
+            return self._colours() if linear else self._numbers()
+        except MemoryError:
+            height, width = self.values.shape[:2]
+            message = f"an image of {width}x{height} pixels takes more memory than there is"
+            raise SceneError(message) from None
+
+    def meant(self, raw: bool) -> Stored:
+        """The same image without gamma and matrix: as data if raw, else with its colours sRGB, or
+        linear Rec. 709."""
+        if raw or not self.is_profiled:
+            return Stored(self.values, self.encoded)
+        return Stored(self.decoded(), encoded=False)
+
+    def notes_of(self, raw: bool) -> tuple[str, ...]:
+        """What is left out of what the file says, for one who takes it as data or as colours."""
+        return self.notes if raw else (*self.notes, *self.colour_notes)
+
+    def _numbers(self) -> Array:
+        return _SCALE[self.values] if self.values.dtype == np.uint8 else self.values
+
+    def _colours(self) -> Array:
+        if not self.encoded and self.matrix is None:
+            return self._numbers()
+        height, width, count = self.values.shape
+        made = np.empty((height, width, count), np.float32)
+        rows = max(BLOCK // max(width * count, 1), 1)
+        for first in range(0, height, rows):
+            part = slice(first, first + rows)
+            made[part] = self._linear(self.values[part])
+        return made
+
+    def _linear(self, values: NDArray[Any]) -> Array:
+        """Some rows as linear Rec. 709."""
+        made = self._without_transfer(values)
+        if self.matrix is not None and made.shape[2] >= 3:
+            colours = made[..., :3] @ self.matrix.T.astype(np.float32)
+            made = np.concatenate([colours, made[..., 3:]], axis=2)
+        return made
+
+    def _without_transfer(self, values: NDArray[Any]) -> Array:
+        is_bytes, curve = values.dtype == np.uint8, self._curve()
+        if not self.encoded:
+            return _SCALE[values] if is_bytes else values
+        made = curve(_SCALE)[values] if is_bytes else curve(values)
+        if values.shape[2] == 4:
+            made[..., 3] = _SCALE[values[..., 3]] if is_bytes else values[..., 3]
+        return made
+
+    def _curve(self) -> Callable[[Array], Array]:
+        if self.gamma is None:
+            return srgb_to_linear
+        power = np.float32(1.0 / self.gamma)
+        return lambda values: np.maximum(values, np.float32(0.0)) ** power
+
+
+_SCALE = np.arange(256, dtype=np.float32) / np.float32(255.0)

@@ -1,0 +1,89 @@
+"""Between linear values and the codes of displays: sRGB, tone curves, views; white to white."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.colour import tones
+from clpt.colour.view import View
+from clpt.spectra.spaces import between
+
+Array = NDArray[np.float32]
+
+
+def srgb_to_linear(x: Array) -> Array:
+    """The sRGB transfer decoded (IEC 61966-2-1)."""
+    return _srgb_decoded(x).astype(np.float32)
+
+
+def _srgb_decoded(x: NDArray[Any]) -> NDArray[Any]:
+    return np.where(x <= 0.04045, x / 12.92, ((np.maximum(x, 0) + 0.055) / 1.055) ** 2.4)
+
+
+@cache
+def srgb8_steps() -> Array:
+    """The least linear value of each 8-bit sRGB code, then infinity: (257,) float32, rising."""
+    exact = _srgb_decoded((np.arange(255) + 0.5) / 255.0)
+    steps = exact.astype(np.float32)
+    steps = np.where(steps < exact, np.nextafter(steps, np.float32(1.0)), steps)
+    return np.concatenate([[-np.inf], steps, [np.inf]]).astype(np.float32)
+
+
+def linear_to_srgb(x: Array) -> Array:
+    """The sRGB transfer applied (IEC 61966-2-1)."""
+    power = np.maximum(x, 0.0031308) ** (1 / 2.4)
+    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * power - 0.055).astype(np.float32)
+
+
+def to_srgb8(image: Array, exposure: float = 0.0) -> NDArray[np.uint8]:
+    """Linear (h, w, c) as 8-bit sRGB, scaled by 2^exposure; NaN becomes black, infinity white."""
+    finite = np.nan_to_num(image, nan=0.0, posinf=np.inf, neginf=0.0)
+    colour, alpha = finite[..., :3], finite[..., 3:]
+    shown = np.clip(colour * np.float32(2.0**exposure), 0, 1)
+    scaled = linear_to_srgb(shown) * 255
+    codes = np.round(scaled)
+    close = np.abs(scaled - codes) > 0.499  # where float32 may round to the wrong side
+    codes[close] = np.searchsorted(srgb8_steps(), shown[close], side="right") - 1
+    stored = np.round(np.clip(alpha, 0, 1) * 255)
+    return np.concatenate([codes, stored], axis=2).astype(np.uint8)
+
+
+def to_codes(
+    image: Array, exposure: float = 0.0, tone: str = "none", view: View | None = None
+) -> NDArray[np.uint8]:
+    """Linear Rec. 709 (h, w, c), scaled by 2^exposure, as 8-bit codes of a display.
+
+    tone: see clpt.colour.tones, then sRGB; view: in the place of both. Raises UnknownKindError.
+    """
+    if view is None and tone == "none":
+        return to_srgb8(image, exposure)
+    colour = np.repeat(image, 3, axis=2) if image.shape[2] == 1 else image[..., :3]
+    brought = colour * np.float32(2.0**exposure)
+    if view is None:
+        shown = np.concatenate([tones.apply(brought, tone), image[..., 3:]], axis=2)
+        return to_srgb8(shown)
+    codes = np.concatenate([view.codes(brought), np.clip(image[..., 3:], 0, 1)], axis=2)
+    return np.round(codes * 255).astype(np.uint8)
+
+
+def straight(image: Array) -> Array:
+    """Colours (h, w, 4) over nothing as those of what covers: divided by alpha, as a .png has them.
+
+    Images of other shapes are returned as they are; so are colours where nothing covers.
+    """
+    if image.shape[2] != 4:
+        return image
+    alpha = image[..., 3:]
+    return np.concatenate([image[..., :3] / np.where(alpha > 0, alpha, 1), alpha], axis=2)
+
+
+def to_rec709(pixels: Array, space: str) -> Array:
+    """Colours (h, w, 3 or 4) of a space in linear Rec. 709, white to white; alpha stays."""
+    if space == "rec709" or pixels.shape[2] == 1:
+        return pixels
+    matrix = between(space, "rec709").astype(np.float32)
+    return np.concatenate([pixels[..., :3] @ matrix.T, pixels[..., 3:]], axis=2)
