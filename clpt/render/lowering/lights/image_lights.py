@@ -122,7 +122,7 @@ def _content(lamp: Envmap | CubeMap, encoder: Encoder) -> _Content:
 def _sphere(given: Any, scale: float, spectral: bool, lo: float, hi: float) -> _Content:
     """An image in latitude and longitude, its spectra from lo to hi [nm]."""
     where = "envmap.image"
-    found = spectral_exr.find(given, emissive=True)
+    found = spectral_exr.find(given, emissive=True, where=where)
     notes: list[str] = []
     image = _loaded(given if found is None else found.to_rgb(), where, notes)
     image = _at_least_two_rows(image * np.float32(scale))
@@ -186,7 +186,7 @@ def _loaded(image: Any, where: str, notes: list[str]) -> Array:
 
     notes: gets what its file says that is left out.
     """
-    if spectral_exr.find(image, emissive=True) is not None:
+    if spectral_exr.find(image, emissive=True, where=where) is not None:
         raise SceneError("spectral images can be an envmap only", where=where)
     if image is None:
         raise SceneError("an image is needed: a path, or an array (h, w, 3)", where=where)
