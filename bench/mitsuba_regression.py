@@ -1,7 +1,7 @@
 """Mitsuba's own regression scenes: does clpt make of them what Mitsuba makes?
 
 `python -m bench.mitsuba_regression FOLDER [--only NAME] [--mode rgb|spectral]`; FOLDER is a
-checkout of Mitsuba's repository of data files, or its tests/scenes. A file NAME_INTEGRATOR.xml there
+checkout of Mitsuba's repository of data files, or its tests/scenes. NAME_INTEGRATOR.xml there
 has references refs/NAME_ref_MODE.exr and ..._var.exr, mean and variance of 32,000 samples a pixel;
 where they are missing, or with --live, the installed Mitsuba renders. A picture passes when
 Mitsuba's own test would accept it: a z-test of each pixel, by the reference's variance, in XYZ. It
