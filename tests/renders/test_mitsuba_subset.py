@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -105,3 +106,19 @@ def test_numbers_from_textures(write, name):
     )
     theirs, ours = (mean(path, "rgb", 256) for mean in (mitsuba_mean, our_mean))
     np.testing.assert_allclose(ours, theirs, rtol=0.02)
+
+
+def test_a_texture_on_a_grid_of_distances(write, tmp_path):
+    """It has one value, that at uv (0, 0), which is 0.8 here; the other half would be 0.2."""
+    z, y, x = np.meshgrid(*[np.linspace(-0.5, 0.5, 12)] * 3, indexing="ij")
+    ball = (np.sqrt(x * x + y * y + z * z) - 0.45).astype("<f4")
+    header = struct.pack("<3sB5i6f", b"VOL", 3, 1, 12, 12, 12, 1, 0, 0, 0, 1, 1, 1)
+    (tmp_path / "ball.vol").write_bytes(header + ball.tobytes())
+    path = write(
+        '<integrator type="direct"/><emitter type="constant"/><shape type="sdfgrid">'
+        '<string name="filename" value="ball.vol"/><transform name="to_world">'
+        '<translate x="-.5" y="-.5" z="-.5"/><scale value="4"/></transform>'
+        f'<bsdf type="diffuse">{checks("reflectance", 0.8, 0.2)}</bsdf></shape>'
+    )
+    theirs, ours = (mean(path, "rgb", 256) for mean in (mitsuba_mean, our_mean))
+    np.testing.assert_allclose(ours, theirs, rtol=0.01)
