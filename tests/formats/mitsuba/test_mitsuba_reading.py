@@ -35,6 +35,17 @@ def material(read):
     return of
 
 
+def test_colours_of_coefficients(read) -> None:
+    """Up to 1 they have the spectrum of a reflectance; above, where Mitsuba cuts off, their own."""
+
+    def sigma_t(rgb: str):
+        medium = f'<medium name="interior" type="homogeneous"><rgb name="sigma_t" value="{rgb}"/>'
+        return read(f'<shape type="cube">{medium}</medium></shape>').shapes[0].interior.sigma_t
+
+    assert sigma_t("1, .2, .7") == RGB(1.0, 0.2, 0.7)
+    assert sigma_t("1, 2, 3") == RGBUnbounded(1.0, 2.0, 3.0)
+
+
 def diffuse(inner: str) -> str:
     return f'<bsdf type="diffuse">{inner}</bsdf>'
 
@@ -289,14 +300,3 @@ def test_a_batch_of_sensors(tmp_path):
     assert any("no row" in warning for warning in scene.warnings)
     with pytest.raises(SceneError, match=r"a\.xml:1.*multiple of its sensors"):
         load(written(127))
-
-
-def test_colours_of_coefficients(read) -> None:
-    """Up to 1 they have the spectrum of a reflectance; above, where Mitsuba cuts off, their own."""
-
-    def sigma_t(rgb: str):
-        medium = f'<medium name="interior" type="homogeneous"><rgb name="sigma_t" value="{rgb}"/>'
-        return read(f'<shape type="cube">{medium}</medium></shape>').shapes[0].interior.sigma_t
-
-    assert sigma_t("1, .2, .7") == RGB(1.0, 0.2, 0.7)
-    assert sigma_t("1, 2, 3") == RGBUnbounded(1.0, 2.0, 3.0)
