@@ -64,9 +64,9 @@ def factored(
 ) -> tuple[RGBUnbounded, NDArray[np.float32], NDArray[np.float32] | None]:
     """Return an extinction of colours (nx, ny, nz, 3) as what a `Grid` has of it.
 
-    That is one colour, a density (nx, ny, nz), and None where their product is all; else twice white,
-    the highest of each three numbers, and half of what share of it each is (nx, ny, nz, 3): colours
-    that may exceed 1 have the spectra of halves, in PBRT, in Mitsuba and in `RGBUnbounded`.
+    That is one colour, a density (nx, ny, nz), and None where their product is all; else twice
+    white, the highest of each three numbers, and half of what share of it each is (nx, ny, nz, 3):
+    colours that may exceed 1 have the spectra of halves, in PBRT, Mitsuba and `RGBUnbounded`.
     """
     values = np.asarray(values, np.float64)
     most = values.max(axis=(0, 1, 2))

@@ -41,8 +41,8 @@ def surface(shape: SdfGrid, name: str) -> tuple[Any, Any, Any, Any]:
 
     vertices, normals (n, 3) float32 in the unit cube; faces (m, 3) uint32, seen from where the
     distance is positive; uvs (n, 2) float32, all 0, so that a texture does not show how the
-    surface is cut into triangles. name: for messages. Raises SceneError for values that are no grid, for a
-    grid without a surface, and for one of too many pieces.
+    surface is cut into triangles. name: for messages. Raises SceneError for values that are no
+    grid, for a grid without a surface, and for one of too many pieces.
     """
     values, pieces = _checked(shape, name), shape.pieces
     cells = _crossed(values)
