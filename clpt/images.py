@@ -33,6 +33,7 @@ Metadata = Mapping[str, str | int | float | tuple[float, ...]]
 
 LARGEST = 1 << 29  # pixels of an image that is read
 _HALF_MAX = 65504.0
+_HALF_MIN = 2.0**-14  # from which on it has 11 bits
 _PILLOW = (".png", ".jpg", ".jpeg", ".tga", ".bmp", ".webp", ".gif", ".tif", ".tiff")
 
 
@@ -108,8 +109,8 @@ def write(
 ) -> None:
     """Write a linear (h, w), (h, w, 1), (h, w, 3) or (h, w, 4) image in the format of the suffix.
 
-    .exr: half or float, with attributes from `metadata` and further `layers` in float, name ->
-    (h, w) as the channel of that name, or (h, w, 3) as its .R, .G, .B; prefix: before R, G and B of
+    .exr: half, or float where `half` is False or half numbers do not reach the brightest pixel,
+    with attributes from `metadata` and further `layers` in float, name -> (h, w) as the channel of that name, or (h, w, 3) as its .R, .G, .B; prefix: before R, G and B of
     the image, such as "ViewLayer.Combined.". .png: sRGB transfer, 8 bit,
     scaled by 2^exposure, with texts from `metadata`; NaN is black there, values beyond [0, 1] are
     clipped. .hdr, .pfm, .npy: as it is.
@@ -391,6 +392,12 @@ def _colour_channels(names: Collection[str]) -> list[str]:
     return sorted(names)
 
 
+def _fits_half(pixels: Array) -> bool:
+    """Whether half numbers hold the brightest finite value, at their full precision."""
+    largest = float(np.max(np.abs(pixels), initial=0.0, where=np.isfinite(pixels)))
+    return largest == 0.0 or _HALF_MIN <= largest <= _HALF_MAX
+
+
 def _write_exr(
     path: Path,
     pixels: Array,
@@ -410,7 +417,7 @@ def _write_exr(
         letters = (".R", ".G", ".B", ".A")[: layer.shape[2]] if layer.shape[2] > 1 else ("",)
         parts.append((name, letters, layer))
     for name, letters, layer in parts:
-        narrow = half and not name
+        narrow = half and not name and _fits_half(layer)
         stored = np.clip(layer, -_HALF_MAX, _HALF_MAX).astype(np.float16) if narrow else layer
         for index, letter in enumerate(letters):
             channels[name + letter] = np.ascontiguousarray(stored[..., index])
