@@ -127,7 +127,7 @@ SETTINGS = Record(
     guide_side=("real", "of the cells of a guide, see kernels/guiding/guide.cl [m]"),
     guide_paths=("integer", "light paths from which it learns"),
     wavelength_groups=("integer", "groups of paths that have the same wavelengths, in a pass"),
-    rival_area=("real", "unit of areas in rivals: a power of two; kernels/lighting/rivals.cl [m^2]"),
+    rival_area=("real", "unit of areas in kernels/lighting/rivals.cl, a power of two [m^2]"),
     aims=(
         "integer",
         "first float in `distributions` of the spheres at which light paths aim",

@@ -200,8 +200,8 @@ def lower(
         row = encoder.store.append_floats("distributions", _vertex_tangents(geometry))
         features = replace(features, vertex_tangents=row + TANGENT_WORDS)
     settings = settings_of(
-        index, geometry, lights, light_level(index, lights, sphere), wavelengths, density_row, ambient_row, sphere,
-        features.dispersion, (first_aim, len(targets)), camera,
+        index, geometry, lights, light_level(index, lights, sphere), wavelengths, density_row,
+        ambient_row, sphere, features.dispersion, (first_aim, len(targets)), camera,
     )  # fmt: skip
     cache.settle()
     tables = encoder.store.arrays()

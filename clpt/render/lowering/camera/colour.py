@@ -14,7 +14,7 @@ from clpt.spectra import Sensor, spaces
 from clpt.spectra.sensors import observer
 
 LARGEST_SCALE = 60  # exponent of 2 of an exposure that sums follow
-# Exponents of 2 between which the light of an ordinary scene lies in its sums, kernels/core/fixed.cl
+# Exponents of 2 between which ordinary light lies in the sums of kernels/core/fixed.cl
 DIMMEST, BRIGHTEST = -20, 32
 
 
