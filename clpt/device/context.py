@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pyopencl as cl
 
-from clpt.device import memory, native_programs, program_cache, runtimes, speed_trial
+from clpt.device import forking, memory, native_programs, program_cache, runtimes, speed_trial
 
 from ..errors import DeviceError
 from .compilers import Compilers
@@ -128,6 +128,7 @@ class Device:
     """
 
     def __init__(self, context: cl.Context, queue: cl.CommandQueue, info: DeviceInfo):
+        forking.check(queue)
         self.context, self.queue, self.info = context, queue, info
         self.builds = Builds()
         self.compilers: Compilers | None = None  # in other processes, where the caller gives some

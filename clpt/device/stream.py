@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pyopencl as cl
 
+from . import forking
 from .buffers import host_buffer
 from .program import BoundKernel
 from .refusals import refused, wait
@@ -33,7 +34,7 @@ class Stream:
     On an in-order queue that costs nothing; on an out-of-order one each command waits for the event
     of the last. The host waits in `read` and `wait` only. Nothing calls clFinish, so that commands
     of others on the queue are left alone. What the driver refuses is raised as DeviceError, or as
-    MemoryBudgetError where memory has run out.
+    MemoryBudgetError where memory has run out; so is a fork that the driver does not survive.
 
     queue: the caller's; last: the event of the last command, None before the first.
     """
@@ -98,6 +99,7 @@ class Stream:
 
     def wait(self) -> None:
         """Wait until the last command has ended."""
+        forking.check(self.queue)
         if self.last is not None:
             wait(self.last)
 
@@ -109,6 +111,7 @@ class Stream:
             raise refused("a flush of the queue", error) from error
 
     def _waits(self) -> list[cl.Event] | None:
+        forking.check(self.queue)
         waits, self._before = self._before, []
         if not self.ordered and self.last is not None:
             waits = [*waits, self.last]

@@ -39,9 +39,9 @@ def settings_of(
     """Return the record SETTINGS of a scene; the wavefront adds what depends on the device.
 
     level: of the scene's light, see `light_level`; density_row: where the table of
-    `density` begins in `distributions`; ambient_row: in `light_params`; sphere: centre and radius of one around the scene [m];
-    disperses: whether directions depend on wavelengths; aims: the first of the spheres at which
-    light paths aim, and their number; around: words of the bodies
+    `density` begins in `distributions`; ambient_row: in `light_params`; sphere: centre and
+    radius of one around the scene [m]; disperses: whether directions depend on wavelengths; aims:
+    the first of the spheres at which light paths aim, and their number; around: words of the bodies
     and of the medium at the camera.
     """
     scene, film, integrator = index.scene, index.scene.film, index.scene.integrator

@@ -59,11 +59,11 @@ class LightRows:
 
     rows: structured (n,) of LIGHT.dtype; power: (n,) float64, what each sends into the scene, in a
     unit of all of them; radiance: the largest mean one of a shape [W m^-2 sr^-1 nm^-1]; infinite:
-    how many of the rows, the first ones, are infinite; kinds: those that occur, for `dispatch_text`; first: per emitter, its first row; whole: per
-    emitter, whether that one row stands for all of it; visible: whether one is no delta light;
-    two_sided: whether one shines from the back of its shape too; bounds: of the rows of each lamp
-    and emitter; tree: the words of the tree that
-    stand behind the rows, None where the alias table chooses.
+    how many of the rows, the first ones, are infinite; kinds: those that occur, for
+    `dispatch_text`; first: per emitter, its first row; whole: per emitter, whether that one row
+    stands for all of it; visible: whether one is no delta light; two_sided: whether one shines from
+    the back of its shape too; bounds: of the rows of each lamp and emitter; tree: the words of the
+    tree that stand behind the rows, None where the alias table chooses.
     """
 
     rows: np.ndarray
