@@ -112,8 +112,8 @@ def write(
     .exr: half, or float where `half` is False or half numbers do not reach the brightest pixel,
     with attributes from `metadata` and further `layers` in float, name -> (h, w) as the channel of
     that name, or (h, w, 3) as its .R, .G, .B; prefix: before R, G and B of the image, such as
-    "ViewLayer.Combined.". .png: sRGB transfer, 8 bit, scaled by 2^exposure, with texts
-    from `metadata`; NaN is black there, values beyond [0, 1] are clipped. .hdr, .pfm, .npy: as it is.
+    "ViewLayer.Combined.". .png: sRGB transfer, 8 bit, scaled by 2^exposure, with texts from
+    `metadata`; NaN is black there, values beyond [0, 1] are clipped. .hdr, .pfm, .npy: as it is.
     space: of the colours, see clpt.spectra.spaces; an .exr states it by its chromaticities, a .png
     is converted to sRGB, white to white. tone: of a .png, see clpt.colour.tones; view: of a .png,
     a `clpt.View` of OpenColorIO, in the place of tone and sRGB transfer.

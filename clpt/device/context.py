@@ -15,7 +15,15 @@ from typing import Any
 import numpy as np
 import pyopencl as cl
 
-from clpt.device import forking, memory, native_programs, program_cache, runtimes, speed_trial
+from clpt.device import (
+    disk_cache,
+    forking,
+    memory,
+    native_programs,
+    program_cache,
+    runtimes,
+    speed_trial,
+)
 
 from ..errors import DeviceError
 from .compilers import Compilers
@@ -150,7 +158,12 @@ class Device:
 
     @classmethod
     def adopt(cls, queue: cl.CommandQueue) -> Device:
-        """Return the device of a caller's queue, with the caller's context."""
+        """Return the device of a caller's queue, with the caller's context. Raises DeviceError."""
+        if not disk_cache.has_home():
+            raise DeviceError(
+                "PyOpenCL runs no kernel for a user without a home folder: set HOME, or "
+                "XDG_CACHE_HOME to a folder for caches"
+            )
         info = _info(-1, queue.device)
         log.info("%s: the device of the caller's queue", info.label)
         return cls(queue.context, queue, info)

@@ -9,8 +9,8 @@ that names the library where it is, repeats every ICD file of the system, and po
 OCL_ICD_VENDORS there. Where the user has set OCL_ICD_VENDORS, it stays as it is: whoever sets it
 wants exactly those drivers.
 
-Where the user's caches cannot be written, PoCL lists no device, and PyOpenCL runs no kernel. clpt
-then gives its process a temporary folder for caches.
+Where the user's caches cannot be written, or the user has no home, PoCL lists no device, and
+PyOpenCL runs no kernel. clpt then gives its process a temporary folder for caches.
 """
 
 from __future__ import annotations
@@ -24,8 +24,6 @@ import sys
 import tempfile
 from collections.abc import Iterable
 from pathlib import Path
-
-import platformdirs
 
 from clpt import output_files
 from clpt.device import disk_cache
@@ -44,8 +42,8 @@ _WHEEL, _LIBRARY = "intel-opencl-rt", "libintelocl.so"
 @functools.cache
 def prepare() -> None:
     """Set the variables that the OpenCL loader and its runtimes read, once a process."""
-    _make_wheel_known()
     _make_caches_writable()
+    _make_wheel_known()
 
 
 def _make_wheel_known() -> None:
@@ -63,8 +61,10 @@ def _make_wheel_known() -> None:
 
 
 def _make_caches_writable() -> None:
+    if not disk_cache.has_home():
+        os.environ["XDG_CACHE_HOME"] = str(disk_cache.user_folder())
     for variable, wanted in (
-        ("XDG_CACHE_HOME", platformdirs.user_cache_path()),
+        ("XDG_CACHE_HOME", disk_cache.user_folder()),
         ("POCL_CACHE_DIR", Path(os.environ.get("POCL_CACHE_DIR", tempfile.gettempdir()))),
     ):
         nearest = next(path for path in (wanted, *wanted.parents) if path.exists())

@@ -50,7 +50,8 @@ class FilmState:
     numbers that were taken, ascending and apart. scale: of a value of 1, a power of two that
     follows from the film's exposure and the scene's light. layers: (words, h, w) uint32, those of
     the first samples, see kernels/film/layers.cl; light_layers: (sums, 3, h, w)
-    uint32; mattes: (lists, slots, h, w) uint32, names and how often they were met, the first ones of the scene.
+    uint32; mattes: (lists, slots, h, w) uint32, names and how often they were met, the first ones
+    of the scene.
     """
 
     words: Words
