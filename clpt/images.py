@@ -198,7 +198,11 @@ def check_output(path: str | Path) -> Path:
     path = Path(path)
     if path.suffix.lower() not in WRITABLE:
         _fail(path, f"unknown image suffix {path.suffix!r}; can write {', '.join(WRITABLE)}")
-    if not path.absolute().parent.is_dir():
+    try:
+        known = path.absolute().parent.is_dir()
+    except FileNotFoundError:  # the current folder is gone
+        known = False
+    if not known:
         _fail(path, "its folder does not exist")
     return path
 

@@ -164,9 +164,16 @@ class Device:
                 "PyOpenCL runs no kernel for a user without a home folder: set HOME, or "
                 "XDG_CACHE_HOME to a folder for caches"
             )
+        try:
+            context = queue.context
+        except cl.Error as error:
+            raise DeviceError(
+                "the queue's context is gone: keep it in a variable for as long as the queue, as "
+                f"in context = cl.create_some_context(); queue = cl.CommandQueue(context) ({error})"
+            ) from error
         info = _info(-1, queue.device)
         log.info("%s: the device of the caller's queue", info.label)
-        return cls(queue.context, queue, info)
+        return cls(context, queue, info)
 
     @cached_property
     def lanes(self) -> int:
@@ -424,9 +431,8 @@ def _listing(infos: tuple[DeviceInfo, ...]) -> str:
 
 
 def _cl_devices() -> Iterator[cl.Device]:
-    runtimes.prepare()
     try:
-        platforms = cl.get_platforms()
+        platforms = runtimes.platforms()
     except cl.Error as error:
         log.warning("no OpenCL platform: %s", error)
         return

@@ -12,7 +12,7 @@ import pyopencl as cl
 from . import forking
 from .buffers import host_buffer
 from .program import BoundKernel
-from .refusals import refused, wait
+from .refusals import failed_before, refused, wait
 
 Events = Iterable[cl.Event] | None  # as `wait_for` takes them
 TILE = (64, 2)  # work-items of a group of pixels
@@ -48,8 +48,15 @@ class Stream:
         self._copies: deque[cl.Event] = deque()  # to the host, that may not have ended
 
     def after(self, events: Events) -> None:
-        """Let the next command wait for events of others too."""
-        self._before += events or ()
+        """Let the next command wait for events of others too.
+
+        Raises DeviceError for one that has failed: on some drivers the command would never begin.
+        """
+        given = list(events or ())
+        for event in given:
+            if event.command_execution_status < 0:
+                raise failed_before(event)
+        self._before += given
 
     def run(
         self,
