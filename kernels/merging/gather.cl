@@ -11,8 +11,7 @@
 #define MERGING_FLAT 0.5f    /* how far off the plane photons may lie, over the radius */
 #define MERGING_TURN 0.866f  /* least cosine between the normals */
 
-/* Light from one photon for each lane that is `near`, without what the path carries. unit: that of areas in rivals
- * [m^2]. */
+/* Light from one photon for each lane that is `near`, without what the path carries. unit: of areas in rivals [m^2]. */
 inline Spectrum merge_photon(Photon photon, mask near, Vertex v, Scattering scatter, Rival rival, Spectrum ratio,
                              real area, real unit, real number)
 {

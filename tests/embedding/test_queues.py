@@ -90,7 +90,7 @@ def test_an_event_that_has_failed_is_refused(
             lambda: accel.intersect(corners, corners + 1, wait_for=[bad]),
             lambda: accel.occluded(corners, corners + 1, wait_for=[bad]),
         ):
-            with pytest.raises(clpt.DeviceError, match="wait_for.*OUT_OF_RESOURCES"):
+            with pytest.raises(clpt.DeviceError, match=r"wait_for.*OUT_OF_RESOURCES"):
                 use()
         renderer.reset()
         renderer.run(4)
