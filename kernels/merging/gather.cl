@@ -37,7 +37,7 @@ inline Spectrum merge_photons(Scene scene, mask active, Vertex v, Scattering sca
     global const Settings *settings = scene.settings;
     integer group = 0;
     real radius = merging_radius(scene, pass), area = merging_area(scene, pass);
-    real number = settings->light_paths;
+    real unit = settings->rival_area, number = settings->light_paths;
 #if SPECTRUM_SIZE == 4
     group = merging_group(scene, sampler_pair(scatter.sampler, (natural)(DIMENSION_WAVELENGTH)).x);
 #endif
@@ -65,7 +65,7 @@ inline Spectrum merge_photons(Scene scene, mask active, Vertex v, Scattering sca
                 near = near & ((photon.depth >> 16) == group);
                 near = near & ((photon.depth & 0xffff) + v.depth < settings->max_depth);
                 near = near & (fabs(dot3(octahedral_unpack(photon.normal), v.s.n)) > MERGING_TURN);
-                Spectrum light = merge_photon(photon, near, v, scatter, rival, ratio, area, settings->rival_area, number);
+                Spectrum light = merge_photon(photon, near, v, scatter, rival, ratio, area, unit, number);
                 sum = spectrum_add(sum, light);
             }
             entry += sel_i(there, (integer)(1), (integer)(0));
