@@ -46,6 +46,7 @@ from clpt.render.lowering.layer_names import lower_names
 from clpt.render.lowering.lights.aims import aims
 from clpt.render.lowering.lights.hard_light import Lit, decided
 from clpt.render.lowering.lights.light_bounds import Bounds
+from clpt.render.lowering.lights.light_level import light_level
 from clpt.render.lowering.lights.light_media import NOWHERE, LightMedia, light_media
 from clpt.render.lowering.lights.lights import Around, Emitter, LightRows, light_rows, row_order
 from clpt.render.lowering.lowering_cache import LoweringCache
@@ -199,8 +200,8 @@ def lower(
         row = encoder.store.append_floats("distributions", _vertex_tangents(geometry))
         features = replace(features, vertex_tangents=row + TANGENT_WORDS)
     settings = settings_of(
-        index, geometry, lights, wavelengths, density_row, ambient_row, sphere,
-        features.dispersion, (first_aim, len(targets)), camera,
+        index, geometry, lights, light_level(index, lights, sphere), wavelengths, density_row,
+        ambient_row, sphere, features.dispersion, (first_aim, len(targets)), camera,
     )  # fmt: skip
     cache.settle()
     tables = encoder.store.arrays()
