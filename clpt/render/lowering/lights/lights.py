@@ -225,9 +225,9 @@ def _emitter_block(emitter: Emitter, encoder: Encoder) -> Block:
     rows = _block(count, "triangle", at, radiance, emitter.shape_row)
     rows["emission_mode"] = emission_mode
     bounds = cache(_triangle_bounds, *corners, emission_mode == BOTH)
-    bright = cache(triangle_means, value, emitter.uvs, emitter.faces)
+    means = cache(triangle_means, value, emitter.uvs, emitter.faces)
     areas = cache(_triangle_areas, *corners)
-    return Block(rows, strength * areas * bright, bounds, radiance=float(bright.max(initial=0.0)))
+    return Block(rows, strength * areas * means, bounds, radiance=float(means.max(initial=0.0)))
 
 
 def _triangle_rows(vertices: shapes.Points, faces: shapes.Faces, keys: int) -> NDArray[np.uint32]:
