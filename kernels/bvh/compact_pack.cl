@@ -9,8 +9,8 @@
 #include "bvh/items.cl"
 
 /* Slots for the children: the pair with the largest offset along a slot's diagonal first, and so on. */
-inline void compact_slots(global const float8 *nodes, float8 parent, const uint *children, uint found,
-                          uint slots[8])
+inline void compact_child_slots(global const float8 *nodes, float8 parent, const uint *children, uint found,
+                                uint slots[8])
 {
     float4 middle = parent.lo + parent.hi;
     for (uint i = 0; i < 8; i++) slots[i] = 8;
@@ -49,7 +49,7 @@ kernel NO_VECTORIZE void compact_nodes(global const float8 *restrict nodes, glob
     uint w = begin + get_global_id(0), children[8], slots[8];
     uint2 place = w ? places[w] : (uint2)(0);
     uint found = collapse_children(nodes, costs, roots[place.x], children), mask = 0, next = 0;
-    compact_slots(nodes, nodes[roots[place.x]], children, found, slots);
+    compact_child_slots(nodes, nodes[roots[place.x]], children, found, slots);
     global uint *node = compact + (ulong)w * COMPACT_WORDS;
     uint numbers[8], base = firsts[place.x].x, own = 0;
     union { uint words[2]; uchar at[8]; } meta = {{0, 0}};

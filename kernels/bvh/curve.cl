@@ -83,7 +83,7 @@ inline float8 curve_shift(float8 v, float first)
 }
 
 /* A bound of the last 1 .. 8 items, with one more. */
-inline float8 curve_reach(float8 last, float next)
+inline float8 curve_widen(float8 last, float next)
 {
     return item_union(curve_shift(last, INFINITY), (float8)(next));
 }
@@ -104,12 +104,12 @@ kernel NO_VECTORIZE void curve_cut(global const float8 *restrict items, global c
         FETCH(items + curve_item(keys[min(i + CURVE_AHEAD, count - 1)]));
         float8 item = items[curve_item(keys[i])];
         sorted[i] = item;
-        x = curve_reach(x, item.s0);
-        y = curve_reach(y, item.s1);
-        z = curve_reach(z, item.s2);
-        to_x = curve_reach(to_x, item.s4);
-        to_y = curve_reach(to_y, item.s5);
-        to_z = curve_reach(to_z, item.s6);
+        x = curve_widen(x, item.s0);
+        y = curve_widen(y, item.s1);
+        z = curve_widen(z, item.s2);
+        to_x = curve_widen(to_x, item.s4);
+        to_y = curve_widen(to_y, item.s5);
+        to_z = curve_widen(to_z, item.s6);
         float8 dx = -to_x - x, dy = -to_y - y, dz = -to_z - z;
         float8 area = dx * dy + dy * dz + dz * dx;
         float8 cost = before + area + CURVE_SHARE * area.s7 + limit;

@@ -107,13 +107,13 @@ inline Spectrum lens_reflectance(Scene scene, LensSurface s, real cosine, real n
         for (int i = 0; any(i < s.coats); ++i) {
             mask there = i < s.coats;
             integer word = sel_i(there, s.first_coat + 2 * i, (integer)(0));
-            Medium film = medium_of(gather(scene.camera, word), (real)(0.0f), near, c);
+            Admittance film = admittance_of(gather(scene.camera, word), (real)(0.0f), near, c);
             real thickness = gather(scene.camera, word + 1);
 #define C(c_) CAT(stack_, c_) = stack_sel(there, stack_layer(CAT(stack_, c_), film, thickness, at.c_), CAT(stack_, c_));
             LENS_EACH(C)
 #undef C
         }
-        Medium outer = medium_of(near, (real)(0.0f), near, c);
+        Admittance outer = admittance_of(near, (real)(0.0f), near, c);
         mask coated = s.coats > 0;
 #define C(c_)                                                                                                 \
         {                                                                                                     \

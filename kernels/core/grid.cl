@@ -82,7 +82,7 @@ inline void grid_weights(Scene scene, Grid g, integer row, integer column, real 
     w[2] = bottom.x;
     w[3] = bottom.y;
 }
-inline real grid_density(Grid g, real w[4], vec2 at)
+inline real cell_density(Grid g, real w[4], vec2 at)
 {
     real top = w[0] + at.x * (w[1] - w[0]), bottom = w[2] + at.x * (w[3] - w[2]);
     return (top + at.y * (bottom - top)) * g.norm;
@@ -108,7 +108,7 @@ inline GridPoint grid_sample(Scene scene, Grid g, integer receiver, vec2 u)
     p.at.y = linear_sample(grid_rest(scene, rows, row, u.y), w[0] + w[1], w[2] + w[3]);
     p.at.x = linear_sample(grid_rest(scene, columns, column, u.x), w[0] + p.at.y * (w[2] - w[0]),
                            w[1] + p.at.y * (w[3] - w[1]));
-    p.pdf = grid_density(g, w, p.at) * gather(scene.distributions, strips + strip + down * across);
+    p.pdf = cell_density(g, w, p.at) * gather(scene.distributions, strips + strip + down * across);
     return p;
 }
 
@@ -119,7 +119,7 @@ inline real grid_pdf(Scene scene, Grid g, integer receiver, integer row, integer
     integer strip = to_integer((to_real(column) + 0.5f) / to_real(g.block_columns));
     real w[4];
     grid_weights(scene, g, row, column, w);
-    return grid_density(g, w, at) * gather(scene.distributions, receiver + down + (down + band) * across + strip);
+    return cell_density(g, w, at) * gather(scene.distributions, receiver + down + (down + band) * across + strip);
 }
 
 /* Radiance between four texels of four floats, the first of which begins at `first`. */

@@ -10,3 +10,15 @@ inline natural hash_natural(natural x)
 /* [0, 1): 23 bits put into a mantissa, so that 1 never comes out. */
 #define UNIT_GRAIN 0x1p-23f
 inline real unit_interval(natural x) { return as_real((x >> 9u) | 0x3f800000u) - 1.0f; }
+
+inline natural reverse_bits(natural x)
+{
+    x = (x << 16u) | (x >> 16u);
+    x = ((x & 0x00ff00ffu) << 8u) | ((x & 0xff00ff00u) >> 8u);
+    x = ((x & 0x0f0f0f0fu) << 4u) | ((x & 0xf0f0f0f0u) >> 4u);
+    x = ((x & 0x33333333u) << 2u) | ((x & 0xccccccccu) >> 2u);
+    return ((x & 0x55555555u) << 1u) | ((x & 0xaaaaaaaau) >> 1u);
+}
+
+/* Whence the numbers of one sample of a pixel come; each sampler has its own use of both. */
+typedef struct { natural seed, index; } Sampler;

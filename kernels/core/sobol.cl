@@ -1,17 +1,7 @@
 /* Owen-scrambled Sobol points, two dimensions at a time: the sample's index is shuffled and both
  * coordinates scrambled by nested uniform hashes (Burley 2020, JCGT 9(4); Laine and Karras 2011 with
- * the constants of Vegdahl). Dimension pairs and pixels are decorrelated by their seeds. */
-typedef struct { natural seed, index; } Sampler; /* index: of the sample, bits reversed */
-
-inline natural reverse_bits(natural x)
-{
-    x = (x << 16u) | (x >> 16u);
-    x = ((x & 0x00ff00ffu) << 8u) | ((x & 0xff00ff00u) >> 8u);
-    x = ((x & 0x0f0f0f0fu) << 4u) | ((x & 0xf0f0f0f0u) >> 4u);
-    x = ((x & 0x33333333u) << 2u) | ((x & 0xccccccccu) >> 2u);
-    return ((x & 0x55555555u) << 1u) | ((x & 0xaaaaaaaau) >> 1u);
-}
-
+ * the constants of Vegdahl). Dimension pairs and pixels are decorrelated by their seeds. `index` of a
+ * `Sampler` is that of the sample, bits reversed. */
 /* Nested uniform scramble of a bit-reversed number: every bit depends on the bits below it. */
 inline natural scramble_reversed(natural x, natural seed)
 {

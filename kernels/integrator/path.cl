@@ -132,7 +132,7 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     store_path_light(path, at, shine, ls.row);
 #endif
 #if BRICK_LIGHTS
-    store_shadow_into(shadow, at, shine, light_medium(scene, sel_i(shine, ls.row, (integer)(0))));
+    store_shadow_into(shadow, at, shine, brick_medium(scene, sel_i(shine, ls.row, (integer)(0))));
 #endif
 #if SHADOW_MEDIA
 #if USES_BODIES

@@ -27,7 +27,7 @@ LightSample emissive_brick_sample(EmissiveBrick l, Scene scene, vec3 p, vec2 u, 
 }
 
 /* The medium that a row of `lights` is a part of, 0 for any other light. */
-inline integer light_medium(Scene scene, integer row)
+inline integer brick_medium(Scene scene, integer row)
 {
     LightRow l = light_at(scene, row);
     mask part = l.kind == LIGHT_EMISSIVE_BRICK;

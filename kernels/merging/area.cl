@@ -1,8 +1,6 @@
 /* The disk in which paths from the camera and photons are merged. A pass is a sample of every pixel, with the light
  * paths beside it; its radius shrinks from pass to pass, so that the picture converges (Hachisuka and Jensen 2009). */
 
-#include "core/sobol.cl"
-
 /* The pass of a light path. That of a sample of the camera has the sample's number. */
 inline integer merging_pass(Scene scene, integer light_path)
 {

@@ -32,14 +32,14 @@ inline Complex complex_sqrt(Complex a)
     return complex_of(sel(a.re < 0.0f, small, large), sel(a.re < 0.0f, large, small));
 }
 
-/* What a medium is to a wave of given direction: Y of both polarisations; q is that of s. */
-typedef struct { Complex s, p; } Medium;
+/* What a medium is to a wave of given direction: its admittance Y of both polarisations; q is that of s. */
+typedef struct { Complex s, p; } Admittance;
 
 /* Medium of index eta + i k; the wave came in at cosine c from a medium of index `from`. */
-inline Medium medium_of(real eta, real k, real from, real c)
+inline Admittance admittance_of(real eta, real k, real from, real c)
 {
     Complex index2 = complex_of(eta * eta - k * k, 2.0f * eta * k);
-    Medium m;
+    Admittance m;
     m.s = complex_sqrt(complex_of((eta - from) * (eta + from) - k * k + sqr(from * c), index2.im));
     m.p = complex_div(m.s, index2);
     return m;
@@ -71,17 +71,17 @@ inline Wave wave_through(Wave w, real turns, real left)
 }
 
 /* All that is stacked so far, at one wavelength. */
-typedef struct { Medium top; Wave s, p; } Stack;
+typedef struct { Admittance top; Wave s, p; } Stack;
 
 inline Stack stack_on(real eta, real k, real from, real c)
 {
     Stack a;
-    a.top = medium_of(eta, k, from, c);
+    a.top = admittance_of(eta, k, from, c);
     a.s.r = a.p.r = complex_of((real)(0.0f), (real)(0.0f));
     a.s.t = a.p.t = sel(a.top.s.re > 0.0f, (real)(1.0f), (real)(0.0f)); /* totally reflected: nothing */
     return a;
 }
-inline Stack stack_cross(Stack a, Medium above)
+inline Stack stack_cross(Stack a, Admittance above)
 {
     a.s = wave_cross(a.s, above.s, a.top.s);
     a.p = wave_cross(a.p, above.p, a.top.p);
@@ -89,7 +89,7 @@ inline Stack stack_cross(Stack a, Medium above)
     return a;
 }
 /* Lengths [nm]. */
-inline Stack stack_layer(Stack a, Medium layer, real thickness, real lambda)
+inline Stack stack_layer(Stack a, Admittance layer, real thickness, real lambda)
 {
     a = stack_cross(a, layer);
     real waves = 2.0f * thickness / lambda;

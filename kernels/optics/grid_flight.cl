@@ -9,24 +9,15 @@ typedef struct {
     mask collides;
     real t; /* [m] */
     Spectrum weight, ratio;
-#if GRIDS_EMIT
-    Spectrum light; /* that it gathers */
-#endif
-#if GRIDS_MIXED
-    integer phase; /* material word of the part that it collides with */
-#endif
+    Spectrum light; /* that it gathers, where some grids emit */
+    integer phase;  /* material word of the part that it collides with */
 } GridFlight;
 
-#if GRIDS_EMIT
-#define GRID_ORIGIN_ARGS , Wavelengths lambdas, GridOrigin origin
-/* How a flight's direction was chosen: see Path.pdf, and from where. */
+/* How a flight's direction was chosen: see Path.pdf, and from where. It matters where some grids emit. */
 typedef struct {
     real pdf, before; /* [1/sr]; [m] from there to the flight's origin */
     vec3 from, hemisphere;
 } GridOrigin;
-#else
-#define GRID_ORIGIN_ARGS GRID_TINT_ARGS
-#endif
 
 /* After so much of the highest density, times metres, since the last collision the path is as likely as `pdf` at each
  * wavelength, and `value` of light is left; both lack what passes at the least extinction. */
@@ -51,7 +42,7 @@ inline void grid_weigh(Medium m, real thickness, Spectrum value, Spectrum pdf, m
 #if GRIDS_EMIT
 /* Adds what a brick emits along the way from w.t to `to`, the flight having come through `passed` before. */
 inline void grid_gather(Scene scene, integer name, Medium m, GridWalk w, GridBrick b, real to, real passed, mask dims,
-                        natural bits, mask active, GridFlight *f GRID_ORIGIN_ARGS)
+                        natural bits, mask active, GridFlight *f, Wavelengths lambdas, GridOrigin origin)
 {
     integer row = grid_light_row(scene, name, w, active);
     active = active & (row != 0) & (to > w.t);
@@ -102,16 +93,11 @@ inline Medium grid_part_met(Scene scene, integer name, Medium m, GridWalk w, nat
 
 /* A flight from o along d through the medium `name`, at most t metres; u: of its first way. */
 inline GridFlight grid_flight(Scene scene, integer name, Medium m, vec3 o, vec3 d, real t, Spectrum ratio, vec2 u,
-                              natural key, mask active GRID_ORIGIN_ARGS)
+                              natural key, mask active, Wavelengths lambdas, GridOrigin origin)
 {
+    GridFlight f = {mask_of(0), t, spectrum_of(1.0f), ratio, spectrum_of(0.0f), m.phase};
 #if GRIDS_EMIT
-    GridFlight f = {mask_of(0), t, spectrum_of(1.0f), ratio, spectrum_of(0.0f)};
     natural ways = 0u;
-#else
-    GridFlight f = {mask_of(0), t, spectrum_of(1.0f), ratio};
-#endif
-#if GRIDS_MIXED
-    f.phase = m.phase;
 #endif
     GridWalk w;
     mask all = active;
@@ -137,7 +123,7 @@ inline GridFlight grid_flight(Scene scene, integer name, Medium m, vec3 o, vec3 
         if (any(meets)) {
             natural bits = hash_natural(key + count * 0x9e3779b9u), more = hash_natural(bits ^ 0x68bc21ebu);
             real density = grid_density(scene, w, b, meets, more);
-            Medium own = grid_medium(scene, name, m, w, meets, more GRID_TINT_PASSED);
+            Medium own = grid_medium(scene, name, m, w, meets, more, lambdas);
             Spectrum scatters = spectrum_scale(own.sigma_s, density);
 #if GRIDS_VARY
             Spectrum lacks = spectrum_sub(m.sigma_t, spectrum_scale(own.sigma_t, density));

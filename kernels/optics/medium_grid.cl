@@ -214,14 +214,8 @@ inline Medium grid_part(Scene scene, integer name, int part, integer shares, Wav
 /* The medium at the point that `bits` choose, where its density is 1: albedo and extinction may have colours there.
  * These are at most 1, so that the highest density of a brick bounds the extinction at all wavelengths. */
 #define GRIDS_VARY (GRIDS_COLOURED || GRIDS_MIXED) /* their extinction has other colours from point to point */
-#if GRIDS_TINTED || GRIDS_VARY
-#define GRID_TINT_ARGS , Wavelengths lambdas
-#define GRID_TINT_PASSED , lambdas
-#else
-#define GRID_TINT_ARGS
-#define GRID_TINT_PASSED
-#endif
-inline Medium grid_medium(Scene scene, integer name, Medium m, GridWalk w, mask active, natural bits GRID_TINT_ARGS)
+inline Medium grid_medium(Scene scene, integer name, Medium m, GridWalk w, mask active, natural bits,
+                          Wavelengths lambdas)
 {
 #if GRIDS_COLOURED
     Spectrum colour = grid_tint(scene, name, GRID_COLOUR, w, active, bits, lambdas);
@@ -249,7 +243,7 @@ inline Medium grid_medium(Scene scene, integer name, Medium m, GridWalk w, mask 
 
 /* How much of the light passes t metres from o along d through the medium `name`: an estimate. */
 inline Spectrum grid_transmittance(Scene scene, integer name, Medium m, vec3 o, vec3 d, real t, natural key,
-                                   mask active GRID_TINT_ARGS)
+                                   mask active, Wavelengths lambdas)
 {
     GridWalk w;
     active = grid_begin(scene, name, o, d, t, active, &w);
@@ -271,7 +265,7 @@ inline Spectrum grid_transmittance(Scene scene, integer name, Medium m, vec3 o, 
             natural more = hash_natural(bits ^ 0x68bc21ebu);
             real density = grid_density(scene, w, b, meets, more);
 #if GRIDS_VARY
-            Spectrum share = grid_medium(scene, name, m, w, meets, more GRID_TINT_PASSED).sigma_t;
+            Spectrum share = grid_medium(scene, name, m, w, meets, more, lambdas).sigma_t;
             share = spectrum_scale(share, inverse);
 #endif
             Spectrum kept = spectrum_sub(spectrum_of(1.0f), spectrum_scale(share, density));

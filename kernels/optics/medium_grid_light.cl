@@ -97,7 +97,7 @@ inline Spectrum grid_emission(Scene scene, integer name, Medium m, GridWalk w, G
         light = spectrum_sel(glows, grid_black_body(scene, at, number, kind == 2, glows, lambdas), light);
     }
 #endif
-    m = grid_medium(scene, name, m, w, active, bits GRID_TINT_PASSED);
+    m = grid_medium(scene, name, m, w, active, bits, lambdas);
     Spectrum absorbs = spectrum_sub(m.sigma_t, m.sigma_s);
 #define C(c) light.c *= max_r(absorbs.c, (real)(0.0f)) * density;
     SPECTRUM_EACH(C)

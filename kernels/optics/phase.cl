@@ -2,10 +2,10 @@
  * light turns, for each wavelength. In spectral mode the hero's is sampled, and path/hero.cl weighs all four. In RGB
  * mode one of the three is chosen, and the density is their mean; where the three are the same nothing is chosen. */
 #if SPECTRUM_SIZE == 4
-#define phase_same(s) mask_of(1)
-#define phase_component(same, u) ((integer)(0))
-#define phase_part(s, component) ((s).x)
-#define phase_pdf(densities, same) ((densities).x)
+inline mask phase_same(Spectrum s) { return mask_of(1); }
+inline integer phase_component(mask same, real *u) { return (integer)(0); }
+inline real phase_part(Spectrum s, integer component) { return s.x; }
+inline real phase_pdf(Spectrum densities, mask same) { return densities.x; }
 #else
 inline mask phase_same(Spectrum s) { return (s.x == s.y) & (s.x == s.z); }
 /* Which of the three is sampled; what is left of u is as good as new. */

@@ -17,7 +17,7 @@ inline Boundary thin_film(Layers layers, mask outward, real cos_i, Spectrum from
         real thickness = layer.thickness * clamp_r(layer.profile, (real)(0.0f), (real)(1.0f));
 #define C(c)                                                                                \
         {                                                                                   \
-            Medium medium = medium_of(layer.eta.c, layer.k.c, from.c, c_i);                 \
+            Admittance medium = admittance_of(layer.eta.c, layer.k.c, from.c, c_i);         \
             Stack grown = stack_layer(CAT(stack_, c), medium, thickness, layers.lambdas.c); \
             CAT(stack_, c) = stack_sel(there, grown, CAT(stack_, c));                       \
         }
@@ -27,7 +27,7 @@ inline Boundary thin_film(Layers layers, mask outward, real cos_i, Spectrum from
     Boundary b;
 #define C(c)                                                                                     \
     {                                                                                            \
-        Medium outer = medium_of(from.c, (real)(0.0f), from.c, c_i);                             \
+        Admittance outer = admittance_of(from.c, (real)(0.0f), from.c, c_i);                     \
         Stack whole = stack_cross(CAT(stack_, c), outer);                                        \
         b.r.c = min_r(0.5f * (complex_norm(whole.s.r) + complex_norm(whole.p.r)), (real)(1.0f)); \
         b.t.c = min_r(0.5f * (whole.s.t + whole.p.t), 1.0f - b.r.c);                             \

@@ -1,5 +1,4 @@
 /* Independent uniform numbers: a hash of (seed, pixel, sample, dimension). */
-typedef struct { natural seed, index; } Sampler;
 
 inline Sampler sampler_start(uint seed, natural pixel, natural sample)
 {

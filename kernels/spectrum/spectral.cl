@@ -4,4 +4,4 @@ typedef struct { real x, y, z, w; } Spectrum;
 #define SPECTRUM_EACH(F) F(x) F(y) F(z) F(w)
 #define SPECTRUM_MEAN(s) (((s).x + (s).y + (s).z + (s).w) * 0.25f)
 /* The value by which something is sampled: the hero's. */
-#define spectrum_pick(s, ratio, u) ((s).x)
+inline real spectrum_pick(Spectrum s, Spectrum ratio, real u) { return s.x; }

@@ -109,24 +109,22 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS FLIGHT_ARGS STAGE_AT_ARG)
         mask gridded = flies & ((name & MEDIUM_GRID) != 0);
         if (any(gridded)) {
             natural key = grid_key(scene, load_path_pixel_key(path, at), load_path_sample(path, at), vertex);
+            GridOrigin origin = {(real)(0.0f), (real)(0.0f), o, d};
 #if GRIDS_EMIT
-            GridOrigin origin;
             origin.pdf = load_path_pdf(path, at);
             origin.before = path_null_distance(path, at) - lead;
             origin.from = madd3(d, -origin.before, o);
             origin.hemisphere = path_hemisphere(path, at);
+#endif
             GridFlight own = grid_flight(scene, name, m, o, d, end, ratio, u, key, gridded, lambdas, origin);
+#if GRIDS_EMIT
             light = spectrum_sel(gridded, own.light, light);
-#else
-            GridFlight own = grid_flight(scene, name, m, o, d, end, ratio, u, key, gridded GRID_TINT_PASSED);
 #endif
             weight = spectrum_sel(gridded, own.weight, weight);
             collides = sel_i(gridded, own.collides, collides);
             t = sel(gridded, own.t, t);
             hero_keep(path, at, gridded, own.ratio);
-#if GRIDS_MIXED
             m.phase = sel_i(gridded, own.phase, m.phase);
-#endif
         }
 #endif
 #if MEDIA_EMIT

@@ -1,6 +1,6 @@
 /* How much of the light between two points passes, where some surfaces transmit a part of it as if nothing were there,
  * and media dim it between them. Each surface is met in turn; it may be where one medium ends and another begins.
- * `into` is the medium where it must end, 0 for any. */
+ * key: of the random numbers in media on grids; into: the medium where it must end, 0 for any. */
 #include "interface/shape.cl"
 #include "generated/textures.cl"
 #include "generated/mixture.cl"
@@ -9,17 +9,8 @@
 #include "generated/medium.cl"
 #include "generated/null_transmittance.cl"
 
-#if USES_GRIDS
-#if BRICK_LIGHTS
-#define GRID_KEY_ARG , natural key, integer into
-#else
-#define GRID_KEY_ARG , natural key
-#endif
-#else
-#define GRID_KEY_ARG
-#endif
 inline Spectrum trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real t, integer medium,
-                                    Wavelengths lambdas, mask active GRID_KEY_ARG)
+                                    Wavelengths lambdas, mask active, natural key, integer into)
 {
     Spectrum passes = spectrum_sel(active, spectrum_of(1.0f), spectrum_of(0.0f));
     int surfaces = 0;
@@ -40,7 +31,7 @@ inline Spectrum trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, rea
         if (any(gridded)) {
             Medium m = medium_load(scene, sel_i(gridded, medium, (integer)(0)), lambdas);
             natural own = hash_natural(key + 1u + (uint)surfaces);
-            Spectrum passed = grid_transmittance(scene, medium, m, o, d, way, own, gridded GRID_TINT_PASSED);
+            Spectrum passed = grid_transmittance(scene, medium, m, o, d, way, own, gridded, lambdas);
             dims = spectrum_sel(gridded, passed, dims);
         }
 #endif

@@ -37,7 +37,10 @@ def texts(features: Features, way: Way) -> list[str]:
     if layout == "brute" and features.instances:
         layout = bvh.TREES[0]
     if way.form == "film":
-        made = {**programs.film_sources(features, layout), **programs.noise_sources(features, layout)}
+        made = {
+            **programs.film_sources(features, layout),
+            **programs.noise_sources(features, layout),
+        }
         return [source.text for source in made.values()]
     interleaved = way.form == "interleaved" and can_interleave(features, layout, lanes)
     if way.form in ("loop", "interleaved"):

@@ -483,8 +483,12 @@ def shown(value: Any) -> str:
     if isinstance(value, (list, tuple)):
         return f"[{', '.join(map(shown, value))}]"
     if isinstance(value, np.ndarray):
+        if value.size > 48:
+            return f"array(..., {value.dtype}, shape={value.shape})"
         small = np.array2string(value, separator=", ", threshold=20).replace("\n", "")
         return f"array({small}, {value.dtype}, shape={value.shape})"
     if isinstance(value, spectra.Constant):
         return f"Constant({value.value})"
+    if isinstance(value, spectra.Tabulated) and len(value.lambdas) > 8:
+        return f"Tabulated({len(value.lambdas)} values)"
     return repr(value)

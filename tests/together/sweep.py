@@ -10,6 +10,7 @@ were new, and what failed. A failure's smallest scene is printed and written onc
 from __future__ import annotations
 
 import argparse
+import contextlib
 import hashlib
 import json
 import re
@@ -59,7 +60,7 @@ def attempt(scene: Scene, way: Way) -> tuple[str, list[str]]:
 def kind_of(error: str) -> str:
     """The first error of clang's, without what differs between scenes."""
     first = next((row for row in error.splitlines() if "error:" in row), error[:200])
-    return f"failed: {re.sub(r':[0-9]+: ', ': ', first)}"[:200]
+    return f"failed: {re.sub(r':[0-9]+:', ':', first)}"[:200]
 
 
 def block(seed: int, count: int, known: set[bytes]) -> tuple[Counter, dict[str, int], list[Any]]:
@@ -114,10 +115,8 @@ def smallest(seed: int, count: int, what: str) -> str:
             last = f"{way}\n{shown(scene)}"
             raise Failed
 
-    try:
+    with contextlib.suppress(Failed):
         shrink()
-    except Failed:
-        pass
     return last
 
 

@@ -142,12 +142,12 @@ def _operand_text(kinds: dict[str, list[str]], depth: int) -> list[str]:
     for role in (role for role in ROLES if kinds.get(role)):
         read = f"texture_leaf_{role}(scene, {at}, point, lambdas)"
         # The role is known when the text is built: what it does not look up is dropped.
-        tests = [f"(operand == OPERAND_OWN & mask_of(role == TEXTURE_ROLE_{role.upper()}))"]
+        tests = [f"((operand == OPERAND_OWN) & mask_of(role == TEXTURE_ROLE_{role.upper()}))"]
         if role == "real":
             read = f"spectrum_of({read})"
-            tests.append("(operand == OPERAND_REAL & mask_of(role != TEXTURE_ROLE_REAL))")
+            tests.append("((operand == OPERAND_REAL) & mask_of(role != TEXTURE_ROLE_REAL))")
         if role == "reflectance":
-            tests.append("(operand == OPERAND_FACTOR & mask_of(role == TEXTURE_ROLE_EMISSION))")
+            tests.append("((operand == OPERAND_FACTOR) & mask_of(role == TEXTURE_ROLE_EMISSION))")
         cases.append(Case(f"running & ({' | '.join(tests)})", read))
     signature = (
         "Spectrum texture_operand(Scene scene, int role, integer operand, integer argument,"

@@ -66,6 +66,22 @@ def view_of(camera: Camera, width: int, height: int) -> View | None:
     return View(matrix[:3, 3], matrix[:3, 2], extent[0], math.atan(math.hypot(*extent) / 2.0))
 
 
+def origin_of(camera: Camera, width: int, height: int) -> NDArray[np.float64]:
+    """Return the point (3,) [m] from which a camera sees before it moves: of one without, that in
+    the middle of its film; of a lens, its front. width, height: of the film [pixels].
+
+    Raises SceneError for a matrix or a lens that cannot be used.
+    """
+    if isinstance(camera, Lens):
+        front = [0.0, 0.0, lens.front(camera, height / width)]
+        return np.asarray(transforms.transform_points(_rigid(camera), front), np.float64)
+    members = MEMBERS[type(camera)](camera, width, height)
+    if "to_world" in members:
+        return np.asarray(members["to_world"], np.float64)[:3, 3]
+    near = np.asarray(members["near"], np.float64)
+    return near[:3] / near[3]
+
+
 def lower_camera(
     camera: Camera, width: int, height: int, glass_rows: Sequence[int] = ()
 ) -> tuple[str, NDArray[np.float32]]:

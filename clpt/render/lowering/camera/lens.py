@@ -59,6 +59,27 @@ def _placed(
     return made, distance, zones(made, distance, radius), axis_solid_angle(made, distance)
 
 
+def _focused(camera: Lens, aspect: float) -> tuple[Prescription, float, Values, float, float]:
+    """What `_placed` tells of a camera, whose film's height over its width is `aspect`, and the
+    radius of the film that has zones [mm]. Raises SceneError."""
+    unit = camera.unit
+    radius = MARGIN * 0.5 * camera.film_width * math.hypot(1.0, aspect) / unit
+    placed = _placed(
+        camera.prescription, camera.f_number, camera.focus_distance / unit,
+        camera.film_shift / unit, radius,
+    )  # fmt: skip
+    return *placed, radius
+
+
+def front(camera: Lens, aspect: float) -> float:
+    """Return how far the front of the lens is from its film [m]: there light comes in.
+
+    aspect: of the film, height over width. Raises SceneError for a lens that cannot be used.
+    """
+    lens, back, *_ = _focused(camera, aspect)
+    return (back + lens.length) * camera.unit
+
+
 def lens_words(
     camera: Lens, to_world: Any, width: int, height: int, rows: Mapping[Spectrum, int]
 ) -> NDArray[np.float32]:
@@ -68,11 +89,7 @@ def lens_words(
     """
     unit = camera.unit
     extent = np.array([camera.film_width, camera.film_width * height / width])
-    radius = MARGIN * 0.5 * float(np.hypot(*extent)) / unit
-    lens, back, ellipses, angle = _placed(
-        camera.prescription, camera.f_number, camera.focus_distance / unit,
-        camera.film_shift / unit, radius,
-    )  # fmt: skip
+    lens, back, ellipses, angle, radius = _focused(camera, height / width)
     if not angle > 0.0:
         raise SceneError("no light comes through to the middle of the film", where="lens")
     lens = lens.with_coating(COATINGS[camera.coating])

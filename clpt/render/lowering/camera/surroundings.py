@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
-from clpt.render.lowering.camera.cameras import MEMBERS
+from clpt.render.lowering.camera.cameras import origin_of
 from clpt.render.lowering.geometry import analytic, shapes, spheres
 from clpt.render.lowering.geometry.tessellate import keeps_its_kind, tessellate
 from clpt.render.lowering.geometry.triangles import at_time, counted, triangulate
@@ -218,13 +218,8 @@ def stands_still(scene: Scene) -> bool:
 
 
 def camera_origin(scene: Scene, time: float | None = None) -> NDArray[np.float64]:
-    """The point from which a camera sees; of one without, that in the middle of its film."""
-    members = MEMBERS[type(scene.camera)](scene.camera, *scene.film.size)
-    if "to_world" in members:
-        origin = np.asarray(members["to_world"], np.float64)[:3, 3]
-    else:
-        near = np.asarray(members["near"], np.float64)
-        origin = near[:3] / near[3]
+    """The point from which a camera sees at a time [s], see `origin_of`."""
+    origin = origin_of(scene.camera, scene.film.width, scene.film.height)
     if scene.camera.motion is None:
         return origin
     matrix = scene.camera.motion.at(_moment(scene, time))

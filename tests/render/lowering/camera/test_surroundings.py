@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -54,6 +56,14 @@ def test_inside_and_outside(name: str) -> None:
     assert around(*body) == (FOG,)
     far = cameras.Perspective(to_world=tf.translate([4.9, 0.1, 0.0]))
     assert around(*body, camera=far) == ()
+
+
+def test_a_lens_is_where_light_comes_into_it() -> None:
+    """Its film is outside of the ball, 7 cm behind the front of the lens, which is inside."""
+    lens = cameras.Lens(to_world=tf.translate([0.0, 0.0, -1.05]))
+    assert around(Sphere(**IN), camera=lens) == (FOG,)
+    moved = dataclasses.replace(lens, to_world=tf.translate([0.0, 0.0, -1.4]))
+    assert around(Sphere(**IN), camera=moved) == ()
 
 
 def test_one_in_the_other() -> None:

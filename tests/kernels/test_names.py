@@ -1,0 +1,105 @@
+"""No two kernel files define a name, but those of which a program has one: so all others can meet."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from fnmatch import fnmatch
+from pathlib import Path
+
+from clpt.device.source import kernels_folder
+
+ALTERNATIVES = (  # files, of each row of which a program has one at most
+    ("bvh/*_keyed.cl",),
+    ("bvh/query*.cl",),
+    ("bvh/shapes_*.cl",),
+    ("film/exposure.cl", "film/splatting.cl"),
+    ("integrator/*.cl",),
+    ("optics/boundary_*.cl",),
+    ("optics/boundary_bare.cl", "optics/layers_*.cl"),
+    ("path/*_frame*.cl",),
+    ("path/pixel_sampler*.cl",),
+    ("path/shadow_ray*.cl",),
+    ("sampler/*.cl", "core/sobol.cl"),
+    ("spectrum/density.cl", "spectrum/visible.cl", "spectrum/rgb_read.cl"),
+    ("spectrum/rgb*.cl", "spectrum/spectral*.cl"),
+    ("tracing/curve_others*.cl",),
+    ("tracing/instances_*.cl",),
+    ("tracing/shape_rows_*.cl",),
+    ("tracing/trace_*.cl",),
+    ("tracing/transmittance*.cl",),
+)
+COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
+DEFINITION = re.compile(
+    r"^(?:\w+ )+\*?(?P<function>\w+)\([^;{}]*\)\s*\{"
+    r"|^[ \t]*#[ \t]*define[ \t]+(?P<macro>\w+)"
+    r"|^(?:typedef[^;{]*\{[^}]*)?\}[ \t]*(?P<type>\w+);",
+    re.MULTILINE,
+)
+
+
+def defined(text: str) -> dict[str, set[str]]:
+    """What a file defines, and leaves defined, by what it is: function, macro or type."""
+    text = COMMENT.sub("", text)
+    found: dict[str, set[str]] = {"function": set(), "macro": set(), "type": set()}
+    for match in DEFINITION.finditer(text):
+        found[str(match.lastgroup)].add(match[str(match.lastgroup)])
+    found["macro"] -= set(re.findall(r"#[ \t]*undef[ \t]+(\w+)", text))
+    return found
+
+
+def files() -> dict[str, str]:
+    """The texts of all kernel files by their paths in the folder."""
+    root = kernels_folder()
+    paths = sorted(root.rglob("*.cl"))
+    return {path.relative_to(root).as_posix(): Path(path).read_text("utf-8") for path in paths}
+
+
+def meet(first: str, second: str) -> bool:
+    """Whether one program may have both files."""
+    return not any(
+        all(any(fnmatch(name, pattern) for pattern in row) for name in (first, second))
+        for row in ALTERNATIVES
+    )
+
+
+def test_it_sees_what_a_file_defines() -> None:
+    text = """
+#define A 1 /* #define B */
+typedef struct { real x; } Short;
+typedef struct {
+    real x;
+} Long;
+#undef C
+inline real f(real x) { return x; }
+LightSample g(Scene scene,
+              vec3 p)
+{
+    h(scene);
+}
+"""
+    found = defined(text)
+    assert found == {"function": {"f", "g"}, "macro": {"A"}, "type": {"Short", "Long"}}
+
+
+def test_each_name_has_one_file() -> None:
+    where = defaultdict(list)
+    for file, text in files().items():
+        for name in set().union(*defined(text).values()):
+            where[name].append(file)
+    twice = {
+        name: (a, b)
+        for name, owners in where.items()
+        for i, a in enumerate(owners)
+        for b in owners[i + 1 :]
+        if meet(a, b)
+    }
+    assert not twice
+
+
+def test_no_name_is_a_function_and_a_macro() -> None:
+    """The loop's parts give their functions names of their own by macros."""
+    both = {file: defined(text) for file, text in files().items()}
+    assert not {
+        f: d["function"] & d["macro"] for f, d in both.items() if d["function"] & d["macro"]
+    }
