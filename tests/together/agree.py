@@ -30,9 +30,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-import clpt
 from clpt.errors import ClptError
-from clpt.scene import Film, Scene, integrators, lights
+from clpt.scene import Film, Scene, lights
 from clpt.scene import materials as m
 from clpt.scene.integrators import Independent, ParticleTracer, Path, Sobol, Vcm
 from tests.renders.support import ROUNDING, blocks, exposures

@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 
 from tests.together.agree import (
-    RATE, SAMPLES, WAYS, Comparison, compared, discoveries, judged, probabilities,
+    RATE,
+    SAMPLES,
+    WAYS,
+    Comparison,
+    compared,
+    discoveries,
+    judged,
+    probabilities,
 )  # fmt: skip
 from tests.together.fixed import SCENES
 

@@ -6,7 +6,6 @@ What is equal in the mean alone is compared in blocks, as tests/together/agree.p
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
 
 import hypothesis
 import numpy as np
