@@ -1,14 +1,14 @@
 """Scenes, and ways to render them, that have the same picture: the table EQUIVALENTS.
 
-BITS: the same numbers are computed, so that pictures are the same to the bit. NEAR: the same but for
-how float32 rounds. MEAN: other random numbers serve the same integral, so that means agree alone.
+BITS: the same numbers are computed, so that pictures are the same to the bit. NEAR: the same but
+for how float32 rounds. MEAN: other random numbers serve the same integral, so means agree alone.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -344,9 +344,6 @@ EQUIVALENTS: dict[str, Equivalent] = {
     "binary": Equivalent(NEAR, picture=with_options(layout="binary")),
     "compact": Equivalent(NEAR, picture=with_options(layout="compact")),
 }
-STRUCTURES = (  # that have no program of their own for each, if they are all changed at once
-    "groups of one", "keys of one place", "blends with weight 0", "two-sided twice",
-)  # fmt: skip
 
 
 def off(ours: Values, other: Values) -> tuple[float, float]:
@@ -354,14 +351,3 @@ def off(ours: Values, other: Values) -> tuple[float, float]:
     size = np.abs(other).max(axis=-1, keepdims=True) + 1e-3 * np.abs(other).mean() + 1e-30
     away = (np.abs(ours - other) / size).max(axis=-1)
     return float((ours != other).any(axis=-1).mean()), float(away.max())
-
-
-def all_of(names: Sequence[str]) -> Scenes:
-    """Several changes, one after the other."""
-
-    def changed(scene: Scene) -> Scene:
-        for name in names:
-            scene = EQUIVALENTS[name].scene(scene) or scene
-        return scene
-
-    return changed

@@ -92,11 +92,12 @@ SCENES: dict[str, Callable[[], Scene]] = {
     ),
     "a mixture": lambda: world(floor(), peak(RED), box(MIXED), lamp(), lights=[SPOT]),
     "milk in glass": lambda: world(
-        floor(), ball(GLASS, interior=TURBID), lamp((9.0, 9.0, 9.0), 0.9), lights=[Constant(radiance=0.3)]
+        floor(), ball(GLASS, interior=TURBID), lamp((9.0, 9.0, 9.0), 0.9),
+        lights=[Constant(radiance=0.3)],
     ),
     "a wide lens": lambda: world(
-        floor(CHECKS), peak(RED), lamp(), camera=ThinLens(to_world=VIEW, fov=42, aperture_radius=0.1,
-        focus_distance=4.2), sampler=Independent(),
+        floor(CHECKS), peak(RED), lamp(), sampler=Independent(),
+        camera=ThinLens(to_world=VIEW, fov=42, aperture_radius=0.1, focus_distance=4.2),
     ),
     "a coat and a blend": lambda: world(
         floor(), peak(m.TwoSided(front=m.Blend(first=RED, second=METAL, weight=0.4))),
