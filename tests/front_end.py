@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 import tempfile
@@ -10,10 +11,13 @@ from pathlib import Path
 
 CLANG = shutil.which("clang")
 TARGETS = ("nvptx64-nvidia-nvcl", "amdgcn-amd-amdhsa", "spir64-unknown-unknown")
+LINE = re.compile(r'^#line \d+ "', re.MULTILINE)
+OWNER = re.compile(r"(\d+)\.cl[/:]")
 FLAGS = (
     *("-x", "cl", "-cl-std=CL1.2", "-fsyntax-only", "-Wall", "-Werror"),
     *("-finclude-default-header", "-fdeclare-opencl-builtins"),  # as the driver has them
     *("-Wno-unused-function", "-Wno-unused-variable", "-Wno-unknown-warning-option"),
+    *("-ferror-limit", "0"),  # an error does not end the texts behind it
     "-Wno-bitwise-instead-of-logical",  # masks are integers, in one lane as in eight
 )
 
@@ -21,20 +25,28 @@ FLAGS = (
 def errors(texts: Iterable[str], target: str = TARGETS[-1]) -> list[str]:
     """What is wrong with each text, "" where nothing is. Warnings count.
 
-    One process takes them all (the front end itself, as the driver starts one for each), and each
-    by itself only where one is wrong.
+    One process takes them all: the front end itself, as clang's driver starts one for each.
     """
-    given = list(texts)
+    found: list[list[str]] = []
     with tempfile.TemporaryDirectory() as folder:
-        files = [Path(folder, f"{number}.cl") for number in range(len(given))]
-        for file, text in zip(files, given, strict=True):
-            file.write_text(text, encoding="utf-8")
-        if not given or not _run(files, target):
-            return [""] * len(given)
-        return [_run([file], target) for file in files]
-
-
-def _run(files: list[Path], target: str) -> str:
-    command = [str(CLANG), "-cc1", "-triple", target, *FLAGS, *map(str, files)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
-    return (done.stderr or f"clang ended with {done.returncode}") if done.returncode else ""
+        for number, text in enumerate(texts):
+            told = LINE.sub(rf"\g<0>{number}.cl/", text)  # so that an error names its text
+            Path(folder, f"{number}.cl").write_text(told, encoding="utf-8")
+            found.append([])
+        command = [str(CLANG), "-cc1", "-triple", target, *FLAGS]
+        command += [f"{number}.cl" for number in range(len(found))]
+        if not found:
+            return []
+        done = subprocess.run(
+            command, cwd=folder, capture_output=True, text=True, timeout=900, check=False
+        )
+    if done.returncode == 0:
+        return [""] * len(found)
+    rows = [(OWNER.match(row), row) for row in done.stderr.splitlines()]
+    if not any(owner for owner, _ in rows):
+        raise RuntimeError(f"clang ended with {done.returncode}: {done.stderr[-2000:]}")
+    number = 0
+    for owner, row in rows:
+        number = int(owner[1]) if owner else number
+        found[number].append(row[owner.end() :] if owner else row)
+    return ["\n".join(own) for own in found]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import NoReturn
 
@@ -105,7 +105,7 @@ def assemble(
     assembly.add(root, None, 0)
     text = "\n".join([*assembly.rows, ""])
     given = {name: f"#define {name} {value}\n" for name, value in (defines or {}).items()}
-    named = set(_WORD.findall(text)).union(*(_WORD.findall(row)[2:] for row in given.values()))
+    named = assembly.words.union(*(_WORD.findall(row)[2:] for row in given.values()))
     head = "".join(row for name, row in given.items() if name.partition("(")[0] in named)
     return Source(root, head + text, tuple(assembly.files))
 
@@ -119,20 +119,28 @@ def _text(folder: Path, name: str) -> str:
     return path.read_text(encoding="utf-8")
 
 
+@lru_cache(maxsize=1024)
+def _words(text: str) -> frozenset[str]:
+    """The words of a file, most of which are in many programs."""
+    return frozenset(_WORD.findall(text))
+
+
 class _Assembly:
-    """The state of one `assemble`: rows written so far and the files they came from."""
+    """The state of one `assemble`: rows written so far, their words, the files they came from."""
 
     def __init__(self, root: str, virtual: Virtual, folder: Path):
         self.root, self.virtual, self.folder = root, virtual, folder
         self.rows: list[str] = []
         self.files: list[str] = []
         self.names: set[str] = set()
+        self.words: set[str] = set()
 
     def add(self, name: str, includer: str | None, line: int) -> None:
         """Append the file `name` and, in place of its includes, the files that it names."""
         part = self._read(name, includer, line)
         label = part.file
         self.names.add(name)
+        self.words |= _words(part.text)
         self.files.append(label.removeprefix("kernels/"))
         self.rows.append(f'#line {part.line} "{label}"')
         depth = 0

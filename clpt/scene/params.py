@@ -376,13 +376,12 @@ def _orders(value: Any, param: Param, where: str) -> tuple[float, ...]:
 
 
 def _spectrum(value: Any, param: Param, where: str) -> Any:
-    if isinstance(value, str) and param.role == "index":
-        return value
-    if isinstance(value, str) and param.role == "emission":
+    if isinstance(value, str) and param.role in ("index", "emission"):
         try:
-            return illuminant(value)
+            known = index_of(value) if param.role == "index" else illuminant(value)
         except SceneError as error:
             raise SceneError(error.message, where=where) from None
+        return value if param.role == "index" else known
     if isinstance(value, Spectrum):
         _check_spectrum(value, param, where)
         return value

@@ -97,10 +97,14 @@ def unbounded(rgb: ArrayLike) -> tuple[NDArray[np.float32], NDArray[np.float32]]
 
 
 def evaluate(coefficients: ArrayLike, lambdas: ArrayLike) -> Array:
-    """Reflectances of coefficients (..., 3) at `lambdas` [nm] (n,): (..., n) float64 in [0, 1]."""
-    c = np.asarray(coefficients, np.float64)[..., None]
-    lambdas = np.asarray(lambdas, np.float64)
-    x = (c[..., 0, :] * lambdas + c[..., 1, :]) * lambdas + c[..., 2, :]
+    """Reflectances of coefficients (..., 3) at `lambdas` [nm], float64 in [0, 1].
+
+    Their shape is that of the colours and then that of the wavelengths, which may be one number.
+    """
+    given, lambdas = np.asarray(coefficients, np.float64), np.asarray(lambdas, np.float64)
+    shape = given.shape[:-1] + (1,) * lambdas.ndim
+    c0, c1, c2 = (given[..., i].reshape(shape) for i in range(3))
+    x = (c0 * lambdas + c1) * lambdas + c2
     return 0.5 + 0.5 * x / np.sqrt(1.0 + x * x)
 
 

@@ -1,7 +1,7 @@
 /* Layers beside the picture, in memory: sums over the first LAYER_SAMPLES samples of each pixel, so that they cost
  * little; whole numbers, which add in any order. What is summed is in path/layers.cl.
  *
- * `layers` has LAYER_WORDS words for each pixel, side by side, as its samples then touch one line of a cache:
+ * `layers` has PIXEL_LAYER_WORDS words for each pixel, side by side, as its samples then touch one line of a cache:
  * how many samples; a word for each number that is near 1, in units of 2^-22; three for others, in units of 2^8, 2^-16
  * and 2^-40, the lower ones below 2^24; one for an id, 1 more than it, of the sample of number 0. No word leaves its
  * 32 bits, so words add without a carry. LAYER_<NAME> is the first word of a layer. */
@@ -33,7 +33,7 @@ inline void layers_add(Scene scene, global uint *layers, mask m, integer pixel_i
     }
     for (int j = 0; j < n; j++) {
         int i = lanes[j];
-        global uint *at = layers + (size_t)pixels[i] * LAYER_WORDS;
+        global uint *at = layers + (size_t)pixels[i] * PIXEL_LAYER_WORDS;
         if (scene.settings->planes == 1)
             for (int k = 0; k < count; k++) at[k] += added[k * LANES + i];
         else

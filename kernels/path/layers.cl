@@ -38,8 +38,8 @@ inline integer layers_record(Scene scene, Slab path, uint at, LAYER_ARGS, mask m
 #endif
     if (!any(adds)) return state;
     real weight = layer_weight(path, at);
-    integer words[LAYER_WORDS];
-    int count = LAYER_WORDS;
+    integer words[PIXEL_LAYER_WORDS];
+    int count = PIXEL_LAYER_WORDS;
     words[0] = sel_i(first, (integer)(1), (integer)(0));
 #if LAYER_ALBEDO
     layer_put(words + LAYER_ALBEDO, first, layer_albedo(scene, scatter, v.lambdas, spectrum_of(1.0f), weight));

@@ -1,16 +1,5 @@
-/* The row in `shapes` of an analytic primitive. The first single_count ones have a row each; behind them
- * the rows are of many spheres, and say at which primitive theirs begin. */
-inline int shape_row_of(Scene scene, int prim)
-{
-    int low = scene.settings->first_analytic + min(prim, scene.settings->single_count);
-    int high = prim < scene.settings->single_count ? low : scene.settings->shape_count - 1;
-    while (low < high) {
-        int middle = (low + high + 1) / 2;
-        if (prim < (int)scene.shapes[middle * SHAPE_ROW_WORDS + SHAPE_ROW_PRIM]) high = middle - 1;
-        else low = middle;
-    }
-    return low;
-}
+/* Primitives without a row of their own, where these are of one kind. */
+#include "tracing/shape_rows_search.cl"
 
 /* A row with which the primitive is met at the same distance: spheres differ in it only by what their uv
  * and sides are, and finding theirs takes longer. */

@@ -1,3 +1,3 @@
 /* The row in `shapes` of an analytic primitive, where each has its own. */
 inline int shape_row_of(Scene scene, int prim) { return scene.settings->first_analytic + prim; }
-#define shape_row_like shape_row_of
+inline int shape_row_like(Scene scene, int prim) { return shape_row_of(scene, prim); }

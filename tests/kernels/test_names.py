@@ -1,4 +1,4 @@
-"""No two kernel files define a name, but those of which a program has one: so all others can meet."""
+"""No two kernel files define a name, unless a program has one of them at most."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from fnmatch import fnmatch
 from pathlib import Path
 
 from clpt.device.source import kernels_folder
+from clpt.render.codegen import flags, programs
+from clpt.scene import KINDS
 
 ALTERNATIVES = (  # files, of each row of which a program has one at most
     ("bvh/*_keyed.cl",),
@@ -20,16 +22,19 @@ ALTERNATIVES = (  # files, of each row of which a program has one at most
     ("path/*_frame*.cl",),
     ("path/pixel_sampler*.cl",),
     ("path/shadow_ray*.cl",),
-    ("sampler/*.cl", "core/sobol.cl"),
+    ("sampler/independent.cl", "core/sobol.cl"),
     ("spectrum/density.cl", "spectrum/visible.cl", "spectrum/rgb_read.cl"),
     ("spectrum/rgb*.cl", "spectrum/spectral*.cl"),
     ("tracing/curve_others*.cl",),
     ("tracing/instances_*.cl",),
-    ("tracing/shape_rows_*.cl",),
+    ("tracing/shape_rows_m*.cl", "tracing/shape_rows_single.cl"),
+    ("tracing/shape_rows_s*.cl",),
     ("tracing/trace_*.cl",),
     ("tracing/transmittance*.cl",),
 )
+DEFAULTS = ("FEW_LIGHTS", "FILM_GROUP", "FILM_WORDS")  # flags that files define where none is set
 COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
+INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
 DEFINITION = re.compile(
     r"^(?:\w+ )+\*?(?P<function>\w+)\([^;{}]*\)\s*\{"
     r"|^[ \t]*#[ \t]*define[ \t]+(?P<macro>\w+)"
@@ -55,8 +60,10 @@ def files() -> dict[str, str]:
     return {path.relative_to(root).as_posix(): Path(path).read_text("utf-8") for path in paths}
 
 
-def meet(first: str, second: str) -> bool:
+def meet(first: str, second: str, texts: dict[str, str]) -> bool:
     """Whether one program may have both files."""
+    if second in INCLUDE.findall(texts[first]) or first in INCLUDE.findall(texts[second]):
+        return True
     return not any(
         all(any(fnmatch(name, pattern) for pattern in row) for name in (first, second))
         for row in ALTERNATIVES
@@ -83,8 +90,8 @@ LightSample g(Scene scene,
 
 
 def test_each_name_has_one_file() -> None:
-    where = defaultdict(list)
-    for file, text in files().items():
+    where, texts = defaultdict(list), files()
+    for file, text in texts.items():
         for name in set().union(*defined(text).values()):
             where[name].append(file)
     twice = {
@@ -92,7 +99,7 @@ def test_each_name_has_one_file() -> None:
         for name, owners in where.items()
         for i, a in enumerate(owners)
         for b in owners[i + 1 :]
-        if meet(a, b)
+        if meet(a, b, texts)
     }
     assert not twice
 
@@ -103,3 +110,15 @@ def test_no_name_is_a_function_and_a_macro() -> None:
     assert not {
         f: d["function"] & d["macro"] for f, d in both.items() if d["function"] & d["macro"]
     }
+
+
+def test_flags_have_names_of_their_own() -> None:
+    """None is what a kernel file, or a generated text, calls something else."""
+    own = {name for text in files().values() for name in set().union(*defined(text).values())}
+    codegen = Path(programs.__file__).parent.glob("*.py")
+    texts = [path.read_text("utf-8") for path in codegen]
+    generated = {name for text in texts for name in re.findall(r"#define ([A-Z]\w*)[ (]", text)}
+    generated |= {f"{cls.kind.upper()}_WORDS" for row in KINDS.values() for cls in row}
+    assert "LAYER_WORDS" in generated  # of a thin film
+    chosen = {name.partition("(")[0] for name in {**flags.SCENE, **flags.MATERIAL}}
+    assert chosen & (own | generated) == set(DEFAULTS)

@@ -25,6 +25,28 @@ def test_constant_and_tabulated():
     assert hash(table) != hash(held)
 
 
+@pytest.mark.parametrize("shape", [(), (1,), (5,), (2, 3)])
+@pytest.mark.parametrize(
+    "spectrum",
+    [
+        spectra.Constant(1.0),
+        spectra.Tabulated([400, 500], [1, 2]),
+        spectra.RGB(0.2, 0.5, 0.9),
+        spectra.RGBUnbounded(1.0, 1.5, 2.0),
+        spectra.RGBIlluminant(1.0, 1.5, 2.0),
+        spectra.Cauchy(1.5, 0.005),
+        spectra.glass("bk7"),
+        spectra.Blackbody(3000.0),
+        spectra.LED(450.0, 20.0),
+        spectra.Lines([450.0], [1.0]),
+    ],
+    ids=lambda value: type(value).__name__,
+)
+def test_values_have_the_shape_of_the_wavelengths(spectrum, shape):
+    values = spectrum.sample(np.full(shape, 450.0))
+    assert np.shape(values) == shape and np.asarray(values).dtype == np.float64
+
+
 @pytest.mark.parametrize(
     "lambdas, values, message",
     [

@@ -32,7 +32,7 @@ def layouts(features: Features) -> list[str]:
 
 
 def texts(features: Features, way: Way) -> list[str]:
-    """The texts of all programs of a scene, in one way; of trees where it is not for brute force."""
+    """The texts of all programs of a scene in one way; through trees where it has instances."""
     layout, lanes = way.layout, way.lanes
     if layout == "brute" and features.instances:
         layout = bvh.TREES[0]

@@ -8,7 +8,7 @@ choice is always the plainest, so that a scene shrinks to what a failure needs.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from typing import Any
 
@@ -36,28 +36,39 @@ SIZE = 4  # pixels of a film's side
 
 
 class Drawer:
-    """Draws the parts of one scene: `draw` is Hypothesis's. Parts are used again, too."""
+    """Draws a scene by choices: `choose(n)` is a number from 0 to n. Parts are used again, too."""
 
-    def __init__(self, draw: Callable[[Any], Any]):
-        self.draw = draw
+    def __init__(self, choose: Callable[[int], int]):
+        self.choose = choose
         self.depth = 0
         self.rigid = False  # what is drawn may be turned and moved alone
         self.on_shapes: Sequence[type[Kind]] = (lights.Area,)
         self.made: dict[type, list[Any]] = {}
 
     def one(self, values: Sequence[Any]) -> Any:
-        return self.draw(st.sampled_from(values))
+        return values[self.choose(len(values) - 1)] if len(values) > 1 else values[0]
 
     def maybe(self) -> bool:
-        return self.draw(st.booleans())
+        return self.choose(1) == 1
 
-    def many(self, most: int) -> range:
-        return range(self.draw(st.integers(0, most)))
+    def several(self, most: int, least: int = 0) -> Iterator[int]:
+        """Numbers from 0. A choice before each tells whether it is there, so that all that follows
+        from one can be left out by itself."""
+        for number in range(most):
+            if number >= least and self.choose(2) == 0:
+                return
+            yield number
+
+    def some(self, values: Sequence[Any], most: int) -> list[Any]:
+        """Up to so many of the values, each once."""
+        left = list(values)
+        found = self.several(min(most, len(left)))
+        return [left.pop(self.choose(len(left) - 1)) for _ in found]
 
     def again(self, base: type, draw: Callable[[], Any]) -> Any:
         """A new part, or one that the scene has already."""
         found = self.made.setdefault(base, [])
-        number = self.draw(st.integers(0, len(found))) if found else 0
+        number = self.choose(len(found)) if found else 0
         if number:
             return found[number - 1]
         part = draw()
@@ -74,9 +85,7 @@ class Drawer:
             for name, param in declared.items()
             if name not in {**own, **given} and name not in UNDRAWN and param.form not in GEOMETRY
         ]
-        chosen: list[str] = []
-        if names:
-            chosen = self.draw(st.lists(st.sampled_from(names), unique=True, max_size=MOST_GIVEN))
+        chosen = self.some(names, MOST_GIVEN)
         self.depth += 1
         for name, param in declared.items():
             needed = param.form in NEEDED and defaults(cls)[name] is None
@@ -107,7 +116,7 @@ class Drawer:
         return self.nested(materials.Material, materials.KINDS, materials.Diffuse())
 
     def medium(self) -> Any:
-        if self.depth <= 1 and self.draw(st.integers(0, 15)) == 15:
+        if self.depth <= 1 and self.choose(15) == 15:
             return self.again(media.Medium, lambda: clear_air(4.0, 4.0, layers=3))
         return self.nested(media.Medium, media.KINDS, media.Homogeneous(sigma_t=1.0))
 
@@ -173,7 +182,7 @@ def _dyes() -> tuple[Any, ...]:
 
 
 def _layers(self: Drawer, param: Param, default: Any) -> Any:
-    return tuple(self.kind((materials.Layer,)) for _ in range(self.one([1, 2])))
+    return tuple(self.kind((materials.Layer,)) for _ in self.several(2, 1))
 
 
 ROLES: dict[str, Callable[[Drawer, Param, Any], Any]] = {
@@ -278,7 +287,7 @@ def _area_light(self: Drawer, *_: Any) -> Any:
 def _group(self: Drawer, *_: Any) -> Any:
     def draw() -> Any:
         inner = [cls for cls in shapes.KINDS if cls is not shapes.Instance]
-        return shapes.Group(tuple(self.kind(inner, motion=None) for _ in range(self.one([1, 2]))))
+        return shapes.Group(tuple(self.kind(inner, motion=None) for _ in self.several(2, 1)))
 
     return self.again(shapes.Group, draw)
 
@@ -288,22 +297,20 @@ FORMS: dict[str, Callable[[Drawer, Param, Any], Any]] = {
     "integer": _integer,
     "number": _host_number,
     "text": lambda self, p, d: self.one(["a", "b"]),
-    "names": lambda self, p, d: tuple(
-        self.draw(st.lists(st.sampled_from(tuple(LAYERS)), unique=True, min_size=1, max_size=5))
-    ),
+    "names": lambda self, p, d: tuple(self.some(tuple(LAYERS), 5)),
     "vector": lambda self, p, d: self.one([(0.5, 0.25, 1.5), (-0.5, 0.0, 2.0)]),
     "direction": lambda self, p, d: self.one([(0.0, -1.0, 0.2), (1.0, 0.0, 0.0)]),
     "matrix3": lambda self, p, d: np.diag([2.0, 3.0, 1.0]),
     "matrix4": _matrix,
     "material": lambda self, p, d: self.material(),
     "medium": lambda self, p, d: self.medium(),
-    "media": lambda self, p, d: tuple(self.medium() for _ in range(self.one([1, 2]))),
+    "media": lambda self, p, d: tuple(self.medium() for _ in self.several(2, 1)),
     "phase": lambda self, p, d: self.nested(media.Phase, media.PHASES, media.Isotropic()),
     "texture": lambda self, p, d: self.texture((textures.Bitmap,)),
     "filter": lambda self, p, d: self.kind(integrators.FILTERS),
     "area_light": _area_light,
     "group": _group,
-    "grid": lambda self, p, d: d,
+    "grid": lambda self, p, d: d[::2, ::2, ::2],
     "image": _image,
     "volume": _volume,
     "colour_volume": _colours,
@@ -322,7 +329,6 @@ NAMED: dict[str, Sequence[Any]] = {  # parameters that few values suit
     "bits": (16, 8),
     "bands": (0, 3),
     "octaves": (8, 1, 3),
-    "pieces": (1, 2),
     "resolution": (4,),
     "photon_memory": (1,),
     "subdivision": (1,),
@@ -361,7 +367,7 @@ def _mesh(self: Drawer) -> dict[str, Any]:
 
 
 def _deformation(self: Drawer, points: np.ndarray) -> Deformation | None:
-    if not self.draw(st.integers(0, 3)) == 3:
+    if self.choose(3) != 3:
         return None
     later = points.copy()
     later[:, 0] += 0.25
@@ -386,8 +392,20 @@ def _curves(self: Drawer) -> dict[str, Any]:
     }
 
 
+def _sdf_grid(self: Drawer) -> dict[str, Any]:
+    return {"values": defaults(shapes.SdfGrid)["values"][::2, ::2, ::2], "pieces": self.one([1, 2])}
+
+
 def _cloud(self: Drawer) -> dict[str, Any]:
     return {"resolution": 4}
+
+
+def _sky(self: Drawer) -> dict[str, Any]:
+    """One of two skies, as each takes seconds."""
+    given = [n for n, p in params(lights.Sky).items() if p.role == "real" and "scale" not in n]
+    usual = defaults(lights.Sky)
+    low = {"sun_elevation": -5.0, "altitude": 3000.0}
+    return {**{name: usual[name] for name in given}, **self.one([{}, low]), "ground": 0.2}
 
 
 def _tabulated(self: Drawer) -> dict[str, Any]:
@@ -403,8 +421,10 @@ WHOLE: dict[type, Callable[[Drawer], dict[str, Any]]] = {  # parameters that dep
     shapes.Mesh: _mesh,
     shapes.Spheres: _spheres,
     shapes.Curves: _curves,
+    shapes.SdfGrid: _sdf_grid,
     media.Cloud: _cloud,
     media.Tabulated: _tabulated,
+    lights.Sky: _sky,
 }
 
 # Scenes --------------------------------------------------------------------------------------
@@ -412,24 +432,26 @@ WHOLE: dict[type, Callable[[Drawer], dict[str, Any]]] = {  # parameters that dep
 PLACED_LIGHTS = tuple(cls for cls in lights.KINDS if cls not in lights.ON_SHAPES)
 
 
-@st.composite
-def scenes(draw: Any) -> Scene:
-    """A scene of the tables' kinds. What the lowering refuses is rare, but not left out."""
-    self = Drawer(draw)
+def scene_of(choose: Callable[[int], int]) -> Scene:
+    """A scene of the tables' kinds, by choices as `Drawer` has them; of zeros alone the plainest.
+
+    What the lowering refuses is rare, but not left out.
+    """
+    self = Drawer(choose)
     integrator = self.kind(integrators.KINDS)
     traced = isinstance(integrator, integrators.ParticleTracer)
     if traced:
         self.on_shapes = lights.ON_SHAPES
     things: list[Any] = []
-    for _ in range(1 + draw(st.integers(0, 3))):
+    for _ in self.several(4, 1):
         shape = self.kind(shapes.KINDS)
         copies = self.one([1, 2, 17]) if isinstance(shape, shapes.Instance) else 1
         things += [shape] * copies
-    if draw(st.integers(0, 7)) == 7:
+    if choose(7) == 7:
         things = [_as_body(self, thing) for thing in things]
     self.rigid = True
-    lamps = [self.kind(PLACED_LIGHTS) for _ in self.many(3)]
-    lamps += [lights.Point(position=(0.0, 0.0, 2.0 + i)) for i in range(self.one([0, 0, 0, 20]))]
+    lamps = [self.kind(PLACED_LIGHTS) for _ in self.several(3)]
+    lamps += [lights.Point(position=(0.0, 0.0, 2.0 + i)) for i in range(self.one([0] * 7 + [17]))]
     camera = self.kind([cls for cls in cameras.KINDS if not traced or cls.kind in CONNECTED])
     plain = {} if isinstance(integrator, integrators.HAVE_LAYERS) else {"layers": ()}
     return Scene(
@@ -453,12 +475,27 @@ def _as_body(self: Drawer, shape: Any) -> Any:
     return dataclasses.replace(shape, priority=self.one([0, 1, 2]), exterior=None)
 
 
-WAYS = st.builds(
-    Way,
-    layout=st.sampled_from(tuple(bvh.LAYOUTS)),
-    lanes=st.sampled_from((1, 8)),
-    form=st.sampled_from(FORMS_OF_PROGRAMS),
-)
+def way_of(choose: Callable[[int], int]) -> Way:
+    """How a device renders it, by choices."""
+    layouts, lanes = tuple(bvh.LAYOUTS), (1, 8)
+    return Way(
+        layouts[choose(len(layouts) - 1)],
+        lanes[choose(1)],
+        FORMS_OF_PROGRAMS[choose(len(FORMS_OF_PROGRAMS) - 1)],
+    )
+
+
+@st.composite
+def scenes(draw: Any) -> Scene:
+    """`scene_of` as a strategy."""
+    return scene_of(lambda most: draw(st.integers(0, most)))
+
+
+@st.composite
+def ways(draw: Any) -> Way:
+    """`way_of` as a strategy."""
+    return way_of(lambda most: draw(st.integers(0, most)))
+
 
 # Printing ------------------------------------------------------------------------------------
 

@@ -2,20 +2,81 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import hypothesis
+import numpy as np
 import pytest
 
 from clpt.errors import SceneError
 from clpt.render.lowering.scene import lower
-from clpt.scene import Scene
+from clpt.scene import Film, Scene
+from clpt.scene.cameras import Lens, Perspective
+from clpt.scene.integrators import SAMPLERS, Vcm
+from clpt.scene.lights import Area, Envmap, Point
+from clpt.scene.materials import Dielectric, Diffuse, Fluorescent, Layer, Null, RoughConductor
+from clpt.scene.media import Grid, HenyeyGreenstein, Homogeneous, Mixture
+from clpt.scene.shapes import Cube, Disk, Sphere
+from clpt.scene.textures import Checkers, Mix
 from tests.front_end import CLANG, errors
-from tests.together.builds import Way, texts
-from tests.together.strategies import WAYS, scenes, shown
+from tests.together.builds import FORMS, Way, texts
+from tests.together.strategies import scenes, shown, ways
 
 SCENES = 60
 
+pytestmark = pytest.mark.skipif(CLANG is None, reason="clang is not installed")
 
-@pytest.mark.skipif(CLANG is None, reason="clang is not installed")
+FOG, CLOUD = Homogeneous(sigma_s=1.0), Grid(sigma_s=1.0)
+IMAGE = Envmap(image=np.ones((4, 8, 3), np.float32))
+COATED = RoughConductor(layers=(Layer(),))
+
+
+def within(medium: Any, *others: Any) -> list[Any]:
+    """A body of a medium, and others."""
+    return [Cube(material=Null(), interior=medium), *others]
+
+
+MET: dict[str, dict[str, Any]] = {  # parts that once could not be in one scene
+    "a grid, and an image around": {"shapes": within(CLOUD), "lights": [IMAGE]},
+    "a grid, and fluorescence": {"shapes": within(CLOUD, Disk(material=Fluorescent()))},
+    "a medium, and thin films": {"shapes": within(FOG, Sphere(material=COATED))},
+    "a medium, and a lens that reflects": {"shapes": within(FOG), "camera": Lens(losses=True)},
+    "a glowing grid": {"shapes": within(Grid(sigma_a=1.0, emission=1.0))},
+    "a glowing grid, and a mixture": {
+        "shapes": [*within(Grid(sigma_a=1.0, emission=1.0)), *within(Mixture(parts=(CLOUD, FOG)))]
+    },
+    "phases that depend on colours": {
+        "shapes": within(Homogeneous(sigma_s=1.0, phase=HenyeyGreenstein(g=(0.1, 0.2, 0.3))))
+    },
+    "layers of a film, and of a coat": {
+        "shapes": [Sphere(material=COATED)],
+        "film": {"layers": ("depth", "albedo")},
+    },
+    "textures of textures": {
+        "shapes": [Sphere(material=Diffuse(reflectance=Mix(first=0.2, second=Checkers())))],
+        "lights": [Point(position=(0.0, 0.0, 3.0))],
+    },
+    **{
+        f"photons, and the sampler {cls.kind}": {
+            "shapes": [Disk(), Sphere(material=Dielectric(), emission=Area())],
+            "integrator": Vcm(),
+            "sampler": cls(),
+        }
+        for cls in SAMPLERS
+    },
+}
+
+
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+@pytest.mark.parametrize("parts", MET)
+def test_parts_that_once_did_not_go_together(parts: str, mode: str) -> None:
+    given = {"camera": Perspective(), **MET[parts]}
+    film = Film(width=4, height=4, mode=mode, **given.pop("film", {}))
+    features = lower(Scene(film=film, **given)).features
+    made = [text for form in FORMS[:2] for text in texts(features, Way(lanes=8, form=form))]
+    assert errors(dict.fromkeys(made)) == [""] * len(dict.fromkeys(made))
+
+
 @hypothesis.seed(1)
 @hypothesis.settings(
     max_examples=SCENES,
@@ -25,7 +86,7 @@ SCENES = 60
     report_multiple_bugs=False,
     suppress_health_check=list(hypothesis.HealthCheck),
 )
-@hypothesis.given(scenes(), WAYS)
+@hypothesis.given(scenes(), ways())
 def test_scenes_build(scene: Scene, way: Way) -> None:
     try:
         features = lower(scene).features
@@ -33,7 +94,6 @@ def test_scenes_build(scene: Scene, way: Way) -> None:
         assert error.where and "\n" not in str(error)
         hypothesis.reject()
     except Exception as error:
-        error.add_note(shown(scene)) if hasattr(error, "add_note") else None
-        raise
+        raise AssertionError(f"{error!r} of\n{shown(scene)}") from error
     for error in errors(texts(features, way)):
         assert not error, f"{error[:2000]}\n{way}\n{shown(scene)}"

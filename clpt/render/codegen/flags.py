@@ -163,7 +163,7 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "LIGHT_LAYER_INDIRECT": lambda f: _number("indirect", f.light_layers),
     "LIGHT_LAYER_GROUPS": lambda f: _number("light_groups", f.light_layers),
     "LIGHT_GROUPS": lambda f: f.light_groups > 0 and f.light_group_row,
-    "LAYER_WORDS": lambda f: f.layer_words or False,
+    "PIXEL_LAYER_WORDS": lambda f: f.layer_words or False,
     "LAYER_DENOISING": lambda f: _first_for_denoisers(f),
     **{f"LAYER_{n.upper()}": _layer_place(n) for n in LAYERS if LAYERS[n].form in WORDS},
     "SPECTRA_SIZE": lambda f: f.spectra_size,

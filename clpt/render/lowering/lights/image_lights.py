@@ -119,7 +119,7 @@ def _content(lamp: Envmap | CubeMap, encoder: Encoder) -> _Content:
 def _sphere(given: Any, scale: float, spectral: bool, lo: float, hi: float) -> _Content:
     """An image in latitude and longitude, its spectra from lo to hi [nm]."""
     where = "envmap.image"
-    found = spectral_exr.find(given, emissive=True)
+    found = spectral_exr.find(given, emissive=True, where=where)
     image = _loaded(given if found is None else found.to_rgb(), where)
     image = _at_least_two_rows(image * np.float32(scale))
     height, width, _ = image.shape
@@ -176,7 +176,7 @@ def _scaled(image: SpectralImage, scale: float, where: str) -> SpectralImage:
 
 def _loaded(image: Any, where: str) -> Array:
     """An image as (h, w, 3) float32 without negative values. Raises SceneError."""
-    if spectral_exr.find(image, emissive=True) is not None:
+    if spectral_exr.find(image, emissive=True, where=where) is not None:
         raise SceneError("spectral images can be an envmap only", where=where)
     if image is None:
         raise SceneError("an image is needed: a path, or an array (h, w, 3)", where=where)

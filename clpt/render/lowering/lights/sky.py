@@ -6,7 +6,7 @@ the cosine at its surface, Hestroffer and Magnan 1998.
 
 from __future__ import annotations
 
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -123,7 +123,15 @@ def sky_image(lamp: Sky) -> tuple[Floats, Floats]:
 
 
 def _images(numbers: tuple[float, ...], ground: tuple[float, ...]) -> tuple[Floats, Floats]:
-    elevation, altitude, aerosol, exponent, share, asymmetry, ozone, sky, sun = numbers
+    *physical, sky, sun = numbers
+    around, disc = _unscaled(tuple(physical), ground)
+    return np.maximum(around * (sky * SUNLIGHT), 0.0), disc * sun
+
+
+@lru_cache(maxsize=4)  # it takes seconds, and a sky's scene is often made again
+def _unscaled(numbers: tuple[float, ...], ground: tuple[float, ...]) -> tuple[Floats, Floats]:
+    """Both images without their factors: that of the dome per irradiance of the sun [1/sr]."""
+    elevation, altitude, aerosol, exponent, share, asymmetry, ozone = numbers
     air = Atmosphere(aerosol, exponent, share, asymmetry, ozone)
     at, high, zenith = horizon(altitude), height(altitude), np.radians(90.0 - elevation)
     rows = np.arange(ROWS + 1) / ROWS
@@ -133,8 +141,7 @@ def _images(numbers: tuple[float, ...], ground: tuple[float, ...]) -> tuple[Floa
     turns = np.cos(2.0 * np.pi * np.arange(COLUMNS // 2 + 1) / COLUMNS)
     mu, turn = np.broadcast_arrays(np.sin(angles)[..., None], turns)
     around = skylight.radiance(air, np.array(ground), zenith, high, mu.ravel(), turn.ravel())
-    around = around.reshape(*mu.shape, -1) * (sky * SUNLIGHT)
-    return np.maximum(around, 0.0), _disc(air, np.radians(elevation), at, high) * sun
+    return around.reshape(*mu.shape, -1), _disc(air, np.radians(elevation), at, high)
 
 
 def _disc(air: Atmosphere, elevation: float, at: float, high: float) -> Floats:
