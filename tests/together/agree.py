@@ -20,12 +20,12 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
+import random
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-import hypothesis
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
@@ -35,8 +35,7 @@ from clpt.scene import Film, Scene, lights
 from clpt.scene import materials as m
 from clpt.scene.integrators import Independent, ParticleTracer, Path, Sobol, Vcm
 from tests.renders.support import ROUNDING, blocks, exposures
-from tests.together.strategies import scenes
-from tests.together.sweep import QUIET
+from tests.together.strategies import scene_of
 
 Values = NDArray[np.float64]
 RATE = 1e-3  # false discoveries among what is called different
@@ -247,17 +246,9 @@ def judged(found: list[Comparison], seed: int, samples: int) -> list[Comparison]
 
 
 def drawn(seed: int) -> Scene:
-    """A scene of the strategies for random ones, as small and plain a film as there is."""
-    found: list[Scene] = []
-
-    @hypothesis.seed(seed)
-    @hypothesis.settings(max_examples=6, phases=[hypothesis.Phase.generate], **QUIET)
-    @hypothesis.given(scenes())
-    def draw(scene: Scene) -> None:
-        found.append(scene)
-
-    draw()
-    scene = found[-1]  # the first ones are the plainest
+    """A random scene, with as small and plain a film as there is."""
+    choose = random.Random(seed)
+    scene = scene_of(lambda most: choose.randint(0, most))
     film = Film(width=8, height=8, mode=scene.film.mode)
     return dataclasses.replace(scene, film=film, noise=None)
 
