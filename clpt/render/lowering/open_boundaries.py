@@ -61,8 +61,9 @@ def _insides(shape: Shape) -> Iterator[Any]:
         yield shape.interior
         return
     for part in mt.parts(shape.material):
-        if not getattr(part, "thin", False) and getattr(part, "absorption", CLEAR) != CLEAR:
-            yield part.absorption
+        absorbs = getattr(part, "absorption", CLEAR)
+        if absorbs != CLEAR and not getattr(part, "thin", False):
+            yield absorbs
 
 
 def _own_hole(shape: Shape, cached: Callable[..., Any] | None) -> float:
