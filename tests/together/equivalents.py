@@ -69,6 +69,13 @@ def with_materials(scene: Scene, change: Callable[[Any], Any]) -> Scene | None:
     return dataclasses.replace(scene, shapes=found)
 
 
+def _every(scene: Scene) -> list[Any]:
+    """The shapes of a scene, and of its groups."""
+    groups = (getattr(one, "group", None) for one in scene.shapes)
+    found = zip(scene.shapes, groups, strict=True)
+    return [inner for one, group in found for inner in (group.shapes if group else (one,))]
+
+
 def with_media(scene: Scene, change: Callable[[Any], Any]) -> Scene | None:
     """The scene with every medium changed; None where none is."""
     made: dict[Any, Any] = {None: None}
@@ -245,8 +252,11 @@ def two_sided_twice(scene: Scene) -> Scene | None:
 
 
 def shapes_reversed(scene: Scene) -> Scene | None:
-    """The shapes in the other order."""
-    return dataclasses.replace(scene, shapes=scene.shapes[::-1]) if len(scene.shapes) > 1 else None
+    """The shapes in the other order; of several that shine other ones would be chosen."""
+    shining = sum(one.emission is not None for one in _every(scene))
+    if len(scene.shapes) < 2 or shining > 1:
+        return None
+    return dataclasses.replace(scene, shapes=scene.shapes[::-1])
 
 
 def lights_reversed(scene: Scene) -> Scene | None:
