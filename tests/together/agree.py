@@ -35,6 +35,7 @@ from clpt.scene import Film, Scene, lights
 from clpt.scene import materials as m
 from clpt.scene.integrators import Independent, ParticleTracer, Path, Sobol, Vcm
 from tests.renders.support import ROUNDING, blocks, exposures
+from tests.together.equivalents import every_shape
 from tests.together.strategies import scene_of
 
 Values = NDArray[np.float64]
@@ -95,14 +96,8 @@ def discoveries(p: Values, rate: float = RATE) -> NDArray[np.bool_]:
 SHARP = (m.Dielectric, m.Conductor, m.ThinDielectric)
 
 
-def _things(scene: Scene) -> list[Any]:
-    groups = (getattr(one, "group", None) for one in scene.shapes)
-    found = zip(scene.shapes, groups, strict=True)
-    return [inner for one, group in found for inner in (group.shapes if group else (one,))]
-
-
 def _kinds(scene: Scene) -> set[type]:
-    return {type(part) for one in _things(scene) for part in m.parts(one.material)}
+    return {type(part) for one in every_shape(scene) for part in m.parts(one.material)}
 
 
 def _depth(scene: Scene) -> dict[str, Any]:
@@ -142,7 +137,7 @@ MANY = 24  # lamps for one: a tree chooses among them
 
 def many_lamps(scene: Scene) -> Scene | None:
     """Each lamp at a point is many at its place, so that a tree chooses; and the film is dimmed."""
-    bright = any(one.emission is not None for one in _things(scene)) or not scene.lights
+    bright = any(one.emission is not None for one in every_shape(scene)) or not scene.lights
     if bright or any(type(lamp) not in (lights.Point, lights.Spot) for lamp in scene.lights):
         return None
     film = dataclasses.replace(scene.film, exposure=scene.film.exposure / MANY)

@@ -69,7 +69,7 @@ def with_materials(scene: Scene, change: Callable[[Any], Any]) -> Scene | None:
     return dataclasses.replace(scene, shapes=found)
 
 
-def _every(scene: Scene) -> list[Any]:
+def every_shape(scene: Scene) -> list[Any]:
     """The shapes of a scene, and of its groups."""
     groups = (getattr(one, "group", None) for one in scene.shapes)
     found = zip(scene.shapes, groups, strict=True)
@@ -253,7 +253,7 @@ def two_sided_twice(scene: Scene) -> Scene | None:
 
 def shapes_reversed(scene: Scene) -> Scene | None:
     """The shapes in the other order; of several that shine other ones would be chosen."""
-    shining = sum(one.emission is not None for one in _every(scene))
+    shining = sum(one.emission is not None for one in every_shape(scene))
     if len(scene.shapes) < 2 or shining > 1:
         return None
     return dataclasses.replace(scene, shapes=scene.shapes[::-1])
