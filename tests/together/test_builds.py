@@ -74,7 +74,9 @@ MET: dict[str, dict[str, Any]] = {  # parts that once could not be in one scene
         }
         for cls in SAMPLERS
     },
-    "photons that diffuse surfaces leave": {"shapes": [Sphere(emission=Area())], "integrator": Vcm()},
+    "photons that diffuse surfaces leave": {
+        "shapes": [Sphere(emission=Area())], "integrator": Vcm(),
+    },
     "a number mixed of spectra, all of it the first": {
         "shapes": [Sphere(material=Phong(exponent=Mix(first=TABLE, amount=0.0)))]
     },
@@ -87,7 +89,8 @@ def test_parts_that_once_did_not_go_together(parts: str, mode: str) -> None:
     given = {"camera": Perspective(), **MET[parts]}
     film = Film(width=4, height=4, mode=mode, **given.pop("film", {}))
     features = lower(Scene(film=film, **given)).features
-    made = [*texts(features, Way(lanes=1, form="stages")), *texts(features, Way(lanes=8, form="loop"))]
+    ways_ = Way(lanes=1, form="stages"), Way(lanes=8, form="loop")
+    made = [text for way in ways_ for text in texts(features, way)]
     assert errors(dict.fromkeys(made)) == [""] * len(dict.fromkeys(made))
 
 
