@@ -9,19 +9,20 @@ from typing import Any
 
 import numpy as np
 
+from clpt import transforms
 from clpt.scene import Scene
-from clpt.scene.cameras import Camera, Perspective, ThinLens
+from clpt.scene.cameras import Camera, Matrix, Perspective, ThinLens
 from clpt.scene.params import params
 from clpt.view import navigation, views
 from clpt.view.commands import OF_VIEW, CommandError, Request
+from clpt.view.messages import Reply
 from clpt.view.render_loop import RenderLoop
 from clpt.view.target import Change
 
 log = logging.getLogger(__name__)
 
 LENS_SHARE = 0.01  # of the distance in focus: the radius that a pinhole gets as a lens
-
-Reply = Callable[[dict[str, Any]], None]
+FARTHEST = 1e12  # [m] from the origin, as what meshes have
 
 
 class CameraWork:
@@ -70,12 +71,11 @@ class CameraWork:
         self._tell_state()
 
     def _do_open_view(self, reply: Reply, camera: Any, exposure: float, tone: str) -> None:
-        opened = views.camera_of(camera)
+        self._move(views.camera_of(camera, self.scene.camera))
+        self._set_pivot()
         if tone == OF_VIEW and self._loop.display.view is None:
             tone = "none"  # it was of another start
         self._do_display(reply, exposure, tone)
-        self._move(opened)
-        self._set_pivot()
         self._tell_state()
 
     def _do_field_of_view(self, reply: Reply, degrees: float) -> None:
@@ -138,7 +138,13 @@ class CameraWork:
         self._ask_hit(film.width // 2, film.height // 2, silent, aim)
 
     def _move(self, camera: Camera, takes_pivot: bool = False) -> None:
-        """Let another camera look; takes_pivot: the pivot goes where the camera goes."""
+        """Let another camera look; takes_pivot: the pivot goes where the camera goes.
+
+        Raises CommandError for a camera that float32 cannot tell.
+        """
+        matrix = np.asarray(camera.view if isinstance(camera, Matrix) else camera.to_world, float)
+        if transforms.is_singular(matrix) or not (np.abs(matrix) < FARTHEST).all():
+            raise CommandError("the camera would be too far away, or see too much or too little")
         if takes_pivot:
             old, new = navigation.pose(self.scene.camera), navigation.pose(camera)
             away = self._pivot - old.origin

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
@@ -170,6 +169,11 @@ def _parameters(target: str, thing: Kind) -> list[dict[str, Any]]:
     ]
 
 
+def is_plain(param: Param) -> bool:
+    """Return whether a parameter can go to a page and come back: a value, no other thing."""
+    return (param.form or param.role) in (*CONTROLS, "matrix4")
+
+
 def _editable(target: str, key: str, param: Param) -> bool:
     if target == "film" and key not in OF_FILM:
         return False
@@ -216,11 +220,7 @@ def _curve(value: Any, param: Param) -> list[float] | None:
 
 def _shown(value: Any, param: Param) -> Any:
     """Return a value as scene.json has it, None where the page cannot show it."""
-    if isinstance(value, (Texture, Material, Group)) or (param.form or param.role) not in (
-        *CONTROLS,
-        "matrix4",
-        "text",
-    ):
+    if isinstance(value, (Texture, Material, Group)) or not is_plain(param):
         return None
     shown = forms.write(value, param, _WRITER)
     try:
@@ -230,11 +230,14 @@ def _shown(value: Any, param: Param) -> Any:
 
 
 def read(key: str, value: Any, param: Param) -> Any:
-    """Return the value of a parameter that a page gave. Raises SceneError."""
+    """Return the value of a parameter that a page gave, which names no file.
+
+    Raises SceneError, CommandError.
+    """
     if value is None and param.optional:
         return None
     document = {key: value}
-    cursor = Cursor(document, Path("page"), json.dumps(document)).at(key)
+    cursor = Cursor(document, None, json.dumps(document)).at(key)
     try:
         if param.form == "sensor" and not isinstance(value, str):
             raise CommandError("must be the name of an observer")
@@ -272,12 +275,10 @@ def _with_emission(shape: Shape, old: Any, new: Any, groups: dict[int, Group]) -
 
 
 class _NoParts:
-    """Reads and writes no part of a scene but values: a page names no file and no other thing."""
+    """Reads and writes no part of a scene but values: whatever else is asked of it is refused."""
 
-    def _refuse(self, *_: Any) -> NoReturn:
+    def __getattr__(self, name: str) -> NoReturn:
         raise CommandError("only a value can stand here")
-
-    kind = layer = material = area_light = group = image = _refuse
 
 
 _READER: Any = _NoParts()

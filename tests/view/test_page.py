@@ -307,16 +307,17 @@ def test_a_page_elsewhere_reaches_nothing(shown: Shown) -> None:
         socket.onopen = () => done('open');
         socket.onerror = () => done('refused');
     })"""
-    assert page.evaluate(socket, f"ws://{own}/socket") == "refused"
+    own += shown.server.access.room  # let it be known
+    assert page.evaluate(socket, f"ws://{own}socket") == "refused"
     read = """(address) => fetch(address, {credentials: 'include'})
         .then(() => 'read', () => 'refused')"""
-    assert page.evaluate(read, f"http://{own}/") == "refused"
+    assert page.evaluate(read, f"http://{own}") == "refused"
     inside = """(address) => {
         const frame = document.createElement('iframe');
         frame.src = address;
         document.body.append(frame);
     }"""
-    page.evaluate(inside, f"http://{own}/")
+    page.evaluate(inside, f"http://{own}")
     page.wait_for_timeout(300)
     assert all("clpt" not in (frame.title() or "") for frame in page.frames)
     shown.errors.clear()

@@ -73,7 +73,7 @@ def test_a_token_opens_the_page_once(server: Server) -> None:
     status, headers, content = ask(server, path)
     assert status == 200 and b"<!doctype html>" in content
     name, *attributes = headers["set-cookie"].split("; ")
-    assert {"HttpOnly", "SameSite=Strict", "Path=/"} == set(attributes)
+    assert {"HttpOnly", "SameSite=Strict", f"Path={server.access.room}"} == set(attributes)
     assert ask(server, "/", f"Cookie: {name}")[0] == 200
     assert path.split("=", 1)[1] not in name
     again = ask(server, path)
@@ -207,8 +207,8 @@ def test_sixty_a_second_are_let_through(monkeypatch: pytest.MonkeyPatch) -> None
     viewer = serving.Viewer(None)  # type: ignore[arg-type]
     for _ in range(600):
         clock += 1 / serving.RATE
-        assert viewer.may_send()
-    allowed = sum(viewer.may_send() for _ in range(1000))
+        assert viewer.rate.allows()
+    allowed = sum(viewer.rate.allows() for _ in range(1000))
     assert serving.BURST - 2 < allowed <= serving.BURST
 
 
@@ -258,15 +258,31 @@ def test_a_slow_viewer_gets_the_newest_of_few_frames(server: Server, key: str) -
         assert frame(slow) == 100
 
 
-def test_a_viewer_who_reads_nothing_is_left(server: Server, key: str) -> None:
+def test_a_viewer_who_reads_nothing_is_left(
+    server: Server, key: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of what is true only now one message waits, and one frame; after a while it is left."""
+    monkeypatch.setattr(serving, "SEND_SECONDS", 0.5)
     with opened(server, key) as client:
         message(client, "wheel")
+        most, viewer = 0, server._viewers[0]
         for number in range(1, 1000):  # more than any buffer on the way holds
             server.picture({"frame": number}, b"x" * 1_000_000)
-            server.message({"type": "status", "text": "x" * 100_000})
+            for kind in serving.PRESENT:
+                server.message({"type": kind, "text": "x" * 100_000})
+            most = max(most, len(viewer.messages))
             if not server._viewers:
                 break
             time.sleep(0.005)
+        wait_for(lambda: not server._viewers)
+        assert most <= len(serving.PRESENT) + 1
+
+
+def test_a_viewer_who_reads_no_answers_is_left(server: Server, key: str) -> None:
+    with opened(server, key) as client:
+        message(client, "wheel")
+        for _ in range(1000):
+            server.message({"type": "note", "text": "x" * 100_000})
         wait_for(lambda: not server._viewers)
 
 
