@@ -8,6 +8,7 @@ import math
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from clpt.errors import ClptError, KernelBuildError, SceneError
@@ -64,7 +65,7 @@ def answering(reply: Reply, before: str = "") -> Iterator[None]:
 def _reason(error: BaseException) -> str:
     if isinstance(error, SceneError):
         line = f"line {error.line}" if error.line is not None else None
-        name = getattr(error.file, "name", error.file)
+        name = None if error.file is None else Path(error.file).name
         return ": ".join(str(part) for part in (name, line, error.where, error.message) if part)
     if isinstance(error, KernelBuildError):
         return f"the kernel program {error.stage!r} did not build"

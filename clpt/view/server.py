@@ -189,23 +189,24 @@ class Viewer:
 
     async def send_all(self) -> None:
         """Send what waits, until the viewer is gone."""
-        while True:
-            await self.wake.wait()
-            self.wake.clear()
-            while self.messages:
-                await self._send(self.messages.popleft()[1])
-            if self.frame is not None and len(self.unconfirmed) < MOST_FRAMES:
-                (number, data), self.frame = self.frame, None
-                self.unconfirmed.append(number)
-                await self._send(data)
-                self.wake.set()
-
-    async def _send(self, data: str | bytes) -> None:
         try:
-            await asyncio.wait_for(self.connection.send(data), SEND_SECONDS)
+            while True:
+                await self.wake.wait()
+                self.wake.clear()
+                while self.messages:
+                    await self._send(self.messages.popleft()[1])
+                if self.frame is not None and len(self.unconfirmed) < MOST_FRAMES:
+                    (number, data), self.frame = self.frame, None
+                    self.unconfirmed.append(number)
+                    await self._send(data)
+                    self.wake.set()
         except asyncio.TimeoutError:
             self.leave()
-            raise
+        except ConnectionClosed:
+            pass
+
+    async def _send(self, data: str | bytes) -> None:
+        await asyncio.wait_for(self.connection.send(data), SEND_SECONDS)
 
 
 class Server:

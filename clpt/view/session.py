@@ -106,7 +106,8 @@ class Session(CameraWork):
         """Ask for something; reply: gets messages for the viewer alone."""
         with self._wake:
             left_out = self._requests.popleft() if len(self._requests) >= MOST_WAITING else None
-            self._requests.append((request, reply))
+            last = [self._requests.pop()] if self._requests else []
+            self._requests.extend(merged([*last, (request, reply)]))
             self._wake.notify_all()
         if left_out is not None:
             left_out[1](error_message(CommandError(f"{left_out[0].name} was left out: too many")))
@@ -217,7 +218,7 @@ class Session(CameraWork):
         self._handle(requests)
 
     def _handle(self, requests: list[tuple[Request, Reply]]) -> None:
-        for request, reply in merged(requests):
+        for request, reply in requests:
             self._rests = False
             with answering(reply), self._all_or_nothing():
                 getattr(self, f"_do_{request.name}")(reply, **request.values)

@@ -278,14 +278,20 @@ def test_text_that_is_no_utf_8_ends_the_socket(server: Server, key: str) -> None
     assert ask(server, "/", f"Cookie: {key}")[0] == 200
 
 
-def test_what_breaks_the_protocol_ends_the_socket(server: Server, key: str) -> None:
-    """Reserved bits and opcodes, parts of nothing, a frame without a mask, a long ping."""
-    masked = bytes(4)
-    for sent in (b"\xf1\x80" + masked, b"\x83\x80" + masked, raw_frame(0, b"x"),
-                 b"\x81\x01x", b"\x89\xfe\x00\x80" + masked):  # fmt: skip
-        with opened(server, key) as client:
-            client.socket.sendall(sent)
-            assert closed_with(client) == 1002
+@pytest.mark.parametrize(
+    "sent",
+    [
+        b"\xf1\x80" + bytes(4),  # reserved bits
+        b"\x83\x80" + bytes(4),  # a reserved opcode
+        raw_frame(0, b"x"),  # a part of nothing
+        b"\x81\x01x",  # no mask
+        b"\x89\xfe\x00\x80" + bytes(4 + 128),  # a ping that is too long
+    ],
+)
+def test_what_breaks_the_protocol_ends_the_socket(server: Server, key: str, sent: bytes) -> None:
+    with opened(server, key) as client:
+        client.socket.sendall(sent)
+        assert closed_with(client) == 1002
     assert ask(server, "/", f"Cookie: {key}")[0] == 200
 
 
