@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from clpt import transforms
 from clpt.scene import Scene
-from clpt.scene.cameras import Camera, Matrix, Perspective, ThinLens
+from clpt.scene.cameras import Camera, Perspective, ThinLens
 from clpt.scene.params import params
 from clpt.view import navigation, views
 from clpt.view.commands import OF_VIEW, CommandError, Request
@@ -22,8 +21,6 @@ from clpt.view.target import Change
 log = logging.getLogger(__name__)
 
 LENS_SHARE = 0.01  # of the distance in focus: the radius that a pinhole gets as a lens
-FARTHEST = 1e12  # [m] from the origin, as what meshes have
-
 
 class CameraWork:
     """Base of a session: its methods `_do_<command>` that concern the camera, and the pivot.
@@ -142,8 +139,7 @@ class CameraWork:
 
         Raises CommandError for a camera that float32 cannot tell.
         """
-        matrix = np.asarray(camera.view if isinstance(camera, Matrix) else camera.to_world, float)
-        if transforms.is_singular(matrix) or not (np.abs(matrix) < FARTHEST).all():
+        if not navigation.is_within_reach(camera):
             raise CommandError("the camera would be too far away, or see too much or too little")
         if takes_pivot:
             old, new = navigation.pose(self.scene.camera), navigation.pose(camera)

@@ -43,6 +43,7 @@ CONTROLS = {
 }
 MOST_OBJECTS = 500  # that a page lists
 MOST_PANELS = 300
+LONGEST_NAME = 80  # characters that it is told of a name
 CURVE_AT = range(380, 781, 20)  # [nm]
 OF_FILM = (  # what can change while the renderers stay
     "sensor", "white_balance", "exposure", "lambda_min", "lambda_max", "wavelengths",
@@ -86,7 +87,7 @@ def objects(scene: Scene) -> list[dict[str, Any]]:
     number = {id(m): i for i, (m, _) in enumerate(_targets(scene)["material"])}
     return [
         {
-            "name": shape.name or f"{shape.kind} {i + 1}",
+            "name": for_people(shape.name) or f"{shape.kind} {i + 1}",
             "kind": shape.kind,
             "material": number.get(id(shape.material)),
         }
@@ -100,8 +101,19 @@ def object_of(scene: Scene, index: int) -> dict[str, Any]:
     materials = [id(material) for material, _ in _targets(scene)["material"]]
     panel = materials.index(id(shape.material)) if id(shape.material) in materials else None
     made_of = getattr(shape.material, "name", "") or getattr(shape.material, "kind", "")
-    name = shape.name or f"{shape.kind} {index + 1}"
-    return {"name": name, "kind": shape.kind, "made_of": made_of, "material": panel}
+    name = for_people(shape.name) or f"{shape.kind} {index + 1}"
+    return {
+        "name": name, "kind": shape.kind, "made_of": for_people(made_of), "material": panel
+    }  # fmt: skip
+
+
+def for_people(name: str) -> str:
+    """Return a name of a scene, of which a file may make anything, as a page shows it.
+
+    It is short, and has no signs that are not seen, such as those that turn the text around.
+    """
+    shown = "".join(one if one.isprintable() else "?" for one in name[: LONGEST_NAME + 1])
+    return shown if len(shown) <= LONGEST_NAME else f"{shown[: LONGEST_NAME - 3]}..."
 
 
 def edited(scene: Scene, target: str, index: int, key: str, value: Any) -> tuple[Scene, Change]:
@@ -155,9 +167,9 @@ def _members(shape: Shape) -> tuple[Shape, ...]:
 
 def _title(target: str, thing: Any, owners: list[int], scene: Scene) -> str:
     if getattr(thing, "name", ""):
-        return str(thing.name)
+        return for_people(thing.name)
     named = [scene.shapes[i].name for i in owners if scene.shapes[i].name]
-    return named[0] if named else thing.kind.replace("_", " ")
+    return for_people(named[0]) if named else thing.kind.replace("_", " ")
 
 
 def _parameters(target: str, thing: Kind) -> list[dict[str, Any]]:

@@ -130,7 +130,7 @@ class Session(CameraWork):
         return {
             "type": "state",
             "revision": self._revision,
-            "name": scene.name,
+            "name": panels.for_people(scene.name),
             "film": [film.width, film.height],
             "mode": film.mode,
             "lambdas": [film.lambda_min, film.lambda_max],
