@@ -22,6 +22,7 @@ log = logging.getLogger(__name__)
 
 LENS_SHARE = 0.01  # of the distance in focus: the radius that a pinhole gets as a lens
 
+
 class CameraWork:
     """Base of a session: its methods `_do_<command>` that concern the camera, and the pivot.
 

@@ -221,7 +221,10 @@ class Session(CameraWork):
         for request, reply in requests:
             self._rests = False
             with answering(reply), self._all_or_nothing():
-                getattr(self, f"_do_{request.name}")(reply, **request.values)
+                function = getattr(self, f"_do_{request.name}", None)
+                if function is None:  # what the server does
+                    raise CommandError(f"there is nothing to {request.name} here")
+                function(reply, **request.values)
 
     @contextmanager
     def _all_or_nothing(self) -> Iterator[None]:

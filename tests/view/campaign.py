@@ -14,6 +14,7 @@ import argparse
 import collections
 import contextlib
 import json
+import logging
 import os
 import random
 import re
@@ -34,6 +35,8 @@ from websockets.sync.client import ClientConnection, connect
 
 from clpt.view.commands import COMMANDS, Choice, Flag, Name, Number, Optional, Type, Whole
 
+quiet = logging.getLogger(__name__)
+quiet.setLevel(logging.CRITICAL)
 CORNELL = Path(__file__).resolve().parents[2] / "scenes" / "cornell_box"
 CLIENTS = 8  # of which one only asks whether the viewer goes on
 RATE = 40.0  # messages a second of a client that wants to stay
@@ -92,7 +95,7 @@ class View:
         return connect(
             f"ws://{self.room}socket", origin=f"http://{self.own}",  # type: ignore[arg-type]
             additional_headers={"Cookie": self.cookie}, compression=None, max_size=None,
-            open_timeout=ANSWER_SECONDS, close_timeout=1, ping_interval=None, **how,
+            open_timeout=ANSWER_SECONDS, close_timeout=1, ping_interval=None, logger=quiet, **how,
         )  # fmt: skip
 
     def memory(self) -> float:
