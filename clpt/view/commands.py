@@ -16,7 +16,7 @@ OF_VIEW = "view"  # of OpenColorIO, in the place of a tone curve
 TARGETS = ("camera", "film", "light", "emission", "material", "integrator")
 FILES = ("png", "exr", "scene", "view")
 LARGEST_MESSAGE = 64 * 1024  # [bytes]
-DEEPEST, MOST_PARTS = 16, 8192  # levels and numbers, names and lists of a value
+DEEPEST, MOST_PARTS = 16, 4096  # levels and numbers, names and lists of a value
 
 
 class CommandError(ClptError):
