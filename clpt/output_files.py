@@ -13,16 +13,16 @@ PARTIAL = ".clpt-partial-"  # begins the name of a file that is not complete
 
 
 @contextmanager
-def replacing(path: str | Path) -> Iterator[Path]:
+def replacing(path: str | Path, follow: bool = True) -> Iterator[Path]:
     """Yield the path of a new, empty file, which takes the place of `path` afterwards.
 
     The new file is in the same folder, and its content is on the disk before the old file goes. So
     an error, a full disk or a killed process leaves the old file as it was. A link stays a link:
     the file that it names is replaced. What is no regular file, such as a pipe, is yielded itself.
-    Raises OSError.
+    follow: False lets the new file take the place of a link or a pipe too. Raises OSError.
     """
-    path = Path(os.path.realpath(path))
-    if path.exists() and not path.is_file():
+    path = Path(os.path.realpath(path) if follow else path)
+    if follow and path.exists() and not path.is_file():
         yield path
         return
     partial = _new_file(path)

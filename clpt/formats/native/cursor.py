@@ -37,11 +37,12 @@ class DuplicateKey:
 class Cursor(Located):
     """A value of a JSON file and the keys that lead to it.
 
+    file: None for a value that comes from no file: it can name none either.
     confined: whether it can name only files of its own folder.
     """
 
     value: Any
-    file: Path
+    file: Path | None
     text: str
     path: tuple[str | int, ...] = ()
     confined: bool = False

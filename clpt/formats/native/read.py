@@ -86,7 +86,8 @@ class _Reader:
             self.named_medium(name, cursor)
         for name, cursor in root.at("groups").items() if "groups" in root.value else ():
             self.named_group(name, cursor)
-        parts.setdefault("name", root.file.stem)
+        if root.file is not None:
+            parts.setdefault("name", root.file.stem)
         with root.locating():
             return Scene(**parts, warnings=self.warnings, extra={"format": "native"})
 

@@ -129,6 +129,8 @@ def find_file(cursor: Cursor, name: str | None = None) -> Any:
     name: of the file, None where it is all that stands there.
     """
     name = cursor.expect(str) if name is None else name
+    if cursor.file is None:
+        raise cursor.error("names a file, which cannot be done here")
     path = cursor.file.parent / name
     if cursor.confined and path.name != name:
         raise cursor.error(f"{name!r} is not in the folder of this file")
