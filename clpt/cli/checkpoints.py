@@ -205,13 +205,11 @@ class Checkpoints:
 
     def _write(self, saved: SavedFilm) -> None:
         try:
-            if not self._written:
-                output_files.remove_partials(self._path)
             output_files.link(self._path, former_of(self._path))
             film_file.write(self._path, saved)
             self._written = True
-        except OSError as error:
-            self._failure = f"{self._path}: cannot be written: {error}"
+        except (OSError, MemoryError) as error:
+            self._failure = outputs.failure(self._path, error)
 
     def _tell_failure(self) -> None:
         failure, self._failure = self._failure, None

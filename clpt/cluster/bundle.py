@@ -19,7 +19,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from clpt import output_files
 from clpt.device import disk_cache
 from clpt.errors import ClusterError
 from clpt.formats import native
@@ -99,8 +98,7 @@ class Store:
         found = hashlib.sha256(content).hexdigest()
         if found != digest:
             raise ClusterError(f"a file of the bundle is damaged: {found[:12]} for {digest[:12]}")
-        self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        output_files.write(self.folder / digest, content)
+        disk_cache.write(self.folder / digest, content)
         disk_cache.prune(self.folder.parent, self.limit, parts=(self.folder.name,))
 
     @contextmanager
@@ -114,7 +112,7 @@ class Store:
             for name, digest in bundle.files.items():
                 try:
                     _link(self.folder / digest, Path(folder) / name)
-                except FileNotFoundError:
+                except (FileNotFoundError, PermissionError):
                     raise ClusterError(f"the file {name} of the bundle is missing") from None
             yield native.load(Path(folder) / SCENE, confined=True)
 
@@ -144,9 +142,9 @@ def check_digest(digest: Any) -> None:
 
 
 def file_digest(path: Path) -> str:
-    """Return the SHA-256 of a file's content. Raises OSError."""
+    """Return the SHA-256 of the content of a file of this user. Raises OSError."""
     hashed = hashlib.sha256()
-    with path.open("rb") as file:
+    with open(disk_cache.own_file(path), "rb") as file:
         while piece := file.read(1 << 20):
             hashed.update(piece)
     return hashed.hexdigest()
@@ -158,7 +156,8 @@ def canonical(document: Any) -> str:
 
 
 def _link(source: Path, target: Path) -> None:
-    """Give a file a second name, or copy it where the file system has no links."""
+    """Give a file of this user a second name, or copy it where the file system has no links."""
+    os.close(disk_cache.own_file(source))
     try:
         os.link(source, target)
     except FileNotFoundError:
