@@ -148,7 +148,7 @@ class Checkpoints:
             self._due = math.inf
         self._writer: threading.Thread | None = None
         self._failure: str | None = None
-        self._written = False
+        self._written = self._held = False
         self._hold()
 
     def after_pass(self) -> None:
@@ -165,10 +165,10 @@ class Checkpoints:
         """Write the film of the last whole pass, if it stays.
 
         stopped: whether a signal ended the render: then it stays too where checkpoints had begun;
-        failed: whether an error did: then it stays.
+        failed: whether an error did: then it stays if there is one.
         """
         self._wait()
-        if self._keep or (stopped and self._written) or failed:
+        if self._keep or (stopped and self._written) or (failed and self._held):
             self._begin_to_write()
             self._wait()
         self._tell_failure()
@@ -188,6 +188,7 @@ class Checkpoints:
             return
         try:
             self._renderer.hold()
+            self._held = True
         except MemoryBudgetError as error:
             self._note(f"clpt: warning: no checkpoints: {error}")
             self._holds_from = self._due = math.inf

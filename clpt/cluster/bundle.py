@@ -111,9 +111,10 @@ class Store:
         with tempfile.TemporaryDirectory(prefix=_OPENED, dir=self.folder) as folder:
             for name, digest in bundle.files.items():
                 try:
-                    _link(self.folder / digest, Path(folder) / name)
-                except (FileNotFoundError, PermissionError):
+                    os.close(disk_cache.own_file(self.folder / digest))
+                except OSError:
                     raise ClusterError(f"the file {name} of the bundle is missing") from None
+                _link(self.folder / digest, Path(folder) / name)
             yield native.load(Path(folder) / SCENE, confined=True)
 
     def _clear_old(self) -> None:
@@ -156,11 +157,8 @@ def canonical(document: Any) -> str:
 
 
 def _link(source: Path, target: Path) -> None:
-    """Give a file of this user a second name, or copy it where the file system has no links."""
-    os.close(disk_cache.own_file(source))
+    """Give a file a second name, or copy it where the file system has no links."""
     try:
         os.link(source, target)
-    except FileNotFoundError:
-        raise
     except OSError:
         shutil.copyfile(source, target)
