@@ -12,13 +12,14 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any, NoReturn
 
+import click
+
 from . import failures
 
 GRACE = 1.5  # seconds after a signal in which KeyboardInterrupt may end a process by itself
 ENDING = tuple(
     getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)
 )  # as Ctrl-C, which is SIGINT
-INTERRUPTED = "interrupted"  # what is said of it
 STATUS = 128  # added to the number of a signal, as shells do
 
 
@@ -35,6 +36,13 @@ def status(error: BaseException | None) -> int:
     """Return the exit status of a process that a KeyboardInterrupt ends."""
     number = error.args[0] if error is not None and error.args else signal.SIGINT
     return STATUS + int(number)
+
+
+def tell() -> None:
+    """Say that a signal ends the command, on a terminal whose cursor a bar may have hidden."""
+    if sys.stderr.isatty():
+        click.echo("\r\x1b[2K\x1b[?25h", err=True, nl=False)
+    failures.complain("interrupted")
 
 
 @contextmanager
@@ -95,9 +103,7 @@ def _watch(reader: int, last: Callable[[], None]) -> None:
                 break
             number = read[0]
     last()
-    if sys.stderr.isatty():
-        os.write(sys.stderr.fileno(), b"\r\x1b[2K\x1b[?25h")  # a bar hides the cursor
-    failures.complain(INTERRUPTED)
+    tell()
     os._exit(STATUS + number)
 
 

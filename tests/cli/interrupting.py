@@ -171,9 +171,9 @@ def press(folder: Path, moment: str, rng: random.Random, figures: Figures, root:
     if run.strays():
         time.sleep(1.0)
         faults += [f"stray {one}" for one in run.strays()]
-    figures.faults += [
-        f"{moment} at {when:.2f} s, {number.name}: {one}; {said[-300:]!r}" for one in faults
-    ]
+    about = f"{moment} at {when:.2f} s, {number.name}"
+    figures.faults += [f"{about}: {one}; {said[-300:]!r}" for one in faults]
+    print(about, figures.seconds[-1], status, *faults, file=sys.stderr, flush=True)
     for handle in {run.master, run.slave}:
         os.close(handle)
 
