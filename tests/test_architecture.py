@@ -55,31 +55,6 @@ MAY_INCLUDE = {
     "motion": {"core", "generated", "bvh"},
     "stage": SHARED | {"generated", "bvh"},
 }
-# Files that define the same names, since no text has two of them.
-ALTERNATIVES = [
-    set(files.split()) for files in (
-        "bvh/compact bvh/compact_pack",
-        "bvh/curve shape/curve",
-        "bvh/query bvh/query_interleaved",
-        "bvh/shapes_binary bvh/shapes_wide8",
-        "core/sobol sampler/independent",
-        "film/exposure film/splatting",
-        "integrator/both integrator/particle_tracer integrator/path integrator/whitted",
-        "light/emissive_brick optics/medium",
-        "optics/boundary_bare optics/boundary_film optics/boundary_table",
-        "optics/layers_table optics/layers_waves",
-        "path/phase_frame path/shading_frame path/shading_frame_mapped",
-        "path/pixel_sampler path/pixel_sampler_z",
-        "path/shadow_ray path/shadow_ray_media",
-        "spectrum/density spectrum/rgb_read spectrum/visible",
-        "spectrum/rgb_read spectrum/spectral_read",
-        "tracing/instances_binary tracing/instances_compact tracing/instances_few "
-        "tracing/instances_wide8",
-        "tracing/shape_rows_many tracing/shape_rows_single",
-        "tracing/trace_curves tracing/trace_interleaved tracing/trace_lanes tracing/trace_one",
-        "tracing/transmittance tracing/transmittance_media tracing/transmittance_opaque",
-    )
-]  # fmt: skip
 
 
 def modules() -> list[Path]:
@@ -280,20 +255,6 @@ def test_comments_of_kernels_name_what_exists(path: Path) -> None:
         inside = module.parent.with_suffix(".py")  # of a module: the name that it must have
         there = module.is_dir() or module.with_suffix(".py").is_file()
         assert there or re.search(rf"\b{module.name}\b", inside.read_text("utf-8")), name
-
-
-def test_no_two_kernel_files_define_a_name() -> None:
-    """A text that includes both would not build; alternatives of one choice may share names."""
-    defining: dict[str, set[str]] = {}
-    for path in kernel_files():
-        code = re.sub(r"/\*.*?\*/", "", path.read_text("utf-8"), flags=re.DOTALL)
-        for name in re.findall(r"^(?:\w+[ *]+)+(\w+)\([^;{}#]*\)\s*\{", code, re.MULTILINE):
-            file = path.relative_to(KERNELS).with_suffix("").as_posix()
-            defining.setdefault(name, set()).add(file)
-    twice = {name: files for name, files in defining.items() if len(files) > 1}
-    assert len(defining) > 1000 and "spectrum_texel" in twice
-    for name, files in twice.items():
-        assert any(files <= choice for choice in ALTERNATIVES), f"{name}: {sorted(files)}"
 
 
 @pytest.mark.parametrize("path", kernel_files(), ids=lambda p: str(p.relative_to(KERNELS)))

@@ -178,7 +178,10 @@ def _emission(state: State, form: Geometry) -> Light | None:
         return made
 
     made: Any = state.shared.once((definition, area), params, make)  # an Area, as there is no other
-    shares = form.shares() if powerful else None
+    moved = "displacement" in form.parts
+    if powerful and moved:
+        state.warn(params, "the 'power' is that of the mean triangle before displacement")
+    shares = form.shares() if powerful and not moved else None
     if shares is None:
         return cast(Light, made)
     form.parts["attributes"] = {SHARES: shares[:, None]}

@@ -229,11 +229,11 @@ def _emitter_block(emitter: Emitter, encoder: Encoder) -> Block:
     bounds = cache(_triangle_bounds, *corners, emission_mode == BOTH)
     by_face = _face_attributes(shape, value)
     if by_face:
-        bright = triangle_means(value, emitter.uvs, emitter.faces, by_face)
+        means = triangle_means(value, emitter.uvs, emitter.faces, by_face)
     else:
-        bright = cache(triangle_means, value, emitter.uvs, emitter.faces)
+        means = cache(triangle_means, value, emitter.uvs, emitter.faces)
     areas = cache(_triangle_areas, *corners)
-    return Block(rows, strength * areas * bright, bounds, radiance=float(bright.max(initial=0.0)))
+    return Block(rows, strength * areas * means, bounds, radiance=float(means.max(initial=0.0)))
 
 
 def _face_attributes(shape: Shape, value: Any) -> dict[str, NDArray[np.float32]]:
