@@ -30,13 +30,14 @@ _looked_at: set[Path] = set()  # folders, for what was left in them
 
 
 @contextmanager
-def replacing(path: str | Path) -> Iterator[Path]:
+def replacing(path: str | Path, *, suffixed: bool = True) -> Iterator[Path]:
     """Yield the path of a new, empty file, which takes the place of `path` afterwards.
 
     The new file is in the same folder, and its content is on the disk before the old file goes. So
     an error, Ctrl-C, a full disk or a killed process leaves the old file as it was. A link stays a
     link: the file that it names is replaced. What is no regular file, such as a pipe, is yielded
-    itself. Raises OSError.
+    itself. suffixed: whether the new file has the suffix of `path`, by which libraries choose a
+    format, and others find files to read. Raises OSError.
     """
     path = Path(os.path.realpath(path))
     if path.exists() and not path.is_file():
@@ -45,7 +46,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
     if path.parent not in _looked_at:
         remove_left(path.parent)
         _looked_at.add(path.parent)
-    with _partial(path) as partial:
+    with _partial(path, path.suffix if suffixed else "") as partial:
         yield partial
         with partial.open("rb") as file:
             os.fsync(file.fileno())
@@ -55,7 +56,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
 
 def write(path: str | Path, content: bytes) -> None:
     """Write a file as `replacing` does. Raises OSError."""
-    with replacing(path) as partial:
+    with replacing(path, suffixed=False) as partial:
         partial.write_bytes(content)
 
 
@@ -84,7 +85,7 @@ def check_writable(path: str | Path) -> None:
         raise FileNotFoundError("its folder does not exist")
     if not path.exists() or path.is_file():
         try:
-            with _partial(path):
+            with _partial(path, ""):
                 pass
         except OSError as error:
             message = f"no file can be made there: {error.strerror}"
@@ -138,17 +139,17 @@ def _remove_if_left(path: Path) -> None:
 
 
 @contextmanager
-def _partial(path: Path) -> Iterator[Path]:
+def _partial(path: Path, suffix: str) -> Iterator[Path]:
     """Yield the path of a new, empty file beside `path`, which is removed if it is still there.
 
-    It has the suffix of `path`, and its permissions if that exists. Raises OSError.
+    It has the permissions of `path` if that exists. Raises OSError.
     """
-    handle, partial = -1, _new_name(path)
+    handle, partial = -1, _new_name(path, suffix)
     try:
         handle = os.open(partial, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
         while _lock(handle) is False or not partial.exists():  # another process removes it
             os.close(handle)
-            partial = _new_name(path)
+            partial = _new_name(path, suffix)
             handle = os.open(partial, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
         if path.exists():
             partial.chmod(path.stat().st_mode & 0o777)
@@ -168,9 +169,9 @@ def _partial(path: Path) -> Iterator[Path]:
                 os.close(handle)
 
 
-def _new_name(path: Path) -> Path:
-    """A name beside `path` that no file has, of one length for all names, with the same suffix."""
-    return path.with_name(f"{_HERE}{secrets.token_hex(8)}{path.suffix}")
+def _new_name(path: Path, suffix: str = "") -> Path:
+    """A name beside `path` that no file has, of one length for all names."""
+    return path.with_name(f"{_HERE}{secrets.token_hex(8)}{suffix}")
 
 
 def _lock(handle: int) -> bool | None:

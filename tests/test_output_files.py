@@ -210,7 +210,8 @@ def test_ctrl_c_at_every_line(tmp_path: Path, kind: str, wholes: dict[str, bytes
     lines = interrupted(lambda: write(path), 0)
     assert lines > 10
     seen = set()
-    for line in sorted({*range(1, lines + 1, max(1, lines // 20)), *range(lines - 30, lines + 1)}):
+    all_over, at_the_end = range(1, lines + 1, max(1, lines // 8)), range(lines - 26, lines + 1)
+    for line in sorted({*all_over, *at_the_end}):
         path.write_bytes(OLD)
         interrupted(lambda: write(path), line)
         seen.add(path.read_bytes())

@@ -195,7 +195,11 @@ class Checkpoints:
             self._keep = False
 
     def _begin_to_write(self) -> None:
-        saved = self._renderer.saved_film(held=True)
+        try:
+            saved = self._renderer.saved_film(held=True)
+        except MemoryError as error:
+            self._failure = outputs.failure(self._path, error)
+            return
         if saved.film.taken:
             self._writer = threading.Thread(target=self._write, args=(saved,), name="checkpoint")
             self._writer.start()

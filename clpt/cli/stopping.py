@@ -16,7 +16,7 @@ import click
 
 from . import failures
 
-GRACE = 1.5  # seconds after a signal in which KeyboardInterrupt may end a process by itself
+GRACE = 1.0  # seconds after a signal in which KeyboardInterrupt may end a process by itself
 ENDING = tuple(
     getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)
 )  # as Ctrl-C, which is SIGINT

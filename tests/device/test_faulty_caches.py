@@ -5,7 +5,9 @@ from __future__ import annotations
 import dataclasses
 import errno
 import hashlib
+import multiprocessing
 import os
+import random
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -17,7 +19,7 @@ from clpt import device, output_files
 from clpt.cluster.bundle import Bundle, Store
 from clpt.device import disk_cache, runtimes
 from clpt.device.source import Source
-from clpt.errors import ClusterError
+from clpt.errors import ClusterError, SceneError
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="of users, links and pipes")
 
@@ -48,7 +50,7 @@ def vendors(folder: Path) -> Path:
         made = runtimes.write_vendors({"a.icd": "/a/driver.so"})
     except OSError:  # `runtimes.vendors` warns
         return folder / "vendors"
-    assert [path.name for path in made.iterdir()] == ["a.icd"]
+    assert [path.name for path in made.glob("*.icd")] == ["a.icd"]  # as the loader does
     assert (made / "a.icd").read_text() == "/a/driver.so"
     return made / "a.icd"
 
@@ -89,6 +91,10 @@ def flipped(path: Path) -> None:
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 4
     path.write_bytes(content)
+
+
+def swapped(path: Path) -> None:
+    output_files.write(path, b"planted")
 
 
 def gone(path: Path) -> None:
@@ -181,6 +187,34 @@ def test_a_disk_that_refuses(
     monkeypatch.undo()
     kept = [path for path in own.rglob("*") if path.is_file()]
     assert bool(kept) is (call == "flock") and not caplog.records
+
+
+def _race(own: Path, seed: int) -> None:
+    """Use every cache while others do, and while files are damaged and deleted."""
+    rng = random.Random(seed)
+    for _ in range(12):
+        for use in (program, vendors, bundle):
+            try:
+                path = use(own)
+                if use is not vendors:
+                    rng.choice((gone, swapped, lambda path: None))(path)
+            except (ClusterError, SceneError, FileNotFoundError):  # another's doing, in between
+                continue
+
+
+def test_ten_processes_and_damage(own: Path) -> None:
+    """What comes out of a cache is right, or is missing."""
+    disk_cache.folder()
+    fork = multiprocessing.get_context("fork")
+    workers = [fork.Process(target=_race, args=(own, seed)) for seed in range(10)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join(60)
+    assert [worker.exitcode for worker in workers] == [0] * 10
+    for use in CACHES.values():
+        use(own)
+    assert not list(own.rglob(f"{output_files.PARTIAL}*"))
 
 
 def test_a_file_of_a_scene_that_is_swapped_is_missing(own: Path) -> None:
