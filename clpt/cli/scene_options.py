@@ -34,6 +34,7 @@ from .composition import Orbit, Span, composed, composition_options
 from .display import Display
 from .option_sets import Command, with_options
 from .scene_variables import scene_variables
+from .stopping import prompt
 
 LARGEST = 65536  # pixels of a side
 
@@ -219,13 +220,14 @@ def open_renderer(
     accept: called with the scene, before anything is built for it; first_sample: see
     `RenderOptions`; the others as of `open_scene`.
     """
-    plan, devices, loading = open_scene(scene, shown, resources, accept, **options)
     made: dict[str, Any] = {
         "texture_budget": texture_budget, "layout": layout, "tree_quality": tree_quality,
         "first_sample": first_sample, "denoise": options["denoise"],
     }  # fmt: skip
-    with shown.phase(f"building kernels for {' and '.join(on.info.name for on in devices)}"):
-        renderer = new_renderer(plan, devices, **made)
+    with prompt(dev.kill_compilers):
+        plan, devices, loading = open_scene(scene, shown, resources, accept, **options)
+        with shown.phase(f"building kernels for {' and '.join(on.info.name for on in devices)}"):
+            renderer = new_renderer(plan, devices, **made)
     for warning in renderer.warnings:
         shown.note(f"clpt: warning: {warning}")
     return renderer, loading

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import struct
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import OpenEXR
@@ -139,8 +141,63 @@ def _some(path: Path, header: Header, names: Sequence[str]) -> Channels:
 
 
 def write_parts(path: Path, parts: Sequence[Any]) -> None:
-    """Write parts of the library's own class. Raises RuntimeError where it cannot."""
+    """Write parts of the library's own class. Raises RuntimeError or OSError where it cannot."""
     OpenEXR.File(list(parts)).write(exr_name(path))
+    _check_whole(path)
+
+
+def _check_whole(path: Path) -> None:
+    """Raise OSError for a file that ends before its last chunk does.
+
+    The library does not tell that the last bytes were refused, as by a full disk. Behind the
+    headers stand the offsets of all chunks, then these: number of the part in a file of several,
+    row, size (each i32) and data.
+    """
+    with path.open("rb") as file:
+        _, version = _unpacked("<2I", file)
+        several = bool(version & SEVERAL_PARTS)
+        while _skip_header(file) and several:
+            pass
+        (first,) = _unpacked("<Q", file)
+        file.seek(-8, os.SEEK_CUR)
+        offsets = _unpacked(f"<{max(first - file.tell(), 8) // 8}Q", file)
+        last = max(offsets)
+        file.seek(last)
+        *_, size = _unpacked("<3i" if several else "<2i", file)
+        whole = file.tell() + size
+        if not min(offsets) or file.seek(0, os.SEEK_END) != whole:
+            raise OSError(errno.ENOSPC, NOT_WHOLE)
+
+
+SEVERAL_PARTS = 0x1000  # of the version
+NOT_WHOLE = "it could not be written to its end; is the disk full?"
+
+
+def _skip_header(file: BinaryIO) -> bool:
+    """Read over the attributes of a part; return whether there was one."""
+    some = False
+    while _word(file):
+        _word(file)  # its type
+        (size,) = _unpacked("<i", file)
+        file.seek(size, os.SEEK_CUR)
+        some = True
+    return some
+
+
+def _word(file: BinaryIO) -> bytes:
+    """The bytes before the next zero. Raises OSError at the end of the file."""
+    made = bytearray()
+    while (letter := _unpacked("<c", file)[0]) != b"\0":
+        made += letter
+    return bytes(made)
+
+
+def _unpacked(form: str, file: BinaryIO) -> tuple[Any, ...]:
+    """The next numbers of a file. Raises OSError at its end."""
+    try:
+        return struct.unpack(form, file.read(struct.calcsize(form)))
+    except struct.error:
+        raise OSError(errno.ENOSPC, NOT_WHOLE) from None
 
 
 def write_channels(path: Path, metadata: Mapping[str, Any], channels: Channels) -> None:
@@ -148,3 +205,4 @@ def write_channels(path: Path, metadata: Mapping[str, Any], channels: Channels) 
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     with output_files.replacing(path) as partial:
         OpenEXR.File({**metadata, **header}, dict(channels)).write(exr_name(partial))
+        _check_whole(partial)

@@ -28,6 +28,12 @@ def read(path: Path) -> Stored:
 
 
 def write(path: Path, array: NDArray[Any]) -> None:
-    """Write an array of any shape as .npy."""
+    """Write an array of one axis or more as .npy. Raises OSError.
+
+    Not by `np.save`, which does not tell that the last bytes were refused, as by a full disk.
+    """
+    array = np.ascontiguousarray(array)
     with output_files.replacing(path) as partial, partial.open("wb") as file:
-        np.save(file, array)
+        header = np.lib.format.header_data_from_array_1_0(array)
+        np.lib.format.write_array_header_1_0(file, header)
+        file.write(array.data)

@@ -133,6 +133,18 @@ def test_a_full_disk_is_told_and_the_render_goes_on(folder, monkeypatch, capsys)
     assert not list(folder.glob(PARTIAL + "*"))
 
 
+def test_a_host_without_room_for_a_film(folder, monkeypatch, capsys):
+    def full(self, **_):
+        raise MemoryError
+
+    monkeypatch.setattr(Renderer, "saved_film", full)
+    command = ["render", killing.SCENE, "-o", "a.npy", *COMMON[:-1], "--spp", "30"]
+    assert run([*command, "--checkpoint", "0.001s"]) == 0
+    error = capsys.readouterr().err
+    assert "warning: a.resume.exr: cannot be written: memory has run out" in error
+    assert [path.name for path in folder.iterdir()] == ["a.npy"]
+
+
 def test_a_device_without_room_for_a_copy(folder, monkeypatch, capsys):
     def full(self):
         raise MemoryBudgetError("a copy of the film", 100, 10, "save no films")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import io
 import json
 import os
 import re
@@ -238,7 +237,8 @@ class _Writer:
         key = os.path.realpath(path)
         if key not in self.files:
             name = self.file_name("image", path.suffix.lstrip("."))
-            shutil.copyfile(path, self.path.parent / name)
+            with output_files.replacing(self.path.parent / name) as partial:
+                shutil.copyfile(path, partial)
             self.files[key] = name
         return self.files[key]
 
@@ -269,9 +269,7 @@ class _Writer:
     def sdf_grid(self, grid: shapes.SdfGrid) -> str:
         """Write signed distances; return the file's name."""
         name = self.file_name(grid.name or "distances", "npy")
-        file = io.BytesIO()
-        np.save(file, np.asarray(grid.values, np.float32))
-        output_files.write(self.path.parent / name, file.getvalue())
+        images.write_npy(self.path.parent / name, np.asarray(grid.values, np.float32))
         self.files[name] = name
         return name
 
