@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import text
+from clpt import budget, text
 from clpt.errors import SceneError
-from clpt.formats.gzip_file import LARGEST, read_bytes
+from clpt.formats.gzip_file import read_bytes
 from clpt.formats.meshes.triangles import Triangles, indices, see_through
 from clpt.geometry.polygons import triangulate
 
@@ -39,6 +39,7 @@ HEADER = re.compile(
     re.DOTALL,
 )
 LONGEST_HEADER = 1 << 16
+PER_BYTE = 8  # bytes of memory for each of the file, while it is read
 MOST_CORNERS = 1 << 16  # of one polygon
 EVEN = 1 << 12  # values of a list whose rows are read in one go
 
@@ -71,12 +72,10 @@ class Header:
     length: int
 
 
-def read(path: Path, largest: int = LARGEST) -> Triangles:
-    """Read a file; largest: bytes that one of gzip may have, unpacked.
-
-    Raises SceneError for one that is larger, broken, or has no vertices or faces.
-    """
-    data = text.plain(read_bytes(path, largest))
+def read(path: Path) -> Triangles:
+    """Read a file. Raises SceneError for one that is broken, or has no vertices or faces."""
+    data = text.plain(read_bytes(path))
+    budget.check(PER_BYTE * len(data), "its tables", path)
     try:
         header = _header(data)
         if header.order:

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from clpt import transforms
-from clpt.errors import SceneError
+from clpt import input_files, transforms
+from clpt.errors import LONGEST_NAME, SceneError
 from clpt.formats.missing import Missing, grey_for
 from clpt.formats.pbrt.params import Parameter, Parameters
 from clpt.scene.materials import Material
@@ -37,7 +37,7 @@ class Definition:
 class Shared:
     """What all states of a file, and of those that it includes, have in common."""
 
-    folder: Path
+    path: Path  # of the scene, which others beside it make up
     warnings: list[str] = field(default_factory=list)
     textures: dict[tuple[str, str], Definition] = field(default_factory=dict)
     materials: dict[str, Definition] = field(default_factory=dict)
@@ -111,7 +111,7 @@ class State:
         if not name or "\0" in name or len(name) > 4096:
             raise SceneError(f"{name[:40]!r} is no name of a file")
         path = Path(name.replace("\\", "/"))
-        beside, other = self.shared.folder / path, self.file_folder / path
+        beside, other = self.shared.path.parent / path, self.file_folder / path
         try:
             return other if not beside.exists() and other.exists() else beside
         except OSError as error:
@@ -121,7 +121,7 @@ class State:
         """Return `file(name)`. Raises SceneError if it is missing, with all others that are."""
         path = self.file(name)
         if path.is_file():
-            return path
+            return input_files.named("pbrt", self.shared.path.parent, path)
         named = self.shared.files.items()
         missing = [n for n, state in named if n != name and not state.file(n).is_file()]
         nor = f"; nor are there {', '.join(map(repr, missing))}" if missing else ""
@@ -158,5 +158,5 @@ class State:
 
 def nearest(name: str, known: Any) -> str:
     """Return the end of a message about an unknown name: the nearest known ones."""
-    near = difflib.get_close_matches(name, sorted(known), n=3, cutoff=0.5)
+    near = difflib.get_close_matches(name[:LONGEST_NAME], sorted(known), n=3, cutoff=0.5)
     return "; did you mean " + " or ".join(map(repr, near)) + "?" if near else ""
