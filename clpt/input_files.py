@@ -110,6 +110,4 @@ def _other_kind(status: os.stat_result) -> str:
 
 
 def _unreadable(path: Path, error: Exception) -> SceneError:
-    if isinstance(error, FileNotFoundError):
-        return SceneError("there is no such file", file=path)
     return SceneError(f"cannot be read: {getattr(error, 'strerror', None) or error}", file=path)

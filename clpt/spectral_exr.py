@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from clpt import images
 from clpt.errors import SceneError
 from clpt.images import exr, exr_files
-from clpt.images.failures import reading
+from clpt.images.failures import check_there, reading
 from clpt.spectra import Tabulated, cie
 from clpt.spectra.spectrum import d65
 
@@ -204,8 +204,7 @@ def _fail(path: Path | None, message: str) -> NoReturn:
 
 def _contents(path: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
     """Attributes and channels of an EXR file, in its display window. Raises SceneError."""
-    if not path.is_file():
-        _fail(path, "no such image file")
+    check_there(path)
     with reading(path):
         header = images.attributes(path)
         names = [n for n in exr_files.channel_names(header) if _is_spectral(n)]

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import budget, input_files
+from clpt import budget
 from clpt.errors import SceneError
 from clpt.images import exr, hdr, npy, pfm, pillow
-from clpt.images.failures import reading
+from clpt.images.failures import check_there, reading
 from clpt.images.stored import Stored
 
 log = logging.getLogger("clpt.images")
@@ -70,8 +70,5 @@ def check_input(path: str | Path) -> Path:
     if path.suffix.lower() not in READERS:
         message = f"unknown image suffix {path.suffix!r}; known: {', '.join(READERS)}"
         raise SceneError(message, file=path)
-    try:
-        return input_files.checked(path)
-    except SceneError as error:
-        message = "no such image file" if not path.exists() else error.message
-        raise SceneError(message, file=path) from None
+    check_there(path)
+    return path

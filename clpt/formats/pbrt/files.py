@@ -34,7 +34,7 @@ class Files(Located):
 
     def __init__(self, path: Path):
         self.path = path
-        self.contents = Contents(Shared(path))
+        self.contents = Contents(Shared(path.parent))
         self.state = State(self.contents.shared, path.parent)
         self.files: list[Path] = []
         self.warned: set[str] = set()

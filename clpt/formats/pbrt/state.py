@@ -37,7 +37,7 @@ class Definition:
 class Shared:
     """What all states of a file, and of those that it includes, have in common."""
 
-    path: Path  # of the scene, which others beside it make up
+    folder: Path
     warnings: list[str] = field(default_factory=list)
     textures: dict[tuple[str, str], Definition] = field(default_factory=dict)
     materials: dict[str, Definition] = field(default_factory=dict)
@@ -111,7 +111,7 @@ class State:
         if not name or "\0" in name or len(name) > 4096:
             raise SceneError(f"{name[:40]!r} is no name of a file")
         path = Path(name.replace("\\", "/"))
-        beside, other = self.shared.path.parent / path, self.file_folder / path
+        beside, other = self.shared.folder / path, self.file_folder / path
         try:
             return other if not beside.exists() and other.exists() else beside
         except OSError as error:
@@ -121,7 +121,7 @@ class State:
         """Return `file(name)`. Raises SceneError if it is missing, with all others that are."""
         path = self.file(name)
         if path.is_file():
-            return input_files.named("pbrt", self.shared.path.parent, path)
+            return input_files.named("pbrt", self.shared.folder, path)
         named = self.shared.files.items()
         missing = [n for n, state in named if n != name and not state.file(n).is_file()]
         nor = f"; nor are there {', '.join(map(repr, missing))}" if missing else ""

@@ -27,6 +27,7 @@ BARE = b"NanoVDB1"  # a grid without segments
 MAJOR = 32
 CODECS = ("none", "ZIP", "BLOSC")
 METADATA, GRID, TREE, TILE = 176, 672, 64, 32
+DEFLATE = 1032  # bytes at most that one of deflate stands for
 UPPER, LOWER = 270_400, 33_856
 UPPER_TABLE, LOWER_TABLE = 8_256, 1_088  # where a node's children are told
 MINIMUM, FLAGS, CODES = 80, 15, 96  # of a leaf whose numbers are packed
@@ -125,7 +126,7 @@ def _entries(data: bytes) -> Iterator[_Entry]:
         for name, size, packed, codec in heads:
             if at + packed > len(data):
                 raise SceneError(f"is damaged: the grid {name!r} goes beyond its end")
-            if not GRID + TREE + ROOT <= size < 1 << 62:
+            if not GRID + TREE + ROOT <= size <= DEFLATE * max(packed, 1):
                 raise SceneError(f"the grid {name!r} cannot have {size:,} bytes")
             yield _Entry(name, codec, at, at + packed, size)
             at += packed
