@@ -54,27 +54,28 @@ def named(form: str, folder: Path, path: Path) -> Path:
 
 
 def checked(path: Path) -> Path:
-    """Return the path of a regular file, for a library that opens it itself. Raises SceneError."""
+    """Return the path of a regular file, which counts as read now. Raises SceneError."""
     try:
         status = path.stat()
     except (OSError, ValueError) as error:
         raise _unreadable(path, error) from None
-    return _noted(path, status)
+    if kind := _other_kind(status):
+        raise SceneError(f"is {kind}, not a file", file=path)
+    budget.reads(status)
+    return path
 
 
 def opened(path: Path) -> BinaryIO:
     """Open a regular file for reading. Raises SceneError."""
+    checked(path)  # first: to open a device may do something
     try:
-        handle = os.open(path, _FLAGS | _NO_WAITING)  # a pipe without a writer does not wait
+        handle = os.open(path, _FLAGS | _NO_WAITING)  # a pipe that has come since does not wait
     except (OSError, ValueError) as error:
         raise _unreadable(path, error) from None
-    file = os.fdopen(handle, "rb")
-    try:
-        _noted(path, os.fstat(handle))
-    except BaseException:
-        file.close()
-        raise
-    return file
+    if kind := _other_kind(os.fstat(handle)):
+        os.close(handle)
+        raise SceneError(f"is {kind}, not a file", file=path)
+    return os.fdopen(handle, "rb")
 
 
 def read_bytes(path: Path) -> bytes:
@@ -92,14 +93,6 @@ def content(file: BinaryIO, path: Path) -> bytes:
         return file.read(size)  # no more: some files of the system have no end
     except OSError as error:
         raise _unreadable(path, error) from None
-
-
-def _noted(path: Path, status: os.stat_result) -> Path:
-    """Return the path of a regular file, which counts as read."""
-    if kind := _other_kind(status):
-        raise SceneError(f"is {kind}, not a file", file=path)
-    budget.reads(status)
-    return path
 
 
 def _other_kind(status: os.stat_result) -> str:

@@ -24,6 +24,7 @@ from clpt.scene.media import Medium
 from clpt.scene.shapes import Group, Instance, Mesh, Shape
 from clpt.scene.textures import SECOND_UV
 
+PER_PART = 256  # moved vertices that count as a part
 BYTES = 2048  # of a copy in memory, about
 FLIPPED = np.array([1, -1], np.float32)
 INSTANCING = "EXT_mesh_gpu_instancing"
@@ -155,6 +156,7 @@ def _morph(primitive: Element, made: Geometry, weights: tuple[float, ...]) -> No
     """Add the displacements of the targets, each times its weight."""
     for weight, target in zip(weights, made.targets, strict=False):
         for name, change in target.items():
+            budget.take_parts(len(change) // PER_PART, "morph targets", primitive.document.file)
             if weight != 0.0 and name in made.attributes:
                 base = made.attributes[name]
                 width = min(base.shape[1], change.shape[1])
