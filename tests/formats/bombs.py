@@ -276,7 +276,6 @@ def png_header(folder: Path) -> Path:
     def chunk(name: bytes, data: bytes) -> bytes:
         check = struct.pack(">I", zlib.crc32(name + data))
         return struct.pack(">I", len(data)) + name + data + check
-        )
 
     head = chunk(b"IHDR", struct.pack(">2I5B", 13_300, 13_300, 16, 2, 0, 0, 0))
     rows = chunk(b"IDAT", zlib.compress(bytes(1 << 20)))
