@@ -138,7 +138,7 @@ def read(path: str | Path, *, emissive: bool | None = None) -> SpectralImage:
             _fail(path, f"the channels {first} and {second} are of the same wavelength")
     if len({channels[name].shape for _, name in bands}) > 1:
         _fail(path, "its channels are of different sizes")
-    try:
+    with reading(path):
         return SpectralImage(
             np.stack([channels[name] for _, name in bands], axis=2).astype(np.float32, copy=False),
             np.array([nm for nm, _ in bands]),
@@ -149,8 +149,6 @@ def read(path: str | Path, *, emissive: bool | None = None) -> SpectralImage:
             _curve(path, header.get("lensTransmission")),
             _left_out(parts, light),
         )
-    except SceneError as error:
-        _fail(path, error.message)
 
 
 def write(
