@@ -371,14 +371,17 @@ def _meshopt(mode: int = 1) -> bytes:
     packed = {
         "buffer": 0, "byteLength": len(data), "byteStride": 8, "count": 20, "mode": "ATTRIBUTES",
     }  # fmt: skip
-    view = {"buffer": 0, "byteLength": 160, "extensions": {"EXT_meshopt_compression": packed}}
+    view = {
+        "buffer": 1, "byteLength": 160, "byteStride": 8,
+        "extensions": {"EXT_meshopt_compression": packed},
+    }  # fmt: skip
     return _of_view(data, view, {"attributes": {"POSITION": 0}}, 20, 5122)
 
 
 def _of_view(data: bytes, view: Any, primitive: Any, count: int, kind: int = 5126) -> bytes:
     document = {
         "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [primitive]}], "buffers": [{"byteLength": len(data)}],
+        "meshes": [{"primitives": [primitive]}], "buffers": [{"byteLength": len(data)}, {"byteLength": 1 << 16}],
         "bufferViews": [view],
         "accessors": [{"componentType": kind, "count": count, "type": "VEC3"}],
     }  # fmt: skip
