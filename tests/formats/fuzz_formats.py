@@ -381,8 +381,8 @@ def _meshopt(mode: int = 1) -> bytes:
 def _of_view(data: bytes, view: Any, primitive: Any, count: int, kind: int = 5126) -> bytes:
     document = {
         "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [primitive]}], "buffers": [{"byteLength": len(data)}, {"byteLength": 1 << 16}],
-        "bufferViews": [view],
+        "meshes": [{"primitives": [primitive]}], "bufferViews": [view],
+        "buffers": [{"byteLength": len(data)}, {"byteLength": 1 << 16}],
         "accessors": [{"componentType": kind, "count": count, "type": "VEC3"}],
     }  # fmt: skip
     if kind != 5126:
