@@ -127,6 +127,7 @@ SETTINGS = Record(
     guide_side=("real", "of the cells of a guide, see kernels/guiding/guide.cl [m]"),
     guide_paths=("integer", "light paths from which it learns"),
     wavelength_groups=("integer", "groups of paths that have the same wavelengths, in a pass"),
+    rival_area=("real", "unit of areas in kernels/lighting/rivals.cl, a power of two [m^2]"),
     aims=(
         "integer",
         "first float in `distributions` of the spheres at which light paths aim",
@@ -150,7 +151,7 @@ SETTINGS = Record(
     tanh_max=("real", "tanh of the wavelength importance where the sensor ends to respond"),
     bands=("integer", "number of bands of a spectral film"),
     density=("integer", "first word in `distributions` of the density of wavelengths"),
-    film_scale=("real", "what a sum has of a value of 1: a power of two, near the exposure"),
+    film_scale=("real", "what a sum has of a value of 1: a power of two"),
     to_first=("vec3", "factors of the film's three sums in the picture's first channel"),
     to_second=("vec3", "the same of its second channel"),
     to_third=("vec3", "the same of its third channel"),

@@ -95,14 +95,15 @@ class SpectralImage:
         return Tabulated(self.lambdas, values, "zero" if self.emissive else "hold")
 
 
-def find(image: Any, *, emissive: bool) -> SpectralImage | None:
+def find(image: Any, *, emissive: bool, where: str = "image") -> SpectralImage | None:
     """`image` itself if it is spectral, or what is in the file it names; None: it is another image.
 
-    Raises SceneError if it holds reflectances where an emission is needed, or the reverse.
+    where: it stands, for errors that have no file. Raises SceneError if it holds reflectances where
+    an emission is needed, or the reverse.
     """
     if isinstance(image, SpectralImage):
         if image.emissive != emissive:
-            _fail(None, _other_kind(emissive))
+            raise SceneError(_other_kind(emissive), where=where)
         return image
     if isinstance(image, (str, Path)) and is_spectral(image):
         return read(image, emissive=emissive)

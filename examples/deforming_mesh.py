@@ -60,7 +60,8 @@ def scene(mesh: trimesh.Trimesh) -> Scene:
 
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
-queue = cl.CommandQueue(cl.create_some_context(interactive=False))
+context = cl.create_some_context(interactive=False)
+queue = cl.CommandQueue(context)
 deform = cl.Program(queue.context, DEFORM).build().deform
 
 mesh = trimesh.creation.icosphere(subdivisions=5)

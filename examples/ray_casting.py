@@ -51,7 +51,8 @@ rng = np.random.default_rng(7)
 mesh = town(rng)
 origins, directions = camera_rays([-13, -20, 12], [0.3, 0, 1.2], 42)
 
-queue = cl.CommandQueue(cl.create_some_context(interactive=False))
+context = cl.create_some_context(interactive=False)
+queue = cl.CommandQueue(context)
 accel = clpt.Accel(queue, mesh.vertices, mesh.faces)
 hits = accel.intersect(origins, directions)  # numpy in, numpy out
 

@@ -58,7 +58,8 @@ def scene(density):
     return clpt.Scene(camera=camera, film=film, integrator=path, **things)
 
 
-queue = cl.CommandQueue(cl.create_some_context(interactive=False))
+context = cl.create_some_context(interactive=False)
+queue = cl.CommandQueue(context)
 built = cl.Program(queue.context, KERNEL).build("-DNX={} -DNY={} -DNZ={}".format(*SIZE))
 advect, press, project = built.advect, built.press, built.project
 flow, after = (cl_array.zeros(queue, (*SIZE, 4), "f4") for _ in range(2))

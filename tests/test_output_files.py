@@ -161,3 +161,21 @@ def test_a_second_name_stays_when_the_file_is_replaced(tmp_path, monkeypatch):
     output_files.link(path, other)
     assert (path.read_bytes(), other.read_bytes()) == (b"3", b"2")
     assert len(list(tmp_path.iterdir())) == 2
+
+
+@posix
+def test_a_current_folder_that_is_gone(tmp_path):
+    """clpt is imported and writes elsewhere; a picture for that folder is refused."""
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    code = f"""
+import os; os.chdir({str(gone)!r}); os.rmdir({str(gone)!r})
+import clpt
+clpt.write_image({str(tmp_path / "a.png")!r}, [[[0.5, 0.5, 0.5]]])
+try: clpt.write_image("b.png", [[[0.5, 0.5, 0.5]]])
+except clpt.SceneError as error: print(error)
+"""
+    own = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run([sys.executable, "-c", code], env=own, capture_output=True, text=True)
+    assert done.stdout.strip() == "b.png: its folder does not exist", done.stderr
+    assert (tmp_path / "a.png").exists()

@@ -9,6 +9,7 @@ import click
 import platformdirs
 
 from .. import output_files
+from ..device import disk_cache
 from ..errors import ClptError
 
 BAD_INPUT, BUG = 2, 1
@@ -33,7 +34,11 @@ def complain(message: str) -> None:
 
 def _keep_traceback() -> str:
     """Write the current traceback to clpt's log folder; a phrase that tells where."""
-    path = Path(platformdirs.user_log_dir("clpt", appauthor=False)) / "traceback.txt"
+    try:
+        logs = Path(platformdirs.user_log_dir("clpt", appauthor=False))
+    except RuntimeError:  # a user without a home
+        logs = disk_cache.temporary_folder()
+    path = logs / "traceback.txt"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         output_files.write_text(path, traceback.format_exc())

@@ -8,7 +8,7 @@ import pyopencl as cl
 from numpy.typing import DTypeLike, NDArray
 from pyopencl.array import Array
 
-from . import dlpack
+from . import dlpack, forking
 from .refusals import refused, wait
 
 
@@ -20,6 +20,12 @@ class DeviceArray(Array):
     a copy, unless they ask for none. On other devices they get OpenCL's memory, or a copy on the
     host if they ask for the CPU, as numpy.from_dlpack(array, device="cpu") does.
     """
+
+    def get(self, *args: Any, **named: Any) -> Any:
+        """Return a copy on the host, as `pyopencl.array.Array.get` does. Raises DeviceError."""
+        if self.queue is not None:
+            forking.check(self.queue)
+        return super().get(*args, **named)
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         """Return a copy on the host; wait for it. Raises ValueError if no copy may be made."""

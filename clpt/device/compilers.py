@@ -19,6 +19,8 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from clpt.device import runtimes
+
 log = logging.getLogger(__name__)
 
 _PROGRAM = Path(__file__).with_name("compiler_process.py")
@@ -131,6 +133,7 @@ class Compilers:
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
+                env=runtimes.environment(),
                 start_new_session=True,  # Ctrl-C is for this process
             )
         except OSError as error:

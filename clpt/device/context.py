@@ -15,7 +15,15 @@ from typing import Any
 import numpy as np
 import pyopencl as cl
 
-from clpt.device import memory, native_programs, program_cache, runtimes, speed_trial
+from clpt.device import (
+    disk_cache,
+    forking,
+    memory,
+    native_programs,
+    program_cache,
+    runtimes,
+    speed_trial,
+)
 
 from ..errors import DeviceError
 from .compilers import Compilers
@@ -128,6 +136,7 @@ class Device:
     """
 
     def __init__(self, context: cl.Context, queue: cl.CommandQueue, info: DeviceInfo):
+        forking.check(queue)
         self.context, self.queue, self.info = context, queue, info
         self.builds = Builds()
         self.compilers: Compilers | None = None  # in other processes, where the caller gives some
@@ -149,10 +158,22 @@ class Device:
 
     @classmethod
     def adopt(cls, queue: cl.CommandQueue) -> Device:
-        """Return the device of a caller's queue, with the caller's context."""
+        """Return the device of a caller's queue, with the caller's context. Raises DeviceError."""
+        if not disk_cache.has_home():
+            raise DeviceError(
+                "PyOpenCL runs no kernel for a user without a home folder: set HOME, or "
+                "XDG_CACHE_HOME to a folder for caches"
+            )
+        try:
+            context = queue.context
+        except cl.Error as error:
+            raise DeviceError(
+                "the queue's context is gone: keep it in a variable for as long as the queue, as "
+                f"in context = cl.create_some_context(); queue = cl.CommandQueue(context) ({error})"
+            ) from error
         info = _info(-1, queue.device)
         log.info("%s: the device of the caller's queue", info.label)
-        return cls(queue.context, queue, info)
+        return cls(context, queue, info)
 
     @cached_property
     def lanes(self) -> int:
@@ -410,9 +431,8 @@ def _listing(infos: tuple[DeviceInfo, ...]) -> str:
 
 
 def _cl_devices() -> Iterator[cl.Device]:
-    runtimes.prepare()
     try:
-        platforms = cl.get_platforms()
+        platforms = runtimes.platforms()
     except cl.Error as error:
         log.warning("no OpenCL platform: %s", error)
         return

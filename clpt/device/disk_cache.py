@@ -39,7 +39,34 @@ def folder() -> Path:
     The user's folder is passed over, with one warning, where it cannot be written, or where others
     can write: a driver runs what the folder holds.
     """
-    return private_folder(platformdirs.user_cache_path("clpt", appauthor=False))
+    return private_folder(user_folder("clpt"))
+
+
+def user_folder(name: str | None = None) -> Path:
+    """Return the user's folder for caches, or that of a program in it.
+
+    It is a temporary one, with one warning, for a user without a home.
+    """
+    try:
+        return platformdirs.user_cache_path(name, appauthor=False)
+    except RuntimeError:  # HOME is not set, and the system has no entry for the user
+        return _without_home() / (name or "")
+
+
+def has_home() -> bool:
+    """Whether there is a folder for this user's caches."""
+    try:
+        platformdirs.user_cache_path()
+    except RuntimeError:
+        return False
+    return True
+
+
+@functools.cache
+def _without_home() -> Path:
+    other = temporary_folder()
+    log.warning("this user has no home folder: caches go to %s; set HOME to keep them", other)
+    return other
 
 
 @functools.cache

@@ -44,6 +44,13 @@ def refused(
     return DeviceError(f"{what} failed: {f'{known} ({error})' if known else error}")
 
 
+def failed_before(event: cl.Event) -> DeviceError:
+    """Return the error that stands for an event of the caller that failed before it was given."""
+    status = event.command_execution_status
+    name = cl.status_code.to_string(status, "%d")
+    return DeviceError(f"an event in `wait_for` has failed with {name}: nothing can wait for it")
+
+
 def wait(event: cl.Event, what: str = "a command") -> None:
     """Wait until an event has ended. Raises DeviceError, MemoryBudgetError."""
     try:

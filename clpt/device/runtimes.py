@@ -6,11 +6,11 @@ The loader reads ICD files, each naming a driver's library, from /etc/OpenCL/ven
 folder in OCL_ICD_VENDORS. Intel's CPU runtime as a wheel (extra `clpt[cpu]`) brings such a file
 with a placeholder for a path, in a folder that no loader reads. So clpt writes a folder of its own
 that names the library where it is, repeats every ICD file of the system, and points
-OCL_ICD_VENDORS there. Where the user has set OCL_ICD_VENDORS, it stays as it is: whoever sets it
-wants exactly those drivers.
+OCL_ICD_VENDORS there while the loader reads it. Where the user has set OCL_ICD_VENDORS, it stays as
+it is: whoever sets it wants exactly those drivers.
 
-Where the user's caches cannot be written, PoCL lists no device, and PyOpenCL runs no kernel. clpt
-then gives its process a temporary folder for caches.
+Where the user's caches cannot be written, or the user has no home, PoCL lists no device, and
+PyOpenCL runs no kernel. clpt then gives its process a temporary folder for caches.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
-import platformdirs
+import pyopencl as cl
 
 from clpt import output_files
 from clpt.device import disk_cache
@@ -41,30 +41,59 @@ _SYSTEM = Path("/etc/OpenCL/vendors")
 _WHEEL, _LIBRARY = "intel-opencl-rt", "libintelocl.so"
 
 
-@functools.cache
-def prepare() -> None:
-    """Set the variables that the OpenCL loader and its runtimes read, once a process."""
-    _make_wheel_known()
+def platforms() -> list[cl.Platform]:
+    """Return all platforms, Intel's wheel among them. Raises what PyOpenCL raises.
+
+    The loader reads its variable when it lists platforms for the first time in a process. It is set
+    meanwhile, and then as it was.
+    """
     _make_caches_writable()
+    folder, before = vendors(), os.environ.get(VARIABLE)
+    if folder is None:
+        return cl.get_platforms()
+    os.environ[VARIABLE] = str(folder)
+    try:
+        return cl.get_platforms()
+    finally:
+        if before is None:
+            del os.environ[VARIABLE]
+        else:
+            os.environ[VARIABLE] = before
 
 
-def _make_wheel_known() -> None:
+def environment() -> dict[str, str]:
+    """Return the variables for another process that is to have the same platforms."""
+    folder = vendors()
+    return dict(os.environ) if folder is None else {**os.environ, VARIABLE: str(folder)}
+
+
+@functools.cache
+def vendors() -> Path | None:
+    """Return the folder of ICD files that has Intel's wheel too, made where it is missing.
+
+    None where there is no such wheel, or the loader finds its drivers without clpt.
+    """
     library = wheel_library()
     if library is None or os.environ.get(VARIABLE) or not sys.platform.startswith("linux"):
-        return
+        return None
     drivers = icd_files((_SYSTEM, Path(sys.prefix) / "etc/OpenCL/vendors"))
     if any(Path(driver).name == _LIBRARY for driver in drivers.values()):
-        return
+        return None
     drivers["clpt-intel-cpu.icd"] = str(library)
     try:
-        os.environ[VARIABLE] = str(write_vendors(drivers))
+        return write_vendors(drivers)
     except OSError as error:
         log.warning("%s cannot be made known to the OpenCL loader: %s", library, error)
+        return None
 
 
+@functools.cache
 def _make_caches_writable() -> None:
+    """Set the variables by which runtimes find their caches, once a process."""
+    if not disk_cache.has_home():
+        os.environ["XDG_CACHE_HOME"] = str(disk_cache.user_folder())
     for variable, wanted in (
-        ("XDG_CACHE_HOME", platformdirs.user_cache_path()),
+        ("XDG_CACHE_HOME", disk_cache.user_folder()),
         ("POCL_CACHE_DIR", Path(os.environ.get("POCL_CACHE_DIR", tempfile.gettempdir()))),
     ):
         nearest = next(path for path in (wanted, *wanted.parents) if path.exists())

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import pyopencl as cl
 
+from . import forking
 from .buffers import host_buffer
 from .program import BoundKernel
-from .refusals import refused, wait
+from .refusals import failed_before, refused, wait
 
 Events = Iterable[cl.Event] | None  # as `wait_for` takes them
 TILE = (64, 2)  # work-items of a group of pixels
@@ -33,7 +34,7 @@ class Stream:
     On an in-order queue that costs nothing; on an out-of-order one each command waits for the event
     of the last. The host waits in `read` and `wait` only. Nothing calls clFinish, so that commands
     of others on the queue are left alone. What the driver refuses is raised as DeviceError, or as
-    MemoryBudgetError where memory has run out.
+    MemoryBudgetError where memory has run out; so is a fork that the driver does not survive.
 
     queue: the caller's; last: the event of the last command, None before the first.
     """
@@ -47,8 +48,15 @@ class Stream:
         self._copies: deque[cl.Event] = deque()  # to the host, that may not have ended
 
     def after(self, events: Events) -> None:
-        """Let the next command wait for events of others too."""
-        self._before += events or ()
+        """Let the next command wait for events of others too.
+
+        Raises DeviceError for one that has failed: on some drivers the command would never begin.
+        """
+        given = list(events or ())
+        for event in given:
+            if event.command_execution_status < 0:
+                raise failed_before(event)
+        self._before += given
 
     def run(
         self,
@@ -98,6 +106,7 @@ class Stream:
 
     def wait(self) -> None:
         """Wait until the last command has ended."""
+        forking.check(self.queue)
         if self.last is not None:
             wait(self.last)
 
@@ -109,6 +118,7 @@ class Stream:
             raise refused("a flush of the queue", error) from error
 
     def _waits(self) -> list[cl.Event] | None:
+        forking.check(self.queue)
         waits, self._before = self._before, []
         if not self.ordered and self.last is not None:
             waits = [*waits, self.last]

@@ -24,6 +24,7 @@ from clpt.spectra import spaces
 Array = NDArray[np.float32]
 
 HALF_MAX = 65504.0
+HALF_MIN = 2.0**-14  # from which on it has 11 bits
 
 
 def read(path: Path) -> Stored:
@@ -67,6 +68,12 @@ def matrix_of(header: Header) -> Matrix | None:
     return None if stated is None else spaces.to_rec709(stated)
 
 
+def _fits_half(pixels: Array) -> bool:
+    """Return whether half numbers hold the brightest finite value, at their full precision."""
+    largest = float(np.max(np.abs(pixels), initial=0.0, where=np.isfinite(pixels)))
+    return largest == 0.0 or HALF_MIN <= largest <= HALF_MAX
+
+
 def write(
     path: Path,
     pixels: Array,
@@ -88,7 +95,7 @@ def write(
         letters = (".R", ".G", ".B", ".A")[: layer.shape[2]] if layer.shape[2] > 1 else ("",)
         parts.append((name, letters, layer))
     for name, letters, layer in parts:
-        narrow = half and not name
+        narrow = half and not name and _fits_half(layer)
         stored = np.clip(layer, -HALF_MAX, HALF_MAX).astype(np.float16) if narrow else layer
         for index, letter in enumerate(letters):
             channels[name + letter] = np.ascontiguousarray(stored[..., index])

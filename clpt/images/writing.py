@@ -34,11 +34,11 @@ def write(
 ) -> None:
     """Write a linear (h, w), (h, w, 1), (h, w, 3) or (h, w, 4) image in the format of the suffix.
 
-    .exr: half or float, with attributes from `metadata` and further `layers` in float, name ->
-    (h, w) as the channel of that name, or (h, w, 3) as its .R, .G, .B; prefix: before R, G and B of
-    the image, such as "ViewLayer.Combined.". .png: sRGB transfer, 8 bit,
-    scaled by 2^exposure, with texts from `metadata`; NaN is black there, values beyond [0, 1] are
-    clipped. .hdr, .pfm, .npy: as it is.
+    .exr: half, or float where `half` is False or half numbers do not reach the brightest pixel,
+    with attributes from `metadata` and further `layers` in float, name -> (h, w) as the channel of
+    that name, or (h, w, 3) as its .R, .G, .B; prefix: before R, G and B of the image, such as
+    "ViewLayer.Combined.". .png: sRGB transfer, 8 bit, scaled by 2^exposure, with texts from
+    `metadata`; NaN is black there, values beyond [0, 1] are clipped. .hdr, .pfm, .npy: as it is.
     space: of the colours, see clpt.spectra.spaces; an .exr states it by its chromaticities, an .hdr
     by its primaries. A .png is converted to sRGB and a .pfm to Rec. 709, white to white, which is
     what they mean; an .npy is not converted.
@@ -87,6 +87,10 @@ def check_output(path: str | Path) -> Path:
     if path.suffix.lower() not in WRITABLE:
         message = f"unknown image suffix {path.suffix!r}; can write {', '.join(WRITABLE)}"
         raise SceneError(message, file=path)
-    if not path.absolute().parent.is_dir():
+    try:
+        known = path.absolute().parent.is_dir()
+    except FileNotFoundError:  # the current folder is gone
+        known = False
+    if not known:
         raise SceneError("its folder does not exist", file=path)
     return path

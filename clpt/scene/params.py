@@ -74,6 +74,7 @@ MEASURED = {"measurement": Measurement, "merl": MerlTable}
 ORDERS = 8  # highest order of diffraction, see kernels/optics/diffraction.cl
 MOST_PARTS, MOST_NESTED = 1000, 64  # of a material, texture, light or medium
 ROUNDING = 1e-6  # by which a spectrum may be beyond its limits
+LARGEST = float(np.finfo(np.float32).max)  # number of a parameter: kernels have no larger ones
 
 
 @dataclass(frozen=True)
@@ -370,6 +371,8 @@ def _number(value: Any, param: Param, where: str) -> float:
         raise SceneError(f"must be a number, not {value!r}", where=where)
     if not math.isfinite(value):
         raise SceneError(f"must be finite, not {value}", where=where)
+    if abs(value) > LARGEST:
+        raise SceneError(f"{value:g} is beyond {LARGEST:g}, where float32 ends", where=where)
     if not param.low <= value <= param.high:
         raise SceneError(f"{value} is outside [{param.low:g}, {param.high:g}]", where=where)
     if param.positive and value == 0.0:
@@ -430,6 +433,9 @@ def _check_spectrum(value: Spectrum, param: Param, where: str) -> None:
         raise SceneError(f"a colour cannot be negative here: {shown}", where=where)
     meant = index_of(value) if param.role in ("index", "coefficient", "quantity") else value
     for found, at in extremes(meant):
+        if abs(found) > LARGEST:
+            message = f"{found:g} at {at:g} nm is beyond {LARGEST:g}, where float32 ends"
+            raise SceneError(message, where=where)
         if not param.low - ROUNDING <= found <= param.high + ROUNDING:
             raise SceneError(
                 f"{found:g} at {at:g} nm is outside [{param.low:g}, {param.high:g}]", where=where

@@ -192,6 +192,7 @@ class SdfGrid(Shape):
     The front is where it is positive. Corners of triangles lie on that surface. Inside, a triangle
     is off it by at most .005 of a cell on a ball 11 cells across, and .09 at a sharp edge, with 2
     `pieces`; by a quarter of that with twice the pieces.
+    uv are 0 everywhere: a texture has one value all over it.
     """
 
     values: Any = host(

@@ -28,6 +28,18 @@ inline vec3 cross3(vec3 a, vec3 b)
 }
 inline vec3 normalize3(vec3 a) { return scale3(a, 1.0f / sqrt(max_r(dot3(a, a), (real)(1e-35f)))); }
 inline real sqr(real x) { return x * x; }
+
+/* The power of two by which |x| comes into [1, 2), for 2^-126 <= |x| < 2^127: products with it are exact. */
+inline real scale_to_one(real x) { return as_real(0x7f000000u - (as_natural(x) & 0x7f800000u)); }
+
+/* The length of a vector whose square may leave float32, as that of an area does from sides of 4e9 m on; `sqrt(dot3(v,
+ * v))` to the bit where it does not. At least 1e-37. */
+inline real wide_length3(vec3 v)
+{
+    real largest = max_r(max_r(max_r(fabs(v.x), fabs(v.y)), fabs(v.z)), (real)(1e-37f));
+    v = scale3(v, scale_to_one(largest));
+    return sqrt(dot3(v, v)) * as_real(as_natural(largest) & 0x7f800000u);
+}
 inline real safe_div(real a, real b) { return a / sel(b == 0.0f, (real)(1.0f), b); } /* 0 divisor: a */
 
 /* sin and cos of 2 pi u for u in [0, 1]; absolute error below 3.5e-7. */

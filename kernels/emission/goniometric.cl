@@ -1,4 +1,5 @@
-/* A point with an image sends its rays evenly; their power follows the image. */
+/* A point with an image sends its rays evenly; their power follows the image: `goniometric_intensity` stands in
+ * light/goniometric.cl. */
 LightRay goniometric_emit(Goniometric l, Scene scene, vec2 u, vec2 v, Wavelengths lambdas)
 {
     LightRay r = light_ray_nothing();

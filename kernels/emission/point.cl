@@ -1,11 +1,16 @@
 /* A point that emits evenly: intensity times 4 pi [W/nm]. */
+Spectrum point_intensity(Point l, Scene scene, vec3 d, Wavelengths lambdas)
+{
+    return emission_load(scene, l.intensity, texture_point_nowhere(), lambdas);
+}
+
 LightRay point_emit(Point l, Scene scene, vec2 u, vec2 v, Wavelengths lambdas)
 {
     LightRay r = light_ray_nothing();
     r.o = l.position;
     r.d = uniform_sphere(v);
     r.n = r.d;
-    r.power = spectrum_scale(emission_load(scene, l.intensity, texture_point_nowhere(), lambdas), 4.0f * PI);
+    r.power = spectrum_scale(point_intensity(l, scene, r.d, lambdas), 4.0f * PI);
     return r;
 }
 

@@ -12,6 +12,16 @@ LightRay projector_emit(Projector l, Scene scene, vec2 u, vec2 v, Wavelengths la
     return r;
 }
 
+/* Even over the image's plane. */
+Spectrum projector_intensity(Projector l, Scene scene, vec3 d, Wavelengths lambdas)
+{
+    real z;
+    vec2 uv;
+    mask shone = projector_uv(l, d, &z, &uv);
+    Spectrum value = spectrum_scale(projector_irradiance(l, scene, uv, lambdas), 1.0f / (z * z * z));
+    return spectrum_sel(shone, value, spectrum_of(0.0f));
+}
+
 /* dA = d omega / cos^3 on the image's plane. */
 real projector_emit_pdf(Projector l, vec3 d)
 {

@@ -1,10 +1,15 @@
-/* A spot sends its rays evenly into its cone; their power follows its fall toward the edge, as the light
- * sample sees it from a metre away. */
+/* A spot sends its rays evenly into its cone; their power follows its fall toward the edge. */
 inline real spot_one_minus_cos(Spot l)
 {
     real s, c;
     sincos_2pi(l.cutoff * INV_4PI, &s, &c); /* of half the angle: 1 - cos = 2 sin^2 */
     return 2.0f * s * s;
+}
+
+Spectrum spot_intensity(Spot l, Scene scene, vec3 d, Wavelengths lambdas)
+{
+    Spectrum full = emission_load(scene, l.radiance, texture_point_nowhere(), lambdas);
+    return spectrum_scale(full, spot_edge(l, dot3(d, l.axis)));
 }
 
 LightRay spot_emit(Spot l, Scene scene, vec2 u, vec2 v, Wavelengths lambdas)
@@ -14,8 +19,7 @@ LightRay spot_emit(Spot l, Scene scene, vec2 u, vec2 v, Wavelengths lambdas)
     r.o = l.position;
     r.d = to_world(frame_of(l.axis), uniform_cone(v, one_minus_cos));
     r.n = r.d;
-    LightSample seen = spot_sample(l, scene, add3(l.position, r.d), u, lambdas);
-    r.power = spectrum_scale(seen.radiance, 2.0f * PI * one_minus_cos);
+    r.power = spectrum_scale(spot_intensity(l, scene, r.d, lambdas), 2.0f * PI * one_minus_cos);
     return r;
 }
 

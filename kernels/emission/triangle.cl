@@ -4,7 +4,7 @@ SurfacePoint triangle_point(Triangle s, vec2 u)
 {
     vec2 b = uniform_triangle(u);
     vec3 n = cross3(s.e1, s.e2);
-    real twice = max_r(sqrt(dot3(n, n)), (real)(1e-30f));
+    real twice = wide_length3(n);
     SurfacePoint q;
     q.p = madd3(s.e1, b.x, madd3(s.e2, b.y, s.v0));
     q.n = scale3(n, s.side / twice);

@@ -39,7 +39,7 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
     mask shine = active & c.seen & (spectrum_max(f) > 0.0f);
     real carries = VERTEX_COSINE(s.n, c.d) * arrives * c.importance * shading_frame_share(scatter.shading, neg3(v.d));
 #if WEIGHS_LIGHT_PATHS
-    carries *= 1.0f / (1.0f + rival_of_joint(rival, s, c, rival_pdf(m, to, wo), rival_pdf(m, wo, to)));
+    carries *= 1.0f / (1.0f + rival_of_joint(scene, rival, s, c, rival_pdf(m, to, wo), rival_pdf(m, wo, to)));
     mask hidden = mask_of(settings->hide_lights != 0) & (s.light >= 0);
 #if BSDF_IS_PHASE
     shine = shine & (!rival.first | !rival.met);

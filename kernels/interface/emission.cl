@@ -1,6 +1,7 @@
 /* Light as it leaves a light, for integrators that start there: kernels/emission/<kind>.cl has, for
  * lights at a point,
  *
+ *   Spectrum <kind>_intensity(<Kind> l, Scene scene, vec3 d, Wavelengths lambdas);   sent along d [W sr^-1 nm^-1]
  *   LightRay <kind>_emit(<Kind> l, Scene scene, vec2 u, vec2 v, Wavelengths lambdas);
  *   real     <kind>_emit_pdf(<Kind> l, vec3 d);       with which it chooses a direction d [1/sr]; 0: it cannot be
  *                                                     weighed, and is left to paths from the camera
@@ -8,9 +9,6 @@
  * and for shapes, from which `surface_emit` makes a ray,
  *
  *   SurfacePoint <kind>_point(<Kind> s, vec2 u);      a point of its surface, evenly over the area
- *
- * Where light paths aim (lighting/aiming.cl), what a light at a point sends along d is its <kind>_sample seen from a
- * metre away.
  *
  * u: a point of the unit square for the position; v: for the direction. Light from infinity needs no more
  * than the <kind>_sample of interface/light.cl, see `distant_emit`. LightRay and SurfacePoint are Records in

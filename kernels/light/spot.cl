@@ -10,6 +10,16 @@ inline real spot_smooth_edge(Spot l, real cos_t)
     return x * x * (3.0f - 2.0f * x);
 }
 
+/* What arrives of the full intensity, cos_t off the axis. */
+inline real spot_edge(Spot l, real cos_t)
+{
+    real angle = atan2_r(sqrt_r(1.0f - cos_t * cos_t), cos_t);
+    real edge = clamp_r((l.cutoff - angle) / max_r(l.cutoff - l.beam_width, (real)(1e-7f)), (real)(0.0f), (real)(1.0f));
+    mask smooth = l.smooth != 0;
+    if (any(smooth)) edge = sel(smooth, spot_smooth_edge(l, cos_t), edge);
+    return edge;
+}
+
 LightSample spot_sample(Spot l, Scene scene, vec3 p, vec2 u, Wavelengths lambdas)
 {
     vec3 to = sub3(l.position, p);
@@ -17,11 +27,7 @@ LightSample spot_sample(Spot l, Scene scene, vec3 p, vec2 u, Wavelengths lambdas
     LightSample s;
     s.wi = scale3(to, 1.0f / t);
     s.t = t;
-    real cos_t = -dot3(s.wi, l.axis);
-    real angle = atan2_r(sqrt_r(1.0f - cos_t * cos_t), cos_t);
-    real edge = clamp_r((l.cutoff - angle) / max_r(l.cutoff - l.beam_width, (real)(1e-7f)), (real)(0.0f), (real)(1.0f));
-    mask smooth = l.smooth != 0;
-    if (any(smooth)) edge = sel(smooth, spot_smooth_edge(l, cos_t), edge);
+    real edge = spot_edge(l, -dot3(s.wi, l.axis));
     s.radiance = spectrum_scale(emission_load(scene, l.radiance, texture_point_nowhere(), lambdas), edge / t2);
     s.pdf = sel(edge > 0.0f, (real)(-1.0f), (real)(0.0f));
     return s;

@@ -87,12 +87,12 @@ inline LightRay aim_turn(Scene scene, integer chosen, LightRay r, vec3 n, vec2 v
     return r;
 }
 
-/* With what a light at a point sends along a turned ray. s: the light, seen from a metre away; p: density of the ray's
+/* With what a light at a point sends along a turned ray. intensity: along it [W sr^-1 nm^-1]; p: density of the ray's
  * direction without aiming [1/sr]. */
-inline LightRay aim_power(LightRay r, mask turned, LightSample s, real p)
+inline LightRay aim_power(LightRay r, mask turned, Spectrum intensity, real p)
 {
-    mask shines = (s.pdf != 0.0f) & (p > 0.0f);
-    Spectrum power = spectrum_scale(s.radiance, 1.0f / sel(shines, p, (real)(1.0f)));
+    mask shines = p > 0.0f;
+    Spectrum power = spectrum_scale(intensity, 1.0f / sel(shines, p, (real)(1.0f)));
     r.power = spectrum_sel(turned, spectrum_sel(shines, power, spectrum_of(0.0f)), r.power);
     return r;
 }

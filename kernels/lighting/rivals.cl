@@ -47,6 +47,10 @@
  * something sharp begins, at each vertex that is not, with pending' = e / l c' / p, and goes on as above while all that
  * follows is sharp; it counts at a joint to a sharp x_1.
  *
+ * Densities over areas, which importance, emission and 1 / e are, grow and fall with the square of the scene's size. So
+ * areas are in units of `settings->rival_area`, which follows the size of very large and very small scenes and is 1 m^2
+ * in others: rivals stay inside a float, and far from the limits below.
+ *
  * What is sharp depends on the densities of both ways alone, and so is the same for both sides: a delta lobe, or a
  * density above SHARP_PDF. */
 #define RIVAL_MOST 1e18f /* so that its square is finite */
@@ -75,6 +79,14 @@ inline mask rival_ends(Scene scene, Vertex v)
 }
 
 inline mask rival_sharp(mask delta, real p, real p_back) { return delta | (max_r(p, p_back) > SHARP_PDF); }
+
+#if MERGES && BSDF_MERGES
+/* `merging_area` in the unit of rivals. */
+inline real rival_merging_area(Scene scene, integer pass)
+{
+    return merging_area(scene, pass) / scene.settings->rival_area;
+}
+#endif
 
 /* What a vertex knows of the rival of its path. */
 typedef struct {
@@ -110,7 +122,7 @@ inline Rival rival_of_camera(Scene scene, Slab path, uint at, Vertex v, Sampler 
     if (any(r.first)) {
 #if JOINS_CAMERA && !BSDF_DELTA
         CameraPoint c = camera_connect(scene, v.s.p, mask_of(0), sampler_pair(sampler, (natural)(DIMENSION_LENS)));
-        real seen = sel(c.seen, rival / max_r(c.importance, (real)(1e-30f)), (real)(0.0f));
+        real seen = sel(c.seen, rival / max_r(c.importance * scene.settings->rival_area, (real)(1e-30f)), (real)(0.0f));
         rival = sel(r.first, seen, rival);
 #else
         rival = sel(r.first, (real)(0.0f), rival);
@@ -122,7 +134,7 @@ inline Rival rival_of_camera(Scene scene, Slab path, uint at, Vertex v, Sampler 
     r.pending = load_path_pending(path, at) * goes_on;
     r.merges = 0.0f;
 #if BSDF_MERGES
-    real area = merging_area(scene, load_path_sample(path, at));
+    real area = rival_merging_area(scene, load_path_sample(path, at));
     r.merges = sel(merging_here(v.state, v.depth), area, (real)(0.0f));
 #endif
 #endif
@@ -189,7 +201,7 @@ inline Rival rival_of_emission(Scene scene, Slab path, uint at, Vertex v, vec3 h
     r.pending = load_path_pending(path, at) / max_r(VERTEX_COSINE(v.s.n, v.d), (real)(1e-7f));
     r.merges = 0.0f;
 #if BSDF_MERGES
-    real area = merging_area(scene, merging_pass(scene, load_path_sample(path, at)));
+    real area = rival_merging_area(scene, merging_pass(scene, load_path_sample(path, at)));
     r.merges = sel((v.state & PATH_SHARP) != 0, area / scene.settings->light_paths, (real)(0.0f));
 #endif
 #endif
@@ -217,12 +229,12 @@ inline real rival_merged(Rival r, Surface s, vec3 d, mask delta, real p, real p_
 #if JOINS_CAMERA
 /* The square of the rival of a light path that is joined to the camera, where the material has densities p and p_back
  * of a camera's path. */
-inline real rival_of_joint(Rival r, Surface s, CameraPoint c, real p, real p_back)
+inline real rival_of_joint(Scene scene, Rival r, Surface s, CameraPoint c, real p, real p_back)
 {
-    real chosen = 1.0f / max_r(c.importance, (real)(1e-30f));
+    real importance = c.importance * scene.settings->rival_area, chosen = 1.0f / max_r(importance, (real)(1e-30f));
     real square = sqr(rival_to_camera(r, s, c.d, mask_of(0), chosen, p));
 #if MERGES
-    real more = rival_limited(r.pending * p * c.importance * VERTEX_COSINE(s.n, c.d));
+    real more = rival_limited(r.pending * p * importance * VERTEX_COSINE(s.n, c.d));
     square += sel(rival_sharp(mask_of(0), p, p_back), sqr(more), (real)(0.0f));
 #endif
     return square;

@@ -11,14 +11,14 @@
 #define MERGING_FLAT 0.5f    /* how far off the plane photons may lie, over the radius */
 #define MERGING_TURN 0.866f  /* least cosine between the normals */
 
-/* Light from one photon for each lane that is `near`, without what the path carries. */
+/* Light from one photon for each lane that is `near`, without what the path carries. unit: of areas in rivals [m^2]. */
 inline Spectrum merge_photon(Photon photon, mask near, Vertex v, Scattering scatter, Rival rival, Spectrum ratio,
-                             real area, real number)
+                             real area, real unit, real number)
 {
     vec3 to = octahedral_unpack(photon.to_light), wi = to_local(scatter.shading.frame, to);
     Spectrum f = bsdf_eval(scatter.bsdf, scatter.wo, wi);
     real p = rival_pdf(scatter.bsdf, scatter.wo, wi), p_back = rival_pdf(scatter.bsdf, wi, scatter.wo);
-    real w = photon_weight(photon.rival, rival.arrives, number, area, p, p_back);
+    real w = photon_weight(photon.rival, rival.arrives, number, area / unit, p, p_back);
     real share = shading_frame_share(scatter.shading, to);
     real scale = w * share / (area * max_r(fabs(dot3(v.s.n, to)), (real)(1e-3f)));
 #if USES_DISPERSION /* the pdfs of both parts for each wavelength as the hero, over their mean */
@@ -37,7 +37,7 @@ inline Spectrum merge_photons(Scene scene, mask active, Vertex v, Scattering sca
     global const Settings *settings = scene.settings;
     integer group = 0;
     real radius = merging_radius(scene, pass), area = merging_area(scene, pass);
-    real number = settings->light_paths;
+    real unit = settings->rival_area, number = settings->light_paths;
 #if SPECTRUM_SIZE == 4
     group = merging_group(scene, sampler_pair(scatter.sampler, (natural)(DIMENSION_WAVELENGTH)).x);
 #endif
@@ -65,7 +65,7 @@ inline Spectrum merge_photons(Scene scene, mask active, Vertex v, Scattering sca
                 near = near & ((photon.depth >> 16) == group);
                 near = near & ((photon.depth & 0xffff) + v.depth < settings->max_depth);
                 near = near & (fabs(dot3(octahedral_unpack(photon.normal), v.s.n)) > MERGING_TURN);
-                Spectrum light = merge_photon(photon, near, v, scatter, rival, ratio, area, number);
+                Spectrum light = merge_photon(photon, near, v, scatter, rival, ratio, area, unit, number);
                 sum = spectrum_add(sum, light);
             }
             entry += sel_i(there, (integer)(1), (integer)(0));

@@ -6,7 +6,8 @@
 inline real photon_rival(real rival, real cosine) { return rival / max_r(fabs(cosine), (real)(1e-7f)); }
 
 /* The weight of merging. of_light: of the photon; of_camera: what arrives by the path from the camera, where the
- * material has densities p and p_back; number: light paths a sample; area: `merging_area`. */
+ * material has densities p and p_back; number: light paths a sample; area: `merging_area` in
+ * units of `settings->rival_area`. */
 inline real photon_weight(real of_light, real of_camera, real number, real area, real p, real p_back)
 {
     real light = of_light * number * p, camera = of_camera * p_back;

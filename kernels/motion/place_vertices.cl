@@ -9,6 +9,9 @@ inline float3 place_row(global const float *matrix, uint row) { return vload3(0,
 
 inline float3 place_unit(float3 n)
 {
+    float3 size = fabs(n);
+    float largest = fmax(fmax(size.x, size.y), size.z);
+    n *= as_float(0x7f000000u - (as_uint(largest) & 0x7f800000u)); /* into [1, 2): cofactors may be huge */
     float length = sqrt(dot(n, n));
     return length > 0.0f ? n / length : (float3)(0.0f);
 }

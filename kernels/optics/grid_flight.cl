@@ -122,7 +122,7 @@ inline GridFlight grid_flight(Scene scene, integer name, Medium m, vec3 o, vec3 
         left -= sel(active, thick, (real)(0.0f));
         if (any(meets)) {
             natural bits = hash_natural(key + count * 0x9e3779b9u), more = hash_natural(bits ^ 0x68bc21ebu);
-            real density = grid_density(scene, w, b, meets, more);
+            real density = brick_density(scene, w, b, meets, more);
             Medium own = grid_medium(scene, name, m, w, meets, more, lambdas);
             Spectrum scatters = spectrum_scale(own.sigma_s, density);
 #if GRIDS_VARY

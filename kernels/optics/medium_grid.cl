@@ -132,7 +132,7 @@ inline integer grid_corner(GridWalk w, natural bits)
 }
 
 /* The density there over the brick's highest. */
-inline real grid_density(Scene scene, GridWalk w, GridBrick b, mask active, natural bits)
+inline real brick_density(Scene scene, GridWalk w, GridBrick b, mask active, natural bits)
 {
     integer at = grid_corner(w, bits);
 #if USES_BYTES
@@ -266,7 +266,7 @@ inline Spectrum grid_transmittance(Scene scene, integer name, Medium m, vec3 o, 
         if (any(meets)) {
             bits = hash_natural(key + count * 0x9e3779b9u);
             natural more = hash_natural(bits ^ 0x68bc21ebu);
-            real density = grid_density(scene, w, b, meets, more);
+            real density = brick_density(scene, w, b, meets, more);
 #if GRIDS_VARY
             Spectrum share = grid_medium(scene, name, m, w, meets, more, lambdas).sigma_t;
             share = spectrum_scale(share, inverse);

@@ -86,7 +86,7 @@ inline Spectrum grid_emission(Scene scene, integer name, Medium m, GridWalk w, G
                               Wavelengths lambdas)
 {
     integer row = sel_i(active, MEDIUM_ROW(name), (integer)(MEDIUM_LIGHT)), at = sel_i(active, row + GRID_LIGHT, row);
-    real density = b.most * grid_density(scene, w, b, active & (b.most > 0.0f), bits);
+    real density = b.most * brick_density(scene, w, b, active & (b.most > 0.0f), bits);
     integer source = sel_i(active, gather_i(scene.materials, at + 2), (integer)(0));
     real number = sel(source != 0, grid_number(scene, w, source, active & (source != 0)), (real)(1.0f));
     Spectrum light = spectrum_scale(medium_light(scene, row - MEDIUM_LIGHT, texture_point_nowhere(), lambdas), number);

@@ -48,8 +48,7 @@ inline integer cone_scattered(Cone c, real pdf, mask delta)
 /* The longer axis of its section with a surface, in units of the surface's uv; 0 where that has none. */
 inline real cone_footprint(Cone c, vec3 d, vec3 n, vec3 dpdu, vec3 dpdv)
 {
-    vec3 across = cross3(dpdu, dpdv);
-    real area = sqrt(dot3(across, across)), cosine = max_r(fabs(dot3(n, d)), (real)(1e-3f));
-    return sel(area > 0.0f, c.width / (cosine * sqrt(max_r(area, (real)(1e-30f)))), (real)(0.0f));
+    real area = wide_length3(cross3(dpdu, dpdv)), cosine = max_r(fabs(dot3(n, d)), (real)(1e-3f));
+    return sel(area > 1e-36f, c.width / (cosine * sqrt(area)), (real)(0.0f));
 }
 #endif

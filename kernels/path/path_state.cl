@@ -10,7 +10,8 @@
 #define PATH_GHOST 0x20000000 /* of a lens's samples, of light that two of its surfaces have reflected */
 
 /* A null surface (a hole of a mask, a boundary that neither bends nor scatters, with FREE_PANES thin glass where light
- * goes straight through it) is no step of a path: it adds nothing to the depth. A path crosses this many of them, and then ends; a shadow ray that meets more is blocked. */
+ * goes straight through it) is no step of a path: it adds nothing to the depth. A path crosses this many of them, and
+ * then ends; a shadow ray that meets more is blocked. */
 #define MOST_NULL_SURFACES 1024
 #if USES_NULL_SURFACES
 #define path_nulls(path, at) load_path_nulls(path, at)

@@ -67,7 +67,7 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
     Surface s;
     ShapeRow shape = shape_row_row(scene.shapes, sel_i(active, h.shape, (integer)(0)) * SHAPE_ROW_WORDS);
     vec3 n = sel3(active, h.n, v3(0.0f, 0.0f, 1.0f));
-    real inverse = 1.0f / sqrt(max_r(dot3(n, n), (real)(1e-35f)));
+    real inverse = 1.0f / wide_length3(n);
     s.n = scale3(n, inverse);
     s.size = triangle_size(h.side, inverse);
     /* The ray's roundings grow with its length. They may have put its end behind the surface, so that it is put back

@@ -5,7 +5,7 @@ real cylinder_size(Cylinder q) { return q.radius + size3(q.axis); }
 
 inline real cylinder_pdf_area(Cylinder q)
 {
-    return INV_2PI / max_r(q.radius * sqrt(dot3(q.axis, q.axis)), (real)(1e-30f));
+    return INV_2PI / max_r(q.radius * sqrt(dot3(q.axis, q.axis)), (real)(1e-37f));
 }
 
 ShapeSample cylinder_sample(Cylinder q, vec3 p, vec2 u)

@@ -6,8 +6,7 @@ real disk_size(Disk q) { return size3(q.s) + size3(q.t); }
 
 inline real disk_pdf_area(Disk q)
 {
-    vec3 c = cross3(q.s, q.t);
-    return INV_PI / max_r(sqrt(dot3(c, c)), (real)(1e-30f));
+    return INV_PI / wide_length3(cross3(q.s, q.t));
 }
 
 ShapeSample disk_sample(Disk q, vec3 p, vec2 u)
@@ -33,11 +32,12 @@ real disk_pdf(Disk q, vec3 p, vec3 wi, real t, vec3 n)
 /* An origin that lies in the plane to rounding does not meet the disk. */
 ShapeHit disk_intersect(Disk q, vec3 o, vec3 d, real tmin, real tmax)
 {
-    vec3 to = sub3(q.center, o), c = cross3(q.s, q.t);
+    real scale = scale_to_one(disk_size(q)); /* so that products of four lengths stay inside a float */
+    vec3 to = sub3(q.center, o), s = scale3(q.s, scale), along = scale3(q.t, scale), c = cross3(s, along);
     real height = dot3(q.n, to), slope = dot3(q.n, d), t = safe_div(height, slope);
-    vec3 at = sub3(scale3(d, t), to);
+    vec3 at = scale3(sub3(scale3(d, t), to), scale);
     real inverse = 1.0f / max_r(dot3(c, c), (real)(1e-37f));
-    real x = dot3(at, cross3(q.t, c)) * inverse, y = dot3(at, cross3(c, q.s)) * inverse;
+    real x = dot3(at, cross3(along, c)) * inverse, y = dot3(at, cross3(c, s)) * inverse;
     real radius2 = x * x + y * y;
     mask met = (slope != 0.0f) & (radius2 <= 1.0f) & (t > tmin) & (t < tmax)
              & (fabs(height) > SURFACE_ROUNDING * (size3(q.center) + size3(to)));

@@ -5,7 +5,7 @@ ShapeSample rectangle_sample(Rectangle q, vec3 p, vec2 u)
 {
     vec3 to = sub3(madd3(q.s, 2.0f * u.x - 1.0f, madd3(q.t, 2.0f * u.y - 1.0f, q.center)), p);
     vec3 quarter = cross3(q.s, q.t);
-    real t2 = max_r(dot3(to, to), (real)(1e-20f)), area = max_r(4.0f * sqrt(dot3(quarter, quarter)), (real)(1e-30f));
+    real t2 = max_r(dot3(to, to), (real)(1e-20f)), area = 4.0f * wide_length3(quarter);
     ShapeSample r;
     r.t = sqrt(t2);
     r.wi = scale3(to, 1.0f / r.t);
@@ -19,5 +19,5 @@ ShapeSample rectangle_sample(Rectangle q, vec3 p, vec2 u)
 real rectangle_pdf(Rectangle q, vec3 p, vec3 wi, real t, vec3 n)
 {
     vec3 quarter = cross3(q.s, q.t);
-    return solid_angle_pdf(0.25f / max_r(sqrt(dot3(quarter, quarter)), (real)(1e-30f)), t, fabs(dot3(q.n, wi)));
+    return solid_angle_pdf(0.25f / wide_length3(quarter), t, fabs(dot3(q.n, wi)));
 }

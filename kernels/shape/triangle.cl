@@ -5,7 +5,7 @@ ShapeSample triangle_sample(Triangle s, vec3 p, vec2 u)
 {
     vec2 b = uniform_triangle(u);
     vec3 to = sub3(madd3(s.e1, b.x, madd3(s.e2, b.y, s.v0)), p), n = cross3(s.e1, s.e2);
-    real t2 = max_r(dot3(to, to), (real)(1e-20f)), twice = max_r(sqrt(dot3(n, n)), (real)(1e-30f));
+    real t2 = max_r(dot3(to, to), (real)(1e-20f)), twice = wide_length3(n);
     ShapeSample r;
     r.t = sqrt(t2);
     r.wi = scale3(to, 1.0f / r.t);
@@ -20,5 +20,5 @@ ShapeSample triangle_sample(Triangle s, vec3 p, vec2 u)
 real triangle_pdf(Triangle s, vec3 p, vec3 wi, real t, vec3 n)
 {
     vec3 twice = cross3(s.e1, s.e2);
-    return solid_angle_pdf(2.0f / max_r(sqrt(dot3(twice, twice)), (real)(1e-30f)), t, fabs(dot3(n, wi)));
+    return solid_angle_pdf(2.0f / wide_length3(twice), t, fabs(dot3(n, wi)));
 }

@@ -63,7 +63,7 @@ inline integer begin_light_path(Scene scene, Slab path, Slab shadow, uint at, ma
 #endif
     store_path_lambdas(path, at, go, lambdas);
     store_path_beta(path, at, go, r.power);
-    store_path_weight(path, at, go, 1.0f / max_r(strength, (real)(1e-30f)));
+    store_path_weight(path, at, go, 1.0f / max_r(strength, (real)(1e-37f)));
 #if WEIGHS_LIGHT_PATHS
     store_path_light(path, at, go, r.row);
     store_path_sampled_hemisphere(path, at, go, r.n);

@@ -88,7 +88,8 @@ inline void add_sample(Scene scene, Slab path, uint at, BEGIN_ARGS, PathEnd end,
     if (!small) {
         mask rejected = finished & !film_accepts(value);
         count(counters, COUNTER_REJECTED, rejected, (integer)(1));
-#define C(c) radiance.c = sel(fabs(radiance.c) < FIXED_LARGEST, radiance.c, (real)(0.0f));
+#define C(c) \
+    radiance.c = sel(fabs(radiance.c) * scene.settings->film_scale < FIXED_LARGEST, radiance.c, (real)(0.0f));
         SPECTRUM_EACH(C)
 #undef C
         value = scale3(film_value(scene, radiance, lambdas), scale);

@@ -17,9 +17,9 @@ inline void instances_closest(global const float *nodes, global const float *lea
     h->shape = as_int(tri.tag);
     InstanceFrame f = instance_frame(scene, 1, h->instance);
     vec3 own = v3(tri.nx, tri.ny, tri.nz), n = instance_normal(f, own);
-    real size = triangle_size(tri.side, 1.0f / sqrt(max_r(dot3(own, own), (real)(1e-35f))));
+    real size = triangle_size(tri.side, 1.0f / wide_length3(own));
     h->side = size * instance_stretch(f) + size3(sub3(madd3(d, tri.t, o), f.origin));
-    real length = h->side * h->side / sqrt(max_r(dot3(n, n), (real)(1e-35f))); /* as of a triangle that is not thin */
+    real length = h->side * h->side / wide_length3(n); /* as of a triangle that is not thin */
     h->n = scale3(n, length);
     h->plane = tri.plane * f.scale * length + dot3(h->n, f.origin);
 }

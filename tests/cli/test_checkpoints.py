@@ -9,6 +9,7 @@ import subprocess
 from pathlib import Path
 
 import numpy as np
+import OpenEXR
 import pytest
 
 from clpt import images, output_files
@@ -47,7 +48,7 @@ def test_a_render_goes_on_with_more_samples(folder, capsys):
     assert run(command) == 0  # nothing is left to do, but the picture is written
     assert "goes on from a.resume.exr: samples 0 to 39" in capsys.readouterr().err
     np.testing.assert_array_equal(np.load("a.npy"), np.load("whole.npy"))
-    with images.OpenEXR.File("a.resume.exr", header_only=True) as file:
+    with OpenEXR.File("a.resume.exr", header_only=True) as file:
         assert file.parts[0].name() == "picture"
 
 

@@ -23,6 +23,7 @@ from clpt.cli.scene_options import changed
 from clpt.colour.view import View
 from clpt.errors import SceneError
 from clpt.formats import load
+from clpt.images import exr_files
 from clpt.render.renderer import Renderer
 from clpt.spectra import read_sensor
 
@@ -128,14 +129,14 @@ def test_a_target_that_fails_at_the_end(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(outputs.tempfile, "tempdir", str(tmp_path / "temporary"))
     (tmp_path / "temporary").mkdir()
     fine, full = tmp_path / "fine.png", tmp_path / "full.exr"
-    write_channels = images.write_channels
+    write_channels = exr_files.write_channels
 
     def write(path, *rest):
         if path == full:
             raise OSError(28, "No space left on device")
         write_channels(path, *rest)
 
-    monkeypatch.setattr(images, "write_channels", write)
+    monkeypatch.setattr(exr_files, "write_channels", write)
     common = ["--size", "8x8", "--spp", "1", "--mode", "rgb"]
     assert run(["render", CORNELL, "-o", str(full), "-o", str(fine), *common]) == 2
     error = capsys.readouterr().err.splitlines()[-1]

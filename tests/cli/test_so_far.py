@@ -13,6 +13,7 @@ from clpt.cli import outputs, so_far
 from clpt.cli.grading import Grading
 from clpt.cli.so_far import PictureSoFar
 from clpt.errors import SceneError
+from clpt.images import npy
 
 CORNELL = str(Path(__file__).resolve().parents[2] / "scenes" / "cornell_box")
 COMMON = ["--size", "8x6", "--mode", "rgb"]
@@ -79,7 +80,7 @@ def test_a_picture_that_fails_leaves_the_former_one(tmp_path, monkeypatch):
     path = tmp_path / "a.npy"
     assert run(["render", CORNELL, *COMMON, "--quiet", "-o", str(path), "--spp", "1"]) == 0
     before = np.load(path)
-    monkeypatch.setattr(images.np, "save", lambda file, array: file.write(b"\x93NUMPY") and 1 / 0)
+    monkeypatch.setattr(npy.np, "save", lambda file, array: file.write(b"\x93NUMPY") and 1 / 0)
     with pytest.raises(ZeroDivisionError):
         images.write(path, before * 2)
     monkeypatch.undo()

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import shutil
 import sys
 
 import pytest
 
+from clpt import device
 from clpt.device import disk_cache, runtimes
+from clpt.errors import DeviceError
 from clpt.output_files import PARTIAL
 
 posix = pytest.mark.skipif(os.name != "posix", reason="of users and permissions")
@@ -112,7 +115,7 @@ def test_a_folder_of_another_user_is_not_used(user, caplog, monkeypatch):
 def test_a_cache_that_cannot_be_written_is_one_warning(user, monkeypatch, caplog):
     """PoCL finds no device then, PyOpenCL runs no kernel: both get another folder too."""
     user.parent.write_text("in the way")
-    runtimes._make_caches_writable()
+    runtimes._make_caches_writable.__wrapped__()
     chosen = disk_cache.folder()
     assert chosen.is_relative_to(user.parent.parent / "temporary")
     disk_cache.store("entry", "{}", b"binary")
@@ -121,10 +124,65 @@ def test_a_cache_that_cannot_be_written_is_one_warning(user, monkeypatch, caplog
     assert f"the cache folder {user.parent} cannot be written" in caplog.text
 
 
+@pytest.fixture
+def homeless(user, monkeypatch):
+    """A user without an entry in passwd, and without HOME, as in some containers."""
+    pwd = pytest.importorskip("pwd")
+
+    def no_entry(uid):
+        raise KeyError(uid)
+
+    monkeypatch.setattr(pwd, "getpwuid", no_entry)
+    for variable in ("HOME", "XDG_CACHE_HOME", "XDG_STATE_HOME"):
+        monkeypatch.delenv(variable, raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", "")  # so that it is set as it was afterwards
+    disk_cache._without_home.cache_clear()
+    yield user.parent.parent / "temporary"
+    disk_cache._without_home.cache_clear()
+
+
+@posix
+def test_a_user_without_a_home_has_temporary_caches_and_one_warning(homeless, caplog):
+    runtimes._make_caches_writable.__wrapped__()
+    assert os.environ["XDG_CACHE_HOME"].startswith(str(homeless))
+    disk_cache.store("entry", "{}", b"binary")
+    assert disk_cache.load("entry")
+    assert disk_cache.folder().is_relative_to(homeless)
+    assert len(caplog.records) == 1 and "set HOME" in caplog.text
+
+
+@posix
+def test_a_fault_of_a_user_without_a_home_is_told(homeless):
+    from clpt.cli import failures
+
+    try:
+        raise ValueError("a fault")
+    except ValueError as error:
+        message, _ = failures.message_of(error)
+    assert "ValueError: a fault" in message and "traceback.txt" in message
+
+
+@posix
+def test_a_queue_of_a_user_without_a_home_is_refused(request):
+    queue = device.choose().queue
+    request.getfixturevalue("homeless")
+    with pytest.raises(DeviceError, match="set HOME"):
+        device.Device.adopt(queue)
+
+
+@posix
+def test_a_cache_that_goes_away_is_made_again(user):
+    disk_cache.store("entry", "{}", b"binary")
+    shutil.rmtree(user.parent)
+    assert disk_cache.load("entry") is None
+    disk_cache.store("entry", "{}", b"binary")
+    assert disk_cache.load("entry")
+
+
 def test_pocls_own_folder(user, monkeypatch, caplog):
     user.parent.write_text("in the way")
     monkeypatch.setenv("XDG_CACHE_HOME", str(user.parent.parent))
     monkeypatch.setenv("POCL_CACHE_DIR", str(user.parent / "pocl"))
-    runtimes._make_caches_writable()
+    runtimes._make_caches_writable.__wrapped__()
     assert os.environ["POCL_CACHE_DIR"].startswith(str(user.parent.parent / "temporary"))
     assert len(caplog.records) == 1

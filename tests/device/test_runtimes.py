@@ -24,12 +24,23 @@ def wheel(tmp_path, monkeypatch, cache_folder):
     monkeypatch.setattr(runtimes.sys, "platform", "linux")
     monkeypatch.setattr(runtimes.sys, "prefix", str(tmp_path))
     monkeypatch.setenv(runtimes.VARIABLE, "")
-    return library
+    runtimes.vendors.cache_clear()
+    yield library
+    runtimes.vendors.cache_clear()
 
 
 def announce() -> str | None:
-    runtimes._make_wheel_known()
-    return os.environ.get(runtimes.VARIABLE)
+    """The folder that the loader reads in this process, and in those that compile for it."""
+    seen = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            runtimes.cl, "get_platforms", lambda: seen.append(os.environ["OCL_ICD_VENDORS"])
+        )
+        before = os.environ.get(runtimes.VARIABLE)
+        runtimes.platforms()
+        assert os.environ.get(runtimes.VARIABLE) == before, "the program's own variable is changed"
+    assert runtimes.environment().get(runtimes.VARIABLE) == seen[0]
+    return seen[0]
 
 
 def test_both_are_listed(wheel):
@@ -48,6 +59,17 @@ def test_what_the_user_set_stays(wheel, monkeypatch):
 def test_a_system_that_has_it_is_left_alone(wheel):
     (runtimes._SYSTEM / "intel.icd").write_text(str(wheel))
     assert not announce()
+
+
+def test_the_variable_is_as_it_was_after_a_failure(wheel, monkeypatch):
+    def fails():
+        raise ZeroDivisionError
+
+    monkeypatch.delenv(runtimes.VARIABLE)
+    monkeypatch.setattr(runtimes.cl, "get_platforms", fails)
+    with pytest.raises(ZeroDivisionError):
+        runtimes.platforms()
+    assert runtimes.VARIABLE not in os.environ
 
 
 def test_nothing_without_the_wheel(wheel, monkeypatch):

@@ -15,6 +15,7 @@ import pyopencl.array as cl_array
 import pytest
 
 import clpt
+from clpt import device as dev
 from clpt.device import DeviceInfo, assemble, build, program
 from clpt.scene.shapes import Mesh
 from tests.embedding.conftest import SLOTS
@@ -69,6 +70,45 @@ def test_a_step_begins_after_the_hosts_event(
         late.set_status(COMPLETE)
         events[-1].wait()
         assert np.array_equal(renderer.film.get()[..., :3], picture)
+
+
+def test_an_event_that_has_failed_is_refused(
+    scene: clpt.Scene, queue: cl.CommandQueue, picture: np.ndarray
+) -> None:
+    """At once, by each method that takes events: PoCL would wait for it for ever."""
+    bad = cl.UserEvent(queue.context)
+    bad.set_status(cl.status_code.OUT_OF_RESOURCES)
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+    accel = clpt.Accel(queue, corners, np.array([[0, 1, 2]], np.uint32))
+    with clpt.Renderer(scene, queue=fresh_view(queue), slots=SLOTS) as renderer:
+        for use in (
+            lambda: renderer.step(1, wait_for=[bad]),
+            lambda: renderer.reset(wait_for=[bad]),
+            lambda: renderer.resolve(wait_for=[bad]),
+            lambda: renderer.update(camera=scene.camera, wait_for=[bad]),
+            lambda: accel.update(corners, wait_for=[bad]),
+            lambda: accel.intersect(corners, corners + 1, wait_for=[bad]),
+            lambda: accel.occluded(corners, corners + 1, wait_for=[bad]),
+        ):
+            with pytest.raises(clpt.DeviceError, match=r"wait_for.*OUT_OF_RESOURCES"):
+                use()
+        renderer.reset()
+        renderer.run(4)
+        assert np.array_equal(renderer.image(), picture)
+
+
+def test_a_queue_that_has_lost_its_context_is_refused(queue: cl.CommandQueue) -> None:
+    """As with Intel's runtime, whose queues do not hold their context."""
+
+    class Lost:
+        device = queue.device
+
+        @property
+        def context(self) -> cl.Context:
+            cl.Context([])  # no device: what PyOpenCL raises is an error of OpenCL
+
+    with pytest.raises(clpt.DeviceError, match="keep it in a variable"):
+        dev.Device.adopt(Lost())
 
 
 def test_another_queue_waits_for_a_step(

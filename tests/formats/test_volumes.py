@@ -15,6 +15,7 @@ from clpt.errors import SceneError
 from clpt.formats import load, save, volumes
 from clpt.formats.volumes import nvdb, vol
 from clpt.scene import media
+from clpt.spectra import RGB, RGBUnbounded
 
 VERSION = (32 << 21) | (3 << 10) | 3
 SHARED = Path(__file__).resolve().parents[3] / "shared"
@@ -341,6 +342,11 @@ def test_mitsuba(written) -> None:
     medium = load(path).shapes[0].interior
     colours = medium.density[..., None] * medium.colour_grid * medium.sigma_t.to_rgb("unbounded")
     np.testing.assert_allclose(colours, given, rtol=1e-5)
+    lambdas, point = np.linspace(400.0, 700.0, 7), (1, 0, 1)
+    share = RGB(*medium.colour_grid[point].tolist()).sample(lambdas)
+    expected = RGBUnbounded(*given.transpose(2, 1, 0, 3)[point].tolist()).sample(lambdas)
+    spectrum = medium.density[point] * medium.sigma_t.sample(lambdas) * share
+    np.testing.assert_allclose(spectrum, expected, rtol=2e-3)
 
 
 OURS = """<scene version="3.0.0"><shape type="cube"><bsdf type="null"/>

@@ -176,9 +176,19 @@ def test_png_is_srgb_whatever_the_space(tmp_path, space):
         images.write(tmp_path / "a.png", rgb, space="srgb")
 
 
-def test_exr_half_does_not_overflow(tmp_path):
-    images.write(tmp_path / "a.exr", np.full((2, 2, 3), 1e6, np.float32))
-    assert (images.read(tmp_path / "a.exr") == 65504).all()
+@pytest.mark.parametrize("value", [1e6, 1e-5, 1e-20, 1e13])
+def test_an_exr_is_of_floats_where_half_does_not_reach(tmp_path, value):
+    """Half numbers end at 65504 and lose their precision below 2^-14."""
+    picture = np.full((2, 2, 3), value, np.float32)
+    picture[0, 0] = 0.0
+    images.write(tmp_path / "a.exr", picture)
+    np.testing.assert_array_equal(images.read(tmp_path / "a.exr"), picture)
+
+
+def test_an_exr_is_of_halves_where_they_reach(tmp_path):
+    images.write(tmp_path / "a.exr", np.array([[[0.1, 65504.0, np.inf]]], np.float32))
+    assert {c.dtype.name for c in images.read_channels(tmp_path / "a.exr").values()} == {"float16"}
+    np.testing.assert_allclose(images.read(tmp_path / "a.exr"), [[[0.1, 65504, 65504]]], rtol=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -88,7 +88,8 @@ VERTEX = f"""
 
 FROM_CAMERA = ("rival", "pending", "sharp", "met", "chosen", "merged")
 CAMERA = f"""{VERTEX}
-    Rival here = rival_of_camera(world, path, 0, v, sampler_start(0, 0, 0));
+    Sampler none = {{(natural)(0u), (natural)(0u)}};
+    Rival here = rival_of_camera(world, path, 0, v, none);
     mask hit = lamp_row < 1.5f;
 
     LightSample ls;
@@ -120,7 +121,7 @@ LIGHT = f"""{VERTEX}
 #if JOINS_CAMERA
     CameraPoint c = camera_point(world);
     c.d = neg3(onward);
-    joined = 1.0f / (1.0f + rival_of_joint(here, s, c, p_back, p));
+    joined = 1.0f / (1.0f + rival_of_joint(world, here, s, c, p_back, p));
     joined = sel(c.seen & !here.first & !rival_ends(world, v), joined, (real)(0.0f));
 #endif
 #if MERGES
@@ -156,7 +157,7 @@ class VertexProbe:
             lanes=1,
             virtual={**lights.virtual_files(), "world.cl": WORLD},
             defines={name: 1 for name, holds in flags.items() if holds},
-            settings={"light_paths": LIGHT_PATHS, "infinite_count": 1},
+            settings={"light_paths": LIGHT_PATHS, "infinite_count": 1, "rival_area": 1.0},
         )
 
     def __call__(self, **given: NDArray[np.floating]) -> dict[str, NDArray[np.float32]]:

@@ -23,7 +23,7 @@ from clpt.scene import Film, Scene, media
 from clpt.scene.cameras import Orthographic
 from clpt.scene.integrators import Box
 from clpt.scene.integrators import Path as PathIntegrator
-from clpt.scene.lights import Constant, Directional
+from clpt.scene.lights import Constant, Directional, Envmap, Light
 from clpt.scene.materials import Diffuse, Null
 from clpt.scene.shapes import Cube, Rectangle
 from clpt.spectra import uplift
@@ -146,12 +146,20 @@ def test_even_colours_are_one_colour() -> None:
         media.Grid(**given, colour_grid=2.0 * colours)
 
 
-@pytest.mark.parametrize("mode", ["rgb", pytest.param("spectral", marks=pytest.mark.slow)])
-def test_furnace(mode: str) -> None:
+@pytest.mark.parametrize(
+    ("mode", "light"),
+    [
+        ("rgb", Constant(radiance=1.0)),
+        pytest.param("spectral", Constant(radiance=1.0), marks=pytest.mark.slow),
+        pytest.param("rgb", Envmap(image=np.ones((4, 8, 3))), marks=pytest.mark.slow),
+    ],
+    ids=["rgb", "spectral", "rgb_envmap"],
+)
+def test_furnace(mode: str, light: Light) -> None:
     """What scatters all light cannot be seen under the same light from everywhere."""
     medium = media.Grid(density=4.0 * RANDOM, to_world=TURNED, sigma_s=CHROMATIC)
     scene = with_film(scene_of(medium), mode=mode)
-    scene.lights = [Constant(radiance=1.0), scene.lights[1]]
+    scene.lights = [light, scene.lights[1]]
     assert_mean(exposures(scene, 8, 128), 1.0, WITHIN)
 
 

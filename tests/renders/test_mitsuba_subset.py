@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import clpt
+from clpt import images
 from tests.renders.support import exposures, layers_of, with_film
 
 mi = pytest.importorskip("mitsuba", reason="the renderer that we compare with is not installed")
@@ -105,3 +107,52 @@ def test_numbers_from_textures(write, name):
     )
     theirs, ours = (mean(path, "rgb", 256) for mean in (mitsuba_mean, our_mean))
     np.testing.assert_allclose(ours, theirs, rtol=0.02)
+
+
+def test_a_texture_on_a_grid_of_distances(write, tmp_path):
+    """It has one value, that at uv (0, 0), which is 0.8 here; the other half would be 0.2."""
+    z, y, x = np.meshgrid(*[np.linspace(-0.5, 0.5, 12)] * 3, indexing="ij")
+    ball = (np.sqrt(x * x + y * y + z * z) - 0.45).astype("<f4")
+    header = struct.pack("<3sB5i6f", b"VOL", 3, 1, 12, 12, 12, 1, 0, 0, 0, 1, 1, 1)
+    (tmp_path / "ball.vol").write_bytes(header + ball.tobytes())
+    path = write(
+        '<integrator type="direct"/><emitter type="constant"/><shape type="sdfgrid">'
+        '<string name="filename" value="ball.vol"/><transform name="to_world">'
+        '<translate x="-.5" y="-.5" z="-.5"/><scale value="4"/></transform>'
+        f'<bsdf type="diffuse">{checks("reflectance", 0.8, 0.2)}</bsdf></shape>'
+    )
+    theirs, ours = (mean(path, "rgb", 256) for mean in (mitsuba_mean, our_mean))
+    np.testing.assert_allclose(ours, theirs, rtol=0.01)
+
+
+DARK = np.array([[[70, 50, 40], [50, 30, 22]], [[90, 70, 52], [30, 24, 20]]], np.uint8)
+
+
+def test_dark_bitmaps_in_spectral_mode(write, tmp_path):
+    """The colours are those of Mitsuba's RGB mode; its spectral mode is 0.5 % darker.
+
+    Each point sees the same light from everywhere, so that wavelengths are all that is random.
+    """
+    images.write_stored(tmp_path / "dark.png", DARK)
+    path = write(
+        '<integrator type="direct"/><emitter type="constant"/><shape type="rectangle"><transform '
+        'name="to_world"><scale value="2"/></transform><bsdf type="diffuse"><texture type="bitmap" '
+        'name="reflectance"><string name="filename" value="dark.png"/></texture></bsdf></shape>'
+    )
+    theirs, ours = mitsuba_mean(path, "rgb", 256), our_mean(path, "spectral", 512)
+    np.testing.assert_allclose(ours, theirs, rtol=2e-3)
+
+
+@pytest.mark.parametrize("name", ["eta", "k"])
+def test_spectra_of_metals_in_rgb(write, name):
+    """Pairs of a file are numbers under D65 in both; Mitsuba's metals by name are not balanced."""
+    pairs = "360:0.4, 500:2.5, 600:1.2, 830:3.1"
+    mi.set_variant("scalar_rgb")
+    path = write(
+        f'<shape type="sphere"><bsdf type="conductor" id="m"><spectrum name="{name}" '
+        f'value="{pairs}"/></bsdf></shape>'
+    )
+    parameters = dict(mi.traverse(mi.load_file(str(path), optimize=False)))
+    theirs = next(parameters[key] for key in parameters if key.endswith(f".{name}.value"))
+    ours = getattr(clpt.load(path).shapes[0].material, name).to_rgb("unbounded")
+    np.testing.assert_allclose(ours, np.array(theirs).ravel(), rtol=3e-3)

@@ -17,7 +17,17 @@ from clpt import transforms as tf
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Orthographic, Perspective
 from clpt.scene.integrators import Integrator, Path, Vcm
-from clpt.scene.lights import Area, Constant
+from clpt.scene.lights import (
+    Area,
+    Constant,
+    Directional,
+    Envmap,
+    Goniometric,
+    Point,
+    Projector,
+    Sky,
+    Spot,
+)
 from clpt.scene.materials import Conductor, Dielectric, Diffuse, TwoSided
 from clpt.scene.shapes import Cube, Cylinder, Disk, Mesh, Rectangle, Shape, Sphere
 from tests.renders.builders import BLACK, DOWN, UP
@@ -175,3 +185,140 @@ def test_a_closed_box_is_black_inside(layout: str) -> None:
             integrator=Path(max_depth=20, rr_depth=20),
         )
         assert clpt.render(scene, 64, layout=layout).max() == 0.0, to_world
+
+
+LAMPS = {  # what emits in a hall of every light, each by the factor on its emission
+    "sphere": lambda v: Sphere(center=(-1.5, 0, 1.5), radius=0.2, emission=grey(4 * v)),
+    "disk": lambda v: Disk(to_world=over(0.5, 1.0, 2.0, 0.3), emission=grey(2 * v)),
+    "rectangle": lambda v: Rectangle(to_world=over(-0.5, 1.0, 2.5, 0.3), emission=grey(v)),
+    "cylinder": lambda v: Cylinder(p0=(0, 0, 2), p1=(0.5, 0, 2), radius=0.1, emission=grey(v)),
+    "mesh": lambda v: Mesh(
+        vertices=np.array([[0, 0, 2], [1, 0, 2], [0, 1, 2.5]], np.float32),
+        faces=np.array([[0, 2, 1]], np.uint32),
+        emission=grey(v),
+    ),
+    "point": lambda v: Point(position=(1.0, 1.0, 2.0), intensity=v),
+    "spot": lambda v: Spot(to_world=over(-1.0, 1.0, 2.0), intensity=v, cutoff=50.0),
+    "projector": lambda v: Projector(to_world=over(0.0, -1.0, 2.0), irradiance=v),
+    "goniometric": lambda v: Goniometric(to_world=over(-1.0, -1.0, 2.0), intensity=v),
+    "directional": lambda v: Directional(direction=(0.0, 0.3, -1.0), irradiance=0.2 * v),
+    "constant": lambda v: Constant(radiance=0.1 * v),
+    "envmap": lambda v: Envmap(image=IMAGE * np.float32(v)),
+    "sky": lambda v: Sky(sky_scale=v, sun_scale=v),
+}
+IMAGE = np.random.default_rng(5).uniform(0.0, 0.2, (4, 8, 3)).astype(np.float32)
+DIM_AND_BRIGHT = (-60, -41, -17, 11, 25, 40)  # exponents of 2
+
+
+def grey(radiance: float) -> Area:
+    return Area(radiance=(radiance,) * 3)
+
+
+def over(x: float, y: float, z: float, size: float = 1.0) -> np.ndarray:
+    """What looks down from a point."""
+    return tf.translate([x, y, z]) @ DOWN @ tf.scale(size)
+
+
+def lit_hall(
+    size: float, lamps: dict[str, Any], factor: float, at: float = 0.0, **changes: Any
+) -> Scene:
+    """A floor, and a ball of glass, under lamps; a lamp at a point is size^2 as strong.
+
+    at: where the middle is along x [m].
+    """
+    to_world = tf.translate([at, 0.0, 0.0]) @ tf.scale(size)
+    scene = placed(
+        [
+            Rectangle(to_world=tf.scale(2.0), material=Diffuse(reflectance=0.7)),
+            Sphere(center=(0.4, 0.2, 0.4), radius=0.4, material=Dielectric(int_ior=1.5)),
+        ],
+        to_world,
+        "rgb",
+    )
+    shapes, lights = list(scene.shapes), []
+    for make in lamps.values():
+        lamp = make(factor)
+        if isinstance(lamp, Shape):
+            own = to_world @ lamp.to_world
+            shapes.append(dataclasses.replace(lamp, to_world=own, material=BLACK))
+        elif hasattr(lamp, "position"):
+            position = tuple(tf.transform_points(to_world, lamp.position))
+            lights.append(dataclasses.replace(make(factor * size**2), position=position))
+        elif lamp.reach == "placed":
+            own = lamp.to_world.copy()
+            own[:3, 3] = tf.transform_points(to_world, own[:3, 3])
+            lights.append(dataclasses.replace(make(factor * size**2), to_world=own))
+        else:
+            lights.append(lamp)
+    camera = dataclasses.replace(scene.camera, near=1e-4 * size, far=1e3 * size)
+    return dataclasses.replace(scene, camera=camera, shapes=shapes, lights=lights, **changes)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        pytest.param({"integrator": Path(max_depth=4, light_paths=1)}, marks=pytest.mark.slow),
+        pytest.param({"integrator": Vcm(max_depth=4)}, marks=pytest.mark.slow),
+        pytest.param({"film": Film(width=16, height=16)}, marks=pytest.mark.slow),
+        pytest.param({"film": Film(width=16, height=16, bands=4)}, marks=pytest.mark.slow),
+    ],
+    ids=["path", "light_paths", "vcm", "spectral", "bands"],
+)
+def test_light_of_any_strength(changes: dict[str, Any]) -> None:
+    """All emission times a power of two gives the picture times it, from 1e-18 to 1e12.
+
+    A film in units of 2^-48 W m^-2 sr^-1 nm^-1 would be black in the dim half, and full in the
+    bright one. Every kind of light is there.
+    """
+    ordinary = clpt.render(lit_hall(1.0, LAMPS, 1.0, **changes), 4)
+    assert ordinary.max() > 0.0
+    for exponent in DIM_AND_BRIGHT:
+        found = clpt.render(lit_hall(1.0, LAMPS, 2.0**exponent, **changes), 4)
+        error = np.abs(found / 2.0**exponent - ordinary).max() / ordinary.max()
+        assert error < 1e-5, (exponent, error)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LAMPS)
+def test_light_of_one_kind_of_any_strength(name: str) -> None:
+    ordinary = clpt.render(lit_hall(1.0, {name: LAMPS[name]}, 1.0), 4)
+    assert ordinary.max() > 0.0
+    for exponent in DIM_AND_BRIGHT:
+        found = clpt.render(lit_hall(1.0, {name: LAMPS[name]}, 2.0**exponent), 4)
+        error = np.abs(found / 2.0**exponent - ordinary).max() / ordinary.max()
+        assert error < 1e-5, (exponent, error)
+
+
+@pytest.mark.parametrize(
+    "integrator",
+    [
+        Path(max_depth=4),
+        Path(max_depth=4, light_paths=1),
+        pytest.param(Vcm(max_depth=4, light_paths=1), marks=pytest.mark.slow),
+    ],
+    ids=["path", "light_paths", "vcm"],
+)
+def test_light_in_a_scene_of_any_size(integrator: Integrator) -> None:
+    """The same samples in scenes from a micrometre to a hundred million kilometres.
+
+    Squares of areas leave float32 from sides of 4e9 m on, and rivals of light paths grow with the
+    square of the size. Sizes are powers of two, so that samples go the same ways.
+    """
+    ordinary = blocks(clpt.render(lit_hall(1.0, LAMPS, 1.0, integrator=integrator), 16))
+    for exponent in (-20, -13, 13, 24, 27, 33, 36):
+        scene = lit_hall(2.0**exponent, LAMPS, 1.0, integrator=integrator)
+        found = blocks(clpt.render(scene, 16))
+        np.testing.assert_allclose(found, ordinary, rtol=1e-3, err_msg=f"2^{exponent}")
+
+
+def test_a_lamp_far_from_the_origin_lights_glass() -> None:
+    """What a lamp sends along a direction does not depend on where it is: 2e7 m away a float32
+    has steps of 2 m, and a metre beside the lamp was no other place."""
+    lamps = {**LAMPS, "point": lambda v: Point(position=(1.0, 1.0, 2.0), intensity=40.0 * v)}
+    traced = Path(max_depth=4, light_paths=1)
+    here, there = (
+        clpt.render(lit_hall(2e4, lamps, 1.0, at, integrator=traced), 256).mean()
+        for at in (0.0, 2e7)
+    )
+    assert there == pytest.approx(here, rel=0.01)

@@ -27,6 +27,7 @@ from clpt.formats.mitsuba.xml import Element
 from clpt.scene.textures import ATTRIBUTES, Bitmap, Checkerboard, MeshAttribute, Product, Texture
 from clpt.spectra import (
     LED,
+    RGB,
     Blackbody,
     Cauchy,
     Constant,
@@ -71,6 +72,8 @@ def coefficient(props: Properties, name: str, default: float = 0.0) -> Any:
     value = _take(props, name, "coefficient", default)
     if isinstance(value, Texture):
         raise props.element.error(f"{name!r} cannot be a texture")
+    if type(value) is RGBUnbounded and max(value.r, value.g, value.b) <= 1.0:
+        return RGB(value.r, value.g, value.b)  # whose spectrum is Mitsuba's: that of a reflectance
     return value
 
 

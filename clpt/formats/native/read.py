@@ -215,7 +215,7 @@ class _Reader:
             cursor = self._entry(table, f"{family} name", name, referrer)
             known[name] = None
             made = self.kind(cursor, family)
-            known[name] = made if made.name else dataclasses.replace(made, name=name)
+            known[name] = made if "name" in cursor.value else dataclasses.replace(made, name=name)
         if known[name] is None:
             raise referrer.error(f"the {family} {name!r} refers to itself")
         return known[name]

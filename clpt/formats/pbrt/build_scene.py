@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -177,13 +177,16 @@ def _emission(state: State, form: Geometry) -> Light | None:
         _warn_of_unused(params, defined_in)
         return made
 
-    made: Light = state.shared.once((definition, area), params, make)
-    shares = form.shares() if powerful else None
+    made: Any = state.shared.once((definition, area), params, make)  # an Area, as there is no other
+    moved = "displacement" in form.parts
+    if powerful and moved:
+        state.warn(params, "the 'power' is that of the mean triangle before displacement")
+    shares = form.shares() if powerful and not moved else None
     if shares is None:
-        return made
+        return cast(Light, made)
     form.parts["attributes"] = {SHARES: shares[:, None]}
     radiance = Product(first=made.radiance, second=MeshAttribute(name=SHARES))
-    return replace(made, radiance=radiance)
+    return cast(Light, replace(made, radiance=radiance))
 
 
 def lights(contents: Contents) -> list[Light]:

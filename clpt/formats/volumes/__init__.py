@@ -64,8 +64,9 @@ def factored(
 ) -> tuple[RGBUnbounded, NDArray[np.float32], NDArray[np.float32] | None]:
     """Return an extinction of colours (nx, ny, nz, 3) as what a `Grid` has of it.
 
-    That is one colour, a density (nx, ny, nz), and None where their product is all; else white, the
-    highest of each three numbers, and what share of it each is (nx, ny, nz, 3).
+    That is one colour, a density (nx, ny, nz), and None where their product is all; else twice
+    white, the highest of each three numbers, and half of what share of it each is (nx, ny, nz, 3):
+    colours that may exceed 1 have the spectra of halves, in PBRT, Mitsuba and `RGBUnbounded`.
     """
     values = np.asarray(values, np.float64)
     most = values.max(axis=(0, 1, 2))
@@ -73,8 +74,8 @@ def factored(
     if np.allclose(values, density[..., None] * most, _GREY, 1e-5 * most.max()):
         return RGBUnbounded(*most.tolist()), density.astype(np.float32), None
     highest = values.max(axis=3)
-    colours = values / np.maximum(highest, 1e-30)[..., None]
-    white = RGBUnbounded(1.0, 1.0, 1.0)
+    colours = 0.5 * values / np.maximum(highest, 1e-30)[..., None]
+    white = RGBUnbounded(2.0, 2.0, 2.0)
     return white, highest.astype(np.float32), colours.astype(np.float32)
 
 

@@ -77,7 +77,8 @@ def densities_text(
 
     light_emit_pdf(scene, row, wi, t): how densely light_emit sends rays against wi to a surface
     across it at distance t; over the cosine at a light on a shape. Of that, what is left where
-    squared distances cancel: [1/(m^2 sr)], and of a light at a point per t^2 [1/m^2].
+    squared distances cancel: [1/(m^2 sr)], and of a light at a point per t^2 [1/m^2], in units of
+    Settings.rival_area.
     light_found_pdf(scene, row, p, hemisphere, wi, t, n): the density with which next-event
     estimation at p finds that point of the light [1/sr]; n: the normal there. Of a delta light it
     is the chance of its row.
@@ -98,7 +99,7 @@ def densities_text(
             *motion,
             *("wi = motion_back_unit(motion, wi);",) * moving,
         ),
-        "value * l.pmf",
+        "value * l.pmf * scene.settings->rival_area",
     )
     found = Function(
         "real light_found_pdf(Scene scene, integer row, vec3 p, vec3 hemisphere, vec3 wi, real t, "
@@ -173,17 +174,14 @@ def _aimed_text(present: list[str], surfaces: bool, moving: bool) -> list[str]:
         ]
     rows.append("r = aim_turn(scene, chosen, r, n, v, &turned);")
     placed = [kind for kind in present if kind in PLACED]
-    at, along = "r.o", "r.d"
+    along = "r.d"
     if moving and placed:
-        at, along = "rest", "along"
-        rows += [
-            "vec3 rest = motion_point_back(motion, r.o);",
-            "vec3 along = motion_back_unit(motion, r.d);",
-        ]
+        along = "along"
+        rows.append("vec3 along = motion_back_unit(motion, r.d);")
     for kind in placed:
         row = row_text(kind)
-        seen = f"{kind}_sample({row}, scene, add3({at}, {along}), u, lambdas)"
-        power = f"aim_power(r, turned, {seen}, {kind}_emit_pdf({row}, {along}))"
+        sent = f"{kind}_intensity({row}, scene, {along}, lambdas)"
+        power = f"aim_power(r, turned, {sent}, {kind}_emit_pdf({row}, {along}))"
         rows += choose("r", "LightRay", Case(kind_test(kind, present), power))
     return [
         *rows,

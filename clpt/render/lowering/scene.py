@@ -14,7 +14,7 @@ from clpt.render.contract import shape_records
 from clpt.render.contract.features import Features
 from clpt.render.contract.layer_names import LayerNames
 from clpt.render.contract.parameter_words import row_words
-from clpt.render.lowering import photons
+from clpt.render.lowering import open_boundaries, photons
 from clpt.render.lowering.bodies import BodyWords, matter_of
 from clpt.render.lowering.camera import cameras, filters
 from clpt.render.lowering.camera.colour import sensor
@@ -46,6 +46,7 @@ from clpt.render.lowering.layer_names import lower_names
 from clpt.render.lowering.lights.aims import aims
 from clpt.render.lowering.lights.hard_light import Lit, decided
 from clpt.render.lowering.lights.light_bounds import Bounds
+from clpt.render.lowering.lights.light_level import light_level
 from clpt.render.lowering.lights.light_media import NOWHERE, LightMedia, light_media
 from clpt.render.lowering.lights.lights import Around, Emitter, LightRows, light_rows, row_order
 from clpt.render.lowering.lowering_cache import LoweringCache
@@ -179,7 +180,7 @@ def lower(
     glass_rows = _lower_camera(index, encoder)
     ambient_row = _lower_ambient(index, encoder)
     warnings = (
-        *_warnings(index), *noted,
+        *_warnings(index), *noted, *open_boundaries.warnings_of(index, cache),
         *sorted(encoder.warnings), *geometry.warnings,
         *encoder.textures.finish(),
     )  # fmt: skip
@@ -199,8 +200,8 @@ def lower(
         row = encoder.store.append_floats("distributions", _vertex_tangents(geometry))
         features = replace(features, vertex_tangents=row + TANGENT_WORDS)
     settings = settings_of(
-        index, geometry, lights, wavelengths, density_row, ambient_row, sphere,
-        features.dispersion, (first_aim, len(targets)), camera,
+        index, geometry, lights, light_level(index, lights, sphere), wavelengths, density_row,
+        ambient_row, sphere, features.dispersion, (first_aim, len(targets)), camera,
     )  # fmt: skip
     cache.settle()
     tables = encoder.store.arrays()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.lights.lights import LightRows
 from clpt.spectra.cie import tanh_ends
 
+ORDINARY_SIZE = 10  # exponent of 2 of the radius of a scene [m], up and down
 MOST_SAMPLE_BITS = 16  # of a zsobol pixel's part of its sequence
 DEEPEST = 4000  # path state has 12 bits for the depth
 DEPTHS = {"direct": 2}  # of integrators without the parameter
@@ -25,6 +27,7 @@ def settings_of(
     index: SceneIndex,
     geometry: Geometry,
     lights: LightRows,
+    level: float,
     density: Density,
     density_row: int,
     ambient_row: int,
@@ -35,10 +38,10 @@ def settings_of(
 ) -> NDArray[np.void]:
     """Return the record SETTINGS of a scene; the wavefront adds what depends on the device.
 
-    density_row: where the table of `density` begins in `distributions`; ambient_row: in
-    `light_params`; sphere: centre and radius of one around the scene [m];
-    disperses: whether directions depend on wavelengths; aims: the first of the spheres at which
-    light paths aim, and their number; around: words of the bodies
+    level: of the scene's light, see `light_level`; density_row: where the table of
+    `density` begins in `distributions`; ambient_row: in `light_params`; sphere: centre and
+    radius of one around the scene [m]; disperses: whether directions depend on wavelengths; aims:
+    the first of the spheres at which light paths aim, and their number; around: words of the bodies
     and of the medium at the camera.
     """
     scene, film, integrator = index.scene, index.scene.film, index.scene.integrator
@@ -64,6 +67,7 @@ def settings_of(
         settings["photon_cells"] = guides.CELLS
         settings["guide_paths"] = guides.PATHS
         settings["guide_side"] = guides.SIDE * sphere[1]
+    settings["rival_area"] = rival_area(sphere[1])
     settings["aims"], settings["aim_count"] = aims
     settings["camera_bodies"], settings["camera_medium"] = around
     settings["light_count"] = len(lights.rows)
@@ -77,11 +81,21 @@ def settings_of(
     settings["tanh_min"], settings["tanh_max"] = tanh_ends(density.lo, density.hi)
     settings["bands"] = film.bands
     settings["density"] = density_row
-    matrix, scale = output_matrix(film, index.mode), film_scale(film)
+    matrix, scale = output_matrix(film, index.mode), film_scale(film, level)
     settings["film_scale"] = scale
     settings["to_first"], settings["to_second"], settings["to_third"] = matrix / scale
     settings["center"], settings["scene_radius"] = sphere
     return settings
+
+
+def rival_area(scene_radius: float) -> float:
+    """Return the unit of areas in rivals of light paths [m^2], a power of two.
+
+    1 for scenes of ordinary size; of larger and smaller ones, what brings their size to these.
+    """
+    exponent = math.frexp(scene_radius)[1]
+    beyond = exponent - min(max(exponent, -ORDINARY_SIZE), ORDINARY_SIZE)
+    return 4.0**beyond
 
 
 def _set_photons(

@@ -48,9 +48,10 @@ class FilmState:
     uint32, a sum for each band, then, where light paths are weighed, one of theirs for each; sums
     may be 0. taken: first and end of each range of sample
     numbers that were taken, ascending and apart. scale: of a value of 1, a power of two that
-    follows from the film's exposure. layers: (words, h, w) uint32, those of the first samples, see
-    kernels/film/layers.cl; light_layers: (sums, 3, h, w) uint32; mattes: (lists, slots, h, w)
-    uint32, names and how often they were met, the first ones of the scene.
+    follows from the film's exposure and the scene's light. layers: (words, h, w) uint32, those of
+    the first samples, see kernels/film/layers.cl; light_layers: (sums, 3, h, w)
+    uint32; mattes: (lists, slots, h, w) uint32, names and how often they were met, the first ones
+    of the scene.
     """
 
     words: Words
@@ -89,7 +90,8 @@ class FilmState:
                     f"films of another form cannot be merged: {name} are {own} and {given}"
                 )
         if self.scale != other.scale:
-            raise SceneError("films of another exposure cannot be merged", where="film.exposure")
+            message = "films cannot be merged whose exposure, or whose light, is of another scale"
+            raise SceneError(message, where="film.exposure")
         taken = join_ranges(self.taken, other.taken)
         return replace(self.plus(other), taken=taken)
 

@@ -15,7 +15,9 @@ ROOT = Path(str(files(__name__)))
 @cache
 def table(name: str) -> NDArray[np.float64]:
     """Rows of the CSV file `name`, read-only (n, columns) float64."""
-    rows = np.loadtxt(ROOT / name, delimiter=",", comments="#", ndmin=2)
+    # Opened here: numpy asks for the current folder, which may be gone.
+    with (ROOT / name).open(encoding="utf-8") as file:
+        rows = np.loadtxt(file, delimiter=",", comments="#", ndmin=2)
     rows.setflags(write=False)
     return rows
 

@@ -11,7 +11,7 @@ import pytest
 from clpt import images
 from clpt.errors import SceneError
 from clpt.formats import load
-from clpt.spectra import RGB, Constant
+from clpt.spectra import RGB, Constant, RGBUnbounded
 
 
 @pytest.fixture
@@ -33,6 +33,17 @@ def material(read):
         return read(f'{before}<shape type="cube">{bsdf}</shape>').shapes[0].material
 
     return of
+
+
+def test_colours_of_coefficients(read) -> None:
+    """Up to 1 they have the spectrum of a reflectance; above, where Mitsuba cuts off, their own."""
+
+    def sigma_t(rgb: str):
+        medium = f'<medium name="interior" type="homogeneous"><rgb name="sigma_t" value="{rgb}"/>'
+        return read(f'<shape type="cube">{medium}</medium></shape>').shapes[0].interior.sigma_t
+
+    assert sigma_t("1, .2, .7") == RGB(1.0, 0.2, 0.7)
+    assert sigma_t("1, 2, 3") == RGBUnbounded(1.0, 2.0, 3.0)
 
 
 def diffuse(inner: str) -> str:

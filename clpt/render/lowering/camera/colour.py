@@ -13,7 +13,9 @@ from clpt.scene.integrators import Film
 from clpt.spectra import Sensor, spaces
 from clpt.spectra.sensors import observer
 
-LARGEST_SCALE = 60  # exponent of 2
+LARGEST_SCALE = 60  # exponent of 2 of an exposure that sums follow
+# Exponents of 2 between which ordinary light lies in the sums of kernels/core/fixed.cl
+DIMMEST, BRIGHTEST = -20, 32
 
 
 def sensor(film: Film) -> Sensor:
@@ -35,11 +37,20 @@ def output_matrix(film: Film, mode: str) -> NDArray[np.float64]:
     return film.exposure * np.round(whole, 12)  # from a space to itself is the identity, to the bit
 
 
-def film_scale(film: Film) -> float:
-    """The power of two next to the film's exposure: what is seen well is near 1 in its sums."""
-    if not 0.0 < film.exposure < math.inf:
-        return 1.0
-    return 2.0 ** min(max(round(math.log2(film.exposure)), -LARGEST_SCALE), LARGEST_SCALE)
+def film_scale(film: Film, level: float) -> float:
+    """What a film's sums have of a value of 1: a power of two.
+
+    level: of the scene's light [W m^-2 sr^-1 nm^-1], see `light_level`. The scale is the power of
+    two next to the film's exposure: what is seen well is near 1. Where the light is too dim or too
+    bright to be summed so, the scale brings it to the nearest end of what is ordinary.
+    """
+    own = 0
+    if 0.0 < film.exposure < math.inf:
+        own = min(max(round(math.log2(film.exposure)), -LARGEST_SCALE), LARGEST_SCALE)
+    if not 0.0 < level < math.inf:
+        return 2.0**own
+    light = math.frexp(level)[1] + own
+    return 2.0 ** (own + min(max(light, DIMMEST), BRIGHTEST) - light)
 
 
 def white(film: Film) -> NDArray[np.float64]:

@@ -163,7 +163,7 @@ def emissions(index: SceneIndex) -> Iterator[Spectrum]:
             continue
         declared = params(type(source))
         if "image" in declared and declared["image"].role == "host":
-            yield _mean(source.image)
+            yield _mean(source.image, f"{source.kind}.image")
         for name, param in declared.items():
             if param.role == "emission":
                 yield _emitted(getattr(source, name))
@@ -173,13 +173,13 @@ def emissions(index: SceneIndex) -> Iterator[Spectrum]:
 def _emitted(value: Any) -> Spectrum:
     """An emission as a spectrum, of a texture its mean."""
     if getattr(value, "is_texture", False):
-        return _mean(getattr(value, "image", None))
+        return _mean(getattr(value, "image", None), f"{value.kind}.image")
     return RGBIlluminant(value.r, value.g, value.b) if isinstance(value, RGB) else value
 
 
-def _mean(image: Any) -> Spectrum:
+def _mean(image: Any, where: str) -> Spectrum:
     """The mean light of an image of spectra; any other stands for D65."""
-    found = spectral_exr.find(image, emissive=True)
+    found = spectral_exr.find(image, emissive=True, where=where)
     if found is None:
         return d65()
     return found.spectrum(np.nan_to_num(found.values.mean(axis=(0, 1), dtype=np.float64)))

@@ -36,12 +36,13 @@ EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 HALVINGS = 8  # of an edge, until its zero is looked for along a straight line
 
 
-def surface(shape: SdfGrid, name: str) -> tuple[Any, Any, Any, None]:
-    """Return vertices, faces, normals or None, and None for uvs, before the transform.
+def surface(shape: SdfGrid, name: str) -> tuple[Any, Any, Any, Any]:
+    """Return vertices, faces, normals or None, and uvs, before the transform.
 
     vertices, normals (n, 3) float32 in the unit cube; faces (m, 3) uint32, seen from where the
-    distance is positive. name: for messages. Raises SceneError for values that are no grid, for a
-    grid without a surface, and for one of too many pieces.
+    distance is positive; uvs (n, 2) float32, all 0, so that a texture does not show how the
+    surface is cut into triangles. name: for messages. Raises SceneError for values that are no
+    grid, for a grid without a surface, and for one of too many pieces.
     """
     values, pieces = _checked(shape, name), shape.pieces
     cells = _crossed(values)
@@ -57,7 +58,8 @@ def surface(shape: SdfGrid, name: str) -> tuple[Any, Any, Any, None]:
     if normals is not None:
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         normals = (normals / np.where(length > 0.0, length, 1.0)).astype(np.float32)
-    return (points * scale).astype(np.float32), faces.astype(np.uint32), normals, None
+    uvs = np.zeros((len(points), 2), np.float32)
+    return (points * scale).astype(np.float32), faces.astype(np.uint32), normals, uvs
 
 
 def _checked(shape: SdfGrid, name: str) -> Floats:

@@ -25,6 +25,7 @@ from clpt.render.lowering.motion import Motions
 from clpt.render.lowering.textures.attributes import Owner
 from clpt.scene.shapes import Shape
 
+LEAST_RADIUS = 1e-12  # of a sphere around a scene [m]
 SWEPT_CELLS = 4  # of the hull of what moves, see `instancing.hull_points`
 SHAPE_NORMALS, SHAPE_UVS, SHAPE_TWO_SIDED, SHAPE_ONE_LIGHT, SHAPE_MANY = 1, 2, 4, 8, 16
 SHAPE_TANGENTS, SHAPE_DEFORMS = 32, 64
@@ -74,7 +75,7 @@ class Geometry:
         if not lows:
             return np.zeros(3), 1.0
         low, high = np.min(lows, axis=0), np.max(highs, axis=0)
-        return (low + high) / 2, max(float(np.linalg.norm(high - low)) / 2, 1e-3)
+        return (low + high) / 2, max(float(np.linalg.norm(high - low)) / 2, LEAST_RADIUS)
 
 
 def lower_geometry(index: SceneIndex, encoder: Encoder, materials: MaterialWords) -> Geometry:

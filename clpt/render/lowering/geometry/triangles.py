@@ -26,6 +26,7 @@ POINTS = {  # what a deformation moves
 }  # fmt: skip
 SUMMED = 1 << 20  # triangles whose normals are summed at a time
 
+LEAST_CROSS = 2.0**-75  # up to which a square is zero in float32
 CHUNK = 1 << 16  # triangles that are looked at at a time: what is made of them stays in the cache
 
 # Corners of the cube's sides in the order of _CORNER_UVS, as Mitsuba has them.
@@ -224,11 +225,11 @@ def _in_world(
 
 
 def _solid(vertices: Points, faces: Faces) -> NDArray[np.bool_]:
-    """Which faces have a cross product that is not zero in float32."""
+    """Which faces have a cross product whose square is not zero in float32."""
     found = np.empty(len(faces), np.bool_)
     for first in range(0, len(faces), CHUNK):
         crosses = _crosses(vertices, faces[first : first + CHUNK])
-        found[first : first + CHUNK] = (crosses * crosses > 0.0).any(axis=1)
+        found[first : first + CHUNK] = (np.abs(crosses) > LEAST_CROSS).any(axis=1)
     return found
 
 

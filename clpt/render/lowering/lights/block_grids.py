@@ -42,16 +42,20 @@ class BlockGrid(NamedTuple):
 
 
 def members(corners: NDArray[Any], grid: BlockGrid, encoder: Encoder) -> dict[str, ArrayLike]:
-    """Put a grid, and the weights at its corners, into the tables; return a record's members."""
+    """Put a grid, and the weights at its corners, into the tables; return a record's members.
+
+    A power of two brings the largest weight next to 1, so that squares of weights stay in float32.
+    """
     append = partial(encoder.store.append_floats, "distributions")
+    unit = 2.0 ** math.frexp(float(corners.max()))[1]
     return {
-        "corners": append(corners),
+        "corners": append(corners / unit),
         "marginal": append(grid.marginal),
         "conditional": append(grid.conditional),
         "blocks": append(grid.blocks),
         "block_rows": grid.block_rows,
         "block_columns": grid.block_columns,
-        "norm": 1.0 / grid.total if grid.total > 0.0 else 0.0,
+        "norm": unit / grid.total if grid.total > 0.0 else 0.0,
     }
 
 

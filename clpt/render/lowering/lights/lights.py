@@ -60,16 +60,17 @@ class LightRows:
     """The table `lights` and what follows from it.
 
     rows: structured (n,) of LIGHT.dtype; power: (n,) float64, what each sends into the scene, in a
-    unit of all of them; infinite: how many of them, the first ones, are infinite;
-    kinds: those that occur, for `dispatch_text`; first: per emitter, its first row; whole: per
-    emitter, whether that one row stands for all of it; visible: whether one is no delta light;
-    two_sided: whether one shines from the back of its shape too; bounds: of the rows of each lamp
-    and emitter; tree: the words of the tree that
-    stand behind the rows, None where the alias table chooses.
+    unit of all of them; radiance: the largest mean one of a shape [W m^-2 sr^-1 nm^-1]; infinite:
+    how many of the rows, the first ones, are infinite; kinds: those that occur, for
+    `dispatch_text`; first: per emitter, its first row; whole: per emitter, whether that one row
+    stands for all of it; visible: whether one is no delta light; two_sided: whether one shines from
+    the back of its shape too; bounds: of the rows of each lamp and emitter; tree: the words of the
+    tree that stand behind the rows, None where the alias table chooses.
     """
 
     rows: np.ndarray
     power: NDArray[np.float64]
+    radiance: float
     infinite: int
     kinds: tuple[str, ...]
     first: tuple[int, ...]
@@ -84,12 +85,14 @@ class Block(NamedTuple):
     """The rows of one lamp or emitter, their power [W/nm], and where they shine.
 
     importance: how much they count in a tree, see `non_shape_lights`; their power by default.
+    radiance: of a shape, the largest mean one of its rows.
     """
 
     rows: np.ndarray
     power: np.ndarray
     bounds: light_bounds.Bounds
     importance: np.ndarray | None = None
+    radiance: float = 0.0
 
 
 def row_order(lamps: Sequence[Light]) -> list[int]:
@@ -151,6 +154,7 @@ def light_rows(
     return LightRows(
         rows=rows,
         power=power,
+        radiance=max((block.radiance for block in blocks), default=0.0),
         infinite=infinite,
         kinds=kinds,
         first=tuple(int(i) for i in first),
@@ -207,9 +211,13 @@ def _emitter_block(emitter: Emitter, encoder: Encoder) -> Block:
         rows = _block(1, shape.kind, at, radiance, emitter.shape_row)
         rows["emission_mode"] = emission_mode
         bounds = light_bounds.of_shape(shape, emission_mode == BOTH)
-        return Block(rows, np.array([strength * analytic.area(shape) * brightness(value)]), bounds)
+        bright = brightness(value)
+        sent = np.array([strength * analytic.area(shape) * bright])
+        return Block(rows, sent, bounds, radiance=bright)
     if shape.kind in shape_records.ONE_OF:
-        return _balls_block(emitter, encoder, emission_mode, radiance, strength * brightness(value))
+        bright = brightness(value)
+        block = _balls_block(emitter, encoder, emission_mode, radiance, strength * bright)
+        return block._replace(radiance=bright)
     if emitter.vertices is None or emitter.faces is None:
         raise SceneError("its triangles are missing", where=shapes.where(shape))
     cache, corners = encoder.cache, (emitter.vertices, emitter.faces, emitter.keys)
@@ -221,11 +229,11 @@ def _emitter_block(emitter: Emitter, encoder: Encoder) -> Block:
     bounds = cache(_triangle_bounds, *corners, emission_mode == BOTH)
     by_face = _face_attributes(shape, value)
     if by_face:
-        bright = triangle_means(value, emitter.uvs, emitter.faces, by_face)
+        means = triangle_means(value, emitter.uvs, emitter.faces, by_face)
     else:
-        bright = cache(triangle_means, value, emitter.uvs, emitter.faces)
+        means = cache(triangle_means, value, emitter.uvs, emitter.faces)
     areas = cache(_triangle_areas, *corners)
-    return Block(rows, strength * areas * bright, bounds)
+    return Block(rows, strength * areas * means, bounds, radiance=float(means.max(initial=0.0)))
 
 
 def _face_attributes(shape: Shape, value: Any) -> dict[str, NDArray[np.float32]]:

@@ -24,7 +24,7 @@ def spectral_image(texture: Any, role: str) -> SpectralImage | None:
     """Return a texture's image if it is a bitmap of spectra, in the role of a parameter."""
     if not isinstance(texture, Bitmap):
         return None
-    return spectral_exr.find(texture.image, emissive=role == "emission")
+    return spectral_exr.find(texture.image, emissive=role == "emission", where="bitmap.image")
 
 
 def pixels(texture: Bitmap, role: str) -> Floats:

@@ -9,7 +9,7 @@ import pytest
 
 from clpt import spectra
 from clpt.errors import SceneError
-from clpt.render.lowering.camera.colour import output_matrix
+from clpt.render.lowering.camera.colour import BRIGHTEST, DIMMEST, film_scale, output_matrix
 from clpt.scene import Film
 from clpt.spectra import Sensor, cie, spaces
 
@@ -101,3 +101,22 @@ def test_what_cannot_become_white_is_refused() -> None:
 def test_exposure_is_a_factor_on_the_picture(mode):
     plain, bright = output_matrix(Film(), mode), output_matrix(Film(exposure=2.5), mode)
     assert bright == pytest.approx(2.5 * plain, rel=1e-12)
+
+
+def test_a_films_scale_follows_its_exposure() -> None:
+    """As far as ordinary light goes, and where nothing is known of the light."""
+    for level in (0.0, 1e-5, 1.0, 1e9):
+        assert film_scale(Film(), level) == 1.0
+        assert film_scale(Film(exposure=3.0), level) == 4.0
+    assert film_scale(Film(exposure=0.0), 1.0) == 1.0
+
+
+@pytest.mark.parametrize("exponent", [-120, -60, -21, 33, 60, 120])
+def test_a_films_scale_brings_light_to_what_is_ordinary(exponent: int) -> None:
+    end = DIMMEST if exponent < 0 else BRIGHTEST
+    assert film_scale(Film(), 2.0 ** (exponent - 1)) == 2.0 ** (end - exponent)
+    own = 2.0 ** -(exponent // 2)  # an exposure that leaves it half as far
+    half = exponent - exponent // 2
+    assert film_scale(Film(exposure=own), 2.0 ** (exponent - 1)) == own * 2.0 ** (
+        min(max(half, DIMMEST), BRIGHTEST) - half
+    )

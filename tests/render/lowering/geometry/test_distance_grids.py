@@ -26,7 +26,8 @@ def test_closed_and_where_the_distance_is_zero(smooth, pieces):
     values = waves((9, 12, 7))
     shape = SdfGrid(values=values, smooth=smooth, pieces=pieces)
     vertices, faces, normals, uvs = triangles.triangulate(shape)
-    assert uvs is None and (normals is not None) == smooth
+    assert uvs.shape == (len(vertices), 2) and not uvs.any()  # no texture shows the triangles
+    assert (normals is not None) == smooth
     edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
     counts = np.unique(edges, axis=0, return_counts=True)[1]
     assert (counts % 2 == 0).all() and counts.max() == 2  # watertight

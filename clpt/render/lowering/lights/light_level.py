@@ -1,0 +1,33 @@
+"""How bright a scene is: it tells the film which numbers to expect."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.render.lowering.index import SceneIndex
+from clpt.render.lowering.lights.light_bounds import concatenated
+from clpt.render.lowering.lights.lights import LightRows
+from clpt.render.lowering.lights.non_shape_lights import brightness
+
+
+def light_level(
+    index: SceneIndex, lights: LightRows, sphere: tuple[NDArray[np.float64], float]
+) -> float:
+    """Estimate the largest radiance of what the camera may see [W m^-2 sr^-1 nm^-1].
+
+    It is that of shapes and media that emit, or what all lights send evenly to the scene, the
+    larger one. sphere: centre and radius of one around the scene [m]. 0 where nothing emits, or
+    nothing whose values the host knows.
+    """
+    centre, radius = sphere
+    arrives = 0.0
+    if lights.bounds:
+        bounds = concatenated(list(lights.bounds))
+        away = np.square((bounds.low + bounds.high) / 2.0 - centre).sum(axis=1)
+        square = np.where(bounds.placed, np.maximum(away, radius**2), radius**2)
+        arrives = float((lights.power / (4.0 * np.pi * square)).sum())
+    glow = [brightness(one.light) * radius for one in index.emitting if one.light is not None]
+    ambient = getattr(index.scene.integrator, "ambient", None)
+    around = 0.0 if ambient is None else brightness(ambient)
+    return max(lights.radiance, arrives, around, *glow)
