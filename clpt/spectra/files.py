@@ -200,8 +200,10 @@ def _yaml(path: str | Path, text: str) -> Any:
     class Loader(yaml.BaseLoader):
         def compose_node(self, parent: Any, index: Any) -> Any:
             if self.check_event(yaml.AliasEvent):
-                mark = self.peek_event().start_mark
-                raise yaml.MarkedYAMLError(None, None, "references (*name) are not read", mark)
+                event: Any = self.peek_event()  # type: ignore[no-untyped-call]
+                raise yaml.MarkedYAMLError(
+                    None, None, "references (*name) are not read", event.start_mark
+                )
             return super().compose_node(parent, index)
 
     try:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import sys
 
 import pytest
+from click.testing import CliRunner
 
 import clpt
 from clpt import budget
+from clpt.cli import main
 from clpt.errors import LONGEST, SceneError
 from tests.formats import bombs
 
@@ -83,3 +85,12 @@ def test_errors_are_short_lines():
     error = SceneError(text, file="/" + "d" * 5000, where="e" * 5000, line=7)
     assert len(str(error)) <= LONGEST and str(error).isprintable()
     assert ":7: " in str(error) and ": a b ccc" in str(error)
+
+
+def test_the_command_line_raises_what_a_load_may_take(tmp_path):
+    path = tmp_path / "a.xml"
+    path.write_text('<scene version="3.0.0"><shape type="sphere"/></scene>')
+    told = CliRunner().invoke(main, ["info", str(path), "--load-parts", "1"])
+    assert isinstance(told.exception, SceneError) or told.exit_code == 2
+    assert "raise --load-parts or clpt.Budget(parts=...)" in str(told.exception) + told.output
+    assert CliRunner().invoke(main, ["info", str(path)]).exit_code == 0

@@ -103,7 +103,7 @@ def _from_file(cursor: Cursor) -> Deformation:
     """Return the keys of points in a .npz file."""
     path = find_file(cursor)
     with cursor.locating():
-        arrays = numpy_files.arrays(path, ("times", *POINTS))
+        arrays: dict[str, Any] = numpy_files.arrays(path, ("times", *POINTS))
     for name in ("times", "points"):
         if name not in arrays:
             raise cursor.error(f"has no array {name!r}")
