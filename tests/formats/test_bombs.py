@@ -6,10 +6,10 @@ import sys
 
 import pytest
 from click.testing import CliRunner
+from clpt.cli.main import cli
 
 import clpt
 from clpt import budget
-from clpt.cli import main
 from clpt.errors import LONGEST, SceneError
 from tests.formats import bombs
 
@@ -90,7 +90,7 @@ def test_errors_are_short_lines():
 def test_the_command_line_raises_what_a_load_may_take(tmp_path):
     path = tmp_path / "a.xml"
     path.write_text('<scene version="3.0.0"><shape type="sphere"/></scene>')
-    told = CliRunner().invoke(main, ["info", str(path), "--load-parts", "1"])
+    told = CliRunner().invoke(cli, ["info", str(path), "--load-parts", "1"])
     assert isinstance(told.exception, SceneError) or told.exit_code == 2
     assert "raise --load-parts or clpt.Budget(parts=...)" in str(told.exception) + told.output
-    assert CliRunner().invoke(main, ["info", str(path)]).exit_code == 0
+    assert CliRunner().invoke(cli, ["info", str(path)]).exit_code == 0
