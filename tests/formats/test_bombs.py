@@ -6,10 +6,10 @@ import sys
 
 import pytest
 from click.testing import CliRunner
-from clpt.cli.main import cli
 
 import clpt
 from clpt import budget
+from clpt.cli import cli
 from clpt.errors import LONGEST, SceneError
 from tests.formats import bombs
 
