@@ -14,9 +14,9 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
-from clpt import output_files
+from clpt import budget, output_files
 from clpt.errors import SceneError
-from clpt.images import budget
+from clpt.images import sizes
 
 Channels = Mapping[str, NDArray[Any]]
 Header = Mapping[str, Any]
@@ -83,7 +83,7 @@ def check(path: Path, header: Header) -> None:
         raise SceneError(f"has deep pixels ({header['type'].name}); flatten it", file=path)
     for name in ("dataWindow", "displayWindow"):
         x0, y0, x1, y1 = window(header, name)
-        budget.check_size(path, x1 - x0, y1 - y0)
+        sizes.check_size(path, x1 - x0, y1 - y0)
 
 
 def read_channels(path: Path, chosen: Sequence[str] | None = None, part: int = 0) -> Channels:
@@ -100,7 +100,7 @@ def read_channels(path: Path, chosen: Sequence[str] | None = None, part: int = 0
     if len(found) == 1 and set(names) < set(channel_names(found[0])):
         return _some(path, found[0], names)
     # The library reads all channels of all parts.
-    budget.take(sum(_size(one, channel_names(one)) for one in found), _WHAT, path)
+    budget.check(sum(_size(one, channel_names(one)) for one in found), _WHAT, path)
     with opened(path) as parts:
         channels = parts[part].channels
         return {name: np.asarray(channels[name].pixels) for name in names}
@@ -123,7 +123,7 @@ def _some(path: Path, header: Header, names: Sequence[str]) -> Channels:
 
     By the library's older interface, for the newer one always reads all of them.
     """
-    budget.take(_size(header, names), _WHAT, path)
+    budget.check(_size(header, names), _WHAT, path)
     x0, y0, x1, y1 = window(header, "dataWindow")
     file = OpenEXR.InputFile(exr_name(path))
     try:

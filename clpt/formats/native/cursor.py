@@ -14,11 +14,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from clpt import budget
 from clpt import text as text_files
 from clpt.errors import SceneError, UnusedParameterError
 from clpt.formats.located import Located
 
 LARGEST_INTEGER = 2**31 - 1
+PER_LETTER = 16  # bytes of memory for each letter of JSON, while it is read
 SKIPPED = re.compile(r"[\s,:]*")
 NAMES = {
     dict: "an object", list: "a list", str: "a string", bool: "true or false", float: "a number",
@@ -125,6 +127,7 @@ def parse(path: Path, confined: bool = False) -> Cursor:
     """
     text = text_files.read(path)
     try:
+        budget.check(PER_LETTER * len(text), "its JSON", path)
         value = json.loads(text, object_pairs_hook=_object)
     except json.JSONDecodeError as error:
         raise SceneError(f"is not JSON: {error.msg}", file=path, line=error.lineno) from None

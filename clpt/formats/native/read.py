@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from clpt import measured, spectra
+from clpt import budget, measured, spectra
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
 from clpt.formats import volumes
 from clpt.formats.missing import EVEN, GREY, Missing, grey_for
@@ -100,6 +100,7 @@ class _Reader:
 
     def object_of(self, cursor: Cursor, cls: type[Kind], other_keys: tuple[str, ...] = ()) -> Any:
         """Read an object of a kind; `other_keys` are no parameters, and are not read."""
+        budget.take_parts(1, "its objects", cursor.file)
         declared = params(cls)
         shortcut = ("metal",) if {"eta", "k"} <= declared.keys() else ()
         values: dict[str, Any] = {}
