@@ -14,7 +14,17 @@ from numpy.typing import NDArray
 from pyopencl.array import Array
 
 from ..bvh import TREES, choose_tree, traversal_text
-from ..device import BoundKernel, Device, Events, Program, Stream, assemble, build, wait
+from ..device import (
+    BoundKernel,
+    Device,
+    Events,
+    Program,
+    Stream,
+    assemble,
+    build,
+    supersede,
+    wait,
+)
 from ..errors import DeviceError, SceneError
 from ..records import INSTANCE
 from . import batch
@@ -195,7 +205,7 @@ class Queries:
             self._stream.after(wait_for)
             event = self._enqueue(name, rays, outputs)
             for array in results.values():
-                array.events[:] = [event]  # which has waited for those before
+                supersede(array, event)
             return results, event
 
     def _wait(
