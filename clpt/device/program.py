@@ -152,6 +152,7 @@ class BoundKernel:
                 known = ", ".join(self._indices) or "nothing"
                 raise TypeError(f"kernel {self.kernel.name!r} takes no {name!r}; it takes {known}")
             index, argument = self._indices[name]
+            self._numbers.pop(name, None)  # first: an interrupt may come between any two lines
             try:
                 value = argument.value(new)
                 self._cl_kernel.set_arg(index, value)
@@ -163,8 +164,6 @@ class BoundKernel:
             self._values[name] = value  # the driver does not keep buffers alive
             if number:
                 self._numbers[name] = new
-            else:
-                self._numbers.pop(name, None)
 
     def enqueue(
         self,

@@ -27,15 +27,52 @@ class DeviceOwner:
             "pickle its scene and make another one of it"
         )
 
+    @property
+    def _inside(self) -> bool:
+        """Whether this thread is in a method: who asks is called by it."""
+        return bool(self._lock._is_owned())  # type: ignore[attr-defined]
+
+    def _check_open(self) -> None:
+        """Raise DeviceError after `close`."""
+        if self._closed:
+            raise DeviceError(f"this {type(self).__name__} is closed; make another one")
+
+    def _check(self, inside: bool) -> None:
+        """Raise DeviceError where it cannot be used; inside: by what one of its methods calls."""
+        self._check_open()
+
 
 def synchronized(method: Callable[Concatenate[_S, _P], _R]) -> Callable[Concatenate[_S, _P], _R]:
     """Return a method for one thread at a time, which raises DeviceError after `close`."""
 
     def locked(self: _S, /, *args: _P.args, **named: _P.kwargs) -> _R:
+        inside = self._inside
         with self._lock:
-            if self._closed:
-                raise DeviceError(f"this {type(self).__name__} is closed; make another one")
+            self._check(inside)
             return method(self, *args, **named)
 
     functools.update_wrapper(locked, method)
     return locked
+
+
+class Stop:
+    """Whether what is being done is to stop.
+
+    As threading.Event, but without a lock: a signal's handler would wait for ever where it has
+    interrupted who holds it.
+    """
+
+    def __init__(self) -> None:
+        self._wanted = False
+
+    def set(self) -> None:
+        """Let it stop."""
+        self._wanted = True
+
+    def clear(self) -> None:
+        """Let it go on."""
+        self._wanted = False
+
+    def is_set(self) -> bool:
+        """Whether it is to stop."""
+        return self._wanted

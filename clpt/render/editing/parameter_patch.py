@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from typing import Any
 
 from clpt.render.editing.rebuild import ranges
@@ -18,10 +19,13 @@ from clpt.scene.materials import COMPOSITES, Material
 from clpt.scene.params import params
 
 
-def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> str | None:
+def patch(
+    on_device: DeviceScene, former: Scene, scene: Scene, begin: Callable[[], None]
+) -> str | None:
     """Enqueue the words in which a scene differs from the one on the device.
 
     They may differ in the camera, which must be of the same kind, and in values of materials.
+    begin: is called before the first word changes.
     Returns None, or, with nothing done, why more than that differs. Raises SceneError as `lower`
     does.
     """
@@ -49,6 +53,7 @@ def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> str | None:
         if changed is None:
             return f"parameters of a {new.kind} come from elsewhere, such as a texture or a table"
         rows += changed
+    begin()
     _write(on_device, camera, rows)
     return None
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -63,10 +63,16 @@ class _Staged:
     queue: dict[str, Any]
 
 
-def take(wavefronts: Sequence[Wavefront], lowered: Lowered, refit: bool = False) -> None:
+def take(
+    wavefronts: Sequence[Wavefront],
+    lowered: Lowered,
+    begin: Callable[[], None],
+    refit: bool = False,
+) -> None:
     """Render another lowering from now on.
 
-    wavefronts: all of a renderer, which share their scene; refit: refit the tree over triangles
+    wavefronts: all of a renderer, which share their scene; begin: is called before the first
+    change; refit: refit the tree over triangles
     that only moved, which is faster to do, and slower to trace where they went far. Programs are
     built if the features differ, trees if triangles or boxes do; of tables the words that differ
     are written. The picture is then that of a new renderer.
@@ -88,6 +94,7 @@ def take(wavefronts: Sequence[Wavefront], lowered: Lowered, refit: bool = False)
     changes = _changes(first, lowered, refit)
     with scene.buffers.all_or_nothing():
         staged = _stage(first, lowered, changes)
+    begin()
     replaced = _replaced(first, staged)
     _write_tables(scene, lowered, staged.tables)
     paths.set_settings(lowered.settings)
