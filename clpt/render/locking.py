@@ -41,14 +41,32 @@ class DeviceOwner:
         """Raise DeviceError where it cannot be used; inside: by what one of its methods calls."""
         self._check_open()
 
+    def _check_healing(self, inside: bool) -> None:
+        """Raise DeviceError where it cannot be made whole."""
+        self._check_open()
+
 
 def synchronized(method: Callable[Concatenate[_S, _P], _R]) -> Callable[Concatenate[_S, _P], _R]:
-    """Return a method for one thread at a time, which raises DeviceError after `close`."""
+    """Return a method for one thread at a time; it raises DeviceError after `close`, and where the
+    object is broken."""
 
     def locked(self: _S, /, *args: _P.args, **named: _P.kwargs) -> _R:
         inside = self._inside
         with self._lock:
             self._check(inside)
+            return method(self, *args, **named)
+
+    functools.update_wrapper(locked, method)
+    return locked
+
+
+def healing(method: Callable[Concatenate[_S, _P], _R]) -> Callable[Concatenate[_S, _P], _R]:
+    """Return a method as `synchronized` does, which makes what is broken whole again."""
+
+    def locked(self: _S, /, *args: _P.args, **named: _P.kwargs) -> _R:
+        inside = self._inside
+        with self._lock:
+            self._check_healing(inside)
             return method(self, *args, **named)
 
     functools.update_wrapper(locked, method)

@@ -27,7 +27,7 @@ from clpt.render.editing.scene_edit import (
     resolve_device_arrays,
 )
 from clpt.render.film.contents import Change, Contents
-from clpt.render.locking import Stop, synchronized
+from clpt.render.locking import Stop, healing, synchronized
 from clpt.render.lowering.bodies import matter_of
 from clpt.render.lowering.camera.surroundings import bodies_around, media_around
 from clpt.render.lowering.scene import Lowered, lower
@@ -346,6 +346,7 @@ class Renderer(Resumable):
             self._discards = True
         self._stop.set()
 
+    @healing
     def reset(
         self,
         wait_for: dev.Events = None,
@@ -365,19 +366,15 @@ class Renderer(Resumable):
             first_sample = _sample_number(first_sample)
         if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int)):
             raise SceneError(f"must be a whole number, not {seed!r}", where="seed")
-        inside = self._inside
-        with self._lock:
-            self._check_open()
-            broken = isinstance(self._contents, Change)
-            change = self.healing("reset", lambda _: self._emptied(recover=True), inside)
-            self.wavefronts[0].stream.after(wait_for)
-            with change:
-                if seed is not None:
-                    self.scene = dataclasses.replace(self.scene, seed=seed)
-                if first_sample is not None:
-                    self._first_sample = first_sample
-                self._contents = self._emptied(recover=broken)
-                return self._last
+        broken = isinstance(self._contents, Change)
+        self.wavefronts[0].stream.after(wait_for)
+        with self.healing("reset", lambda _: self._emptied(recover=True)):
+            if seed is not None:
+                self.scene = dataclasses.replace(self.scene, seed=seed)
+            if first_sample is not None:
+                self._first_sample = first_sample
+            self._contents = self._emptied(recover=broken)
+        return self._last
 
     @property
     def _last(self) -> cl.Event:

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import datetime
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from types import TracebackType
 
@@ -63,6 +64,18 @@ class Change:
     def begin(self) -> None:
         """Note that from now on the film is not what it was."""
         self._began = True
+
+    @contextmanager
+    def beginning_unless(self, *refusals: type[BaseException]) -> Iterator[None]:
+        """Begin when what is inside ends, but not where one of these ends it: nothing changes."""
+        try:
+            yield
+        except refusals:
+            raise
+        except BaseException:
+            self.begin()
+            raise
+        self.begin()
 
     def __enter__(self) -> Change:
         self._owner._contents = self
@@ -142,18 +155,19 @@ class FilmOwner(DeviceOwner):
         """
         return Change(self, what, self.contents, finish, heals)
 
-    def healing(
-        self, what: str, finish: Callable[[BaseException], Contents], inside: bool
-    ) -> Change:
+    def healing(self, what: str, finish: Callable[[BaseException], Contents]) -> Change:
         """Return a change as `change` does, also of what is broken."""
         now = self._contents
-        if not isinstance(now, Change):
-            return Change(self, what, now, finish, heals=True)
-        if inside:
-            raise now.unfinished()
-        if not now.heals:
-            raise now.failure()
-        return Change(self, what, now.former, finish, heals=True)
+        former = now.former if isinstance(now, Change) else now
+        return Change(self, what, former, finish, heals=True)
+
+    def _check_healing(self, inside: bool) -> None:
+        super()._check_healing(inside)
+        if isinstance(self._contents, Change):
+            if inside:
+                raise self._contents.unfinished()
+            if not self._contents.heals:
+                raise self._contents.failure()
 
     def _check(self, inside: bool) -> None:
         super()._check(inside)
