@@ -506,16 +506,34 @@ class Renderer(Resumable):
         if camera is not None:
             new = dataclasses.replace(new, camera=camera)
         parameters_only = quick and not transforms and not vertices
-        with self.change("update", heals=False) as change:
-            if not (parameters_only and self._patch(new, change.begin)):
-                shown, remarks = between(self.scene, new) if motion else (new, [])
-                self._rebuild(shown, events, change.begin, refit=scene is None)
-                self.warnings += remarks
-                self._blurred = motion
-            self.scene = new
-            self._successors.note(replaced)
-            self._contents = self._emptied()
+        write = self._patch(new) if parameters_only else None
+        warnings = self.warnings
+        if write is None:
+            shown, remarks = between(self.scene, new) if motion else (new, [])
+            write, warnings = self._rebuild(shown, events, refit=scene is None)
+            warnings += remarks
+        self._take(write, new, replaced, warnings, motion=motion)
         return self._last
+
+    def _take(
+        self,
+        write: Callable[[], None],
+        scene: Scene,
+        replaced: Replacements,
+        warnings: list[str],
+        *,
+        motion: bool,
+    ) -> None:
+        """Render another scene from now on; write: brings it to the device, twice if it must."""
+
+        def put(_: BaseException | None = None) -> Contents:
+            write()
+            self.scene, self.warnings, self._blurred = scene, warnings, motion
+            self._successors.note(replaced)
+            return self._emptied()
+
+        with self.change("update", put, heals=False):
+            self._contents = put()
 
     def _lower(self, scene: Scene, former: Lowered | None = None) -> Lowered:
         """Return the tables of a scene; former: of the scene before it."""
@@ -549,14 +567,15 @@ class Renderer(Resumable):
             self._contents = self._emptied()
         return True
 
-    def _patch(self, scene: Scene, begin: Callable[[], None]) -> bool:
-        """Write the words of parameters that differ; return whether nothing else does."""
+    def _patch(self, scene: Scene) -> Callable[[], None] | None:
+        """Return what writes the words of parameters that differ, None if more does."""
         if self._enters_a_medium(scene):
-            return False
-        refusal = parameter_patch.patch(self.wavefronts[0].scene, self.scene, scene, begin)
-        if refusal is not None:
-            log.debug("words alone do not change the scene: %s", refusal)
-        return refusal is None
+            return None
+        found = parameter_patch.patch(self.wavefronts[0].scene, self.scene, scene)
+        if isinstance(found, str):
+            log.debug("words alone do not change the scene: %s", found)
+            return None
+        return found
 
     def _enters_a_medium(self, scene: Scene) -> bool:
         """Whether the camera or a light of a changed scene may be in other media than before."""
@@ -571,9 +590,9 @@ class Renderer(Resumable):
         return bodies_around(readable, matter_of, lowered.cache) != lowered.around
 
     def _rebuild(
-        self, scene: Scene, events: list[cl.Event], begin: Callable[[], None], refit: bool
-    ) -> None:
-        """Lower a scene and render it from now on; see `rebuild.take`.
+        self, scene: Scene, events: list[cl.Event], refit: bool
+    ) -> tuple[Callable[[], None], list[str]]:
+        """Lower a scene; return what lets it be rendered, see `rebuild.prepare`, and its warnings.
 
         events: that arrays on the device wait for, which may be read.
         """
@@ -581,9 +600,13 @@ class Renderer(Resumable):
             dev.wait(event)
         first = self.wavefronts[0]
         lowered = self._lower(scene, first.scene.lowered)
-        rebuild.take(self.wavefronts, lowered, begin, refit)
-        self._moving = None
-        self.warnings = list(lowered.warnings)
+        take = rebuild.prepare(self.wavefronts, lowered, refit)
+
+        def write() -> None:
+            take()
+            self._moving = None
+
+        return write, list(lowered.warnings)
 
     @property
     @synchronized

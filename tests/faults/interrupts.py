@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 import clpt
 from clpt.render.film import film_file
+from clpt.render.lowering.geometry import shapes as placing
 from clpt.render.wavefront.film_state import FilmState, Ranges
 from tests.renders.support import with_film
 
@@ -195,7 +196,9 @@ def changes(trial: Trial) -> dict[str, Callable[[], Any]]:
     renderer.reset()
     renderer.run(3)
     renderer.save_state(path)
-    wider = dataclasses.replace(scene.camera)
+    same = dataclasses.replace(scene.camera)
+    shape = next(shape for shape in scene.shapes if shape.emission is None)
+    place = placing.placement(shape)
     return {
         "run": lambda: trial.renderer.run(4),
         "step": lambda: trial.renderer.step(4),
@@ -204,25 +207,31 @@ def changes(trial: Trial) -> dict[str, Callable[[], Any]]:
         "prepare": lambda: trial.renderer.prepare(),
         "load_state": lambda: trial.renderer.load_state(path),
         "save_state": lambda: trial.renderer.save_state(trial.folder / "b.film"),
-        "update": lambda: trial.renderer.update(camera=wider),
+        "update of the camera": lambda: trial.renderer.update(camera=same),
+        "update of the scene": lambda: trial.renderer.update(scene=scene),
+        "update of a place": lambda: trial.renderer.update(transforms={shape: place}),
     }
 
 
-def every_line(trial: Trial, name: str, act: Callable[[], Any], stride: int = 1) -> int:
-    """Raise an error at every `stride`-th line of an act, and check; return how many there are."""
-    line, last = 1, None
-    while last is None or line <= last:
+def every_line(trial: Trial, name: str, act: Callable[[], Any], most: int) -> int:
+    """Raise an error at every line of an act, or at so many of them, and check each.
+
+    Returns how many lines there are.
+    """
+    trial.renderer.run(2)
+    with raising_at(0) as count:
+        act()
+    trial.renderer.reset()
+    for line in range(1, count[0] + 1, max(1, count[0] // most)):
+        what = f"{name}, whole"
         trial.renderer.run(2)
-        with raising_at(line) as count:
+        with raising_at(line):
             try:
                 act()
             except Injected as error:
                 what = f"{name}, {error}"
-            else:
-                last, what = count[0], f"{name}, whole"
         trial.check(what)
-        line += stride
-    return last
+    return count[0]
 
 
 def signals(trial: Trial, count: int, seed: int = 0) -> int:
@@ -255,7 +264,7 @@ def main() -> None:
         trial = Trial(lambda options=options: clpt.Renderer(scene, slots=128, **options))
         start = time.perf_counter()
         for name, act in changes(trial).items():
-            lines = every_line(trial, name, act)
+            lines = every_line(trial, name, act, 200 if "scene" in name else 2000)
             print(options, name, lines, "lines", dict(trial.outcomes), flush=True)
             trial.outcomes.clear()
         caught = signals(trial, int(sys.argv[1]))

@@ -19,15 +19,12 @@ from clpt.scene.materials import COMPOSITES, Material
 from clpt.scene.params import params
 
 
-def patch(
-    on_device: DeviceScene, former: Scene, scene: Scene, begin: Callable[[], None]
-) -> str | None:
-    """Enqueue the words in which a scene differs from the one on the device.
+def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> Callable[[], None] | str:
+    """Return what enqueues the words in which a scene differs from the one on the device.
 
-    They may differ in the camera, which must be of the same kind, and in values of materials.
-    begin: is called before the first word changes.
-    Returns None, or, with nothing done, why more than that differs. Raises SceneError as `lower`
-    does.
+    They may differ in the camera, which must be of the same kind, and in values of materials; else
+    this returns why more than that differs. What is returned may be called again where an error
+    has ended it. Raises SceneError as `lower` does.
     """
     lowered = on_device.lowered
     pairs = [] if scene.shapes is former.shapes else _pairs(former, scene)
@@ -53,9 +50,7 @@ def patch(
         if changed is None:
             return f"parameters of a {new.kind} come from elsewhere, such as a texture or a table"
         rows += changed
-    begin()
-    _write(on_device, camera, rows)
-    return None
+    return lambda: _write(on_device, camera, rows)
 
 
 def _reflects(camera: Camera) -> tuple[bool, bool]:

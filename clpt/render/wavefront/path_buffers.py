@@ -199,7 +199,7 @@ class PathBuffers:
         return changed
 
     def _set(self, settings: NDArray[np.void]) -> None:
-        if settings != self.settings:
+        if settings.tobytes() != self.settings.tobytes():  # numpy swallows Ctrl-C in a !=
             self.stream.write(self._fixed["settings"], _words(settings))
             self.settings = settings
 
