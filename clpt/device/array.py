@@ -13,7 +13,7 @@ from pyopencl.array import Array
 from . import dlpack, forking
 from .refusals import refused, wait
 
-_changing = threading.Lock()  # held while a list of events is changed
+_changing = forking.renewed(threading.Lock())  # held while a list of events is changed
 
 
 class EventsCopy(list[cl.Event]):

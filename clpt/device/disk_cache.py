@@ -19,6 +19,7 @@ from pathlib import Path
 import platformdirs
 
 from clpt import output_files
+from clpt.device import forking
 
 from .source import Source
 
@@ -29,7 +30,7 @@ _PARTS = ("programs", "failed")  # the folders that are kept within LIMIT
 _STEP = LIMIT // 16  # bytes that a process writes before it looks at the folder's size again
 _STALE = 3600.0  # [s] after which a file that is not complete belongs to a process that has died
 
-_lock = threading.Lock()
+_lock = forking.renewed(threading.Lock())
 _written = _STEP  # bytes since the folder's size was looked at: a process looks at its first file
 
 

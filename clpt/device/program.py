@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pyopencl as cl
 
+from . import forking
 from .refusals import refused
 
 _SCALARS = {
@@ -70,7 +71,7 @@ class Program:
     def __init__(self, name: str, cl_program: cl.Program, signatures: Signatures):
         self.name, self.cl_program, self.signatures = name, cl_program, signatures
         self._borrowed: dict[str, BoundKernel] = {}
-        self._borrowing = threading.Lock()
+        self._borrowing = forking.renewed(threading.Lock())
 
     def kernel(self, name: str) -> Kernel:
         """Return the kernel of that name. Raises KeyError, which lists the kernels."""

@@ -22,6 +22,7 @@ from ..device import (
     Stream,
     assemble,
     build,
+    forking,
     supersede,
     wait,
 )
@@ -105,7 +106,7 @@ class Queries:
             raise SceneError(f"{layout!r} is none of {', '.join(TREES)}", where="layout")
         self._memory = queue.context, self.device.info.is_cpu
         self._stream = Stream(queue)
-        self._lock = threading.RLock()
+        self._lock = forking.renewed(threading.RLock())
         self._kernels: dict[str, BoundKernel] = {}
         self._interleaved = False  # whether a work-item traces several rays at once
         self._trees: dict[str, cl.Buffer] | None = {}

@@ -7,6 +7,7 @@ import threading
 from collections.abc import Callable
 from typing import Concatenate, NoReturn, ParamSpec, TypeVar
 
+from clpt.device import forking
 from clpt.errors import DeviceError
 
 _P = ParamSpec("_P")
@@ -18,7 +19,7 @@ class DeviceOwner:
     """Base of objects on a device, whose `synchronized` methods exclude each other."""
 
     def __init__(self) -> None:
-        self._lock = threading.RLock()  # a callback may call back
+        self._lock = forking.renewed(threading.RLock())  # a callback may call back
         self._closed = False
 
     def __reduce__(self) -> NoReturn:

@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from types import TracebackType
 
+from clpt.device import Device, forking
 from clpt.errors import DeviceError
 from clpt.render.film.saved_film import Session
 from clpt.render.locking import DeviceOwner
@@ -168,6 +169,16 @@ class FilmOwner(DeviceOwner):
                 raise self._contents.unfinished()
             if not self._contents.heals:
                 raise self._contents.failure()
+
+    @property
+    def devices(self) -> tuple[Device, ...]:
+        """Where it renders."""
+        raise NotImplementedError
+
+    def _check_open(self) -> None:
+        super()._check_open()
+        for device in self.devices:
+            forking.check(device.queue)
 
     def _check(self, inside: bool) -> None:
         super()._check(inside)
