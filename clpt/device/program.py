@@ -5,16 +5,17 @@ from __future__ import annotations
 import json
 import re
 import threading
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pyopencl as cl
 
 from . import forking
 from .refusals import refused
+
+_R = TypeVar("_R")
 
 _SCALARS = {
     "char": np.int8,
@@ -80,13 +81,15 @@ class Program:
             raise KeyError(f"program {self.name!r} has no kernel {name!r}; it has {known}")
         return Kernel(self, name)
 
-    @contextmanager
-    def borrow_kernel(self, name: str, **named: Any) -> Iterator[BoundKernel]:
-        """Lend a kernel with its arguments, to enqueue; it is made the first time only.
+    def lend_kernel(
+        self, name: str, named: Mapping[str, Any], use: Callable[[BoundKernel], _R]
+    ) -> _R:
+        """Lend a kernel with its arguments to `use`, which enqueues it; return what that returns.
 
-        PyOpenCL takes half a millisecond to make one. Another thread waits meanwhile. Raises as
-        `kernel` and `Kernel.bind` do.
+        It is made the first time only: PyOpenCL takes half a millisecond to make one. Another
+        thread waits meanwhile. Raises as `kernel` and `Kernel.bind` do.
         """
+        # No generator: one that an interrupt leaves in the middle holds the lock till it is freed.
         with self._borrowing:
             bound = self._borrowed.get(name)
             if bound is None:
@@ -96,7 +99,7 @@ class Program:
             else:
                 bound.bind(**named)
             try:
-                yield bound
+                return use(bound)
             finally:
                 bound.drop_buffers()
 

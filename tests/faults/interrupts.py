@@ -39,10 +39,13 @@ class Injected(BaseException):
 
 
 @functools.cache
-def ends_of_withs(code: CodeType) -> frozenset[int]:
-    """Where a `with` ends well in a function: a tracer sees its line again, but there no signal
-    comes before what it holds is given back."""
+def safe_places(code: CodeType) -> frozenset[int]:
+    """Where no signal is raised in a function, though a tracer sees a line begin.
+
+    At the end of a `with`, before what it holds is given back, and at the word `try`.
+    """
     found, steps = set(), list(dis.get_instructions(code))
+    found.update(one.offset for one in steps if one.opname == "NOP")
     for i in range(len(steps) - 2):
         names = [(one.opname, one.argval) for one in steps[i : i + 3]]
         if names in ([("LOAD_CONST", None)] * 3, [("LOAD_CONST", None), *[("DUP_TOP", None)] * 2]):
@@ -62,7 +65,7 @@ def raising_at(line: int, error: type[BaseException] = Injected) -> Iterator[lis
         name = frame.f_code.co_filename
         if not name.startswith(CODE):
             return None
-        if event == "line" and frame.f_lasti not in ends_of_withs(frame.f_code):
+        if event == "line" and frame.f_lasti not in safe_places(frame.f_code):
             count[0] += 1
             if count[0] == line:
                 raise error(f"line {frame.f_lineno} of {Path(name).name}")
@@ -181,8 +184,8 @@ class Trial:
 
 
 def small(scene: clpt.Scene) -> clpt.Scene:
-    """A scene with a small film."""
-    return with_film(scene, mode="rgb", width=16, height=12)
+    """A scene with a small film, whose pixels may differ in their numbers of samples."""
+    return dataclasses.replace(with_film(scene, mode="rgb", width=16, height=12), noise=0.2)
 
 
 def changes(trial: Trial) -> dict[str, Callable[[], Any]]:
@@ -197,10 +200,11 @@ def changes(trial: Trial) -> dict[str, Callable[[], Any]]:
     renderer.run(3)
     renderer.save_state(path)
     same = dataclasses.replace(scene.camera)
-    shape = next(shape for shape in scene.shapes if shape.emission is None)
+    shape = next(shape for shape in scene.shapes if shape.name == "floor")
     place = placing.placement(shape)
     return {
         "run": lambda: trial.renderer.run(4),
+        "run by noise": lambda: trial.renderer.run(NUMBERS - 2, noise=0.2),
         "step": lambda: trial.renderer.step(4),
         "merge": lambda: trial.renderer.merge(state),
         "reset": lambda: trial.renderer.reset(),
@@ -209,7 +213,7 @@ def changes(trial: Trial) -> dict[str, Callable[[], Any]]:
         "save_state": lambda: trial.renderer.save_state(trial.folder / "b.film"),
         "update of the camera": lambda: trial.renderer.update(camera=same),
         "update of the scene": lambda: trial.renderer.update(scene=scene),
-        "update of a place": lambda: trial.renderer.update(transforms={shape: place}),
+        "update of a place": lambda: trial.renderer.update(transforms={shape.name: place}),
     }
 
 

@@ -59,7 +59,7 @@ class Change:
         self._owner, self._what, self.former = owner, what, former
         self.heals, self._finish = heals, finish
         self._began = finish is not None
-        self._error: BaseException | None = None
+        self._cause = ""  # no exception: that would keep all that its traceback refers to
         self.over = False
 
     def begin(self) -> None:
@@ -93,7 +93,10 @@ class Change:
         if not self._began:
             self._owner._contents = self.former
             return
-        self._error, self.over = error, True
+        self.over = True
+        if error is not None:
+            words = " ".join(str(error).split())[:LONGEST]
+            self._cause = f" by {type(error).__name__}" + (f" ({words})" if words else "")
         if self._finish is None or error is None:
             return
         try:
@@ -103,12 +106,11 @@ class Change:
 
     def failure(self) -> DeviceError:
         """The error of every use after a change that did not end."""
-        name, cause = type(self._owner).__name__, ""
-        if self._error is not None:
-            words = " ".join(str(self._error).split())[:LONGEST]
-            cause = f" by {type(self._error).__name__}" + (f" ({words})" if words else "")
+        name = type(self._owner).__name__
         advice = "reset it or make another one" if self.heals else "make another one"
-        return DeviceError(f"this {name} is broken: its {self._what} was stopped{cause}; {advice}")
+        return DeviceError(
+            f"this {name} is broken: its {self._what} was stopped{self._cause}; {advice}"
+        )
 
     def unfinished(self) -> DeviceError:
         """The error of who is called by a change, and asks what it will bring."""

@@ -20,8 +20,7 @@ nothing is decided ahead.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -196,13 +195,18 @@ class Adaptive:
         overrun = guide_cells & (self.next < look)  # finished, and still a guide
         lights = self._lights if self._lights is not None and self._lights.open else None
         self._tracer.gather()
-        with self._film_restored(lights is not None or bool(overrun.any())):
+        if lights is not None or overrun.any():
+            self._copy_film()
+        try:
             if lights is not None and not lights.measure(look, on_batch):
                 return False
             if not self._sample(np.where(overrun, look, 0), on_batch):
                 return False
             self._tracer.gather()
             self._measure(guide_cells)
+        finally:
+            if self._has_guides:
+                self._restore_film()
         self._decide(self.noise)
         return True
 
@@ -248,12 +252,8 @@ class Adaptive:
         wanted = np.ceil(np.where(sure, needed, 0.0) / step) * step
         self.stop[sure] = np.maximum(wanted, measured_at)[sure]
 
-    @contextmanager
-    def _film_restored(self, wanted: bool) -> Iterator[None]:
-        """Give the film back the samples that it had before, if that is wanted."""
-        if not wanted:
-            yield
-            return
+    def _copy_film(self) -> None:
+        """Keep what the film holds, for `_restore_film`."""
         stream, film = self.wavefront.stream, self.wavefront.film
         for name, sums in film.sums.items():
             if name not in self._film_copies:
@@ -261,10 +261,6 @@ class Adaptive:
                 self._film_copies[name] = self.wavefront.buffers.allocate(what, sums.size)
             stream.copy(self._film_copies[name], sums)
         self._has_guides = True
-        try:
-            yield
-        finally:
-            self._restore_film()
 
     def _restore_film(self) -> None:
         """Give the film back the samples that it had before."""
