@@ -75,5 +75,5 @@ class Building:
         program = self._programs.get(root)
         if program is None:
             program = self._programs[root] = build_program(self.device, _source(root))
-        with program.borrow_kernel(kernel, **arguments) as bound:
-            self.stream.run(bound, (-(-n // group) * group,), (group,))
+        size = (-(-n // group) * group,)
+        program.lend_kernel(kernel, arguments, lambda bound: self.stream.run(bound, size, (group,)))

@@ -10,13 +10,16 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import replace
+from queue import Empty, SimpleQueue
 from typing import NoReturn
 
 from clpt.cluster.blocks import Block, Blocks, WorkerRecord
 from clpt.cluster.device_worker import DeviceWorker, added
 from clpt.cluster.sample_ranges import gaps
 from clpt.errors import ClusterError
+from clpt.render.locking import Stop
 from clpt.render.wavefront.film_state import FilmState, Ranges, join_ranges
 from clpt.render.wavefront.tracer import Selection, use_all_pixels
 from clpt.render.wavefront.wavefront import Counts
@@ -41,14 +44,19 @@ class Crew:
     picture beside its own samples, if there is one. stop: ends what is being done.
     """
 
-    def __init__(self, workers: Iterable[DeviceWorker], stop: threading.Event):
+    def __init__(self, workers: Iterable[DeviceWorker], stop: Stop):
         self.workers, self.stop = list(workers), stop
         self.failed: list[tuple[DeviceWorker, BaseException]] = []
         self.saved: FilmState | None = None
         self.saved_ranges: Ranges = ()
         self.lost: list[tuple[Selection, int, int]] = []
         self.keeper: DeviceWorker | None = None
-        self._changed = threading.Condition()
+        # Ctrl-C may come while the main thread takes a Condition, and leave it taken for ever; a
+        # lock and a queue of the interpreter it cannot.
+        self._lock = threading.RLock()
+        self._changed = threading.Condition(self._lock)
+        self._news: SimpleQueue[None] = SimpleQueue()  # for who waits for all devices
+        self._threads: list[threading.Thread] = []
         self._ending = False
         self._past = [Counts() for _ in self.workers[0].past]  # of devices that failed
 
@@ -144,7 +152,7 @@ class Crew:
 
     def drop(self, worker: DeviceWorker, error: BaseException) -> None:
         """Leave a device out from now on."""
-        with self._changed:
+        with self._lock:
             if worker not in self.workers:
                 return
             self.workers.remove(worker)
@@ -154,7 +162,7 @@ class Crew:
             else:
                 self.lost += worker.unsaved
             self._past = [added(*pair) for pair in zip(self._past, worker.past, strict=True)]
-            self._changed.notify_all()
+            self._tell()
         others = "others do its part" if self.workers else "no other is left"
         log.warning("%s failed and is left out, %s: %s", worker.name, others, error)
 
@@ -176,23 +184,20 @@ class Crew:
             blocks.workers[worker] = WorkerRecord(
                 worker.name, worker.rate / selection.pixels, size=size
             )
-        threads = [
+        self._threads = [
             threading.Thread(target=self._work, args=(worker, blocks, selection), daemon=True)
             for worker in self.workers
         ]
         try:
-            for thread in threads:
+            for thread in self._threads:
                 thread.start()
             while not self._over(blocks):
-                with self._changed:
-                    if not self._over(blocks):
-                        self._changed.wait(TICK)
+                with suppress(Empty):
+                    self._news.get(timeout=TICK)
                 if not tick():
                     break
         finally:
-            self._end()
-            for thread in threads:
-                thread.join()
+            self.rest()
         if self.keeper is not None and self.keeper not in self.workers:
             raise LostPicture
         tick()
@@ -203,10 +208,19 @@ class Crew:
     def _over(self, blocks: Blocks) -> bool:
         return self._ending or self.stop.is_set() or blocks.done or not self.workers
 
-    def _end(self) -> None:
-        with self._changed:
+    def rest(self) -> None:
+        """Let devices end what they do, and wait for them."""
+        with self._lock:
             self._ending = True
-            self._changed.notify_all()
+            self._tell()
+        for thread in self._threads:
+            if thread.ident is not None:  # it was started
+                thread.join()
+
+    def _tell(self) -> None:
+        """Wake up all who wait for a change."""
+        self._changed.notify_all()
+        self._news.put(None)
 
     def _work(self, worker: DeviceWorker, blocks: Blocks, selection: Selection) -> None:
         """Take blocks until none is left: a device's thread."""
@@ -224,7 +238,7 @@ class Crew:
             self.drop(worker, error)
             with self._changed:
                 blocks.lose(worker)
-                self._changed.notify_all()
+                self._tell()
 
     def _goes_on(self) -> bool:
         return not (self._ending or self.stop.is_set())
@@ -256,13 +270,13 @@ class Crew:
                 blocks.finish(worker, block, time.perf_counter(), seconds=seconds)
                 worker.paths += block.samples * selection.pixels
                 worker.rate = blocks.workers[worker].rate * selection.pixels
-            self._changed.notify_all()
+            self._tell()
 
     def _save(self, worker: DeviceWorker) -> None:
         """Add a device's film to the one on the host."""
         ranges = worker.ranges
         state = worker.take()
-        with self._changed:
+        with self._lock:
             given = replace(state, taken=ranges)
             self.saved = given if self.saved is None else self.saved.merged(given)
             self.saved_ranges = self.saved.taken

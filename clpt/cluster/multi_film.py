@@ -15,11 +15,13 @@ from clpt.cluster.crew import Crew
 from clpt.cluster.device_worker import DeviceWorker
 from clpt.cluster.multi_noise import AdaptiveCrew
 from clpt.errors import ClusterError, DeviceError, MemoryBudgetError, SceneError
+from clpt.render.film.contents import Contents
 from clpt.render.film.film_keeping import FilmKeeping
 from clpt.render.film.saved_film import Origin, PictureForm, SavedFilm, Session
+from clpt.render.locking import synchronized
 from clpt.render.pictures import Image, Pictures
 from clpt.render.wavefront.adaptive import Adaptive
-from clpt.render.wavefront.film_state import FilmState, Ranges
+from clpt.render.wavefront.film_state import FilmState
 from clpt.render.wavefront.wavefront import Counts, Wavefront
 
 log = logging.getLogger(__name__)
@@ -61,50 +63,56 @@ class MultiFilm(FilmKeeping, Pictures):
 
     def __init__(self) -> None:
         super().__init__()
-        self._taken: Ranges = ()
         self._noise: AdaptiveCrew | None = None
         self._telling = False  # whether devices are at work
         self._held: SavedFilm | _Held | None = None
-        self._sessions: tuple[Session, ...] = ()  # before
         self._seconds_rendered = 0.0  # since the film was empty, or gone on with
+
+    @property
+    def _sessions(self) -> tuple[Session, ...]:  # type: ignore[override]
+        return self._known.sessions
 
     @property
     @abstractmethod
     def counts(self) -> tuple[Counts, ...]:
         """What has happened so far, of each film."""
 
+    @synchronized
     def film_state(self) -> FilmState:
         """Return the film of all devices, as whole numbers; see `Renderer.film_state`.
 
         When all devices have failed it is what was saved of them.
         """
-        with self._lock:
-            self._check_open()
-            if self._noise is not None and not self._crew.workers:
-                return self._noise.base
-            if self._noise is not None:
-                state = self._on_first(lambda first: first.renderer.film_state())
-                return dataclasses.replace(state, taken=self._taken)
-            if self._crew.workers:
-                self._crew.save()
-            if self._crew.saved is not None:
-                return self._crew.saved
-            return self._on_first(lambda first: first.renderer.film_state())
+        taken = self.contents.taken
+        if self._noise is not None and not self._crew.workers:
+            return self._noise.base
+        if self._noise is not None:
+            state = self._on_first(lambda first: first.renderer.film_state())
+            return dataclasses.replace(state, taken=taken)
+        if self._crew.workers:
+            self._crew.save()
+        if self._crew.saved is not None:
+            return self._crew.saved
+        return self._on_first(lambda first: first.renderer.film_state())
 
+    @synchronized
     def merge(self, state: FilmState) -> None:
         """Add the samples of another film of the same scene to this one; see `Renderer.merge`."""
-        with self._lock:
-            merged = self.film_state().merged(state)
+        merged = self.film_state().merged(state)
+
+        def put(_: BaseException | None = None) -> Contents:
             self._forget()
             self._crew.saved, self._crew.saved_ranges = merged, merged.taken
-            self._taken = merged.taken
+            return Contents(merged.taken)
+
+        with self.change("merge", put):
+            self._contents = put()
 
     @property
+    @synchronized
     def wavefronts(self) -> list[Wavefront]:  # type: ignore[override]
         """Those of the first device, whose films then hold the picture of all."""
-        with self._lock:
-            self._check_open()
-            return self._on_first(lambda first: first.renderer.wavefronts)
+        return self._on_first(lambda first: first.renderer.wavefronts)
 
     def image(self) -> Image:
         """The picture so far of all devices; see `Renderer.image`."""
@@ -132,35 +140,37 @@ class MultiFilm(FilmKeeping, Pictures):
     @property
     def first_sample(self) -> int:
         """The number of the first sample of the film, or of the first one to come."""
-        return self._taken[0][0] if self._taken else self._first_sample
+        taken = self._known.taken
+        return taken[0][0] if taken else self._first_sample
 
     def origin(self) -> Origin:
         """Return what the samples are of. Raises SceneError for a scene that cannot be read."""
         return self._crew.first.renderer.origin()
 
+    @synchronized
     def hold(self) -> None:
         """Keep a copy of the film as it is now, for `saved_film`; see `Renderer.hold`.
 
         Each device keeps what only it has, in its own memory.
         """
-        with self._lock:
-            crew = self._crew
-            workers = [w for w in crew.workers if w.unsaved or w is crew.keeper]
-            saved = crew.saved if crew.keeper is None else None
-            if not workers and saved is None:
-                workers = [crew.first]  # an empty film
-            try:
-                if crew.has_losses:
-                    raise ClusterError("a device has failed: others do its part first")
-                for worker in workers:
-                    worker.hold()
-                self._held = _Held(workers, saved, self._so_far(crew.first))
-            except MemoryBudgetError:
-                raise
-            except Exception as error:
-                log.debug("a film cannot be held on devices: %s", error)
-                self._held = self.saved_film()
+        self._held, crew = None, self._crew
+        workers = [w for w in crew.workers if w.unsaved or w is crew.keeper]
+        saved = crew.saved if crew.keeper is None else None
+        if not workers and saved is None:
+            workers = [crew.first]  # an empty film
+        try:
+            if crew.has_losses:
+                raise ClusterError("a device has failed: others do its part first")
+            for worker in workers:
+                worker.hold()
+            self._held = _Held(workers, saved, self._so_far(crew.first))
+        except MemoryBudgetError:
+            raise
+        except Exception as error:
+            log.debug("a film cannot be held on devices: %s", error)
+            self._held = self.saved_film()
 
+    @synchronized
     def saved_film(self, *, held: bool = False) -> SavedFilm:
         """Return the film with all that it takes to go on with it; see `Renderer.saved_film`.
 
@@ -175,13 +185,15 @@ class MultiFilm(FilmKeeping, Pictures):
         state, so_far = self._on_first(
             lambda first: (first.renderer.film_state(), self._so_far(first))
         )
-        return self._film_with(dataclasses.replace(state, taken=self._taken), so_far)
+        return self._film_with(dataclasses.replace(state, taken=self.contents.taken), so_far)
 
     def _so_far(self, first: DeviceWorker) -> dict[str, Any]:
         """What changes while samples are taken, but for the film's words."""
-        renderer = first.renderer
-        renderer._taken, renderer._adaptive = self._taken, self._adaptive
-        renderer._sessions, renderer._seconds_rendered = self._sessions, self._seconds_rendered
+        renderer, now = first.renderer, self.contents
+        renderer._contents = dataclasses.replace(
+            renderer.contents, taken=now.taken, adaptive=self._adaptive, sessions=now.sessions
+        )
+        renderer._seconds_rendered = self._seconds_rendered
         counts = tuple(dict(vars(one)) for one in self.counts)
         return {**renderer.progress_so_far(), "counts": counts}
 
@@ -194,11 +206,12 @@ class MultiFilm(FilmKeeping, Pictures):
         try:
             return self._film_with(held.film(), held.so_far)
         except Exception as error:
-            if held.so_far["taken"] != self._taken:
+            if held.so_far["taken"] != self._known.taken:
                 message = f"a device has failed that had a part of the film: {error}"
                 raise SceneError(message) from error
         return self.saved_film()  # nothing was added since: others do its part
 
+    @synchronized
     def restore(self, saved: SavedFilm) -> None:
         """Go on from a saved film, as `load_state` does. Raises SceneError."""
 
@@ -206,9 +219,12 @@ class MultiFilm(FilmKeeping, Pictures):
             first.renderer.restore(saved)
             return first.renderer.film_state()
 
-        with self._lock:
-            self._go_on(self._on_first(load), saved)
-            self._sessions, self._seconds_rendered, self._held = saved.sessions, 0.0, None
+        with self.change("load_state") as change:
+            with change.beginning_unless(Exception):
+                state = self._on_first(load)
+            self._go_on(state, saved)
+            self._seconds_rendered, self._held = 0.0, None
+            self._contents = Contents(state.taken, None, saved.sessions)
 
     # ---- inside
 
@@ -224,42 +240,38 @@ class MultiFilm(FilmKeeping, Pictures):
         crew.empty(worker for worker in crew.workers if worker is not crew.first)
         crew.first.unsaved, crew.first.shows = [], True
         crew.clear_counts()
-        self._taken = state.taken
         if saved.adaptive:
             self._noise = self._adaptively(state, saved.adaptive)
         else:
             crew.saved, crew.saved_ranges = state, state.taken
 
     def _check_open(self) -> None:
-        if self._closed:
-            raise DeviceError("this MultiRenderer is closed; make another one")
+        super()._check_open()
         if self._telling:
             raise DeviceError("devices are at work; the picture is there when the run has ended")
 
     def _forget(self) -> None:
-        """Note that all films are empty."""
+        """Empty all films."""
         self._crew.empty(self._crew.workers)
         self._crew.saved, self._crew.saved_ranges, self._crew.keeper = None, (), None
         self._crew.lost.clear()
-        self._taken, self._noise = (), None
-        self._held, self._sessions, self._seconds_rendered = None, (), 0.0
+        self._held, self._noise, self._seconds_rendered = None, None, 0.0
 
     def _adaptively(self, base: FilmState, arrays: Mapping[str, NDArray[Any]]) -> AdaptiveCrew:
         """Begin adaptive sampling over a film; arrays: the state, if there is one."""
         return AdaptiveCrew(self._crew, base, self._first_sample, arrays)
 
+    @synchronized
     def _on_first(self, action: Callable[[DeviceWorker], _Result]) -> _Result:
         """Do something on the first device, whose film holds the picture; or else on the next."""
-        with self._lock:
-            self._check_open()
-            while True:
-                first = self._show()
-                try:
-                    return action(first)
-                except SceneError:
-                    raise
-                except Exception as error:
-                    self._crew.drop(first, error)
+        while True:
+            first = self._show()
+            try:
+                return action(first)
+            except SceneError:
+                raise
+            except Exception as error:
+                self._crew.drop(first, error)
 
     def _show(self) -> DeviceWorker:
         """Let the film of the first device hold the picture; return that device."""

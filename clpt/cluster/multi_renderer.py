@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -16,6 +15,8 @@ from clpt.cluster.multi_film import MultiFilm
 from clpt.cluster.multi_noise import CrewTracer
 from clpt.errors import DeviceError
 from clpt.render.editing.scene_edit import MaterialKey, ShapeKey
+from clpt.render.film.contents import Contents
+from clpt.render.locking import Stop, healing, synchronized
 from clpt.render.options import RenderOptions, check_options, check_scene
 from clpt.render.progress import Progress
 from clpt.render.renderer import next_range, texture_budget_of
@@ -81,7 +82,7 @@ class MultiRenderer(MultiFilm):
         self._first_sample = options.pop("first_sample", 0) or 0
         if options.get("texture_budget") is None:
             options["texture_budget"] = min(texture_budget_of(device) for device in chosen)
-        self._stop = threading.Event()
+        self._stop = Stop()
         shared, warnings = Once(), list[str]()
 
         def make(device: dev.Device) -> SharingRenderer:
@@ -160,7 +161,8 @@ class MultiRenderer(MultiFilm):
     @property
     def samples(self) -> int:
         """The number of the next sample; see `Renderer.samples`."""
-        return self._taken[-1][1] if self._taken else self._first_sample
+        taken = self._known.taken
+        return taken[-1][1] if taken else self._first_sample
 
     @property
     def active(self) -> float:
@@ -169,11 +171,12 @@ class MultiRenderer(MultiFilm):
 
     # ---- rendering
 
+    @synchronized
     def prepare(self) -> None:
         """Run every kernel of `run` once on each device; see `Renderer.prepare`."""
-        with self._lock:
-            self._on_each(lambda renderer: renderer.prepare())
+        self._on_each(lambda renderer: renderer.prepare())
 
+    @synchronized
     def run(
         self,
         samples: int,
@@ -186,33 +189,41 @@ class MultiRenderer(MultiFilm):
         progress is called in this thread; it cannot ask for the picture. Raises ClusterError too,
         when the last device has failed: `film_state` then has the samples that were saved.
         """
-        with self._lock:
-            self._check_open()
-            first, end = next_range(self.samples, samples)
-            if self._stop.is_set():  # before it began: nothing is taken
-                self._stop.clear()
-                return False
-            if noise is not None:
-                noise = adaptive.checked(noise, self._crew.first.renderer.wavefronts[0].features)
-            raised: list[BaseException] = []
-            tick = self._ticker(end, progress, raised)
-            finished, began = False, time.perf_counter()
-            try:
-                if noise is None and self._noise is None:
+        first, end = next_range(self.samples, samples)
+        if self._stop.is_set():  # before it began: nothing is taken
+            self._stop.clear()
+            return False
+        if noise is not None:
+            noise = adaptive.checked(noise, self._crew.first.renderer.wavefronts[0].features)
+            self._noise = self._noise or self._adaptively(self.film_state(), {})
+        raised: list[BaseException] = []
+        tick = self._ticker(end, progress, raised)
+        now, chosen, began = self.contents, self._noise, time.perf_counter()
+        more = dataclasses.replace(now, taken=join_ranges(now.taken, ((first, end),)))
+
+        def finish(error: BaseException) -> Contents:
+            self._crew.rest()
+            if chosen is None:
+                return dataclasses.replace(now, taken=self._crew.ranges)
+            if isinstance(error, Exception):
+                return more
+            raise error  # cells of some devices may be in no film
+
+        try:
+            with self.change("run", finish):
+                if chosen is None:
                     finished = self._crew.run(self._crew.whole, ((first, end),), tick)
+                    self._contents = dataclasses.replace(now, taken=self._crew.ranges)
                 else:
-                    self._noise = self._noise or self._adaptively(self.film_state(), {})
-                    finished = self._noise.run((first, end, noise), tick)
-            finally:
-                self._stop.clear()
-                self._seconds_rendered += time.perf_counter() - began
-                if self._noise is None:
-                    self._taken = self._crew.ranges
-                else:
-                    self._taken = join_ranges(self._taken, ((first, end),))
-            if raised:
-                raise raised.pop()
-            return finished
+                    finished = chosen.run((first, end, noise), tick)
+                    self._contents = more
+        finally:
+            self._telling = False
+            self._stop.clear()
+            self._seconds_rendered += time.perf_counter() - began
+        if raised:
+            raise raised.pop()
+        return finished
 
     def tracer(self) -> Tracer:
         """Return what adds selections of samples to the films of all devices."""
@@ -222,16 +233,24 @@ class MultiRenderer(MultiFilm):
         """Let the `run` of another thread, or else the next one, stop soon and return False."""
         self._stop.set()
 
+    @healing
     def reset(self, *, seed: int | None = None, first_sample: int | None = None) -> None:
         """Empty the film; the next sample is the first one again; see `Renderer.reset`."""
-        with self._lock:
-            self._check_open()
+
+        def put(_: BaseException | None = None) -> Contents:
+            self._crew.rest()
             self._on_each(lambda renderer: renderer.reset(seed=seed).wait())
             self._forget()
+            self._crew.use_all_pixels()
             self._crew.clear_counts()
             if first_sample is not None:
                 self._first_sample = first_sample
+            return Contents()
 
+        with self.healing("reset", put):
+            self._contents = put()
+
+    @synchronized
     def update(
         self,
         *,
@@ -246,20 +265,21 @@ class MultiRenderer(MultiFilm):
 
         Arrays are of numpy. The scene is lowered once for all devices.
         """
-        with self._lock:
-            self._check_open()
-            shared = Once()
+        shared = Once()
 
-            def change(renderer: SharingRenderer) -> None:
-                renderer.shared = shared
-                renderer.update(
-                    camera=camera, materials=materials, transforms=transforms, vertices=vertices,
-                    scene=scene, motion=motion,
-                ).wait()  # fmt: skip
+        def edit(renderer: SharingRenderer) -> None:
+            renderer.shared = shared
+            renderer.update(
+                camera=camera, materials=materials, transforms=transforms, vertices=vertices,
+                scene=scene, motion=motion,
+            ).wait()  # fmt: skip
 
-            self._on_each(change)
+        with self.change("update", heals=False) as change:
+            with change.beginning_unless(Exception):
+                self._on_each(edit)
             self._forget()
             self._crew.clear_counts()
+            self._contents = Contents()
 
     def close(self) -> None:
         """Give the memory of all devices back; see `Renderer.close`."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Iterable
 from typing import Any
 
 import pyopencl as cl
@@ -11,15 +13,42 @@ from pyopencl.array import Array
 from . import dlpack, forking
 from .refusals import refused, wait
 
+_changing = forking.renewed(threading.Lock())  # held while a list of events is changed
+
+
+class EventsCopy(list[cl.Event]):
+    """The events of an array as they were; shared: the list that it and its views have."""
+
+    def __init__(self, shared: list[cl.Event]):
+        super().__init__(shared)
+        self.shared = shared
+
 
 class DeviceArray(Array):
-    """A `pyopencl.array.Array` with `__array__` and DLPack.
+    """A `pyopencl.array.Array` with `__array__` and DLPack, which several threads may use.
 
     `numpy.asarray(array)` waits for the array's events and copies to the host. `__dlpack__` is for
     numpy.from_dlpack, torch.from_dlpack and jax.dlpack.from_dlpack. On a CPU they get host memory:
     a copy, unless they ask for none. On other devices they get OpenCL's memory, or a copy on the
     host if they ask for the CPU, as numpy.from_dlpack(array, device="cpu") does.
     """
+
+    # PyOpenCL hands this list to the driver and lets other threads run meanwhile: an event that one
+    # of them takes out of it is gone before the driver has read it. So each use has its own copy.
+    @property
+    def events(self) -> list[cl.Event]:
+        """The events that the content depends on, a copy of the list: `add_event` adds to it."""
+        return EventsCopy(self._events)
+
+    @events.setter
+    def events(self, events: list[cl.Event]) -> None:
+        self._events = events.shared if isinstance(events, EventsCopy) else events
+
+    def add_event(self, evt: cl.Event) -> None:
+        """Let what changes the array wait for an event too."""
+        with _changing:
+            before = list(self._events)  # what is dropped ends after the lock
+            self._events[:] = [*unfinished(before), evt]
 
     def get(self, *args: Any, **named: Any) -> Any:
         """Return a copy on the host, as `pyopencl.array.Array.get` does. Raises DeviceError."""
@@ -86,11 +115,21 @@ class DeviceArray(Array):
             raise refused("a mapping of an array", error, self.nbytes) from error
 
 
+def unfinished(events: Iterable[cl.Event]) -> list[cl.Event]:
+    """Return those events that have not ended."""
+    done = cl.command_execution_status.COMPLETE
+    return [event for event in events if event.command_execution_status > done]
+
+
 def supersede(array: Array, event: cl.Event) -> None:
     """Replace an array's events by one that came after them.
 
     Events of copies to the host that have not ended stay: PyOpenCL waits where it drops one.
     """
-    done = cl.command_execution_status.COMPLETE
-    copies = [e for e in array.events if isinstance(e, cl.NannyEvent)]
-    array.events[:] = [*(e for e in copies if e.command_execution_status > done), event]
+    with _changing:
+        before = array.events
+        shared = before.shared if isinstance(before, EventsCopy) else before
+        copies = [e for e in before if isinstance(e, cl.NannyEvent)]
+        dropped = list(shared)  # what is dropped ends after the lock
+        shared[:] = [*unfinished(copies), event]
+    del dropped

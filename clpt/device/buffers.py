@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 
 import numpy as np
 import pyopencl as cl
@@ -31,6 +30,23 @@ def host_buffer(context: cl.Context, flags: int, array: NDArray) -> cl.Buffer:
         return cl.Buffer(context, flags, hostbuf=array)
     except cl.Error as error:
         raise refused("a buffer", error, array.nbytes) from error
+
+
+class AllOrNothing:
+    """See `Buffers.all_or_nothing`.
+
+    It is no generator: one that an interrupt leaves in the middle would go on when it is freed.
+    """
+
+    def __init__(self, buffers: Buffers):
+        self._buffers, self._before = buffers, buffers.live()
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is not None:
+            self._buffers.release(*(self._buffers.live() - self._before))
 
 
 class Buffers:
@@ -93,15 +109,13 @@ class Buffers:
                 raise refused("a copy to the host", error, host.nbytes) from error
         return host
 
-    @contextmanager
-    def all_or_nothing(self) -> Iterator[None]:
-        """Free what is allocated inside, if an error ends it."""
-        before = set(self._live)
-        try:
-            yield
-        except BaseException:
-            self.release(*(set(self._live) - before))
-            raise
+    def all_or_nothing(self) -> AllOrNothing:
+        """For a `with`: free what is allocated inside, if an error ends it."""
+        return AllOrNothing(self)
+
+    def live(self) -> set[CountedBuffer]:
+        """All buffers that live."""
+        return set(self._live)
 
     def release(self, *buffers: cl.Buffer) -> None:
         """Free buffers."""

@@ -21,6 +21,7 @@ from pathlib import Path
 import platformdirs
 
 from clpt import output_files
+from clpt.device import forking
 
 from .source import Source
 
@@ -30,7 +31,7 @@ LIMIT = 2**30  # bytes
 _PARTS = ("programs", "failed")  # the folders that are kept within LIMIT
 _STEP = LIMIT // 16  # bytes that a process writes before it looks at the folder's size again
 
-_lock = threading.Lock()
+_lock = forking.renewed(threading.Lock())
 _written = _STEP  # bytes since the folder's size was looked at: a process looks at its first file
 
 

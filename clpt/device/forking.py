@@ -1,16 +1,29 @@
-"""What a forked process has lost: the threads of PoCL, without which its commands never end."""
+"""What a forked process has lost: other threads.
+
+Without those of PoCL its commands never end, and a lock that one of them held is never given back.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import os
+import weakref
 from pathlib import Path
+from typing import Any, TypeVar
 
 import pyopencl as cl
 
 from ..errors import DeviceError
 
 _lost = False  # whether PoCL was loaded when this process, or one it descends from, was forked
+_locks: weakref.WeakSet[Any] = weakref.WeakSet()
+_Lock = TypeVar("_Lock")
+
+
+def renewed(lock: _Lock) -> _Lock:
+    """Return a lock of threading, which nobody holds in a process that is forked later."""
+    _locks.add(lock)
+    return lock
 
 
 def check(queue: cl.CommandQueue) -> None:
@@ -29,5 +42,11 @@ def _note_loss() -> None:
         _lost = _lost or "libpocl" in Path("/proc/self/maps").read_text(errors="replace")
 
 
+def _renew_locks() -> None:
+    for lock in list(_locks):
+        lock._at_fork_reinit()  # as the locks of threading and logging are
+
+
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_note_loss)
+    os.register_at_fork(after_in_child=_renew_locks)

@@ -5,15 +5,17 @@ from __future__ import annotations
 import json
 import re
 import threading
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pyopencl as cl
 
+from . import forking
 from .refusals import refused
+
+_R = TypeVar("_R")
 
 _SCALARS = {
     "char": np.int8,
@@ -70,7 +72,7 @@ class Program:
     def __init__(self, name: str, cl_program: cl.Program, signatures: Signatures):
         self.name, self.cl_program, self.signatures = name, cl_program, signatures
         self._borrowed: dict[str, BoundKernel] = {}
-        self._borrowing = threading.Lock()
+        self._borrowing = forking.renewed(threading.Lock())
 
     def kernel(self, name: str) -> Kernel:
         """Return the kernel of that name. Raises KeyError, which lists the kernels."""
@@ -79,13 +81,15 @@ class Program:
             raise KeyError(f"program {self.name!r} has no kernel {name!r}; it has {known}")
         return Kernel(self, name)
 
-    @contextmanager
-    def borrow_kernel(self, name: str, **named: Any) -> Iterator[BoundKernel]:
-        """Lend a kernel with its arguments, to enqueue; it is made the first time only.
+    def lend_kernel(
+        self, name: str, named: Mapping[str, Any], use: Callable[[BoundKernel], _R]
+    ) -> _R:
+        """Lend a kernel with its arguments to `use`, which enqueues it; return what that returns.
 
-        PyOpenCL takes half a millisecond to make one. Another thread waits meanwhile. Raises as
-        `kernel` and `Kernel.bind` do.
+        It is made the first time only: PyOpenCL takes half a millisecond to make one. Another
+        thread waits meanwhile. Raises as `kernel` and `Kernel.bind` do.
         """
+        # No generator: one that an interrupt leaves in the middle holds the lock till it is freed.
         with self._borrowing:
             bound = self._borrowed.get(name)
             if bound is None:
@@ -95,7 +99,7 @@ class Program:
             else:
                 bound.bind(**named)
             try:
-                yield bound
+                return use(bound)
             finally:
                 bound.drop_buffers()
 
@@ -152,6 +156,7 @@ class BoundKernel:
                 known = ", ".join(self._indices) or "nothing"
                 raise TypeError(f"kernel {self.kernel.name!r} takes no {name!r}; it takes {known}")
             index, argument = self._indices[name]
+            self._numbers.pop(name, None)  # first: an interrupt may come between any two lines
             try:
                 value = argument.value(new)
                 self._cl_kernel.set_arg(index, value)
@@ -163,8 +168,6 @@ class BoundKernel:
             self._values[name] = value  # the driver does not keep buffers alive
             if number:
                 self._numbers[name] = new
-            else:
-                self._numbers.pop(name, None)
 
     def enqueue(
         self,

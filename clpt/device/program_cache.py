@@ -10,9 +10,11 @@ from typing import Any
 
 import pyopencl as cl
 
+from clpt.device import forking
+
 _LIMIT = 128  # programs, some megabytes of a driver's memory
 
-_contexts_lock = threading.Lock()
+_contexts_lock = forking.renewed(threading.Lock())
 
 
 class ProgramCache:
@@ -25,7 +27,7 @@ class ProgramCache:
     def __init__(self, context: cl.Context):
         self.context = context
         self._programs: OrderedDict[Hashable, Any] = OrderedDict()
-        self._lock = threading.Lock()
+        self._lock = forking.renewed(threading.Lock())
 
     def __len__(self) -> int:
         return len(self._programs)

@@ -104,6 +104,11 @@ class Stream:
         )
         return self._keep(event)
 
+    def rejoin(self) -> None:
+        """Let the next command wait for all so far, also for one whose event was lost."""
+        if not self.ordered:
+            self._before.append(cl.enqueue_marker(self.queue))
+
     def wait(self) -> None:
         """Wait until the last command has ended."""
         forking.check(self.queue)

@@ -14,7 +14,18 @@ from numpy.typing import NDArray
 from pyopencl.array import Array
 
 from ..bvh import TREES, choose_tree, traversal_text
-from ..device import BoundKernel, Device, Events, Program, Stream, assemble, build, wait
+from ..device import (
+    BoundKernel,
+    Device,
+    Events,
+    Program,
+    Stream,
+    assemble,
+    build,
+    forking,
+    supersede,
+    wait,
+)
 from ..errors import DeviceError, SceneError
 from ..records import INSTANCE
 from . import batch
@@ -95,7 +106,7 @@ class Queries:
             raise SceneError(f"{layout!r} is none of {', '.join(TREES)}", where="layout")
         self._memory = queue.context, self.device.info.is_cpu
         self._stream = Stream(queue)
-        self._lock = threading.RLock()
+        self._lock = forking.renewed(threading.RLock())
         self._kernels: dict[str, BoundKernel] = {}
         self._interleaved = False  # whether a work-item traces several rays at once
         self._trees: dict[str, cl.Buffer] | None = {}
@@ -195,7 +206,7 @@ class Queries:
             self._stream.after(wait_for)
             event = self._enqueue(name, rays, outputs)
             for array in results.values():
-                array.events[:] = [event]  # which has waited for those before
+                supersede(array, event)
             return results, event
 
     def _wait(

@@ -14,10 +14,11 @@ from clpt import device as dev
 from clpt import images
 from clpt.colour.view import View
 from clpt.errors import ClptError, SceneError
+from clpt.render.film.contents import FilmOwner
 from clpt.render.film.layers import layers_of
 from clpt.render.film.resolve import Resolve
 from clpt.render.film.saved_film import PictureForm
-from clpt.render.locking import DeviceOwner, synchronized
+from clpt.render.locking import synchronized
 from clpt.render.wavefront.wavefront import Wavefront
 from clpt.scene import Scene
 from clpt.spectral_exr import SpectralImage
@@ -25,7 +26,7 @@ from clpt.spectral_exr import SpectralImage
 Image = NDArray[np.float32]
 
 
-class Pictures(DeviceOwner):
+class Pictures(FilmOwner):
     """Base of renderers: their picture as an array, on the device or the host.
 
     wavefronts: its one.

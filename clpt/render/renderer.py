@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import logging
-import threading
 import time
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
@@ -14,7 +13,7 @@ import pyopencl as cl
 
 from clpt import device as dev
 from clpt.denoise import needs
-from clpt.errors import DeviceError, SceneError
+from clpt.errors import DeviceError, MemoryBudgetError, SceneError
 from clpt.render.editing import parameter_patch, rebuild
 from clpt.render.editing.blurring import between
 from clpt.render.editing.moving import Moving
@@ -27,7 +26,8 @@ from clpt.render.editing.scene_edit import (
     match_replacements,
     resolve_device_arrays,
 )
-from clpt.render.locking import synchronized
+from clpt.render.film.contents import Change, Contents
+from clpt.render.locking import Stop, healing, synchronized
 from clpt.render.lowering.bodies import matter_of
 from clpt.render.lowering.camera.surroundings import bodies_around, media_around
 from clpt.render.lowering.scene import Lowered, lower
@@ -37,8 +37,8 @@ from clpt.render.progress import Progress
 from clpt.render.resumable import Resumable
 from clpt.render.stats import RenderStats, collect
 from clpt.render.wavefront import adaptive
-from clpt.render.wavefront.film_state import FilmState, Ranges, join_ranges
-from clpt.render.wavefront.tracer import Tracer
+from clpt.render.wavefront.film_state import FilmState, join_ranges
+from clpt.render.wavefront.tracer import Tracer, use_all_pixels
 from clpt.render.wavefront.wavefront import Counts, Wavefront
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
@@ -81,7 +81,7 @@ class Renderer(Resumable):
         super().__init__()
         check_scene(scene)
         check_options(scene, options)
-        self._stop, self._discards = threading.Event(), False
+        self._stop, self._discards = Stop(), False
         self.denoise = options.get("denoise")
         self.scene = scene = needs.prepared(scene, self.denoise)
         queue, threads = options.get("queue"), options.get("threads")
@@ -123,7 +123,6 @@ class Renderer(Resumable):
         self._seconds["ready"] = time.perf_counter() - self._start
         self.warnings = list(lowered.warnings)
         self._first_sample = _sample_number(options.get("first_sample", 0))
-        self._taken: Ranges = ()
         self._progress = progress
         if self.denoise is not None:
             splats = first.features.filter_reach > 0
@@ -131,7 +130,6 @@ class Renderer(Resumable):
             self.warnings += needs.remarks(lowered.integrator, scene.sampler, splats, weighed)
         self._moving: Moving | None = None
         self._blurred = False  # by keys that `scene` does not have
-        self._adaptive: adaptive.Adaptive | None = None
         log.info("ready in %.2f s", self._seconds["ready"])
 
     @synchronized
@@ -141,8 +139,11 @@ class Renderer(Resumable):
         Many drivers compile a kernel to its end when it runs for the first time. The film and the
         number of the next sample stay.
         """
-        for wavefront in self.wavefronts:
-            wavefront.render_samples(self.samples, self.samples)
+        now = self.contents
+        with self._adding("prepare", now):
+            for wavefront in self.wavefronts:
+                wavefront.render_samples(self.samples, self.samples)
+            self._contents = now
 
     @synchronized
     def step(self, samples: int = 1, wait_for: dev.Events = None) -> cl.Event:
@@ -157,12 +158,14 @@ class Renderer(Resumable):
         first, end = next_range(self.samples, samples)
         stream = self.wavefronts[0].stream
         stream.after(wait_for)
-        for wavefront in self.wavefronts:
-            wavefront.enqueue(first, end)
-        self._taken = join_ranges(self._taken, ((first, end),))
-        if self._adaptive is not None:
-            self._adaptive.skip(end)
-        stream.flush()
+        more = self._with(first, end)
+        with self._adding("step", more, plain=True):
+            for wavefront in self.wavefronts:
+                wavefront.enqueue(first, end)
+            stream.flush()
+            if more.adaptive is not None:
+                more.adaptive.skip(end)
+            self._contents = more
         event = stream.last
         if self._progress is not None:
             self._report_later(event, self._progress)
@@ -235,14 +238,23 @@ class Renderer(Resumable):
             self._discards = False
             self._stop.clear()
             return False
+        if noise is not None:
+            noise = adaptive.checked(noise, self.wavefronts[0].features)
+            if self.contents.adaptive is None:
+                begun = self.adaptively(None, self.denoise)
+                begun.skip(first)
+                self._contents = dataclasses.replace(self.contents, adaptive=begun)
+        more = self._with(first, end)
         for wavefront in self.wavefronts:
             wavefront.leave.lower()  # that a `cancel` raised which came too late for another run
         try:
-            finished = self._render_samples(first, end, noise, on_batch)
-            self._taken = join_ranges(self._taken, ((first, end),))
-        except _Discarded:
-            self.reset()
-            return False
+            with self._adding("run", more, plain=noise is None):
+                try:
+                    finished = self._render_samples(more.adaptive, first, end, noise, on_batch)
+                except _Discarded:
+                    self._contents = self._emptied()
+                    return False
+                self._contents = more
         finally:
             self._seconds_rendered += time.perf_counter() - start
             self._discards = False
@@ -252,19 +264,54 @@ class Renderer(Resumable):
         return finished
 
     def _render_samples(
-        self, first: int, end: int, noise: float | None, on_batch: Callable[[Any], bool]
+        self,
+        chosen: adaptive.Adaptive | None,
+        first: int,
+        end: int,
+        noise: float | None,
+        on_batch: Callable[[Any], bool],
     ) -> bool:
         """Add samples to all pixels, or to those with noise; return whether all were added."""
-        if noise is None:
-            finished = all(one.render_samples(first, end, on_batch) for one in self.wavefronts)
-            if finished and self._adaptive is not None:
-                self._adaptive.skip(end)
-            return finished
-        noise = adaptive.checked(noise, self.wavefronts[0].features)
-        if self._adaptive is None:
-            self._adaptive = self.adaptively(None, self.denoise)
-            self._adaptive.skip(first)
-        return self._adaptive.run(end, noise, on_batch)
+        if noise is not None and chosen is not None:
+            return chosen.run(end, noise, on_batch)
+        finished = all(one.render_samples(first, end, on_batch) for one in self.wavefronts)
+        if chosen is not None:
+            chosen.skip(end)  # after a stop too: numbers are not used again
+        return finished
+
+    def _with(self, first: int, end: int) -> Contents:
+        """What the film holds with more samples."""
+        now = self.contents
+        return dataclasses.replace(now, taken=join_ranges(now.taken, ((first, end),)))
+
+    def _adding(self, what: str, more: Contents, *, plain: bool = False) -> Change:
+        """Return the change of a film that samples are added to.
+
+        more: what it then holds; plain: whether all pixels get as many. After an error at any line
+        it holds that too, though some pixels may lack some of these samples; or what it held, if
+        none has begun. An error of the device makes nothing whole.
+        """
+        now = self.contents
+        for wavefront in self.wavefronts:
+            wavefront.begun = False
+
+        def finish(error: BaseException) -> Contents:
+            begun = any(wavefront.begun for wavefront in self.wavefronts)
+            if isinstance(error, DeviceError) and not isinstance(error, MemoryBudgetError):
+                if begun:
+                    raise error
+                return now
+            for wavefront in self.wavefronts:
+                wavefront.finish()
+            if more.adaptive is not None:
+                more.adaptive.finish()
+                if plain and begun:
+                    more.adaptive.skip(more.taken[-1][1])
+            for wavefront in self.wavefronts:
+                wavefront.refresh()
+            return more if begun else now
+
+        return self.change(what, finish)
 
     def tracer(self) -> Tracer:
         """Return what adds selections of samples to the film."""
@@ -283,7 +330,8 @@ class Renderer(Resumable):
     @property
     def active(self) -> float:
         """The share of the pixels that would get more samples, 1 but for `run` with `noise`."""
-        return 1.0 if self._adaptive is None else self._adaptive.active
+        chosen = self._known.adaptive
+        return 1.0 if chosen is None else chosen.active
 
     def cancel(self, *, discard: bool = False) -> None:
         """Let the `run` of another thread, or else the next one, stop soon and return False.
@@ -298,7 +346,7 @@ class Renderer(Resumable):
             self._discards = True
         self._stop.set()
 
-    @synchronized
+    @healing
     def reset(
         self,
         wait_for: dev.Events = None,
@@ -311,27 +359,47 @@ class Renderer(Resumable):
         first_sample: its number from now on, by default as before. seed: of the samples from now
         on, which `self.scene` then has; by default as before. Raises SceneError for a seed that is
         no whole number, and for a number that is too large.
+
+        A renderer that says it is broken is whole again then, unless it says otherwise.
         """
+        if first_sample is not None:
+            first_sample = _sample_number(first_sample)
         if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int)):
             raise SceneError(f"must be a whole number, not {seed!r}", where="seed")
-        stream = self.wavefronts[0].stream
-        stream.after(wait_for)
-        if seed is not None:
-            self.scene = dataclasses.replace(self.scene, seed=seed)
-            self.wavefronts[0].paths.set_seed(seed)
+        broken = isinstance(self._contents, Change)
+        self.wavefronts[0].stream.after(wait_for)
+        with self.healing("reset", lambda _: self._emptied(recover=True)):
+            if seed is not None:
+                self.scene = dataclasses.replace(self.scene, seed=seed)
+            if first_sample is not None:
+                self._first_sample = first_sample
+            self._contents = self._emptied(recover=broken)
+        return self._last
+
+    @property
+    def _last(self) -> cl.Event:
+        event = self.wavefronts[0].stream.last
+        assert event is not None, "something was enqueued"
+        return event
+
+    def _emptied(self, *, recover: bool = False) -> Contents:
+        """Enqueue that the film is empty; return what it then holds; recover: from an error at any
+        line."""
         for wavefront in self.wavefronts:
+            if recover:
+                wavefront.stream.rejoin()
+                use_all_pixels(wavefront)
+            wavefront.paths.set_seed(self.scene.seed)
             wavefront.clear()
-        if first_sample is not None:
-            self._first_sample = _sample_number(first_sample)
-        self._taken, self._adaptive = (), None
-        self._begin_anew()
-        stream.flush()
-        return stream.last
+        self._held, self._seconds_rendered = None, 0.0
+        self.wavefronts[0].stream.flush()
+        return Contents()
 
     @property
     def samples(self) -> int:
         """The number of the next sample: of all so far, where they began at number 0."""
-        return self._taken[-1][1] if self._taken else self._first_sample
+        taken = self._known.taken
+        return taken[-1][1] if taken else self._first_sample
 
     @synchronized
     def merge(self, state: FilmState) -> None:
@@ -343,14 +411,23 @@ class Renderer(Resumable):
         Raises SceneError if the film has another form, or a sample is in both: nothing has changed.
         """
         merged = self.film_state().merged(state)
-        self.set_words(merged)
-        self._taken, self._adaptive = merged.taken, None
+        after = dataclasses.replace(self.contents, taken=merged.taken, adaptive=None)
+        self._hold_words("merge", merged, after)
 
     @synchronized
     def set_words(self, state: FilmState) -> None:
         """Let the film hold the words of another one of its form; `samples` stays."""
-        for one, words in zip(self.wavefronts, state.films, strict=True):
-            one.set_words(words)
+        self._hold_words("set_words", state, self.contents)
+
+    def _hold_words(self, what: str, state: FilmState, after: Contents) -> None:
+        """Let the film hold these words; after: what it then holds."""
+
+        def put(_: BaseException | None = None) -> Contents:
+            self._put(state)
+            return after
+
+        with self.change(what, put):
+            self._contents = put()
 
     def close(self) -> None:
         """Give the device's memory back; the renderer is of no use afterwards.
@@ -361,7 +438,8 @@ class Renderer(Resumable):
         with self._lock:
             self._closed = True
             self.wavefronts = []
-            self._moving = self._adaptive = self._resolve = None
+            self._contents = Contents()
+            self._moving = self._resolve = None
 
     def __enter__(self) -> Renderer:
         return self
@@ -418,9 +496,8 @@ class Renderer(Resumable):
         moves = quick and bool(transforms or vertices)
         if moves and self._move(transforms or {}, vertices or {}):
             transforms = vertices = None
-            event = self.reset()  # also if the other changes are refused
             if materials is None and camera is None:
-                return event
+                return self._last
         new = self.scene if scene is None else scene
         replaced = {} if scene is None else match_replacements(self.scene, new)
         if materials or transforms or vertices:
@@ -429,14 +506,34 @@ class Renderer(Resumable):
         if camera is not None:
             new = dataclasses.replace(new, camera=camera)
         parameters_only = quick and not transforms and not vertices
-        if not (parameters_only and self._patch(new)):
+        write = self._patch(new) if parameters_only else None
+        warnings = self.warnings
+        if write is None:
             shown, remarks = between(self.scene, new) if motion else (new, [])
-            self._rebuild(shown, events, refit=scene is None)
-            self.warnings += remarks
-            self._blurred = motion
-        self.scene = new
-        self._successors.note(replaced)
-        return self.reset()
+            write, warnings = self._rebuild(shown, events, refit=scene is None)
+            warnings += remarks
+        self._take(write, new, replaced, warnings, motion=motion)
+        return self._last
+
+    def _take(
+        self,
+        write: Callable[[], None],
+        scene: Scene,
+        replaced: Replacements,
+        warnings: list[str],
+        *,
+        motion: bool,
+    ) -> None:
+        """Render another scene from now on; write: brings it to the device, twice if it must."""
+
+        def put(_: BaseException | None = None) -> Contents:
+            write()
+            self.scene, self.warnings, self._blurred = scene, warnings, motion
+            self._successors.note(replaced)
+            return self._emptied()
+
+        with self.change("update", put, heals=False):
+            self._contents = put()
 
     def _lower(self, scene: Scene, former: Lowered | None = None) -> Lowered:
         """Return the tables of a scene; former: of the scene before it."""
@@ -454,28 +551,31 @@ class Renderer(Resumable):
         return edit_scene(scene, self._successors, materials, transforms, vertices)
 
     def _move(self, transforms: Mapping[ShapeKey, Any], vertices: Mapping[ShapeKey, Any]) -> bool:
-        """Move shapes on the device; return whether they could."""
+        """Move shapes on the device, and begin at sample 0; return whether they could."""
         if self._moving is None:
             self._moving = Moving(self.wavefronts[0].scene, self.scene)
         moved, replaced = self._edit(self.scene, None, transforms, vertices)
         if self._enters_a_medium(moved):
             return False
-        refusal = self._moving.move(self.scene, replaced)
-        if refusal is not None:
-            log.debug("shapes cannot move on the device: %s", refusal)
-            return False
-        self.scene = moved
-        self._successors.note(replaced)
+        with self.change("update", heals=False) as change:
+            refusal = self._moving.move(self.scene, replaced, change.begin)
+            if refusal is not None:
+                log.debug("shapes cannot move on the device: %s", refusal)
+                return False
+            self.scene = moved
+            self._successors.note(replaced)
+            self._contents = self._emptied()
         return True
 
-    def _patch(self, scene: Scene) -> bool:
-        """Write the words of parameters that differ; return whether nothing else does."""
+    def _patch(self, scene: Scene) -> Callable[[], None] | None:
+        """Return what writes the words of parameters that differ, None if more does."""
         if self._enters_a_medium(scene):
-            return False
-        refusal = parameter_patch.patch(self.wavefronts[0].scene, self.scene, scene)
-        if refusal is not None:
-            log.debug("words alone do not change the scene: %s", refusal)
-        return refusal is None
+            return None
+        found = parameter_patch.patch(self.wavefronts[0].scene, self.scene, scene)
+        if isinstance(found, str):
+            log.debug("words alone do not change the scene: %s", found)
+            return None
+        return found
 
     def _enters_a_medium(self, scene: Scene) -> bool:
         """Whether the camera or a light of a changed scene may be in other media than before."""
@@ -489,8 +589,10 @@ class Renderer(Resumable):
             return media_around(readable, lowered.cache) != lowered.around
         return bodies_around(readable, matter_of, lowered.cache) != lowered.around
 
-    def _rebuild(self, scene: Scene, events: list[cl.Event], refit: bool) -> None:
-        """Lower a scene and render it from now on; see `rebuild.take`.
+    def _rebuild(
+        self, scene: Scene, events: list[cl.Event], refit: bool
+    ) -> tuple[Callable[[], None], list[str]]:
+        """Lower a scene; return what lets it be rendered, see `rebuild.prepare`, and its warnings.
 
         events: that arrays on the device wait for, which may be read.
         """
@@ -498,9 +600,13 @@ class Renderer(Resumable):
             dev.wait(event)
         first = self.wavefronts[0]
         lowered = self._lower(scene, first.scene.lowered)
-        rebuild.take(self.wavefronts, lowered, refit)
-        self._moving = None
-        self.warnings = list(lowered.warnings)
+        take = rebuild.prepare(self.wavefronts, lowered, refit)
+
+        def write() -> None:
+            take()
+            self._moving = None
+
+        return write, list(lowered.warnings)
 
     @property
     @synchronized

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import datetime
+import dataclasses
 import hashlib
 import logging
 from functools import cache
@@ -14,6 +14,7 @@ from clpt import device as dev
 from clpt.errors import SceneError
 from clpt.render.contract import custom_materials
 from clpt.render.editing.scene_edit import resolve_device_arrays
+from clpt.render.film.contents import Contents
 from clpt.render.film.denoised_noise import DenoisedNoise
 from clpt.render.film.film_keeping import FilmKeeping
 from clpt.render.film.layers import white_paper
@@ -48,32 +49,28 @@ class Resumable(FilmKeeping, Pictures):
     """
 
     warnings: list[str]
-    _taken: Ranges
     _first_sample: int
-    _adaptive: Adaptive | None
 
     def __init__(self) -> None:
         super().__init__()
         self._scene_read: tuple[Scene, Fingerprint] | None = None
         self._held: dict[str, Any] | None = None
-        self._begin_anew()
-
-    def _begin_anew(self) -> None:
-        """Note that the film is empty."""
-        self._began = datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds")
         self._seconds_rendered = 0.0
-        self._sessions: tuple[Session, ...] = ()
-        self._held = None
+
+    @property
+    def _sessions(self) -> tuple[Session, ...]:  # type: ignore[override]
+        return self._known.sessions
 
     @property
     def first_sample(self) -> int:
         """The number of the first sample of the film, or of the first one to come."""
-        return self._taken[0][0] if self._taken else self._first_sample
+        taken = self._known.taken
+        return taken[0][0] if taken else self._first_sample
 
     @synchronized
     def film_state(self) -> FilmState:
         """Return what the film holds, as whole numbers on the host; wait for it."""
-        return self.words(self._taken, held=False)
+        return self.words(self.contents.taken, held=False)
 
     def words(self, taken: Ranges, *, held: bool) -> FilmState:
         """Return what the film holds, or held, as `film_state` does, of samples that are taken."""
@@ -90,9 +87,10 @@ class Resumable(FilmKeeping, Pictures):
         So a render that is stopped in the middle of a `run` can be saved as it was before: without
         samples that some pixels have and others have not. Raises MemoryBudgetError.
         """
+        so_far, self._held = self.progress_so_far(), None
         for one in self.wavefronts:
             one.film.hold()
-        self._held = self.progress_so_far()
+        self._held = so_far
 
     @synchronized
     def saved_film(self, *, held: bool = False) -> SavedFilm:
@@ -170,25 +168,36 @@ class Resumable(FilmKeeping, Pictures):
             except (KeyError, ValueError) as error:
                 message = f"the state of adaptive sampling does not fit: {error}"
                 raise SceneError(message) from error
-        for one, words, counts in zip(self.wavefronts, saved.film.films, saved.counts, strict=True):
-            one.set_words(words)
-            for name, number in counts.items():
-                setattr(one.counts, name, number)
-        self._begin_anew()
-        self._taken, self._adaptive, self._sessions = saved.film.taken, adaptive, saved.sessions
+        restored = Contents(saved.film.taken, adaptive, saved.sessions)
+
+        def put(_: BaseException | None = None) -> Contents:
+            self._held, self._seconds_rendered = None, 0.0
+            for one, counts in zip(self.wavefronts, saved.counts, strict=True):
+                one.counts = dataclasses.replace(one.counts, **counts)
+            self._put(saved.film)
+            return restored
+
+        with self.change("load_state", put):
+            self._contents = put()
         others = other_devices(saved.sessions, self.device_class())
         if others:
             self.warnings.append(classes_text(others))
             log.warning("%s", self.warnings[-1])
 
+    def _put(self, state: FilmState) -> None:
+        """Enqueue that the film holds the words of another one of its form."""
+        for one, words in zip(self.wavefronts, state.films, strict=True):
+            one.set_words(words)
+
     def progress_so_far(self) -> dict[str, Any]:
         """Return what changes while samples are taken, but for the film's words."""
-        session = Session(self._began, self._seconds_rendered, VERSION, self.device_class())
+        now = self.contents
+        session = Session(now.began, self._seconds_rendered, VERSION, self.device_class())
         return {
-            "taken": self._taken,
+            "taken": now.taken,
             "counts": tuple(dict(vars(one.counts)) for one in self.wavefronts),
-            "sessions": (*self._sessions, session),
-            "adaptive": {} if self._adaptive is None else self._adaptive.arrays(),
+            "sessions": (*now.sessions, session),
+            "adaptive": {} if now.adaptive is None else now.adaptive.arrays(),
         }
 
     @property

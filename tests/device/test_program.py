@@ -85,16 +85,15 @@ def test_two_bindings_do_not_disturb(device, fill, out):
 def test_what_is_lent_lets_go_of_buffers_and_asks_for_all(device, fill, out):
     held = sys.getrefcount(out)
     for sign in (-1, -1, 100):
-        with fill.program.borrow_kernel("fill", **arguments(out, sign=sign)) as bound:
-            assert (result(device, bound, out) == 14 + sign).all()
+        named = arguments(out, sign=sign)
+        got = fill.program.lend_kernel("fill", named, lambda bound: result(device, bound, out))
+        del named
+        assert (got == 14 + sign).all()
         assert sys.getrefcount(out) == held
-    with fill.program.borrow_kernel("fill", **arguments(out)) as again:
-        assert again is bound
-    with (
-        pytest.raises(TypeError, match="'fill' also takes out"),
-        fill.program.borrow_kernel("fill", n=3),
-    ):
-        pass
+    lent = [fill.program.lend_kernel("fill", arguments(out), lambda bound: bound) for _ in "ab"]
+    assert lent[0] is lent[1]
+    with pytest.raises(TypeError, match="'fill' also takes out"):
+        fill.program.lend_kernel("fill", {"n": 3}, lambda bound: bound)
 
 
 def test_events_chain(device, fill, out):
@@ -193,8 +192,7 @@ def test_a_context_keeps_its_programs(device):
     assert build(first, source(), ["-DX=1"]) is not built
     assert first.builds.programs == 2
     bound = built.kernel("other").bind(x=None)
-    with built.borrow_kernel("other", x=None):
-        pass
+    built.lend_kernel("other", {"x": None}, lambda bound: None)
     gone = weakref.ref(built)
     del first, queue, built, bound
     assert gone() is None, "at once, without the collector of cycles"

@@ -6,6 +6,7 @@ Threads of its parent did not come along.
 from __future__ import annotations
 
 import multiprocessing
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -127,3 +128,84 @@ def test_a_fork_of_a_process_without_opencl_renders() -> None:
 def fork_first(queue: Any) -> None:
     """Fork before OpenCL is used, and tell what the child says."""
     queue.put(in_a_fork(lambda: dev.choose("pocl")))
+
+
+def even() -> Scene:
+    return Scene(
+        camera=cameras.Perspective(),
+        film=clpt.scene.Film(width=4, height=4, mode="rgb"),
+        lights=[clpt.scene.lights.Constant(radiance=1.0)],
+    )
+
+
+def test_a_fork_while_another_thread_works_is_an_error_at_once() -> None:
+    """The lock of the renderer is then held by a thread that the child does not have."""
+    device = of_pocl()
+    accel = clpt.Accel(device.queue, *map(np.array, TRIANGLE))
+    rays = np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32)
+    begun, asked = threading.Event(), threading.Event()
+    with clpt.Renderer(even(), queue=device.queue) as renderer:
+
+        def progress(_: clpt.Progress) -> bool:
+            with accel._lock:
+                begun.set()
+                asked.wait(60.0)
+            return False
+
+        thread = threading.Thread(target=renderer.run, args=(1, progress))
+        thread.start()
+        begun.wait(60.0)
+        works = {
+            "a run": lambda: renderer.run(1),
+            "a reset": renderer.reset,
+            "a picture": renderer.image,
+            "rays": lambda: accel.intersect(*rays),
+            "a new one": lambda: clpt.Renderer(even(), device="pocl"),
+        }
+        said = {name: in_a_fork(work) for name, work in works.items()}
+        asked.set()
+        thread.join()
+        assert renderer.samples == 1, "the parent goes on"
+    wrong = {name: words for name, words in said.items() if "spawn or forkserver" not in words}
+    assert not wrong
+
+
+def test_what_else_is_on_a_device_says_so_in_a_fork() -> None:
+    device = of_pocl()
+    array = dev.DeviceArray(device.queue, (4,), np.float32)
+    array.fill(1.0)
+    accel = clpt.Accel(device.queue, *map(np.array, TRIANGLE))
+    rays = np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32)
+    with clpt.MultiRenderer(even(), [device]) as several:
+        several.run(1)
+        works = {
+            "an array's copy": lambda: array.get(),
+            "an array for numpy": lambda: np.asarray(array),
+            "an array for others": lambda: array.__dlpack__(),
+            "an occlusion": lambda: accel.occluded(*rays),
+            "all hits": lambda: accel.intersect_all(*rays),
+            "a moved mesh": lambda: accel.update(np.array(TRIANGLE[0], np.float32)),
+            "several devices": lambda: several.run(1),
+            "their picture": several.image,
+            "others": lambda: clpt.MultiRenderer(even(), "pocl"),
+            "a render": lambda: clpt.render(even(), 1, device="pocl"),
+        }
+        said = {name: in_a_fork(work) for name, work in works.items()}
+    wrong = {name: words for name, words in said.items() if "spawn or forkserver" not in words}
+    assert not wrong
+
+
+def pooled(number: int) -> str:
+    """What a worker of a pool says."""
+    try:
+        clpt.render(even(), number, device="pocl")
+    except DeviceError as error:
+        return str(error)
+    return "it worked"
+
+
+@pytest.mark.parametrize(("method", "wanted"), [("fork", "spawn or forkserver"), ("spawn", "it")])
+def test_a_pool(method: str, wanted: str) -> None:
+    of_pocl()
+    with multiprocessing.get_context(method).Pool(1) as pool:
+        assert wanted in pool.apply_async(pooled, (1,)).get(timeout=60.0)

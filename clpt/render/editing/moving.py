@@ -88,10 +88,11 @@ class Moving:
                 ranges.own = transforms.inverse(outer) @ shapes.placement(ranges.shape)
             self.ranges.setdefault(number, []).append(ranges)
 
-    def move(self, scene: Scene, replaced: Replacements) -> str | None:
+    def move(self, scene: Scene, replaced: Replacements, begin: Callable[[], None]) -> str | None:
         """Enqueue that shapes have other transforms or vertices, and that trees follow.
 
-        scene: as it is; replaced: the shapes that move, and what they become. Returns None, or,
+        scene: as it is; replaced: the shapes that move, and what they become; begin: is called
+        before the first change. Returns None, or,
         with nothing done, why the scene must be lowered again.
 
         Triangles, instances, spheres, disks, cylinders and curves can move. A shape must keep its
@@ -105,6 +106,7 @@ class Moving:
             actions = self._plan(scene, replaced)
         except CannotMove as reason:
             return str(reason)
+        begin()
         for action in actions:
             action()
         self._fit_trees()

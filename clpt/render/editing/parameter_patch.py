@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from typing import Any
 
 from clpt.render.editing.rebuild import ranges
@@ -18,12 +19,12 @@ from clpt.scene.materials import COMPOSITES, Material
 from clpt.scene.params import params
 
 
-def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> str | None:
-    """Enqueue the words in which a scene differs from the one on the device.
+def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> Callable[[], None] | str:
+    """Return what enqueues the words in which a scene differs from the one on the device.
 
-    They may differ in the camera, which must be of the same kind, and in values of materials.
-    Returns None, or, with nothing done, why more than that differs. Raises SceneError as `lower`
-    does.
+    They may differ in the camera, which must be of the same kind, and in values of materials; else
+    this returns why more than that differs. What is returned may be called again where an error
+    has ended it. Raises SceneError as `lower` does.
     """
     lowered = on_device.lowered
     pairs = [] if scene.shapes is former.shapes else _pairs(former, scene)
@@ -49,8 +50,7 @@ def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> str | None:
         if changed is None:
             return f"parameters of a {new.kind} come from elsewhere, such as a texture or a table"
         rows += changed
-    _write(on_device, camera, rows)
-    return None
+    return lambda: _write(on_device, camera, rows)
 
 
 def _reflects(camera: Camera) -> tuple[bool, bool]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -63,10 +63,13 @@ class _Staged:
     queue: dict[str, Any]
 
 
-def take(wavefronts: Sequence[Wavefront], lowered: Lowered, refit: bool = False) -> None:
-    """Render another lowering from now on.
+def prepare(
+    wavefronts: Sequence[Wavefront], lowered: Lowered, refit: bool = False
+) -> Callable[[], None]:
+    """Return what lets wavefronts render another lowering from now on.
 
-    wavefronts: all of a renderer, which share their scene; refit: refit the tree over triangles
+    It may be called again where an error has ended it. wavefronts: all of a renderer, which share
+    their scene; refit: refit the tree over triangles
     that only moved, which is faster to do, and slower to trace where they went far. Programs are
     built if the features differ, trees if triangles or boxes do; of tables the words that differ
     are written. The picture is then that of a new renderer.
@@ -89,17 +92,22 @@ def take(wavefronts: Sequence[Wavefront], lowered: Lowered, refit: bool = False)
     with scene.buffers.all_or_nothing():
         staged = _stage(first, lowered, changes)
     replaced = _replaced(first, staged)
-    _write_tables(scene, lowered, staged.tables)
-    paths.set_settings(lowered.settings)
-    scene.lowered, scene.strategy, scene.trees = lowered, changes.strategy, staged.trees
-    scene.tables |= staged.tables
-    scene.fill_grids()
-    paths.queue = staged.queue
-    _refit(scene, changes)
-    if changes.kernels or changes.boxes or replaced or staged.tables:
-        for wavefront in wavefronts:
-            wavefront.bind_again(rebuilt=changes.kernels)
-    scene.buffers.release(*replaced)
+
+    def take() -> None:
+        _write_tables(scene, lowered, staged.tables)
+        paths.set_settings(lowered.settings)
+        scene.tables |= staged.tables
+        scene.lowered, scene.strategy, scene.trees = lowered, changes.strategy, staged.trees
+        scene.fill_grids()
+        paths.queue = staged.queue
+        _refit(scene, changes)
+        if changes.kernels or changes.boxes or replaced or staged.tables:
+            for wavefront in wavefronts:
+                wavefront.bind_again(rebuilt=changes.kernels)
+        while replaced:
+            scene.buffers.release(replaced.pop())
+
+    return take
 
 
 def _changes(wavefront: Wavefront, lowered: Lowered, refit: bool) -> _Changes:

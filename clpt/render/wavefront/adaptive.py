@@ -20,8 +20,7 @@ nothing is decided ahead.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -93,16 +92,18 @@ class Adaptive:
         self.noise = 0.0
         self.next = np.zeros(count, np.int64)
         self.stop = np.full(count, OPEN)
+        self._begun = self.next  # what `next` becomes when the samples under way have ended
         self._level = 0  # samples at the last look
         self._measured_at = np.zeros(count, np.int64)  # samples when a cell was last measured
         self._variance = np.full(count, np.inf)  # of a sample, relative
         self._film_copies: dict[str, Any] = {}
+        self._has_guides = False  # whether the film has samples beside those of the picture
 
     @property
     def active(self) -> float:
         """The share of the picture's pixels that get more samples."""
         active = self.next < self.stop
-        if self._lights is not None:
+        if self._lights is not None and self.noise:
             active |= self._lights.noisy(self.noise**2, self._known_variance)
         return float(self._pixels[active].sum() / self._pixels.sum())
 
@@ -148,11 +149,12 @@ class Adaptive:
         `Wavefront.render_samples`. Returns whether it was not stopped.
         """
         if noise != self.noise:
-            self.noise = noise
+            self.noise = 0.0  # until all is decided: an interrupt may come at any line
             self.stop[:] = np.where(self._pixels > 0, OPEN, 0)
             if self._lights is not None:
                 self._lights.reopen()
-            self._decide()
+            self._decide(noise)
+            self.noise = noise
         try:
             while self._goes_on(end):
                 if not self._round(end, on_batch):
@@ -160,6 +162,14 @@ class Adaptive:
         finally:
             self._tracer.use_all_pixels()
         return True
+
+    def finish(self) -> None:
+        """Take out of the film what is not of the picture, wherever an interrupt has left `run`."""
+        if self._has_guides:
+            self._restore_film()
+        self.next = np.maximum(self.next, self._begun)
+        self._tracer.use_all_pixels()
+        self.noise = 0.0  # all is decided again
 
     def _goes_on(self, end: int) -> bool:
         """Whether something is missing of what is to come before sample `end`."""
@@ -171,9 +181,10 @@ class Adaptive:
         look = self._next_look()
         ends = np.minimum(self.stop, min(look, end))
         # Pixels stay black without samples of the camera, and dark without light paths.
+        self._begun = np.maximum(self.next, ends)
         finished = self._lights is None or self._lights.sample(min(look, end), on_batch)
         finished = finished and self._sample(ends, on_batch)
-        self.next = np.maximum(self.next, ends)  # after a stop too: numbers are not used again
+        self.next = self._begun  # after a stop too: numbers are not used again
         if not finished:
             return False
         if end < look:
@@ -184,14 +195,19 @@ class Adaptive:
         overrun = guide_cells & (self.next < look)  # finished, and still a guide
         lights = self._lights if self._lights is not None and self._lights.open else None
         self._tracer.gather()
-        with self._film_restored(lights is not None or bool(overrun.any())):
+        if lights is not None or overrun.any():
+            self._copy_film()
+        try:
             if lights is not None and not lights.measure(look, on_batch):
                 return False
             if not self._sample(np.where(overrun, look, 0), on_batch):
                 return False
             self._tracer.gather()
             self._measure(guide_cells)
-        self._decide()
+        finally:
+            if self._has_guides:
+                self._restore_film()
+        self._decide(self.noise)
         return True
 
     def _next_look(self) -> int:
@@ -222,9 +238,9 @@ class Adaptive:
         self._variance[known] = self._level * relative[known]
         self._measured_at[cells] = self._level
 
-    def _decide(self) -> None:
+    def _decide(self, noise: float) -> None:
         """Decide how many samples cells get whose partners know it closely enough."""
-        limit: Any = self.noise**2
+        limit: Any = noise**2
         if self._lights is not None:
             self._lights.decide(limit, self._known_variance, AHEAD, STEPS)
             limit = self._lights.left_over(limit, self._known_variance)[self._partner]
@@ -236,25 +252,23 @@ class Adaptive:
         wanted = np.ceil(np.where(sure, needed, 0.0) / step) * step
         self.stop[sure] = np.maximum(wanted, measured_at)[sure]
 
-    @contextmanager
-    def _film_restored(self, wanted: bool) -> Iterator[None]:
-        """Give the film back the samples that it had before, if that is wanted."""
-        if not wanted:
-            yield
-            return
+    def _copy_film(self) -> None:
+        """Keep what the film holds, for `_restore_film`."""
         stream, film = self.wavefront.stream, self.wavefront.film
         for name, sums in film.sums.items():
             if name not in self._film_copies:
                 what = f"a copy of the {name}"
                 self._film_copies[name] = self.wavefront.buffers.allocate(what, sums.size)
             stream.copy(self._film_copies[name], sums)
-        try:
-            yield
-        finally:
-            self._tracer.discard()
-            for name, sums in film.sums.items():
-                stream.copy(sums, self._film_copies[name])
-            self.wavefront.refresh()
+        self._has_guides = True
+
+    def _restore_film(self) -> None:
+        """Give the film back the samples that it had before."""
+        self._tracer.discard()
+        for name, sums in self.wavefront.film.sums.items():
+            self.wavefront.stream.copy(sums, self._film_copies[name])
+        self._has_guides = False
+        self.wavefront.refresh()
 
 
 def _partners(pixels: Cells, across: int) -> Cells:

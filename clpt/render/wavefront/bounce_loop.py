@@ -81,8 +81,8 @@ class BounceLoop:
 
     which: of `Features.passes`; per_sample: how many of its paths are traced for a sample;
     leave: raised, it lets `run` leave its paths in flight, where the device runs the loop and sees
-    it: then on_batch must raise. cancel_seconds: in which a run is to end that is stopped [s], None
-    for what suits the device.
+    it: then on_batch must raise; None: nothing does. cancel_seconds: in which a run is to end that
+    is stopped [s], None for what suits the device.
     """
 
     def __init__(
@@ -93,13 +93,14 @@ class BounceLoop:
         timings: Timings,
         looped: bool,
         which: int,
-        leave: device.Flag,
+        leave: device.Flag | None,
         cancel_seconds: float | None = None,
     ):
         self.kernels, self.scene, self.paths, self.timings = kernels, scene, paths, timings
         self.device, self.stream, self.looped = scene.device, scene.stream, looped
         self.lanes = self.device.lanes
         self._which, self._leave = which, leave
+        self._first = 0  # path that the last run began with
         self.is_last = which == len(scene.lowered.features.passes) - 1
         self.per_sample = 1 if self.is_last else float(scene.lowered.settings["light_paths"]) or 1
         self._label = "" if self.is_last else "light "
@@ -170,12 +171,25 @@ class BounceLoop:
         done what it was given; paths are left in flight then, and the film is not whole. Returns
         whether all paths were traced.
         """
-        steps = self._batch()
-        begin, numbers = steps[0].bound, self.numbers(first, end)
+        numbers = self.numbers(first, end)
+        self._first = numbers[0]
         self.paths.restart()
+        leave = None if self._leave is None or first == end else self._leave.argument
+        return self._go_on(numbers, leave, on_batch)
+
+    def finish(self) -> None:
+        """Bring every path in flight to its end, wherever `run` was interrupted; wait for it."""
+        self._go_on((self._first, self._first), None, lambda _: True)
+
+    def _go_on(
+        self, numbers: tuple[int, int], leave: Any, on_batch: Callable[[NDArray[np.uint64]], bool]
+    ) -> bool:
+        """Trace paths of these numbers until none is in flight; see `run`."""
+        steps = self._batch()
+        begin = steps[0].bound
         begin.set_args(samples=numbers)
         if self.looped:
-            begin.set_args(bounces=self._bounces, restart=0, leave=self._leave.argument)
+            begin.set_args(bounces=self._bounces, restart=0, leave=leave)
         finished = True
         reads: deque[tuple[NDArray[np.uint64], cl.Event]] = deque()
         before = time.perf_counter()

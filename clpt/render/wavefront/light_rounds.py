@@ -106,14 +106,16 @@ class LightRounds:
         """
         wavefront, loop = self.wavefront, self.wavefront.loops[0]
         first, end = self._guides, look // GUIDES
+        self._guides = 0  # where an interrupt ends this, all are traced again
         wavefront.film.set_group(wavefront.light_group, self._sums if first else None)
         start = math.ceil(GUIDE_NUMBERS / loop.per_sample)
         guides = Selection("guides", self._pixels)
         if not self._tracer.add(guides, start + first, start + end, on_batch):
+            self._guides = first
             return False
         self._tracer.gather()
-        self._guides = end
         wavefront.film.copy_group(wavefront.light_group, self._sums)
+        self._guides = end
         undecided = np.tile(self.stop == FOREVER, len(self.variance) // 2)
         begun, ended = loop.numbers(start, start + end)
         found = self.meter.measure_lights(undecided, float(ended - begun))

@@ -123,7 +123,6 @@ class PathBuffers:
         self._slots, self.slots = slots, slots.total
         self.stride = slots.total + blocks + PADDING
         self.settings = self._with_slots(settings)
-        self._read = np.zeros(len(COUNTERS), np.uint64)
         self._fixed: dict[str, Any] = {"stride": self.stride, "slots": self.slots}
         for record in SLABS:
             name, size = f"{record.name.lower()}_words", 4 * record.words * self.stride
@@ -136,7 +135,7 @@ class PathBuffers:
             stream.fill(buffer, 0, 0, size)
             self._fixed["footprints"] = buffer
         self._fixed["counters"] = buffers.allocate("the counters", 8 * len(COUNTERS))
-        self._fixed["settings"] = buffers.upload("the settings", self._setting_words)
+        self._fixed["settings"] = buffers.upload("the settings", _words(self.settings))
         sampled = work_list.sampled(self.settings)
         self.pixels = len(sampled)
         every_pixel = work_list.table(self.settings, sampled)
@@ -183,23 +182,12 @@ class PathBuffers:
 
     def clear_counters(self) -> None:
         """Enqueue that every counter is zero."""
-        self._read = np.zeros(len(COUNTERS), np.uint64)
         self.stream.fill(self._fixed["counters"], 0, 0, 8 * len(COUNTERS))
 
     def read_counters(self) -> tuple[NDArray[np.uint64], cl.Event]:
         """Enqueue that the counters are read; return where to, and the event."""
         host = np.zeros(len(COUNTERS), np.uint64)
         return host, self.stream.read_later(self._fixed["counters"], host)
-
-    def gained(self, counters: NDArray[np.uint64]) -> dict[str, int]:
-        """Return what counters, just read, have gained since they were read last, by name."""
-        gain = counters - self._read
-        self._read = counters
-        return dict(zip(COUNTERS[1:], gain[1:].tolist(), strict=True))
-
-    @property
-    def _setting_words(self) -> NDArray[np.uint32]:
-        return self.settings.reshape(1).view(np.uint32)
 
     def _with_slots(self, settings: NDArray[np.void]) -> NDArray[np.void]:
         changed = settings.copy()
@@ -211,6 +199,10 @@ class PathBuffers:
         return changed
 
     def _set(self, settings: NDArray[np.void]) -> None:
-        if settings != self.settings:
+        if settings.tobytes() != self.settings.tobytes():  # numpy swallows Ctrl-C in a !=
+            self.stream.write(self._fixed["settings"], _words(settings))
             self.settings = settings
-            self.stream.write(self._fixed["settings"], self._setting_words)
+
+
+def _words(settings: NDArray[np.void]) -> NDArray[np.uint32]:
+    return settings.reshape(1).view(np.uint32)

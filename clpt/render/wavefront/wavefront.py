@@ -26,7 +26,7 @@ from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.render.wavefront.film import Film
 from clpt.render.wavefront.film_state import SAMPLES_WORD, Words
 from clpt.render.wavefront.guide import Guide
-from clpt.render.wavefront.path_buffers import PathBuffers, divide_film
+from clpt.render.wavefront.path_buffers import COUNTERS, PathBuffers, divide_film
 from clpt.render.wavefront.photons import Photons
 from clpt.render.wavefront.strategy import Strategy, Tuning
 
@@ -34,7 +34,7 @@ TURN_SAMPLES = 16  # of a pixel, that each kind of paths takes at a turn; a smal
 TURN_PATHS = 1 << 20
 
 
-@dataclass
+@dataclass(frozen=True)
 class Counts:
     """What has happened so far: samples put on the film, rays traced, what the film refused.
 
@@ -59,7 +59,8 @@ class Wavefront:
     scene, paths: what is on the device; looped: whether a kernel on the device runs the loop;
     tuning: for the strategies of other lowerings.
 
-    counts: of rays and samples; leave: raised, it lets `render_samples` and the like leave paths in
+    counts: of rays and samples; begun: whether paths may have begun since someone set it to False;
+    leave: raised, it lets `render_samples` and the like leave paths in
     flight as soon as the device can; their on_batch must raise then, and the film is not whole.
 
     Raises MemoryBudgetError, KernelBuildError, DeviceError.
@@ -92,10 +93,13 @@ class Wavefront:
             },
         )  # fmt: skip
         self.leave = device.Flag(self.device)
+        self.begun = False
+        self._in_flight: BounceLoop | None = None  # whose paths may not have ended
+        self._counted = np.zeros(len(COUNTERS), np.uint64), Counts()  # read last, and what it gives
         self.loops = [
             BounceLoop(
-                self.kernels, scene, paths, self.timings, looped, which, self.leave,
-                tuning.cancel_seconds,
+                self.kernels, scene, paths, self.timings, looped, which,
+                None if guide and which == 0 else self.leave, tuning.cancel_seconds,
             )
             for which in range(len(features.passes))
         ]  # fmt: skip
@@ -152,6 +156,14 @@ class Wavefront:
             stream, buffers, settings, divided, blocks, chosen.queued, kinds, footprint
         )
         return cls(scene, in_flight, looped, tuning)
+
+    @property
+    def counts(self) -> Counts:
+        return self._counted[1]
+
+    @counts.setter
+    def counts(self, counts: Counts) -> None:
+        self._counted = self._counted[0], counts
 
     @property
     def features(self) -> Features:
@@ -228,15 +240,17 @@ class Wavefront:
 
     def clear(self) -> None:
         """Enqueue that the film is empty; the next sample is number 0."""
-        self.counts = Counts()
         self._paths = [0] * self.film.halves  # that began at lights, in each half of the film
+        self._in_flight = None  # the next paths take the places of these
         self.paths.clear_counters()
+        self._counted = np.zeros(len(COUNTERS), np.uint64), Counts()
         self.film.clear()
         if self.guide is not None:
             self.guide.trained = False
 
     def enqueue(self, first: int, end: int) -> None:
         """Enqueue that samples first to end - 1 of every pixel are added; wait for nothing."""
+        self.begun = True
         self._train(first, end, looped=True)
         for turn in self._turns(first, end) if self.photons else [(first, end)]:
             for loop in self.loops:
@@ -287,6 +301,14 @@ class Wavefront:
     ) -> bool:
         """As `render_from_lights`, but leave the picture as it is."""
         return self._run(self.loops[0], first, end, on_batch)
+
+    def finish(self) -> None:
+        """Bring every path in flight to its end, wherever an interrupt has left `render_samples`
+        and the like, and wait; `refresh` then makes a picture of the film."""
+        self.stream.rejoin()
+        if self._in_flight is not None:
+            self._in_flight.finish()
+            self._in_flight = None
 
     def refresh(self) -> None:
         """Make the picture of whatever the film holds."""
@@ -363,7 +385,17 @@ class Wavefront:
             wanted = (on_batch is None or on_batch(self.counts)) and wanted
             return wanted
 
-        return loop.run(first, end, count)
+        self.begun = True
+        return self._trace(loop, first, end, count)
+
+    def _trace(
+        self, loop: BounceLoop, first: int, end: int, count: Callable[[NDArray[np.uint64]], bool]
+    ) -> bool:
+        """Run a loop; `finish` does what is left where an interrupt ends it."""
+        self._in_flight = loop
+        finished = loop.run(first, end, count)
+        self._in_flight = None
+        return finished
 
     @property
     def _all_loops(self) -> list[BounceLoop]:
@@ -378,7 +410,7 @@ class Wavefront:
         if looped:
             self._trainer.enqueue(0, self.guide.samples)
         else:
-            self._trainer.run(0, self.guide.samples, lambda _: True)
+            self._trace(self._trainer, 0, self.guide.samples, lambda _: True)
         self.guide.sum(self.kernels)
 
     def _before(self, loop: BounceLoop) -> None:
@@ -404,8 +436,9 @@ class Wavefront:
 
     def _count(self, counters: NDArray[np.uint64], samples: bool) -> None:
         """Add what the counters have gained since they were read last; samples: these too."""
-        gained = self.paths.gained(counters)
+        before, counts = self._counted
+        gained = dict(zip(COUNTERS[1:], (counters - before)[1:].tolist(), strict=True))
         if not samples:
-            gained.pop("samples")
-        for name, n in gained.items():
-            setattr(self.counts, name, getattr(self.counts, name) + n)
+            gained["samples"] = 0
+        sums = {name: value + gained[name] for name, value in vars(counts).items()}
+        self._counted = counters, Counts(**sums)

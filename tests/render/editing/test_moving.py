@@ -153,10 +153,10 @@ def test_what_cannot_be_is_told(renderer: Renderer) -> None:
 def test_where_light_is_traced_from_lights_nothing_moves_in_place(renderer: Renderer) -> None:
     target = renderer.wavefronts[0].scene
     moving, lowered = Moving(target, renderer.scene), target.lowered
-    assert moving.move(renderer.scene, {}) is None
+    assert moving.move(renderer.scene, {}, lambda: None) is None
     features = dataclasses.replace(lowered.features, light_paths=True)
     target.lowered = dataclasses.replace(lowered, features=features)
-    assert "traced from lights" in (moving.move(renderer.scene, {}) or "")
+    assert "traced from lights" in (moving.move(renderer.scene, {}, lambda: None) or "")
     target.lowered = lowered
 
 
@@ -176,5 +176,7 @@ def test_the_reason_why_a_shape_does_not_move(
     scene_ = scene()
     moving = Moving(renderer.wavefronts[0].scene, scene_)
     old = next(shape for shape in scene_.shapes if shape.name == name)
-    refusal = moving.move(scene_, {id(old): (old, dataclasses.replace(old, **changes))})
+    refusal = moving.move(
+        scene_, {id(old): (old, dataclasses.replace(old, **changes))}, lambda: None
+    )
     assert refusal is not None and reason in refusal

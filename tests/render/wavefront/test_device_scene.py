@@ -63,16 +63,22 @@ def test_two_wavefronts_share_a_lowered_scene(cornell: Scene) -> None:
     np.testing.assert_array_equal(picture(one), first)
 
     edited = coloured(cornell, (0.1, 0.2, 0.9))
-    assert parameter_patch.patch(one.scene, cornell, edited) is None
+    write = parameter_patch.patch(one.scene, cornell, edited)
+    assert callable(write)
+    write()
     patched = picture(one)
     assert not np.array_equal(patched, first)
-    rebuild.take([one], lower(coloured(cornell, (0.1, 0.2, 0.9)), former=one.scene.lowered))
+    rebuild.prepare(
+        [one], lower(coloured(cornell, (0.1, 0.2, 0.9)), former=one.scene.lowered)
+    )()
     np.testing.assert_array_equal(picture(one), patched)
 
     assert other.scene.lowered is lowered
     np.testing.assert_array_equal(picture(other), second)
     # What one has edited the other edits by itself, if need be by lowering again.
-    if parameter_patch.patch(other.scene, cornell, edited) is not None:
-        rebuild.take([other], lower(edited, former=other.scene.lowered))
+    write = parameter_patch.patch(other.scene, cornell, edited)
+    if isinstance(write, str):
+        write = rebuild.prepare([other], lower(edited, former=other.scene.lowered))
+    write()
     new = Wavefront.create(on, lower(edited), layout="binary", slots=64, looped=False)
     np.testing.assert_array_equal(picture(other), picture(new))
