@@ -202,8 +202,8 @@ class Renderer(Resumable):
         such as 0.02; `samples` is then the most that a pixel gets, see
         clpt.render.wavefront.adaptive. A renderer with `denoise` counts what is left after that.
         progress: called every few milliseconds to seconds; if it returns False the run stops soon,
-        as after `cancel`. Returns whether it came to its end. What progress raises, or Ctrl+C in
-        it, is raised when the paths in flight have ended. The film is whole after a stop too: its
+        as after `cancel`. Returns whether it came to its end. What progress raises, or Ctrl+C at
+        any line, is raised when the paths in flight have ended. The film is whole after a stop too: its
         pixels have fewer samples, and the numbers of those that were left out are not used again.
 
         Raises SceneError for noise that makes no sense with the scene, and for more than 2^31 - 1
