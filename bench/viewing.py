@@ -84,11 +84,12 @@ class Client:
         self.address_after = time.monotonic() - self.start
         with urllib.request.urlopen(address) as answer:
             cookie = answer.headers["Set-Cookie"].split(";")[0]
-        own = address.split("/")[2]
+        room = address.partition("?")[0].removeprefix("http://")
+        own = room.split("/")[0]
         self.stack = contextlib.ExitStack()
         origin: Any = f"http://{own}"
         headers, free = {"Cookie": cookie}, {"compression": None, "max_size": None}
-        opened = connect(f"ws://{own}/socket", origin=origin, additional_headers=headers, **free)
+        opened = connect(f"ws://{room}socket", origin=origin, additional_headers=headers, **free)
         self.socket: ClientConnection = self.stack.enter_context(opened)
 
     def frame(self) -> dict[str, Any]:

@@ -8,6 +8,7 @@
 
 import logging
 
+from clpt.budget import Budget
 from clpt.cluster.multi_renderer import MultiRenderer
 from clpt.colour.view import View
 from clpt.errors import (
@@ -42,6 +43,7 @@ logging.getLogger("clpt").addHandler(logging.NullHandler())  # quiet until the p
 __all__ = [
     "Accel",
     "AllHits",
+    "Budget",
     "ClptError",
     "ClusterError",
     "DenoisedPicture",

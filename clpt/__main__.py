@@ -28,9 +28,11 @@ def run(arguments: Sequence[str]) -> int:
         status = cli.main(args=list(arguments), prog_name="clpt", standalone_mode=False)
         return status if isinstance(status, int) else 0
     except KeyboardInterrupt as error:
-        message, status = "interrupted", stopping.status(error)
+        stopping.tell()
+        return stopping.status(error)
     except click.Abort as error:
-        message, status = "interrupted", stopping.status(error.__cause__)
+        stopping.tell()
+        return stopping.status(error.__cause__)
     except Exception as error:
         message, status = failures.message_of(error)
     failures.complain(message)

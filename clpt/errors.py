@@ -33,8 +33,24 @@ def _restored(cls: type[ClptError], args: tuple[Any, ...]) -> ClptError:
     return cls.__new__(cls, *args)
 
 
+LONGEST, LONGEST_PLACE = 300, 120  # characters of an error about a file, and of where it is
+
+
+def one_line(text: str, longest: int = LONGEST) -> str:
+    """Return a text on one line without control characters, its middle left out if it is long."""
+    if not text.isprintable():
+        text = " ".join("".join(c if c.isprintable() else " " for c in text).split())
+    if len(text) <= longest:
+        return text
+    end = longest // 3
+    return f"{text[: longest - end - 5]} ... {text[-end:]}"
+
+
 class SceneError(ClptError, ValueError):
-    """Bad input, with the file, line and element it stands in where these are known."""
+    """Bad input, with the file, line and element it stands in where these are known.
+
+    Its text is one line of at most LONGEST characters, whatever the input holds.
+    """
 
     def __init__(
         self,
@@ -44,17 +60,23 @@ class SceneError(ClptError, ValueError):
         line: int | None = None,
         where: str | None = None,
     ):
+        message = one_line(message)
+        where = None if where is None else one_line(where, LONGEST_PLACE)
         self.message, self.file, self.line, self.where = message, file, line, where
-        place = str(file) if file is not None else ""
+        place = one_line(str(file), LONGEST_PLACE) if file is not None else ""
         if line is not None:
             place += f":{line}"
-        super().__init__(": ".join(part for part in (place, where, message) if part))
+        before = "".join(f"{part}: " for part in (place, where) if part)
+        super().__init__(before + one_line(message, max(LONGEST - len(before), 40)))
+
+
+LONGEST_NAME = 80  # characters that are compared
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
     """Return the end of a message: the known names that are near a name, or else all of them."""
     known = sorted(known)
-    near = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
+    near = difflib.get_close_matches(name[:LONGEST_NAME], known, n=3, cutoff=0.5)
     if near:
         return "; did you mean " + " or ".join(repr(n) for n in near) + "?"
     return "; known: " + ", ".join(known) if known else ""

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from clpt import images
 from clpt.errors import SceneError
 from clpt.images import exr, exr_files
-from clpt.images.failures import reading
+from clpt.images.failures import check_there, reading
 from clpt.spectra import Tabulated, cie
 from clpt.spectra.spectrum import d65
 
@@ -139,7 +139,7 @@ def read(path: str | Path, *, emissive: bool | None = None) -> SpectralImage:
             _fail(path, f"the channels {first} and {second} are of the same wavelength")
     if len({channels[name].shape for _, name in bands}) > 1:
         _fail(path, "its channels are of different sizes")
-    try:
+    with reading(path):
         return SpectralImage(
             np.stack([channels[name] for _, name in bands], axis=2).astype(np.float32, copy=False),
             np.array([nm for nm, _ in bands]),
@@ -150,8 +150,6 @@ def read(path: str | Path, *, emissive: bool | None = None) -> SpectralImage:
             _curve(path, header.get("lensTransmission")),
             _left_out(parts, light),
         )
-    except SceneError as error:
-        _fail(path, error.message)
 
 
 def write(
@@ -205,8 +203,7 @@ def _fail(path: Path | None, message: str) -> NoReturn:
 
 def _contents(path: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
     """Attributes and channels of an EXR file, in its display window. Raises SceneError."""
-    if not path.is_file():
-        _fail(path, "no such image file")
+    check_there(path)
     with reading(path):
         header = images.attributes(path)
         names = [n for n in exr_files.channel_names(header) if _is_spectral(n)]

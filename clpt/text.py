@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt import budget, input_files
 from clpt.errors import SceneError
 
 UTF_16 = {codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_UTF16_BE: "utf-16-be"}
@@ -42,11 +43,8 @@ def decode(data: bytes) -> str:
 
 def read(path: str | Path) -> str:
     """Read a text file; ends of lines become "\\n". Raises SceneError for one that is not there."""
-    try:
-        data = Path(path).read_bytes()
-    except (OSError, ValueError) as error:  # ValueError: no name of a file
-        reason = getattr(error, "strerror", None) or error
-        raise SceneError(f"cannot be read: {reason}", file=path) from None
+    data = input_files.read_bytes(Path(path))
+    budget.check(8 * len(data), "its text", Path(path))
     return decode(data).replace("\r\n", "\n").replace("\r", "\n")
 
 

@@ -62,8 +62,7 @@ def scene(bodies, rng):
     return clpt.Scene(camera=camera, shapes=things, lights=[sky], film=film)
 
 
-rng = np.random.default_rng(3)
-context = cl.create_some_context(interactive=False)
+rng, context = np.random.default_rng(3), cl.create_some_context(interactive=False)
 queue = cl.CommandQueue(context)
 advance = cl.Program(queue.context, KERNEL).build().advance
 gold, teal = ((-1.1, 0.25, 0), (0.35, 0, -0.25), 20), ((1.1, -0.1, 0), (-0.35, 0, 0.25), -55)

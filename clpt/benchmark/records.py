@@ -13,7 +13,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from clpt import device
+from clpt import device, output_files
 from clpt.errors import SceneError
 
 ROOT = Path(__file__).parents[2]
@@ -92,10 +92,9 @@ def append(path: str | Path, rows: Iterable[dict[str, Any]]) -> None:
     about = circumstances()
     try:
         Path(path).parent.mkdir(parents=True, exist_ok=True)
-        with open(path, "a", encoding="utf-8") as file:
-            for row in rows:
-                head = {name: row[name] for name in ("bench",) if name in row}
-                file.write(json.dumps({**head, **about, **row}) + "\n")
+        heads = (({name: row[name] for name in ("bench",) if name in row}, row) for row in rows)
+        lines = [json.dumps({**head, **about, **row}) + "\n" for head, row in heads]
+        output_files.append_text(path, "".join(lines))
     except OSError as error:
         raise SceneError(f"cannot be written: {error}", file=path) from error
 

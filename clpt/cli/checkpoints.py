@@ -148,7 +148,7 @@ class Checkpoints:
             self._due = math.inf
         self._writer: threading.Thread | None = None
         self._failure: str | None = None
-        self._written = False
+        self._written = self._held = False
         self._hold()
 
     def after_pass(self) -> None:
@@ -165,10 +165,10 @@ class Checkpoints:
         """Write the film of the last whole pass, if it stays.
 
         stopped: whether a signal ended the render: then it stays too where checkpoints had begun;
-        failed: whether an error did: then it stays.
+        failed: whether an error did: then it stays if there is one.
         """
         self._wait()
-        if self._keep or (stopped and self._written) or failed:
+        if self._keep or (stopped and self._written) or (failed and self._held):
             self._begin_to_write()
             self._wait()
         self._tell_failure()
@@ -188,13 +188,18 @@ class Checkpoints:
             return
         try:
             self._renderer.hold()
+            self._held = True
         except MemoryBudgetError as error:
             self._note(f"clpt: warning: no checkpoints: {error}")
             self._holds_from = self._due = math.inf
             self._keep = False
 
     def _begin_to_write(self) -> None:
-        saved = self._renderer.saved_film(held=True)
+        try:
+            saved = self._renderer.saved_film(held=True)
+        except MemoryError as error:
+            self._failure = outputs.failure(self._path, error)
+            return
         if saved.film.taken:
             self._writer = threading.Thread(target=self._write, args=(saved,), name="checkpoint")
             self._writer.start()
@@ -205,13 +210,11 @@ class Checkpoints:
 
     def _write(self, saved: SavedFilm) -> None:
         try:
-            if not self._written:
-                output_files.remove_partials(self._path)
             output_files.link(self._path, former_of(self._path))
             film_file.write(self._path, saved)
             self._written = True
-        except OSError as error:
-            self._failure = f"{self._path}: cannot be written: {error}"
+        except (OSError, MemoryError) as error:
+            self._failure = outputs.failure(self._path, error)
 
     def _tell_failure(self) -> None:
         failure, self._failure = self._failure, None

@@ -21,8 +21,8 @@ from ..scene import Scene, materials, shapes, textures
 from ..scene.params import Kind
 from .film_contents import film_summary, is_film
 from .image_contents import read_contents
+from .loading_options import loading_options
 from .output_console import output_console, shown
-from .scene_variables import scene_variables
 
 OF_FILES = ("scenes", "variables", "asset")  # what some formats tell besides
 FLAT_TRIANGLES = {shapes.Rectangle: 2, shapes.Cube: 12}
@@ -30,7 +30,7 @@ FLAT_TRIANGLES = {shapes.Rectangle: 2, shapes.Cube: 12}
 
 @click.command()
 @click.argument("scene", type=click.Path(path_type=Path))
-@scene_variables
+@loading_options
 @click.option("--json", "as_json", is_flag=True, help="Write JSON instead of a table.")
 def info(scene: Path, variables: dict[str, Any], as_json: bool) -> None:
     """Show what the file or folder SCENE holds, without rendering it.

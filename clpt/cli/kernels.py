@@ -14,7 +14,7 @@ from .. import output_files
 from ..bvh.layouts import LAYOUTS
 from ..errors import SceneError
 from ..formats import load
-from .scene_variables import scene_variables
+from .loading_options import loading_options
 
 
 @click.command()
@@ -31,7 +31,7 @@ from .scene_variables import scene_variables
     "--layout", type=click.Choice(list(LAYOUTS)), default="wide8", show_default=True,
     help="Acceleration structure of the triangles.",
 )  # fmt: skip
-@scene_variables
+@loading_options
 def kernels(scene: Path, folder: Path, lanes: str, layout: str, variables: dict[str, Any]) -> None:
     """Write the OpenCL programs that render SCENE, one file each.
 

@@ -6,10 +6,12 @@ import os
 import secrets
 import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from .. import __version__, images, output_files
 from ..cluster.cluster_renderer import ClusterRenderer
+from ..device import disk_cache
 from ..errors import ClptError, SceneError
 from ..render.film import film_file, layer_channels
 from ..render.film.denoised_picture import DenoisedPicture
@@ -79,8 +81,8 @@ def write_all(
 ) -> None:
     """Write the picture so far to every path, denoised where that was asked for; tell of each.
 
-    A picture that cannot be written goes to the temporary folder. Raises SceneError at the end,
-    which says where it is.
+    A picture that cannot be written goes to another folder, and if that fails too the film does.
+    Raises SceneError at the end, which says where it is.
     """
     failures = []
     source: Source = film
@@ -95,20 +97,40 @@ def write_all(
             write(path, source, stats, grading)
             name = "standard output" if is_standard(path) else path
             tell(f"{name}  {stats['spp']:.4g} spp, {stats['seconds']:.1f} s")
-        except (SceneError, OSError) as error:
-            other = Path(tempfile.gettempdir()) / f"{path.stem}-{secrets.token_hex(4)}{path.suffix}"
-            try:
-                write(other, source, stats, grading)
-                failures.append(f"{failure(path, error)}; the picture is in {other}")
-            except (SceneError, OSError) as second:
-                failures.append(f"{failure(path, error)}; nor can {failure(other, second)}")
+        except FAILURES as error:
+            failures.append(f"{failure(path, error)}; {_rescue(path, source, stats, grading)}")
     if failures:
         raise SceneError("; ".join(failures))
 
 
+FAILURES = (ClptError, OSError, MemoryError)  # of writing a file
+
+
+def _rescue(
+    path: Path, source: Source, stats: dict[str, str | int | float], grading: Grading
+) -> str:
+    """Write a picture, or else its film, where there is room for it; return what to say."""
+    label = f"{path.stem}-{secrets.token_hex(4)}"
+    folders = Path(tempfile.gettempdir()), disk_cache.folder()
+    for folder in folders:
+        other = folder / f"{label}{path.suffix}"
+        with suppress(*FAILURES):
+            write(other, source, stats, grading)
+            return f"the picture is in {other}"
+    for folder in folders:
+        other = folder / f"{label}{FILM}"
+        with suppress(*FAILURES):
+            film_file.write(other, source.saved_film())
+            return f"the film is in {other}, of which clpt merge makes the picture"
+    return f"nor can it in {' or '.join(map(str, folders))}"
+
+
 def failure(path: Path, error: Exception) -> str:
     """Return what to say of a file that cannot be written: it names the file."""
-    return str(error) if isinstance(error, SceneError) else f"{path}: cannot be written: {error}"
+    if isinstance(error, SceneError):
+        return str(error)
+    why = str(error) or "memory has run out"  # which a MemoryError does not say
+    return f"{path}: cannot be written: {why}"
 
 
 def write(

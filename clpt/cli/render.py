@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import time
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -13,13 +14,14 @@ import click
 from ..render.renderer import MOST_SAMPLES
 from ..scene import Scene
 from . import checkpoints, outputs, report
+from .display import Display
 from .display import display as display_of
 from .frame_values import Frames
 from .frames import render_frames
-from .grading import grading, grading_options, names_option
+from .grading import Grading, grading, grading_options, names_option
 from .on_cluster import Where, render_on_cluster
 from .rendering import render_samples
-from .scene_options import denoise_option, open_renderer, scene_options
+from .scene_options import AnyRenderer, denoise_option, open_renderer, scene_options
 from .several_scenes import one_by_one
 from .so_far import PictureSoFar
 from .standard_output import FORMATS
@@ -246,10 +248,14 @@ def render(
             so_far.after_pass()
             show_picture()
 
-        with shown.rendering():
-            render_samples(
-                renderer, end, left, shown.show, renderer.scene.noise, stopped, after_pass
-            )
+        try:
+            with shown.rendering():
+                render_samples(
+                    renderer, end, left, shown.show, renderer.scene.noise, stopped, after_pass
+                )
+        except Exception:
+            _rescue(writer, renderer, targets, stats_so_far, graded, shown)
+            raise
         writer.save(bool(stopped))
         stats = stats_so_far()
         outputs.write_all(targets, renderer, stats, graded, shown.note)
@@ -270,3 +276,28 @@ def render(
         if stopped and on.compilers is not None:
             on.compilers.kill()
     return STATUS + stopped[0] if stopped else 0
+
+
+def _rescue(
+    writer: checkpoints.Checkpoints,
+    renderer: AnyRenderer,
+    targets: tuple[Path, ...],
+    stats: Callable[[], dict[str, str | int | float]],
+    graded: Grading,
+    shown: Display,
+) -> None:
+    """Write the film and the picture so far of a render that fails, as far as they can be read."""
+
+    def write_film() -> None:
+        writer.save(False, failed=True)
+
+    def write_picture() -> None:
+        if any(counts.samples for counts in renderer.counts):
+            outputs.write_all(targets, renderer, stats(), graded, shown.note)
+
+    for step in write_film, write_picture:
+        try:
+            step()
+        except outputs.FAILURES as error:
+            shown.note(f"clpt: warning: {error}")
+    writer.finish(True)

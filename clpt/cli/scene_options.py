@@ -32,8 +32,9 @@ from ..spectra import read_sensor, spaces
 from ..spectra.sensors import OBSERVERS
 from .composition import Orbit, Span, composed, composition_options
 from .display import Display
+from .loading_options import Bytes, loading_options
 from .option_sets import Command, with_options
-from .scene_variables import scene_variables
+from .stopping import prompt
 
 LARGEST = 65536  # pixels of a side
 
@@ -62,19 +63,6 @@ class SensorName(click.ParamType):
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
         return value if value in OBSERVERS else read_sensor(value)
-
-
-class Bytes(click.ParamType):
-    """A number of bytes, such as 500M or 2G."""
-
-    name = "SIZE"
-
-    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        form, text = r"(\d{1,15}(?:\.\d+)?)\s*([KMGT]?)i?B?", str(value).strip()
-        match = re.fullmatch(form, text, re.IGNORECASE)
-        if match is None:
-            self.fail(f"{value!r} is no size in memory; write 500M or 2G", param, ctx)
-        return int(float(match[1]) * 1024 ** " KMGT".index(match[2].upper() or " "))
 
 
 class LightPaths(click.ParamType):
@@ -185,7 +173,7 @@ _OPTIONS = (
     click.option(
         "--alpha", is_flag=True, default=None, help="Leave the sky out, and write what is covered."
     ),
-    scene_variables,
+    loading_options,
     click.option(
         "--texture-budget", type=Bytes(), metavar="SIZE",
         help="Memory for images, such as 500M; larger ones are halved.  [default: half the free]",
@@ -219,13 +207,14 @@ def open_renderer(
     accept: called with the scene, before anything is built for it; first_sample: see
     `RenderOptions`; the others as of `open_scene`.
     """
-    plan, devices, loading = open_scene(scene, shown, resources, accept, **options)
     made: dict[str, Any] = {
         "texture_budget": texture_budget, "layout": layout, "tree_quality": tree_quality,
         "first_sample": first_sample, "denoise": options["denoise"],
     }  # fmt: skip
-    with shown.phase(f"building kernels for {' and '.join(on.info.name for on in devices)}"):
-        renderer = new_renderer(plan, devices, **made)
+    with prompt(dev.kill_compilers):
+        plan, devices, loading = open_scene(scene, shown, resources, accept, **options)
+        with shown.phase(f"building kernels for {' and '.join(on.info.name for on in devices)}"):
+            renderer = new_renderer(plan, devices, **made)
     for warning in renderer.warnings:
         shown.note(f"clpt: warning: {warning}")
     return renderer, loading

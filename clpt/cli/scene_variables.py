@@ -11,6 +11,7 @@ RESERVED = (
     "kinds",
     "progress",
     "missing_textures",
+    "budget",
 )  # parameters of clpt.load that are no variables
 
 

@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from ..errors import SceneError
 from . import outputs
 from .grading import Grading
 
@@ -48,7 +47,7 @@ class PictureSoFar:
     def _write(self, path: Path, stats: dict[str, str | int | float]) -> None:
         try:
             outputs.write(path, self._source, stats, self._grading)
-        except (SceneError, OSError) as error:
+        except outputs.FAILURES as error:
             if path not in self._failed:
                 self._note(f"clpt: warning: {outputs.failure(path, error)}; the render goes on")
             self._failed.add(path)

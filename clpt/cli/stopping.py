@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import os
+import select
 import signal
+import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import Any, NoReturn
 
+import click
+
+from . import failures
+
+GRACE = 1.0  # seconds after a signal in which KeyboardInterrupt may end a process by itself
 ENDING = tuple(
     getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)
 )  # as Ctrl-C, which is SIGINT
@@ -28,6 +36,13 @@ def status(error: BaseException | None) -> int:
     """Return the exit status of a process that a KeyboardInterrupt ends."""
     number = error.args[0] if error is not None and error.args else signal.SIGINT
     return STATUS + int(number)
+
+
+def tell() -> None:
+    """Say that a signal ends the command, on a terminal whose cursor a bar may have hidden."""
+    if sys.stderr.isatty():
+        click.echo("\r\x1b[2K\x1b[?25h", err=True, nl=False)
+    failures.complain("interrupted")
 
 
 @contextmanager
@@ -52,6 +67,44 @@ def stops() -> Iterator[list[int]]:
         yield caught
     finally:
         restore()
+
+
+@contextmanager
+def prompt(last: Callable[[], None]) -> Iterator[None]:
+    """Meanwhile a signal ends the process soon, though a driver compiles: nothing may be lost.
+
+    Python raises KeyboardInterrupt when a call of C returns, and a driver's compiler takes minutes.
+    After GRACE, or at a second signal, a thread calls `last` and ends the process.
+    """
+    if sys.platform == "win32" or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    threading.Thread(target=_watch, args=(reader, last), daemon=True).start()
+    before = signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
+    try:
+        yield
+    finally:
+        signal.set_wakeup_fd(before)
+        os.close(writer)
+
+
+def _watch(reader: int, last: Callable[[], None]) -> None:
+    """Read the numbers of signals until the pipe is closed; end the process if that takes long."""
+    number = 0
+    while select.select([reader], [], [], GRACE if number else None)[0]:
+        read = os.read(reader, 1)
+        if not read:
+            os.close(reader)
+            return
+        if read[0] in (signal.SIGINT, *ENDING):
+            if number:
+                break
+            number = read[0]
+    last()
+    tell()
+    os._exit(STATUS + number)
 
 
 def _raise(number: int, frame: FrameType | None) -> NoReturn:

@@ -1,8 +1,16 @@
-"""A video of frames that are image files, by the ffmpeg of the package imageio-ffmpeg."""
+"""A video of frames that are image files, by the ffmpeg of the package imageio-ffmpeg.
+
+The package's own writer does not tell whether ffmpeg came to its end, so it is not used.
+"""
 
 from __future__ import annotations
 
+import subprocess
+import tempfile
+import time
 from collections.abc import Sequence
+from contextlib import suppress
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +18,9 @@ import numpy as np
 from .. import images, output_files
 from ..errors import SceneError
 from .extras import extra
+from .stopping import stops
 
+LOOK = 0.02  # seconds between two looks at ffmpeg
 FORMATS = (".mp4", ".mov", ".mkv", ".webm")
 QUALITY = {"libx264": ["-crf", "16"], "libvpx-vp9": ["-crf", "24", "-b:v", "0"]}
 # Even sides, which chroma of half the size needs, and colours as screens for Rec. 709 expect.
@@ -35,25 +45,61 @@ def check(path: Path) -> None:
 def write(path: Path, frames: Sequence[Path], fps: float) -> None:
     """Write .png files of one size as a video. Raises SceneError."""
     with extra("video", "--video"):
-        import imageio_ffmpeg
-    height, width = _read(frames[0]).shape[:2]
-    codec = "libvpx-vp9" if path.suffix.lower() == ".webm" else "libx264"
+        from imageio_ffmpeg import get_ffmpeg_exe
     try:
         with output_files.replacing(path) as partial:
-            writer = imageio_ffmpeg.write_frames(
-                str(partial), (width, height), fps=fps, codec=codec, quality=None,
-                macro_block_size=1, pix_fmt_out="yuv420p", ffmpeg_log_level="error",
-                output_params=[*QUALITY[codec], "-vf", FILTER],
-            )  # fmt: skip
-            writer.send(None)
+            _encode(get_ffmpeg_exe(), partial, frames, fps)
+    except OSError as error:
+        raise SceneError(f"cannot be written: {error}", file=path) from error
+
+
+def _encode(ffmpeg: str, path: Path, frames: Sequence[Path], fps: float) -> None:
+    """Let ffmpeg write a file. Raises OSError, with what ffmpeg says, unless it could.
+
+    A signal raises KeyboardInterrupt when ffmpeg is gone: one without an owner would write on.
+    """
+    height, width = _read(frames[0]).shape[:2]
+    rate = str(Fraction(fps).limit_denominator())
+    codec = "libvpx-vp9" if path.suffix.lower() == ".webm" else "libx264"
+    command = [
+        ffmpeg, "-y", "-v", "error", "-xerror", "-f", "rawvideo", "-pix_fmt", "rgb24",
+        "-s", f"{width}x{height}", "-r", rate, "-i", "-", "-an", "-vcodec", codec,
+        "-pix_fmt", "yuv420p", *QUALITY[codec], "-vf", FILTER, str(path),
+    ]  # fmt: skip
+    with (
+        stops() as stopped,
+        tempfile.TemporaryFile() as said,
+        subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=said,
+            start_new_session=True,  # Ctrl-C is for this process
+        ) as process,
+    ):  # fmt: skip
+        assert process.stdin is not None
+        try:
             for frame in frames:
                 pixels = _read(frame)
                 if pixels.shape[:2] != (height, width):
                     raise SceneError("frames of a video have one size", file=frame)
-                writer.send(np.ascontiguousarray(pixels))
-            writer.close()
-    except OSError as error:
-        raise SceneError(f"cannot be written: {error}", file=path) from error
+                process.stdin.write(pixels.tobytes())
+                if stopped:
+                    break
+            process.stdin.close()
+        except BrokenPipeError:  # it ended, and says why
+            with suppress(OSError):
+                process.stdin.close()
+        except BaseException:
+            process.kill()
+            raise
+        while process.poll() is None and not stopped:
+            time.sleep(LOOK)
+        if stopped:
+            process.kill()
+            process.wait()
+            raise KeyboardInterrupt(*stopped)
+        if process.returncode:
+            said.seek(0)
+            told = said.read().decode("utf-8", "replace").strip().splitlines()
+            raise OSError(told[-1] if told else f"ffmpeg ended with status {process.returncode}")
 
 
 def _read(path: Path) -> np.ndarray:

@@ -19,7 +19,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from clpt import output_files
 from clpt.device import disk_cache
 from clpt.errors import ClusterError
 from clpt.formats import native
@@ -99,8 +98,7 @@ class Store:
         found = hashlib.sha256(content).hexdigest()
         if found != digest:
             raise ClusterError(f"a file of the bundle is damaged: {found[:12]} for {digest[:12]}")
-        self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        output_files.write(self.folder / digest, content)
+        disk_cache.write(self.folder / digest, content)
         disk_cache.prune(self.folder.parent, self.limit, parts=(self.folder.name,))
 
     @contextmanager
@@ -113,9 +111,10 @@ class Store:
         with tempfile.TemporaryDirectory(prefix=_OPENED, dir=self.folder) as folder:
             for name, digest in bundle.files.items():
                 try:
-                    _link(self.folder / digest, Path(folder) / name)
-                except FileNotFoundError:
+                    os.close(disk_cache.own_file(self.folder / digest))
+                except OSError:
                     raise ClusterError(f"the file {name} of the bundle is missing") from None
+                _link(self.folder / digest, Path(folder) / name)
             yield native.load(Path(folder) / SCENE, confined=True)
 
     def _clear_old(self) -> None:
@@ -144,9 +143,9 @@ def check_digest(digest: Any) -> None:
 
 
 def file_digest(path: Path) -> str:
-    """Return the SHA-256 of a file's content. Raises OSError."""
+    """Return the SHA-256 of the content of a file of this user. Raises OSError."""
     hashed = hashlib.sha256()
-    with path.open("rb") as file:
+    with open(disk_cache.own_file(path), "rb") as file:
         while piece := file.read(1 << 20):
             hashed.update(piece)
     return hashed.hexdigest()
@@ -161,7 +160,5 @@ def _link(source: Path, target: Path) -> None:
     """Give a file a second name, or copy it where the file system has no links."""
     try:
         os.link(source, target)
-    except FileNotFoundError:
-        raise
     except OSError:
         shutil.copyfile(source, target)

@@ -3,7 +3,7 @@
 from .array import DeviceArray, supersede
 from .buffers import Buffers, host_buffer
 from .building import build, build_all, compile_ahead, link
-from .compilers import Compilers, spare_cores
+from .compilers import Compilers, kill_compilers, spare_cores
 from .context import Device, DeviceInfo, choose, choose_all, devices, names_several
 from .flag import Flag
 from .program import Argument, BoundKernel, Kernel, Program
@@ -39,6 +39,7 @@ __all__ = [
     "devices",
     "host_buffer",
     "kernels_folder",
+    "kill_compilers",
     "link",
     "names_several",
     "refused",

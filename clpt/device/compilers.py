@@ -12,6 +12,7 @@ import pickle
 import subprocess
 import sys
 import threading
+import weakref
 from collections import deque
 from collections.abc import Hashable, Sequence
 from concurrent.futures import Future
@@ -49,6 +50,15 @@ class _Task:
     result: Future[bytes | None] = field(default_factory=Future)
 
 
+_running: weakref.WeakSet[Compilers] = weakref.WeakSet()
+
+
+def kill_compilers() -> None:
+    """End all processes that compile for this one, before it ends itself."""
+    for one in _running:
+        one.kill_processes()
+
+
 class Compilers:
     """Some processes, that start when there is something to do for them.
 
@@ -65,6 +75,7 @@ class Compilers:
         self._processes: list[subprocess.Popen[bytes]] = []
         self._threads: list[threading.Thread] = []
         self._closed = False
+        _running.add(self)
 
     def submit(self, key: Hashable, job: Job) -> None:
         """Let a process do a job, if none has the key yet."""
@@ -108,13 +119,17 @@ class Compilers:
         for thread in self._threads:
             thread.join()
 
-    def kill(self) -> None:
-        """End the processes at once."""
+    def kill_processes(self) -> None:
+        """Let the processes end at once; it waits for nothing."""
         with self._changed:
             self._closed = True
             self._waiting.clear()
             for process in self._processes:
                 process.kill()
+
+    def kill(self) -> None:
+        """End the processes at once."""
+        self.kill_processes()
         self.close()
         for process in self._processes:
             process.wait()

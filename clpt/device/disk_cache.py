@@ -1,8 +1,9 @@
 """Files in the user's cache folder, all of which may be deleted at any time.
 
 Several processes may use the folder at once: each file is written whole or not at all, and a file
-that another process has deleted is one that is missing. The files that were used longest ago are
-deleted where all together take more than LIMIT.
+that another process has deleted is one that is missing. So is a link, or a file that another user
+has written. The files that were used longest ago are deleted where all together take more than
+LIMIT.
 """
 
 from __future__ import annotations
@@ -11,9 +12,10 @@ import functools
 import hashlib
 import logging
 import os
+import stat
 import tempfile
 import threading
-import time
+from contextlib import suppress
 from pathlib import Path
 
 import platformdirs
@@ -28,7 +30,6 @@ log = logging.getLogger(__name__)
 LIMIT = 2**30  # bytes
 _PARTS = ("programs", "failed")  # the folders that are kept within LIMIT
 _STEP = LIMIT // 16  # bytes that a process writes before it looks at the folder's size again
-_STALE = 3600.0  # [s] after which a file that is not complete belongs to a process that has died
 
 _lock = forking.renewed(threading.Lock())
 _written = _STEP  # bytes since the folder's size was looked at: a process looks at its first file
@@ -94,12 +95,13 @@ def _unfit(path: Path) -> str | None:
     try:
         path.mkdir(mode=0o700, parents=True, exist_ok=True)
         output_files.check_writable(path / "trial")
-        for part in (path, *(path / name for name in _PARTS)):
-            if part.exists() and os.name == "posix":
-                if {part.lstat().st_uid, part.stat().st_uid} != {os.getuid()}:
-                    return "belongs to another user"
-                if part.stat().st_mode & 0o022:
-                    return f"can be written by others (see: chmod go-w {part})"
+        if os.name != "posix":
+            return None
+        for part in (path, *(one for one in path.iterdir() if one.is_dir())):
+            if {part.lstat().st_uid, part.stat().st_uid} != {os.getuid()}:
+                return "belongs to another user"
+            if part.stat().st_mode & 0o022:
+                return f"can be written by others (see: chmod go-w {part})"
     except OSError as error:
         return f"cannot be written ({error.strerror or error})"
     return None
@@ -113,7 +115,7 @@ def store(entry: str, header: str, binary: bytes, root: Path | None = None) -> N
     content = header.encode() + b"\n" + binary
     check = hashlib.sha256(content).hexdigest().encode()
     try:
-        _write((root or folder()) / "programs" / entry, check + b"\n" + content)
+        _keep((root or folder()) / "programs" / entry, check + b"\n" + content)
     except OSError as error:
         log.debug("the cache cannot be written: %s", error)
 
@@ -130,10 +132,11 @@ def load(entry: str) -> tuple[str, bytes] | None:
     """
     path = folder() / "programs" / entry
     try:
-        check, _, content = path.read_bytes().partition(b"\n")
-        os.utime(path)  # it was used now; many systems do not note that
+        check, _, content = read(path).partition(b"\n")
     except OSError:
         return None
+    with suppress(OSError):
+        os.utime(path)  # it was used now; many systems do not note that
     if hashlib.sha256(content).hexdigest().encode() != check:
         return None
     header, _, binary = content.partition(b"\n")
@@ -146,7 +149,7 @@ def keep_failed(source: Source) -> str | None:
     stem = source.name.replace("/", "_").removesuffix(".cl")
     path = folder() / "failed" / f"{stem}-{digest}.cl"
     try:
-        _write(path, source.text.encode())
+        _keep(path, source.text.encode())
     except OSError:
         return None
     return str(path)
@@ -155,18 +158,15 @@ def keep_failed(source: Source) -> str | None:
 def prune(root: Path, limit: int = LIMIT, *, parts: tuple[str, ...] = _PARTS) -> None:
     """Delete the files that were used longest ago, until all take at most `limit` bytes.
 
-    parts: their folders in `root`. What processes that have died left behind is deleted too.
+    parts: their folders in `root`.
     """
-    found, now = [], time.time()
+    found = []
     for path in (path for part in parts for path in (root / part).glob("*")):
-        try:
-            facts = path.stat()
-            if not path.name.startswith(output_files.PARTIAL):
-                found.append((facts.st_mtime, facts.st_size, path))
-            elif now - facts.st_mtime > _STALE:
-                path.unlink()
-        except OSError:  # another process has deleted it
+        if path.name.startswith(output_files.PARTIAL):
             continue
+        with suppress(OSError):  # another process has deleted it
+            facts = path.lstat()
+            found.append((facts.st_mtime, facts.st_size, path))
     used = sum(size for _, size, _ in found)
     for _, size, path in sorted(found):
         if used <= limit:
@@ -179,11 +179,40 @@ def prune(root: Path, limit: int = LIMIT, *, parts: tuple[str, ...] = _PARTS) ->
         used -= size
 
 
-def _write(path: Path, content: bytes) -> None:
+def read(path: Path) -> bytes:
+    """Return the content of a file that this user has written. Raises OSError for any other."""
+    with open(own_file(path), "rb") as file:
+        return file.read()
+
+
+def own_file(path: Path) -> int:
+    """Open a file of this user for reading; return its handle.
+
+    Raises OSError for a link, for what is no file, and for a file of another user.
+    """
+    flags = os.O_RDONLY | getattr(os, "O_BINARY", 0)
+    if os.name != "posix":
+        return os.open(path, flags)
+    handle = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK)  # a pipe has no end
+    facts = os.fstat(handle)
+    if stat.S_ISREG(facts.st_mode) and facts.st_uid == os.getuid():
+        return handle
+    os.close(handle)
+    raise PermissionError(f"{path} is no file of this user")
+
+
+def write(path: Path, content: bytes) -> None:
+    """Write a file in a cache, in the place of a link or a pipe too. Raises OSError."""
+    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    if path.is_symlink() or (path.exists() and not path.is_file()):
+        path.unlink()
+    output_files.write(path, content)
+
+
+def _keep(path: Path, content: bytes) -> None:
     """Write a file of the cache, and keep the cache within its limit."""
     global _written
-    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    output_files.write(path, content)
+    write(path, content)
     with _lock:
         _written += len(content)
         due = _written >= _STEP

@@ -134,8 +134,16 @@ def write_vendors(drivers: dict[str, str]) -> Path:
     """Return a folder in the user's cache with these ICD files, named after their content."""
     digest = hashlib.sha256(repr(sorted(drivers.items())).encode()).hexdigest()[:16]
     folder = disk_cache.folder() / "vendors" / digest
-    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     for name, driver in drivers.items():
-        if not (folder / name).is_file():
-            output_files.write_text(folder / name, driver)
+        if not _says(folder / name, driver):
+            disk_cache.write(folder / name, driver.encode())
+    output_files.remove_left(folder)  # the loader reads whatever is there
     return folder
+
+
+def _says(path: Path, driver: str) -> bool:
+    """Whether an ICD file of the cache names a driver."""
+    try:
+        return disk_cache.read(path) == driver.encode()
+    except OSError:
+        return False

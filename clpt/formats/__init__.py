@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, get_args
 
+from clpt import budget as budgets
+from clpt.budget import Budget
 from clpt.errors import SceneError
 from clpt.formats.missing import Missing
 from clpt.scene import Scene
@@ -44,6 +46,7 @@ def load(
     kinds: Iterable[type[Material]] = (),
     progress: Callable[[float, str], None] | None = None,
     missing_textures: Missing = "error",
+    budget: Budget | None = None,
     **variables: Any,
 ) -> Scene:
     """Read a scene, a bare mesh or a bare density; a folder means the scene in it (see IN_FOLDERS).
@@ -53,9 +56,26 @@ def load(
     is the number or name of one of several. `progress` is
     called with the share that is read, from 0 to 1, and a text, for files of many shapes.
     `missing_textures`: "grey" puts grey in the place of images that are not there, with a warning.
+    `budget`: what the load may take of memory and time; a file that asks for more is refused.
     Raises SceneError with the file and, where it is known, the line.
     """
     path = locate(path)
+    try:
+        with budgets.opened(budget):
+            return _load(path, kinds, progress, missing_textures, variables)
+    except RecursionError:
+        raise SceneError("what it holds is nested too deeply", file=path) from None
+    except MemoryError:
+        raise SceneError("reading it takes more memory than there is", file=path) from None
+
+
+def _load(
+    path: Path,
+    kinds: Iterable[type[Material]],
+    progress: Callable[[float, str], None] | None,
+    missing_textures: Missing,
+    variables: dict[str, Any],
+) -> Scene:
     name = path.name.lower()
     kind = next((kind for suffix, kind in FORMATS.items() if name.endswith(suffix)), None)
     if kind is None:

@@ -21,7 +21,6 @@ from clpt.scene.textures import Bitmap
 
 ROWS, COLUMNS = 360, 720  # of the image: half degrees
 MOST_VALUES = 1 << 22
-MOST_BYTES = 1 << 26
 AROUND = ((0, 90), (0, 180), (0, 360), (90, 270))
 TYPES = {2: "B", 3: "A"}  # of photometry, about axes that lie; 1 is C, about the vertical
 # keys of what follows TILT, in their order
@@ -101,12 +100,7 @@ class _Reader:
 
     def __init__(self, path: Path):
         self.path, self.line = path, 1
-        try:
-            if path.stat().st_size > MOST_BYTES:
-                self.fail(f"is larger than the {MOST_BYTES >> 20} MiB that are read")
-            self.lines = text_files.read(path).splitlines()
-        except OSError as error:
-            raise SceneError(f"cannot be read: {error.strerror}", file=path) from None
+        self.lines = text_files.read(path).splitlines()
 
     def fail(self, message: str) -> NoReturn:
         raise SceneError(message, file=self.path, line=self.line)

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import struct
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
-from clpt import output_files
+from clpt import budget, output_files
 from clpt.errors import SceneError
-from clpt.images import budget
+from clpt.images import sizes
 
 Channels = Mapping[str, NDArray[Any]]
 Header = Mapping[str, Any]
@@ -81,7 +83,7 @@ def check(path: Path, header: Header) -> None:
         raise SceneError(f"has deep pixels ({header['type'].name}); flatten it", file=path)
     for name in ("dataWindow", "displayWindow"):
         x0, y0, x1, y1 = window(header, name)
-        budget.check_size(path, x1 - x0, y1 - y0)
+        sizes.check_size(path, x1 - x0, y1 - y0)
 
 
 def read_channels(path: Path, chosen: Sequence[str] | None = None, part: int = 0) -> Channels:
@@ -98,7 +100,7 @@ def read_channels(path: Path, chosen: Sequence[str] | None = None, part: int = 0
     if len(found) == 1 and set(names) < set(channel_names(found[0])):
         return _some(path, found[0], names)
     # The library reads all channels of all parts.
-    budget.take(sum(_size(one, channel_names(one)) for one in found), _WHAT, path)
+    budget.check(sum(_size(one, channel_names(one)) for one in found), _WHAT, path)
     with opened(path) as parts:
         channels = parts[part].channels
         return {name: np.asarray(channels[name].pixels) for name in names}
@@ -121,7 +123,7 @@ def _some(path: Path, header: Header, names: Sequence[str]) -> Channels:
 
     By the library's older interface, for the newer one always reads all of them.
     """
-    budget.take(_size(header, names), _WHAT, path)
+    budget.check(_size(header, names), _WHAT, path)
     x0, y0, x1, y1 = window(header, "dataWindow")
     file = OpenEXR.InputFile(exr_name(path))
     try:
@@ -139,8 +141,63 @@ def _some(path: Path, header: Header, names: Sequence[str]) -> Channels:
 
 
 def write_parts(path: Path, parts: Sequence[Any]) -> None:
-    """Write parts of the library's own class. Raises RuntimeError where it cannot."""
+    """Write parts of the library's own class. Raises RuntimeError or OSError where it cannot."""
     OpenEXR.File(list(parts)).write(exr_name(path))
+    _check_whole(path)
+
+
+def _check_whole(path: Path) -> None:
+    """Raise OSError for a file that ends before its last chunk does.
+
+    The library does not tell that the last bytes were refused, as by a full disk. Behind the
+    headers stand the offsets of all chunks, then these: number of the part in a file of several,
+    row, size (each i32) and data.
+    """
+    with path.open("rb") as file:
+        _, version = _unpacked("<2I", file)
+        several = bool(version & SEVERAL_PARTS)
+        while _skip_header(file) and several:
+            pass
+        (first,) = _unpacked("<Q", file)
+        file.seek(-8, os.SEEK_CUR)
+        offsets = _unpacked(f"<{max(first - file.tell(), 8) // 8}Q", file)
+        last = max(offsets)
+        file.seek(last)
+        *_, size = _unpacked("<3i" if several else "<2i", file)
+        whole = file.tell() + size
+        if not min(offsets) or file.seek(0, os.SEEK_END) != whole:
+            raise OSError(errno.ENOSPC, NOT_WHOLE)
+
+
+SEVERAL_PARTS = 0x1000  # of the version
+NOT_WHOLE = "it could not be written to its end; is the disk full?"
+
+
+def _skip_header(file: BinaryIO) -> bool:
+    """Read over the attributes of a part; return whether there was one."""
+    some = False
+    while _word(file):
+        _word(file)  # its type
+        (size,) = _unpacked("<i", file)
+        file.seek(size, os.SEEK_CUR)
+        some = True
+    return some
+
+
+def _word(file: BinaryIO) -> bytes:
+    """The bytes before the next zero. Raises OSError at the end of the file."""
+    made = bytearray()
+    while (letter := _unpacked("<c", file)[0]) != b"\0":
+        made += letter
+    return bytes(made)
+
+
+def _unpacked(form: str, file: BinaryIO) -> tuple[Any, ...]:
+    """The next numbers of a file. Raises OSError at its end."""
+    try:
+        return struct.unpack(form, file.read(struct.calcsize(form)))
+    except struct.error:
+        raise OSError(errno.ENOSPC, NOT_WHOLE) from None
 
 
 def write_channels(path: Path, metadata: Mapping[str, Any], channels: Channels) -> None:
@@ -148,3 +205,4 @@ def write_channels(path: Path, metadata: Mapping[str, Any], channels: Channels) 
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     with output_files.replacing(path) as partial:
         OpenEXR.File({**metadata, **header}, dict(channels)).write(exr_name(partial))
+        _check_whole(partial)

@@ -6,7 +6,19 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from clpt import input_files
 from clpt.errors import SceneError
+
+
+def check_there(path: Path) -> None:
+    """Raise SceneError unless there is a regular file; it counts as read."""
+    try:
+        exists = path.exists()
+    except (OSError, ValueError):  # no name of a file
+        exists = False
+    if not exists:
+        raise SceneError("no such image file", file=path)
+    input_files.checked(path)
 
 
 @contextmanager

@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import output_files
+from clpt import budget, output_files
 from clpt.errors import SceneError
-from clpt.images import budget
+from clpt.images import sizes
 from clpt.images.stored import Matrix, Stored
 from clpt.spectra import spaces
 
@@ -59,8 +59,8 @@ def read(path: Path) -> Stored:
     with path.open("rb") as file:
         header = _parsed(path, file.read(HEADER_BYTES))
     rows, columns = header.size
-    budget.check_size(path, *(header.size[::-1] if header.order[1] == "Y" else header.size))
-    budget.take(24 * rows * columns, "its pixels", path)
+    sizes.check_size(path, *(header.size[::-1] if header.order[1] == "Y" else header.size))
+    budget.check(24 * rows * columns, "its pixels", path)
     data = path.read_bytes()
     rgbe, at = np.empty((rows, columns, 4), np.uint8), header.end
     try:

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.errors import SceneError
 from clpt.images import exr_files
-from clpt.images.failures import reading
+from clpt.images.failures import check_there, reading
 
 
 def read_layers(path: str | Path) -> dict[str, NDArray[np.float32]]:
@@ -24,7 +23,6 @@ def read_channels(path: str | Path) -> dict[str, NDArray[Any]]:
     Of its data window, and of its first part. Raises SceneError.
     """
     path = Path(path)
-    if not path.is_file():
-        raise SceneError("no such image file", file=path)
+    check_there(path)
     with reading(path):
         return dict(exr_files.read_channels(path))

@@ -8,26 +8,32 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import output_files
+from clpt import budget, numpy_files, output_files
 from clpt.errors import SceneError
-from clpt.images import budget
+from clpt.images import sizes
 from clpt.images.stored import Stored
 
 
 def read(path: Path) -> Stored:
     """Read (h, w) or (h, w, c) of any number. Raises SceneError for other arrays."""
-    array = np.load(path, "r" if path.stat().st_size > 4096 else None, allow_pickle=False)
+    array = numpy_files.array(path)
     if array.ndim > 1:
-        budget.check_size(path, *array.shape[1::-1])
+        sizes.check_size(path, *array.shape[1::-1])
     if array.ndim not in (2, 3) or array.dtype.kind not in "fiu":
         message = f"not an image: an array of {array.dtype}, shape {array.shape}"
         raise SceneError(message, file=path)
-    budget.take(4 * array.size, "its array", path)
+    budget.check(4 * array.size, "its array", path)
     values = np.array(array if array.ndim == 3 else array[..., None], np.float32)
     return Stored(values, encoded=False)
 
 
 def write(path: Path, array: NDArray[Any]) -> None:
-    """Write an array of any shape as .npy."""
+    """Write an array of one axis or more as .npy. Raises OSError.
+
+    Not by `np.save`, which does not tell that the last bytes were refused, as by a full disk.
+    """
+    array = np.ascontiguousarray(array)
     with output_files.replacing(path) as partial, partial.open("wb") as file:
-        np.save(file, array)
+        header = np.lib.format.header_data_from_array_1_0(array)
+        np.lib.format.write_array_header_1_0(file, header)
+        file.write(array.data)

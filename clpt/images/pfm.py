@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import output_files
+from clpt import budget, output_files
 from clpt.errors import SceneError
-from clpt.images import budget
+from clpt.images import sizes
 from clpt.images.stored import Stored
 
 Array = NDArray[np.float32]
@@ -34,9 +34,9 @@ def read(path: Path) -> Stored:
         raise SceneError(message, file=path)
     width, height, channels = int(header[2]), int(header[3]), CHANNELS[header[1]]
     scale = _scale(path, header[4])
-    budget.check_size(path, width, height)
+    sizes.check_size(path, width, height)
     count = width * height * channels
-    budget.take(8 * count, "its pixels", path)
+    budget.check(8 * count, "its pixels", path)
     begin, size = header.end(), path.stat().st_size
     if size - begin == 4 * count + 1 and header[0].endswith(b"\r"):
         begin += 1  # a header of Windows's lines

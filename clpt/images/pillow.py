@@ -18,8 +18,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt import budget
 from clpt.errors import SceneError
-from clpt.images import budget, png_files
+from clpt.images import png_files, sizes
 from clpt.images.stored import Stored
 
 if TYPE_CHECKING:  # else imported where it is used, for many pictures are EXR only
@@ -54,13 +55,9 @@ def decoded(
     Raises SceneError for what is no such image or takes too much memory, else what Pillow does.
     """
     with _opened(source, formats) as image:
-        (admit or partial(budget.check_size, _file(source)))(image.width, image.height)
-        _take(source, image)
-        wide, key = _sixteen_bits(source, formats, image), image.info.get("transparency")
-        if wide is None:
-            made = from_pillow(image)
-        else:
-            made = Stored(_floats(wide, key if isinstance(key, tuple) else None), encoded=True)
+        (admit or partial(sizes.check_size, _file(source)))(image.width, image.height)
+        with budget.lending(_bytes(image), "its pixels", _file(source)):
+            made = _pixels(source, formats, image)
         # Only now: Pillow decodes an image to find its Exif.
         kind, notes, colour_notes = image.format, _notes(image), _colour_notes(image)
     if not profiled:
@@ -76,6 +73,13 @@ def decoded(
         notes=notes,
         colour_notes=(*said.notes, *colour_notes),
     )
+
+
+def _pixels(source: Source, formats: Sequence[str], image: ImageFile) -> Stored:
+    wide, key = _sixteen_bits(source, formats, image), image.info.get("transparency")
+    if wide is None:
+        return from_pillow(image)
+    return Stored(_floats(wide, key if isinstance(key, tuple) else None), encoded=True)
 
 
 def texts(path: Path) -> dict[str, str]:
@@ -104,11 +108,13 @@ def _opened(source: Source, formats: Sequence[str]) -> Iterator[ImageFile]:
         raise SceneError(message, file=file) from None
 
 
-def _take(source: Source, image: ImageFile) -> None:
-    """Ask for the memory that decoding takes, Pillow's own and ours."""
+def _bytes(image: ImageFile) -> int:
+    """Return the memory that decoding takes [bytes], Pillow's own and ours."""
+    bands = max(len(image.getbands()), 1)
     deep = image.mode[0] in "IF" or _raw_mode(image).find(";16") >= 0
-    samples = image.width * image.height * max(len(image.getbands()), 1)
-    budget.take(samples * (12 if deep else 8), "its pixels", _file(source))
+    stored = 1 if bands == 1 else 4  # Pillow's, of a pixel
+    each = 12 * bands if deep else stored + 2 * bands + (4 if image.mode in ("P", "1") else 0)
+    return image.width * image.height * each
 
 
 def _file(source: Source) -> Path | None:

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt import budget
 from clpt.errors import SceneError
 from clpt.images import exr, hdr, npy, pfm, pillow
-from clpt.images.failures import reading
+from clpt.images.failures import check_there, reading
 from clpt.images.stored import Stored
 
 log = logging.getLogger("clpt.images")
@@ -59,6 +60,7 @@ def read_stored(path: str | Path) -> Stored:
         image = READERS[path.suffix.lower()](path)
     if image.values.size == 0:
         raise SceneError("the image has no pixels", file=path)
+    budget.take(image.values.nbytes, "its pixels", path)
     return image
 
 
@@ -68,6 +70,5 @@ def check_input(path: str | Path) -> Path:
     if path.suffix.lower() not in READERS:
         message = f"unknown image suffix {path.suffix!r}; known: {', '.join(READERS)}"
         raise SceneError(message, file=path)
-    if not path.is_file():
-        raise SceneError("no such image file", file=path)
+    check_there(path)
     return path

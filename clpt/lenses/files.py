@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
-from clpt import text
+from clpt import input_files, text
 from clpt.errors import SceneError, UnknownKindError
 from clpt.lenses import optical_bench, pbrt_rows, zemax
 from clpt.lenses.prescription import Prescription
@@ -36,10 +36,7 @@ def read(path: str | Path, aperture: float | None = None) -> Prescription:
     path = Path(path)
     if path.suffix.lower() not in READERS:
         raise SceneError(f"a lens file ends in {', '.join(READERS)}", file=path)
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise SceneError(f"cannot be read: {error.strerror}", file=path) from None
+    data = input_files.read_bytes(path)
     if len(data) > LARGEST:
         raise SceneError("is too large for a lens", file=path)
     lens = READERS[path.suffix.lower()](text.decode(data), path)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import output_files
+from clpt import input_files, output_files
 from clpt.errors import SceneError
 from clpt.measured.fit import Reflection, area, direction, grid, spherical
 from clpt.measured.warp import Values, sample, warp
@@ -54,10 +54,7 @@ class MerlTable:
 def read(path: str | Path) -> MerlTable:
     """Read a table. Raises SceneError for what is none."""
     path = Path(path)
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise SceneError(f"cannot be read: {error.strerror or error}", file=path) from None
+    data = input_files.read_bytes(path)
     shape = struct.unpack_from("<3i", data) if len(data) >= 12 else (0, 0, 0)
     if min(shape) < 2 or (count := math.prod(shape)) > MOST_VALUES:
         shown = " x ".join(map(str, shape))

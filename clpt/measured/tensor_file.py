@@ -14,14 +14,14 @@ from pathlib import Path
 
 import numpy as np
 
-from clpt import output_files
+from clpt import input_files, output_files
 from clpt.errors import SceneError
 
 MAGIC, VERSION = b"tensor_file\0", (1, 0)
 TYPES = (
     "u1", "i1", "<u2", "<i2", "<u4", "<i4", "<u8", "<i8", "<f2", "<f4", "<f8",
 )  # fmt: skip
-MOST_FIELDS, MOST_AXES, MOST_BYTES = 256, 16, 1 << 32
+MOST_FIELDS, MOST_AXES = 256, 16
 ALIGNED = 8  # bytes at whose multiples values begin
 
 
@@ -29,13 +29,7 @@ def read(path: str | Path) -> dict[str, np.ndarray]:
     """Return the arrays of a file by their names. Raises SceneError."""
     path = Path(path)
     try:
-        if path.stat().st_size > MOST_BYTES:
-            raise SceneError(f"is larger than {MOST_BYTES >> 30} GiB")
-        return _fields(path.read_bytes())
-    except OSError as error:
-        raise SceneError(f"cannot be read: {error.strerror or error}", file=path) from None
-    except MemoryError:
-        raise SceneError("does not fit in memory", file=path) from None
+        return _fields(input_files.read_bytes(path))
     except SceneError as error:
         raise SceneError(error.message, file=path) from None
     except struct.error:

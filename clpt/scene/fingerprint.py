@@ -16,6 +16,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from clpt import input_files
 from clpt.errors import SceneError
 from clpt.scene import Scene
 from clpt.scene.materials import Material
@@ -219,9 +220,11 @@ def _file(path: Path, where: str) -> str:
     """The digest of a file's bytes."""
     hashed = hashlib.sha256()
     try:
-        with path.open("rb") as file:
+        with input_files.opened(path) as file:
             while piece := file.read(PIECE):
                 hashed.update(piece)
+    except SceneError as error:
+        raise SceneError(error.message, file=path, where=where) from None
     except OSError as error:
         raise SceneError(f"cannot be read: {error.strerror}", file=path, where=where) from error
     return DIGEST + hashed.hexdigest()

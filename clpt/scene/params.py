@@ -72,6 +72,7 @@ HostForm = Literal[
 ]  # fmt: skip
 MEASURED = {"measurement": Measurement, "merl": MerlTable}
 ORDERS = 8  # highest order of diffraction, see kernels/optics/diffraction.cl
+MOST_PARTS, MOST_NESTED = 1000, 64  # of a material, texture, light or medium
 ROUNDING = 1e-6  # by which a spectrum may be beyond its limits
 LARGEST = float(np.finfo(np.float32).max)  # number of a parameter: kernels have no larger ones
 
@@ -248,6 +249,8 @@ class Kind:
     # Where all numbers of one of these are above 0, its struct has the `luminance` of `base_color`,
     # and its kernel file includes core/luminance.cl.
     tints: ClassVar[tuple[tuple[str, ...], ...]] = ()
+    is_tree: ClassVar[bool] = True  # its parts become one text in the kernels, each at every use
+    _size: ClassVar[tuple[int, int]] = (1, 1)  # of an object: its parts, and how deep they lie
 
     @classproperty
     def kind(cls) -> str:
@@ -255,9 +258,19 @@ class Kind:
         return _snake(cls.__name__)  # type: ignore[attr-defined]
 
     def __post_init__(self) -> None:
+        parts, depth = 1, 0
         for name, param in params(type(self)).items():
             value = _checked(getattr(self, name), param, f"{self.kind}.{name}")
             object.__setattr__(self, name, value)
+            for inner in value if isinstance(value, tuple) else (value,):
+                if isinstance(inner, Kind):
+                    parts, depth = parts + inner._size[0], max(depth, inner._size[1])
+        object.__setattr__(self, "_size", (parts, depth + 1))
+        if self.is_tree and (parts > MOST_PARTS or depth >= MOST_NESTED):
+            message = f"has more than {MOST_PARTS} parts, shared ones counted at each use"
+            if parts <= MOST_PARTS:
+                message = f"is nested deeper than {MOST_NESTED} parts"
+            raise SceneError(message, where=self.kind)
         self.check()
 
     def check(self) -> None:

@@ -25,6 +25,8 @@ BASES = ("linear", "bspline", "bezier")
 class Shape(Kind):
     """Base of all shapes; placed by `to_world`."""
 
+    is_tree = False  # it holds trees side by side
+
     material: Material = host(Diffuse(), "of the surface", form="material")
     emission: Light | None = host(None, "an `area` light, or None", form="area_light")
     interior: Medium | None = host(None, "medium behind its front; None: none", form="medium")

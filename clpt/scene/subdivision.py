@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt import budget
 from clpt.errors import SceneError
 
-MOST_TRIANGLES = 1 << 23
+PER_TRIANGLE = 512  # bytes of memory for each of the finest, while they are made
 Points = NDArray[np.float64]
 Faces = NDArray[np.int64]
 
@@ -23,8 +24,7 @@ def loop(points: Points, faces: Faces, levels: int) -> tuple[Points, Faces, Poin
 
     Raises SceneError for a mesh in which an edge has more than two triangles, or that gets too big.
     """
-    if len(faces) * 4**levels > MOST_TRIANGLES:
-        raise SceneError(f"{levels} levels make more than {MOST_TRIANGLES} triangles; take fewer")
+    budget.check(PER_TRIANGLE * len(faces) * 4**levels, f"{levels} levels of subdivision")
     for _ in range(levels):
         points, faces = _finer(points, faces)
     edges = _Edges(faces, len(points))

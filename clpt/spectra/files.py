@@ -165,14 +165,7 @@ def _tabulated(
 
 def _page(path: str | Path, text: str) -> tuple[Spectrum | None, Spectrum]:
     """Read eta, if there is one, and k from a page of the database."""
-    import yaml  # takes as long to import as all of clpt.spectra
-
-    try:
-        page = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        line = mark.line + 1 if mark else None
-        raise SceneError(f"not YAML: {error}", file=path, line=line) from None
+    page = _yaml(path, text)
     parts = page.get("DATA") if isinstance(page, dict) else None
     if not isinstance(parts, list) or not all(isinstance(part, dict) for part in parts):
         raise SceneError("no list DATA, so not a page of refractiveindex.info", file=path)
@@ -198,6 +191,29 @@ def _page(path: str | Path, text: str) -> tuple[Spectrum | None, Spectrum]:
             line = _line_of(text, error.where or kind)
             raise SceneError(error.message, file=path, line=line) from None
     return eta, k
+
+
+def _yaml(path: str | Path, text: str) -> Any:
+    """A page as texts, lists and dictionaries. References, which grow without end, are refused."""
+    import yaml  # takes as long to import as all of clpt.spectra
+
+    class Loader(yaml.BaseLoader):
+        def compose_node(self, parent: Any, index: Any) -> Any:
+            if self.check_event(yaml.AliasEvent):
+                event: Any = self.peek_event()  # type: ignore[no-untyped-call]
+                raise yaml.MarkedYAMLError(
+                    None, None, "references (*name) are not read", event.start_mark
+                )
+            return super().compose_node(parent, index)
+
+    try:
+        return yaml.load(text, Loader)
+    except yaml.YAMLError as error:
+        mark, problem = getattr(error, "problem_mark", None), getattr(error, "problem", None)
+        line = mark.line + 1 if mark else None
+        raise SceneError(f"not YAML: {problem or error}", file=path, line=line) from None
+    except RecursionError:
+        raise SceneError("not a page: its YAML is nested too deeply", file=path) from None
 
 
 def _page_columns(part: dict[str, Any], count: int) -> NDArray[np.float64]:

@@ -23,11 +23,14 @@ def is_loopback(host: str) -> bool:
 class Access:
     """The secrets of one server; only their digests are kept.
 
-    A token of 256 bits stands in an address, opens the page once, and becomes a cookie.
+    A token of 256 bits stands in an address, opens the page once, and becomes a cookie. The page
+    is in a folder with a name of 128 bits: browsers send a cookie to all ports of a host, of which
+    another may be a stranger's, but only for the folder that it is of.
     """
 
     def __init__(self, port: int):
-        self.cookie_name = f"clpt-{port}"  # browsers send cookies to all ports of a host
+        self.cookie_name = f"clpt-{port}"
+        self.room = f"/{secrets.token_urlsafe(16)}/"
         self._tokens: list[bytes] = []
         self._cookies: list[bytes] = []
 

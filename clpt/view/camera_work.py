@@ -14,14 +14,13 @@ from clpt.scene.cameras import Camera, Perspective, ThinLens
 from clpt.scene.params import params
 from clpt.view import navigation, views
 from clpt.view.commands import OF_VIEW, CommandError, Request
+from clpt.view.messages import Reply
 from clpt.view.render_loop import RenderLoop
 from clpt.view.target import Change
 
 log = logging.getLogger(__name__)
 
 LENS_SHARE = 0.01  # of the distance in focus: the radius that a pinhole gets as a lens
-
-Reply = Callable[[dict[str, Any]], None]
 
 
 class CameraWork:
@@ -70,12 +69,11 @@ class CameraWork:
         self._tell_state()
 
     def _do_open_view(self, reply: Reply, camera: Any, exposure: float, tone: str) -> None:
-        opened = views.camera_of(camera)
+        self._move(views.camera_of(camera, self.scene.camera))
+        self._set_pivot()
         if tone == OF_VIEW and self._loop.display.view is None:
             tone = "none"  # it was of another start
         self._do_display(reply, exposure, tone)
-        self._move(opened)
-        self._set_pivot()
         self._tell_state()
 
     def _do_field_of_view(self, reply: Reply, degrees: float) -> None:
@@ -138,7 +136,12 @@ class CameraWork:
         self._ask_hit(film.width // 2, film.height // 2, silent, aim)
 
     def _move(self, camera: Camera, takes_pivot: bool = False) -> None:
-        """Let another camera look; takes_pivot: the pivot goes where the camera goes."""
+        """Let another camera look; takes_pivot: the pivot goes where the camera goes.
+
+        Raises CommandError for a camera that float32 cannot tell.
+        """
+        if not navigation.is_within_reach(camera):
+            raise CommandError("the camera would be too far away, or see too much or too little")
         if takes_pivot:
             old, new = navigation.pose(self.scene.camera), navigation.pose(camera)
             away = self._pivot - old.origin

@@ -16,7 +16,7 @@ OF_VIEW = "view"  # of OpenColorIO, in the place of a tone curve
 TARGETS = ("camera", "film", "light", "emission", "material", "integrator")
 FILES = ("png", "exr", "scene", "view")
 LARGEST_MESSAGE = 64 * 1024  # [bytes]
-DEEPEST = 16  # levels of a value
+DEEPEST, MOST_PARTS = 16, 4096  # levels and numbers, names and lists of a value
 
 
 class CommandError(ClptError):
@@ -99,11 +99,12 @@ class Name:
 class Value:
     """A JSON value for a parameter of the scene, whose own declaration checks it.
 
-    It names no file: whoever opens the page may not read what lies on the disk.
+    `clpt.view.panels.read` takes it, and lets it name no file.
     """
 
     def check(self, value: Any) -> Any:
-        _check_value(value, DEEPEST)
+        if _check_value(value, DEEPEST) > MOST_PARTS:
+            raise CommandError(f"has more than {MOST_PARTS} parts")
         return value
 
 
@@ -237,7 +238,7 @@ COMMANDS: dict[str, Command] = {
 
 
 def parse(message: str | bytes) -> Request:
-    """Return the command that a message is. Raises CommandError."""
+    """Return the command that a message of JSON is. Raises CommandError."""
     if not isinstance(message, str):
         raise CommandError("a message is text")
     if len(message) > LARGEST_MESSAGE:
@@ -246,14 +247,22 @@ def parse(message: str | bytes) -> Request:
         found = json.loads(message, parse_constant=_no_constant)
     except (ValueError, RecursionError):
         raise CommandError("the message is not JSON") from None
+    return checked(found)
+
+
+def checked(found: Any) -> Request:
+    """Return the command that a message is, with values of its declared types.
+
+    Here alone a command is looked up. Raises CommandError.
+    """
     if not isinstance(found, dict) or not isinstance(found.get("do"), str):
         raise CommandError("a message is an object that says what to do")
-    name = found.pop("do")
+    name = found["do"]
     command = COMMANDS.get(name)
     if command is None:
         raise CommandError(f"there is no command {_shown(name)}")
     for key in found:
-        if key not in command.parameters:
+        if key != "do" and key not in command.parameters:
             raise CommandError(f"{name} has no parameter {_shown(key)}")
     values = {}
     for key, kind in command.parameters.items():
@@ -279,17 +288,17 @@ def _shown(value: Any) -> str:
     return text if len(text) <= 40 else f"{text[:40]}..."
 
 
-def _check_value(value: Any, levels: int) -> None:
-    """Raise CommandError for a value that is nested too deeply, not finite, or names a file."""
+def _check_value(value: Any, levels: int) -> int:
+    """Return how many parts a value has.
+
+    Raises CommandError for what is nested too deeply, and numbers too large or not finite.
+    """
     if levels == 0:
         raise CommandError("is nested too deeply")
     if isinstance(value, dict):
-        if "file" in value:
-            raise CommandError("names a file; a page cannot")
-        for child in value.values():
-            _check_value(child, levels - 1)
-    elif isinstance(value, list):
-        for child in value:
-            _check_value(child, levels - 1)
-    elif isinstance(value, (int, float)) and not -1e30 <= value <= 1e30:
+        value = list(value.values())
+    if isinstance(value, list):
+        return 1 + sum(_check_value(child, levels - 1) for child in value)
+    if isinstance(value, (int, float)) and not -1e30 <= value <= 1e30:
         raise CommandError("has a number that is too large")
+    return 1

@@ -1,10 +1,25 @@
-"""Messages to viewers as JSON, which has no infinity."""
+"""Messages to viewers: JSON, which has no infinity, and errors of one line without folders."""
 
 from __future__ import annotations
 
 import json
+import logging
 import math
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
+
+from clpt.errors import ClptError, KernelBuildError, SceneError
+
+log = logging.getLogger(__name__)
+
+LONGEST_TEXT = 300  # characters of an error
+QUOTED_FOLDER = re.compile(r"""(?<=['"])(?:[A-Za-z]:)?[/\\][^'"\n]*[/\\]""")
+FOLDER = re.compile(r"""(?<![\w.~-])(?:[A-Za-z]:)?[/\\][^\s'"]*[/\\]""")
+
+Reply = Callable[[dict[str, Any]], None]
 
 
 def as_json(message: Any) -> str:
@@ -22,3 +37,42 @@ def finite(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: finite(child) for key, child in value.items()}
     return [finite(child) for child in value] if isinstance(value, (list, tuple)) else value
+
+
+def error_message(error: BaseException, before: str = "") -> dict[str, Any]:
+    """Return what a viewer is told of an error: one line of at most LONGEST_TEXT characters.
+
+    before: begins the line. Of a file only the name is told, not its folder.
+    """
+    text = " ".join(f"{before}{_reason(error)}".split())
+    text = FOLDER.sub("", QUOTED_FOLDER.sub("", text))
+    text = "".join(one if one.isprintable() else "?" for one in text)
+    if len(text) > LONGEST_TEXT:
+        text = f"{text[: LONGEST_TEXT - 3]}..."
+    return {"type": "error", "text": text}
+
+
+@contextmanager
+def answering(reply: Reply, before: str = "") -> Iterator[None]:
+    """Let whatever is raised be an answer: no message, whatever it holds, ends a viewer."""
+    try:
+        yield
+    except Exception as error:
+        log.debug("a message failed", exc_info=True)
+        reply(error_message(error, before))
+
+
+def _reason(error: BaseException) -> str:
+    if isinstance(error, SceneError):
+        line = f"line {error.line}" if error.line is not None else None
+        name = None if error.file is None else Path(error.file).name
+        return ": ".join(str(part) for part in (name, line, error.where, error.message) if part)
+    if isinstance(error, KernelBuildError):
+        return f"the kernel program {error.stage!r} did not build"
+    if isinstance(error, ClptError):
+        return str(error)
+    if isinstance(error, MemoryError):
+        return "there is not enough memory"
+    if isinstance(error, OSError):
+        return error.strerror or "a file cannot be read or written"
+    return f"a fault of clpt ({type(error).__name__})"

@@ -14,6 +14,7 @@ from clpt.scene.cameras import Camera, Matrix, Orthographic, Perspective
 
 Vector = NDArray[np.float64]
 
+FARTHEST = 1e12  # [m] from the origin, as of vertices
 POLE = math.radians(2.0)  # nearest to the pole that a turn ends
 _EYE_TO_CAMERA = np.diag([-1.0, 1.0, -1.0, 1.0])  # OpenGL's eye space looks along -z, +x right
 
@@ -36,6 +37,17 @@ def pose(camera: Camera) -> Pose:
         matrix = np.asarray(camera.to_world, float)
     left, up, forward = (_unit(matrix[:3, i]) for i in range(3))
     return Pose(matrix[:3, 3].copy(), left, up, forward)
+
+
+def is_within_reach(camera: Camera) -> bool:
+    """Return whether the numbers of a camera say where it is and looks, and are below FARTHEST."""
+    matrix = np.asarray(camera.view if isinstance(camera, Matrix) else camera.to_world, float)
+    if transforms.is_singular(matrix):
+        return False
+    with np.errstate(all="ignore"):
+        at = pose(camera)
+    numbers = np.concatenate([matrix.ravel(), at.origin, at.left, at.up, at.forward])
+    return bool((np.abs(numbers) < FARTHEST).all())
 
 
 def moved(camera: Camera, motion: NDArray[np.float64]) -> Camera:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
@@ -44,6 +43,7 @@ CONTROLS = {
 }
 MOST_OBJECTS = 500  # that a page lists
 MOST_PANELS = 300
+LONGEST_NAME = 80  # characters that it is told of a name
 CURVE_AT = range(380, 781, 20)  # [nm]
 OF_FILM = (  # what can change while the renderers stay
     "sensor", "white_balance", "exposure", "lambda_min", "lambda_max", "wavelengths",
@@ -87,7 +87,7 @@ def objects(scene: Scene) -> list[dict[str, Any]]:
     number = {id(m): i for i, (m, _) in enumerate(_targets(scene)["material"])}
     return [
         {
-            "name": shape.name or f"{shape.kind} {i + 1}",
+            "name": for_people(shape.name) or f"{shape.kind} {i + 1}",
             "kind": shape.kind,
             "material": number.get(id(shape.material)),
         }
@@ -101,8 +101,19 @@ def object_of(scene: Scene, index: int) -> dict[str, Any]:
     materials = [id(material) for material, _ in _targets(scene)["material"]]
     panel = materials.index(id(shape.material)) if id(shape.material) in materials else None
     made_of = getattr(shape.material, "name", "") or getattr(shape.material, "kind", "")
-    name = shape.name or f"{shape.kind} {index + 1}"
-    return {"name": name, "kind": shape.kind, "made_of": made_of, "material": panel}
+    name = for_people(shape.name) or f"{shape.kind} {index + 1}"
+    return {
+        "name": name, "kind": shape.kind, "made_of": for_people(made_of), "material": panel
+    }  # fmt: skip
+
+
+def for_people(name: str) -> str:
+    """Return a name of a scene, of which a file may make anything, as a page shows it.
+
+    It is short, and has no signs that are not seen, such as those that turn the text around.
+    """
+    shown = "".join(one if one.isprintable() else "?" for one in name[: LONGEST_NAME + 1])
+    return shown if len(shown) <= LONGEST_NAME else f"{shown[: LONGEST_NAME - 3]}..."
 
 
 def edited(scene: Scene, target: str, index: int, key: str, value: Any) -> tuple[Scene, Change]:
@@ -156,9 +167,9 @@ def _members(shape: Shape) -> tuple[Shape, ...]:
 
 def _title(target: str, thing: Any, owners: list[int], scene: Scene) -> str:
     if getattr(thing, "name", ""):
-        return str(thing.name)
+        return for_people(thing.name)
     named = [scene.shapes[i].name for i in owners if scene.shapes[i].name]
-    return named[0] if named else thing.kind.replace("_", " ")
+    return for_people(named[0]) if named else thing.kind.replace("_", " ")
 
 
 def _parameters(target: str, thing: Kind) -> list[dict[str, Any]]:
@@ -168,6 +179,11 @@ def _parameters(target: str, thing: Kind) -> list[dict[str, Any]]:
         for name, param in params(type(thing)).items()
         if _editable(target, name, param)
     ]
+
+
+def is_plain(param: Param) -> bool:
+    """Return whether a parameter can go to a page and come back: a value, no other thing."""
+    return (param.form or param.role) in (*CONTROLS, "matrix4")
 
 
 def _editable(target: str, key: str, param: Param) -> bool:
@@ -216,11 +232,7 @@ def _curve(value: Any, param: Param) -> list[float] | None:
 
 def _shown(value: Any, param: Param) -> Any:
     """Return a value as scene.json has it, None where the page cannot show it."""
-    if isinstance(value, (Texture, Material, Group)) or (param.form or param.role) not in (
-        *CONTROLS,
-        "matrix4",
-        "text",
-    ):
+    if isinstance(value, (Texture, Material, Group)) or not is_plain(param):
         return None
     shown = forms.write(value, param, _WRITER)
     try:
@@ -230,11 +242,14 @@ def _shown(value: Any, param: Param) -> Any:
 
 
 def read(key: str, value: Any, param: Param) -> Any:
-    """Return the value of a parameter that a page gave. Raises SceneError."""
+    """Return the value of a parameter that a page gave, which names no file.
+
+    Raises SceneError, CommandError.
+    """
     if value is None and param.optional:
         return None
     document = {key: value}
-    cursor = Cursor(document, Path("page"), json.dumps(document)).at(key)
+    cursor = Cursor(document, None, json.dumps(document)).at(key)
     try:
         if param.form == "sensor" and not isinstance(value, str):
             raise CommandError("must be the name of an observer")
@@ -272,12 +287,10 @@ def _with_emission(shape: Shape, old: Any, new: Any, groups: dict[int, Group]) -
 
 
 class _NoParts:
-    """Reads and writes no part of a scene but values: a page names no file and no other thing."""
+    """Reads and writes no part of a scene but values: whatever else is asked of it is refused."""
 
-    def _refuse(self, *_: Any) -> NoReturn:
+    def __getattr__(self, name: str) -> NoReturn:
         raise CommandError("only a value can stand here")
-
-    kind = layer = material = area_light = group = image = _refuse
 
 
 _READER: Any = _NoParts()

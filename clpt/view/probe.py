@@ -7,7 +7,6 @@ the picture goes on. The camera is turned into one that sees that pixel alone.
 from __future__ import annotations
 
 import dataclasses
-import logging
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -17,22 +16,18 @@ from numpy.typing import NDArray
 
 from clpt import transforms
 from clpt.device import Device
-from clpt.errors import ClptError
 from clpt.render.renderer import Renderer
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Camera, Matrix, Orthographic, Perspective
 from clpt.scene.integrators import Box, Direct, Path, Whitted
 from clpt.scene.shapes import Group, Instance, Shape
-
-log = logging.getLogger(__name__)
+from clpt.view.messages import Reply, answering
 
 BANDS = 47  # of 10 nm, of all light
 BATCH = 256  # samples
 BATCHES = (4, 8, 16, 32, 64)  # after which a spectrum is told, each time with less error
 LAYERS = ("depth", "position", "shading_normal", "uv", "albedo", "shape_id", "primitive_id")
 NARROW = 0.01  # pixels around the centre that a hit is looked for in
-
-Reply = Callable[[dict[str, Any]], None]
 
 
 def window(camera: Camera, film: Film, x: int, y: int) -> Camera | None:
@@ -170,12 +165,15 @@ class Probe:
                 if self._closing:
                     break
                 question = self._waiting.pop(True, None) or self._waiting.pop(False)
-            try:
-                self._answer(question)
-            except ClptError as error:
-                question.reply({"type": "error", "text": f"the pixel: {error}"})
-            except Exception:
-                log.exception("the probe failed")
+            with answering(question.reply, "the pixel: "):
+                try:
+                    self._answer(question)
+                except BaseException:
+                    self._close_followers()
+                    raise
+        self._close_followers()
+
+    def _close_followers(self) -> None:
         for follower in (self._hits, self._spectra):
             if follower is not None:
                 follower.close()

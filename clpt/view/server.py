@@ -8,6 +8,7 @@ A socket must also come from the server's own page.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import http
 import logging
 import struct
@@ -15,6 +16,7 @@ import threading
 import time
 from collections import deque
 from concurrent.futures import Future
+from functools import partial
 from importlib import resources
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
@@ -23,13 +25,14 @@ from websockets.asyncio.server import Server as SocketServer
 from websockets.asyncio.server import ServerConnection, serve
 from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
+from websockets.frames import CloseCode, Frame, Opcode
 from websockets.http11 import Request as HttpRequest
 from websockets.http11 import Response
 
 from clpt.errors import ClptError
 from clpt.view.access import LOOPBACK, Access, is_loopback
 from clpt.view.commands import COMMANDS, LARGEST_MESSAGE, CommandError, parse
-from clpt.view.messages import as_json
+from clpt.view.messages import answering, as_json
 from clpt.view.session import Session
 
 log = logging.getLogger(__name__)
@@ -37,11 +40,18 @@ quiet = logging.getLogger(f"{__name__}.connections")
 quiet.setLevel(logging.CRITICAL)  # what strangers send is nothing to report
 
 MOST_VIEWERS = 8
+MOST_STRANGERS = 64  # connections that have not become a viewer's; beyond, the oldest is dropped
+HELLO_SECONDS = 5.0  # in which a connection says what it wants
+PING_SECONDS = 20.0  # between pings, and in which each is answered
+CLOSE_SECONDS = 1.0  # in which the other end agrees that a socket is closed
+MOST_FRAGMENTS = 64  # of a message
+FRAME_RATE, FRAME_BURST = 240.0, 480.0  # parts of messages, pings and confirmations of a viewer
 MOST_FRAMES = 2  # on their way to a viewer, who has not confirmed them
 MOST_MESSAGES = 256  # that wait for a viewer
+PRESENT = ("state", "status", "wheel")  # types of messages that the next one makes untrue
 RATE, BURST = 60.0, 120.0  # messages a second of one viewer, and how many at once
 SEND_SECONDS = 20.0  # after which a viewer who takes nothing is left
-SOCKET = "/socket"
+SOCKET = "socket"
 TYPES = {
     ".html": "text/html; charset=utf-8",
     ".js": "text/javascript; charset=utf-8",
@@ -51,7 +61,8 @@ TYPES = {
 SAFETY = {
     "Content-Security-Policy": (
         "default-src 'self'; img-src 'self' blob:; base-uri 'none'; form-action 'none'; "
-        "frame-ancestors 'none'; object-src 'none'"
+        "frame-ancestors 'none'; object-src 'none'; "
+        "require-trusted-types-for 'script'; trusted-types 'none'"  # no text becomes markup
     ),
     "X-Frame-Options": "DENY",
     "X-Content-Type-Options": "nosniff",
@@ -63,15 +74,79 @@ SAFETY = {
 
 
 def page_files() -> dict[str, tuple[str, bytes]]:
-    """Return the files of the page: type and content by path; no other path exists."""
+    """Return the files of the page: type and content by name; no other name exists."""
     folder = resources.files("clpt.view") / "static"
     files = {}
     for file in folder.iterdir():
         kind = TYPES.get(f".{file.name.rpartition('.')[2]}")
         if kind is not None:
-            files[f"/{file.name}"] = kind, file.read_bytes()
-    files["/"] = files["/index.html"]
+            files[file.name] = kind, file.read_bytes()
+    files[""] = files["index.html"]
     return files
+
+
+class Rate:
+    """How often something may be: `rate` a second, and `burst` at once."""
+
+    def __init__(self, rate: float, burst: float):
+        self.rate, self.burst = rate, burst
+        self.left, self._at = burst, time.monotonic()
+
+    def allows(self) -> bool:
+        """Return whether once more is within the rate, and count it."""
+        now = time.monotonic()
+        self.left = min(self.burst, self.left + self.rate * (now - self._at)) - 1.0
+        self._at = now
+        return self.left >= 0.0
+
+
+class Connection(ServerConnection):
+    """A connection whose other end cannot let memory grow.
+
+    The library bounds what a message holds and how many wait. It answers each ping, though nobody
+    may read the answers, and keeps all parts of a message, of which empty ones cost nothing to
+    send. Both are counted here.
+
+    strangers: all that are no viewer's yet, in their order; the first leaves where they are many.
+    """
+
+    def __init__(self, *args: Any, strangers: dict[Connection, None], **options: Any):
+        super().__init__(*args, **options)
+        self._strangers = strangers
+        self._frames = Rate(FRAME_RATE, FRAME_BURST)
+        self._fragments, self._refused = 0, False
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        super().connection_made(transport)
+        self._strangers[self] = None
+        if len(self._strangers) > MOST_STRANGERS:
+            first = next(iter(self._strangers))
+            del self._strangers[first]
+            first.transport.abort()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self.is_known()
+        super().connection_lost(exc)
+
+    def is_known(self) -> None:
+        """Note that it is no stranger any more."""
+        self._strangers.pop(self, None)
+
+    def process_event(self, event: Any) -> None:
+        if isinstance(event, Frame):
+            self._fragments = self._fragments + 1 if event.opcode is Opcode.CONT else 0
+            if self._fragments > MOST_FRAGMENTS or not self._frames.allows():
+                self._refuse()
+        if not self._refused:
+            super().process_event(event)
+
+    def _refuse(self) -> None:
+        """Take nothing more, say why, and leave, whether or not the other end does."""
+        if not self._refused:
+            self._refused = True
+            self.protocol.fail(CloseCode.POLICY_VIOLATION, "too many messages")
+            self.send_data()
+            self.loop.call_later(CLOSE_SECONDS, self.transport.abort)
 
 
 class Viewer:
@@ -79,22 +154,18 @@ class Viewer:
 
     def __init__(self, connection: ServerConnection):
         self.connection = connection
-        self.messages: deque[str] = deque()
+        self.messages: deque[tuple[str, str]] = deque()  # types, and texts
         self.frame: tuple[int, bytes] | None = None  # the newest that was not sent
         self.unconfirmed: deque[int] = deque()
         self.wake = asyncio.Event()
-        self._tokens, self._at = BURST, time.monotonic()
-
-    def may_send(self) -> bool:
-        """Return whether a message is within the rate, and count it."""
-        now = time.monotonic()
-        self._tokens = min(BURST, self._tokens + RATE * (now - self._at)) - 1.0
-        self._at = now
-        return self._tokens >= 0.0
+        self.rate = Rate(RATE, BURST)
 
     def tell(self, message: dict[str, Any]) -> None:
-        """Let a message be sent."""
-        self.messages.append(as_json(message))
+        """Let a message be sent; of what is true only now, in the place of one that waits."""
+        kind = message["type"]
+        if kind in PRESENT:
+            self.messages = deque(one for one in self.messages if one[0] != kind)
+        self.messages.append((kind, as_json(message)))
         if len(self.messages) > MOST_MESSAGES:  # it takes nothing
             self.messages.clear()
             self.leave()
@@ -113,28 +184,29 @@ class Viewer:
         """Note that the viewer has a frame, and those before it; such a message is not counted."""
         while self.unconfirmed and self.unconfirmed[0] <= frame:
             self.unconfirmed.popleft()
-            self._tokens += 1.0
+            self.rate.left += 1.0
         self.wake.set()
 
     async def send_all(self) -> None:
         """Send what waits, until the viewer is gone."""
-        while True:
-            await self.wake.wait()
-            self.wake.clear()
-            while self.messages:
-                await self._send(self.messages.popleft())
-            if self.frame is not None and len(self.unconfirmed) < MOST_FRAMES:
-                (number, data), self.frame = self.frame, None
-                self.unconfirmed.append(number)
-                await self._send(data)
-                self.wake.set()
-
-    async def _send(self, data: str | bytes) -> None:
         try:
-            await asyncio.wait_for(self.connection.send(data), SEND_SECONDS)
+            while True:
+                await self.wake.wait()
+                self.wake.clear()
+                while self.messages:
+                    await self._send(self.messages.popleft()[1])
+                if self.frame is not None and len(self.unconfirmed) < MOST_FRAMES:
+                    (number, data), self.frame = self.frame, None
+                    self.unconfirmed.append(number)
+                    await self._send(data)
+                    self.wake.set()
         except asyncio.TimeoutError:
             self.leave()
-            raise
+        except ConnectionClosed:
+            pass
+
+    async def _send(self, data: str | bytes) -> None:
+        await asyncio.wait_for(self.connection.send(data), SEND_SECONDS)
 
 
 class Server:
@@ -147,6 +219,7 @@ class Server:
         self.host = host
         self.session: Session | None = None
         self._files = page_files()
+        self._strangers: dict[Connection, None] = {}
         self._viewers: list[Viewer] = []
         self._steers: Viewer | None = None
         self._last_frame: tuple[int, bytes] | None = None
@@ -164,7 +237,8 @@ class Server:
     @property
     def address(self) -> str:
         """An address that opens the page, once."""
-        return f"http://{_bracketed(self.host)}:{self.port}/?token={self.access.new_token()}"
+        place = f"{_bracketed(self.host)}:{self.port}{self.access.room}"
+        return f"http://{place}?token={self.access.new_token()}"
 
     def close(self) -> None:
         """Leave all viewers, and listen no more."""
@@ -190,7 +264,7 @@ class Server:
         self._call(self._tell, message)
 
     def _call(self, function: Any, *arguments: Any) -> None:
-        if not self._loop.is_closed():
+        with contextlib.suppress(RuntimeError):  # the server has ended
             self._loop.call_soon_threadsafe(function, *arguments)
 
     def _begin(self) -> None:
@@ -227,7 +301,9 @@ class Server:
             server: SocketServer = await serve(
                 self._talk, self.host, port,
                 process_request=self._answer, compression=None, max_size=LARGEST_MESSAGE,
-                max_queue=16, server_header=None, logger=quiet, close_timeout=1.0,
+                max_queue=16, server_header=None, logger=quiet, close_timeout=CLOSE_SECONDS,
+                open_timeout=HELLO_SECONDS, ping_interval=PING_SECONDS, ping_timeout=PING_SECONDS,
+                create_connection=partial(Connection, strangers=self._strangers),  # type: ignore
             )  # fmt: skip
         except OSError as error:
             reason = error.strerror or str(error)
@@ -249,20 +325,23 @@ class Server:
             return _response(http.HTTPStatus.METHOD_NOT_ALLOWED, "only GET is answered")
         if headers.get("Host", "") not in self._hosts:
             return _response(http.HTTPStatus.FORBIDDEN, "this server has another name")
-        tokens = parse_qs(url.query).get("token")
-        if url.path == "/" and tokens:
+        tokens, room = parse_qs(url.query).get("token"), self.access.room
+        if url.path == room and tokens:
             cookie = self.access.exchange(tokens[0])
             if cookie is not None:
-                page = self._file("/")
+                page = self._file("")
                 page.headers["Set-Cookie"] = (
-                    f"{self.access.cookie_name}={cookie}; HttpOnly; SameSite=Strict; Path=/"
+                    f"{self.access.cookie_name}={cookie}; HttpOnly; SameSite=Strict; Path={room}"
                 )
                 return page
         if not self.access.allows(headers.get("Cookie", "")):
             text = "Open the address that clpt has printed; it opens the page once."
             return _response(http.HTTPStatus.FORBIDDEN, text)
-        if url.path != SOCKET:
-            return self._file(url.path)
+        if not url.path.startswith(room):
+            return _response(http.HTTPStatus.NOT_FOUND, "there is no such page")
+        name = url.path.removeprefix(room)
+        if name != SOCKET:
+            return self._file(name)
         host = headers["Host"]
         if headers.get("Origin") != f"http://{host}":
             return _response(http.HTTPStatus.FORBIDDEN, "the socket is for the page alone")
@@ -270,13 +349,15 @@ class Server:
             return _response(http.HTTPStatus.SERVICE_UNAVAILABLE, "there are too many viewers")
         return None
 
-    def _file(self, path: str) -> Response:
-        if path not in self._files:
+    def _file(self, name: str) -> Response:
+        if name not in self._files:
             return _response(http.HTTPStatus.NOT_FOUND, "there is no such page")
-        kind, content = self._files[path]
+        kind, content = self._files[name]
         return _response(http.HTTPStatus.OK, content, kind)
 
     async def _talk(self, connection: ServerConnection) -> None:
+        assert isinstance(connection, Connection)
+        connection.is_known()
         if len(self._viewers) >= MOST_VIEWERS:  # several may have asked at once
             await connection.close(1013, "there are too many viewers")
             return
@@ -284,11 +365,11 @@ class Server:
         self._viewers.append(viewer)
         if self._steers is None:
             self._steers = viewer
-        self._welcome(viewer)
         sender = asyncio.ensure_future(viewer.send_all())
         try:
+            self._welcome(viewer)
             async for message in connection:
-                if not viewer.may_send():
+                if not viewer.rate.allows():
                     await connection.close(1008, "too many messages")
                     break
                 self._obey(viewer, message)
@@ -320,8 +401,10 @@ class Server:
 
     def _obey(self, viewer: Viewer, message: str | bytes) -> None:
         """Do what a message asks for, or say why not."""
-        try:
+        with answering(viewer.tell):
             request = parse(message)
+            if COMMANDS[request.name].steers and viewer is not self._steers:
+                raise CommandError("another viewer steers")
             if request.name == "shown":
                 viewer.confirm(request.values["frame"])
             elif request.name == "steer":
@@ -329,12 +412,10 @@ class Server:
                 self._tell_wheel()
             elif request.name == "invite":
                 viewer.tell({"type": "invitation", "address": self.address})
-            elif COMMANDS[request.name].steers and viewer is not self._steers:
-                raise CommandError("another viewer steers")
             elif self.session is not None:
                 self.session.post(request, lambda reply: self._call(viewer.tell, reply))
-        except CommandError as error:
-            viewer.tell({"type": "error", "text": str(error)})
+            else:
+                raise CommandError("the scene is not ready yet")
 
 
 def _response(status: http.HTTPStatus, body: str | bytes, kind: str = "") -> Response:

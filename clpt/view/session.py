@@ -7,17 +7,19 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from clpt.denoise import oidn
 from clpt.device import Device
-from clpt.errors import ClptError, SceneError
+from clpt.errors import SceneError
 from clpt.scene import Scene
 from clpt.view import maps, panels, views
-from clpt.view.camera_work import CameraWork, Reply
+from clpt.view.camera_work import CameraWork
 from clpt.view.commands import COMMANDS, CommandError, Request
 from clpt.view.look import Look
+from clpt.view.messages import Reply, answering, error_message
 from clpt.view.pictures import METHOD, Display
 from clpt.view.probe import Probe, Question
 from clpt.view.render_loop import Outlet, RenderLoop
@@ -26,7 +28,7 @@ from clpt.view.target import Change
 
 log = logging.getLogger(__name__)
 
-MOST_WAITING = 1024  # requests; beyond, the oldest are dropped
+MOST_WAITING = 256  # requests; beyond, the oldest are dropped
 EDITABLE = ("shapes", "lights", "film", "integrator")  # parts of a scene, but the camera
 MOVES = ("orbit", "look", "pan", "dolly", "fly")
 WATCH_SECONDS = 1.0  # between looks at the scene's file
@@ -67,6 +69,8 @@ class Session(CameraWork):
         self.scene = self._first = scene
         self.look = Look()
         self._works = self.scene, self.look  # the last ones that could be rendered
+        self._has_worked = False
+        self._rests = False  # nothing can be rendered until something is asked for
         self.error: BaseException | None = None
         self._loop = RenderLoop(scene, device, outlet, display or Display(), **options)
         self._loop.meanwhile = self._handle_quick_ones
@@ -101,10 +105,12 @@ class Session(CameraWork):
     def post(self, request: Request, reply: Reply) -> None:
         """Ask for something; reply: gets messages for the viewer alone."""
         with self._wake:
-            if len(self._requests) >= MOST_WAITING:
-                self._requests.popleft()
-            self._requests.append((request, reply))
+            left_out = self._requests.popleft() if len(self._requests) >= MOST_WAITING else None
+            last = [self._requests.pop()] if self._requests else []
+            self._requests.extend(merged([*last, (request, reply)]))
             self._wake.notify_all()
+        if left_out is not None:
+            left_out[1](error_message(CommandError(f"{left_out[0].name} was left out: too many")))
         command = COMMANDS.get(request.name)  # None for what the probe asks for
         if command is not None and command.restarts:
             self._loop.cancel(discard=True)
@@ -124,7 +130,7 @@ class Session(CameraWork):
         return {
             "type": "state",
             "revision": self._revision,
-            "name": scene.name,
+            "name": panels.for_people(scene.name),
             "film": [film.width, film.height],
             "mode": film.mode,
             "lambdas": [film.lambda_min, film.lambda_max],
@@ -140,7 +146,7 @@ class Session(CameraWork):
             },
             "objects": panels.objects(scene),
             "panels": panels.panels(scene),
-            "folder": None if self.folder is None else str(self.folder.folder),
+            "saves": self.folder is not None,
             "compares": self._loop.kept is not None,
             "edited": any(
                 getattr(scene, part) is not getattr(self._first, part) for part in EDITABLE
@@ -162,27 +168,35 @@ class Session(CameraWork):
         except BaseException as error:
             log.debug("the session ended", exc_info=True)
             self.error = error
-            self.outlet.message({"type": "error", "text": f"the render ended: {error}"})
+            self.outlet.message(error_message(error, "the render ended: "))
         finally:
             if self._probe is not None:
                 self._probe.close()
             self._loop.close()
 
     def _try_to_advance(self) -> bool:
-        """Go on; a scene that cannot be rendered is given up for the last one that could."""
+        """Go on; a scene that cannot be rendered is given up for the last one that could.
+
+        Raises what the loop raises where the first one cannot be rendered. If a later one cannot be
+        rendered any more, as with a device that is gone, the render rests.
+        """
+        if self._rests:
+            return False
         try:
             advanced = self._loop.advance()
-        except ClptError as error:
+        except Exception as error:
             scene, look = self._works
-            if self.scene is scene and self.look == look:
+            again = self.scene is scene and self.look == look
+            if again and not self._has_worked:
                 raise
-            self._tell_error(error)
-            self.look = look
-            self._show(scene, Change(whole=True))
+            log.debug("the scene cannot be rendered", exc_info=True)
+            self.outlet.message(error_message(error))
+            self._show(scene, Change(whole=True), look)
+            self._rests = again
             self._tell_state()
             return True
         if self._loop.has_shown:
-            self._works = self.scene, self.look
+            self._works, self._has_worked = (self.scene, self.look), True
             if not self._aimed:
                 self._aim()
         return advanced
@@ -204,11 +218,26 @@ class Session(CameraWork):
         self._handle(requests)
 
     def _handle(self, requests: list[tuple[Request, Reply]]) -> None:
-        for request, reply in merged(requests):
-            try:
-                getattr(self, f"_do_{request.name}")(reply, **request.values)
-            except (ClptError, OSError) as error:
-                reply({"type": "error", "text": str(error)})
+        for request, reply in requests:
+            self._rests = False
+            with answering(reply), self._all_or_nothing():
+                function = getattr(self, f"_do_{request.name}", None)
+                if function is None:  # what the server does
+                    raise CommandError(f"there is nothing to {request.name} here")
+                function(reply, **request.values)
+
+    @contextmanager
+    def _all_or_nothing(self) -> Iterator[None]:
+        """Undo what a request has changed of scene, look and pivot if it fails halfway."""
+        scene, look = self.scene, self.look
+        pivot = self._pivot, self._up, self._aimed
+        try:
+            yield
+        except Exception:
+            self._pivot, self._up, self._aimed = pivot
+            if self.scene is not scene or self.look != look:
+                self._show(scene, Change(whole=True), look)
+            raise
 
     def _watch(self) -> None:
         """Read the scene again if its file has changed."""
@@ -219,27 +248,28 @@ class Session(CameraWork):
         if stamp == self._stamp or stamp is None:
             return
         self._stamp = stamp
-        try:
-            scene = self.source.load()
-        except ClptError as error:
-            self._tell_error(error)
-            return
+        with answering(self.outlet.message):
+            self._read_again(self.source.load())
+
+    def _read_again(self, scene: Scene) -> None:
+        """Show the scene that its file has now."""
         same_camera = panels.written(scene.camera) == panels.written(self._first.camera)
+        camera = self.scene.camera if same_camera else scene.camera  # the viewer's stays
+        look = Look(lamp=self.look.lamp, wavelength=self.look.wavelength)
+        self._show(dataclasses.replace(scene, camera=camera), Change(whole=True), look)
         self._first = scene
-        if same_camera:  # the viewer's stays
-            scene = dataclasses.replace(scene, camera=self.scene.camera)
-        self.look = Look(lamp=self.look.lamp, wavelength=self.look.wavelength)
-        self._show(scene, Change(whole=True))
         if not same_camera:
             self._set_pivot()
         self._tell_state()
         self.outlet.message({"type": "note", "text": "the scene's file was read again"})
 
-    def _show(self, scene: Scene, change: Change) -> None:
-        """Render another scene, as it is looked at."""
-        self.scene = scene
-        self._loop.shows = self.look.shows
-        self._begin(self.look.apply(scene), change)
+    def _show(self, scene: Scene, change: Change, look: Look | None = None) -> None:
+        """Render another scene, as it is looked at; look: another one too."""
+        look = self.look if look is None else look
+        shown = look.apply(scene)
+        self.scene, self.look = scene, look
+        self._loop.shows, self._rests = look.shows, False
+        self._begin(shown, change)
 
     def _begin(self, shown: Scene, change: Change) -> None:
         self._loop.begin(shown, change, METHOD if self.look.denoises else None)
@@ -251,9 +281,6 @@ class Session(CameraWork):
     def _tell_state(self) -> None:
         self._revision += 1
         self.outlet.message(self.state())
-
-    def _tell_error(self, error: BaseException) -> None:
-        self.outlet.message({"type": "error", "text": str(error)})
 
     # pixels
 
@@ -312,8 +339,7 @@ class Session(CameraWork):
         self._show(scene, change)
 
     def _do_restore(self, reply: Reply) -> None:
-        self.look = Look()
-        self._show(self._first, Change(whole=True))
+        self._show(self._first, Change(whole=True), Look())
         self._set_pivot()
         self._tell_state()
 
@@ -358,8 +384,7 @@ class Session(CameraWork):
         self._look(region=(x, y, width, height))
 
     def _look(self, **changes: Any) -> None:
-        self.look = dataclasses.replace(self.look, **changes)
-        self._show(self.scene, Change(whole=True))
+        self._show(self.scene, Change(whole=True), dataclasses.replace(self.look, **changes))
         self._tell_state()
 
     # the render
@@ -395,8 +420,9 @@ class Session(CameraWork):
         self._tell_state()
 
     def _do_stop_at(self, reply: Reply, spp: int, noise: float | None) -> None:
-        for name, value in (("scene", self.scene), ("_first", self._first)):
-            setattr(self, name, dataclasses.replace(value, spp=spp, noise=noise))
+        until: dict[str, Any] = {"spp": spp, "noise": noise}
+        self._first = dataclasses.replace(self._first, **until)
+        self.scene = dataclasses.replace(self.scene, **until)
         before = self._loop.scene.noise
         shown = dataclasses.replace(self._loop.scene, spp=spp, noise=noise)
         if noise != before:  # filters and light paths may depend on it

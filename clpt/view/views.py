@@ -22,21 +22,27 @@ def written(scene: Scene, display: Display) -> dict[str, Any]:
     return {"camera": panels.written(scene.camera), "display": shown}
 
 
-def camera_of(document: Any) -> Camera:
-    """Return the camera that a view has. Raises CommandError."""
+def camera_of(document: Any, present: Camera | None = None) -> Camera:
+    """Return the camera that a view has. Raises CommandError.
+
+    present: gives what no view holds: a lens, the medium around, motion and shutter.
+    """
     if not isinstance(document, dict):
         raise CommandError("the camera of a view is an object, as in scene.json")
     known, values = kinds("camera"), dict(document)
     kind = values.pop("type", None)
-    if kind not in known:
+    if not isinstance(kind, str) or kind not in known:
         raise CommandError(str(UnknownKindError("camera", str(kind), known)))
     declared = params(known[kind])
+    held = {name: param for name, param in declared.items() if panels.is_plain(param)}
     for name in values:
-        if name not in declared:
-            raise CommandError(f"the camera {kind} has no {name!r}")
-    read = {name: panels.read(name, value, declared[name]) for name, value in values.items()}
+        if name not in held:
+            raise CommandError(f"a view of a camera {kind} has no {name!r}")
+    read = {name: panels.read(name, value, held[name]) for name, value in values.items()}
+    had = {} if present is None else params(type(present))
+    kept = {name: getattr(present, name) for name in declared if name in had and name not in held}
     try:
-        return cast(Camera, known[kind](**read))
+        return cast(Camera, known[kind](**kept, **read))
     except SceneError as error:
         raise CommandError(str(error)) from None
 

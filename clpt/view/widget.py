@@ -6,7 +6,6 @@ the page; in the browser both have the same modules.
 
 from __future__ import annotations
 
-import json
 import re
 import threading
 from collections import deque
@@ -19,8 +18,8 @@ import numpy as np
 from clpt import images
 from clpt.device import Device
 from clpt.scene import Scene
-from clpt.view.commands import CommandError, parse
-from clpt.view.messages import finite
+from clpt.view.commands import checked
+from clpt.view.messages import answering, finite
 from clpt.view.session import Session
 
 MODULES = (  # of the page, in an order in which each finds what it needs
@@ -106,19 +105,17 @@ class Widget(anywidget.AnyWidget):
     def _obey(self, _: Any, content: Any, buffers: Any) -> None:
         """Do what a view asks for, or say why not."""
         asked = content.get("do") if isinstance(content, dict) else None
-        try:
+        with answering(self.message):
             if asked == "watch":
                 self._watch(content.get("watching") is True)
             elif asked == "stop":
                 self.stop()
             else:
-                request = parse(json.dumps(content))
+                request = checked(content)
                 if request.name == "shown":
                     self._confirm(request.values["frame"])
                 else:
                     self._session.post(request, self.message)
-        except CommandError as error:
-            self.message({"type": "error", "text": str(error)})
 
     def _watch(self, watching: bool) -> None:
         self._views = max(0, self._views + (1 if watching else -1))

@@ -97,7 +97,7 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
     store_path_rival(path, at, next & !null, rival_to_camera(rival, s, onward, delta, p, p_back));
 #if MERGES
     store_path_pending(path, at, next & !null, rival_merged(rival, s, onward, delta, p, p_back));
-    state = state | sel_i(!null & rival_sharp(delta, p, p_back), (integer)(PATH_SHARP), (integer)(0));
+    state = state | sel_i(rival_sharp(delta, p, p_back) & !null, (integer)(PATH_SHARP), (integer)(0));
 #endif
 #endif
 #if BSDF_IS_PANE

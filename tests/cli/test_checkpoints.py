@@ -9,6 +9,7 @@ import subprocess
 from pathlib import Path
 
 import numpy as np
+import OpenEXR
 import pytest
 
 from clpt import images, output_files
@@ -47,7 +48,7 @@ def test_a_render_goes_on_with_more_samples(folder, capsys):
     assert run(command) == 0  # nothing is left to do, but the picture is written
     assert "goes on from a.resume.exr: samples 0 to 39" in capsys.readouterr().err
     np.testing.assert_array_equal(np.load("a.npy"), np.load("whole.npy"))
-    with images.OpenEXR.File("a.resume.exr", header_only=True) as file:
+    with OpenEXR.File("a.resume.exr", header_only=True) as file:
         assert file.parts[0].name() == "picture"
 
 
@@ -130,6 +131,18 @@ def test_a_full_disk_is_told_and_the_render_goes_on(folder, monkeypatch, capsys)
     assert "the render goes on" in error and (folder / "a.npy").exists()
     assert (folder / "a.resume.exr").read_bytes() == before
     assert not list(folder.glob(PARTIAL + "*"))
+
+
+def test_a_host_without_room_for_a_film(folder, monkeypatch, capsys):
+    def full(self, **_):
+        raise MemoryError
+
+    monkeypatch.setattr(Renderer, "saved_film", full)
+    command = ["render", killing.SCENE, "-o", "a.npy", *COMMON[:-1], "--spp", "30"]
+    assert run([*command, "--checkpoint", "0.001s"]) == 0
+    error = capsys.readouterr().err
+    assert "warning: a.resume.exr: cannot be written: memory has run out" in error
+    assert [path.name for path in folder.iterdir()] == ["a.npy"]
 
 
 def test_a_device_without_room_for_a_copy(folder, monkeypatch, capsys):

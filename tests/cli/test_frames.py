@@ -179,21 +179,26 @@ def test_a_device_that_fails_leaves_its_frames_to_others(
 
 def test_a_video_has_all_frames(scene, tmp_path, monkeypatch, capsys):
     """The package is another's; what goes into it is ours."""
-    sent: list = []
-
-    def write_frames(path, size, **named):
-        assert size == (16, 12) and named["fps"] == 12.0
-        Path(path).write_bytes(b"video")
-        while (pixels := (yield)) is not None:
-            sent.append(np.array(pixels))
-
-    package = types.SimpleNamespace(write_frames=write_frames)
+    ffmpeg = tmp_path / "ffmpeg"  # writes what it was given
+    ffmpeg.write_text(f"""#!{sys.executable}
+import sys
+assert "-s 16x12 -r 12 -i -" in " ".join(sys.argv), sys.argv
+with open(sys.argv[-1], "wb") as file:
+    file.write(sys.stdin.buffer.read())
+""")
+    ffmpeg.chmod(0o755)
+    package = types.SimpleNamespace(get_ffmpeg_exe=lambda: str(ffmpeg))
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", package)
     command = ["render", "turn.xml", "--frames", "1:3", *TURN, *SIZE, "--fps", "12"]
     assert run([*command, "--video", "a.mp4"]) == 0
-    assert len(sent) == 3 and Path("a.mp4").read_bytes() == b"video"
+    sent = np.frombuffer(Path("a.mp4").read_bytes(), np.uint8).reshape(3, 12, 16, 3)
     expected = images.read_stored("turn.0002.png").values
     np.testing.assert_array_equal(sent[1], expected)
+    ffmpeg.write_text("#!/bin/sh\necho the disk is full >&2\nexit 1\n")
+    before = Path("a.mp4").read_bytes()
+    assert run([*command, "--video", "a.mp4"]) == 2
+    assert "a.mp4: cannot be written: the disk is full" in capsys.readouterr().err
+    assert Path("a.mp4").read_bytes() == before and not [*tmp_path.glob(".clpt*")]
     assert run([*command, "--video", "a.mp4", "-o", "a.exr"]) == 2
     assert run([*command, "--video", "a.txt"]) == 2
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)

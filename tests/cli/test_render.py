@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import logging
 import os
@@ -21,13 +22,17 @@ from clpt.__main__ import run
 from clpt.cli import outputs, stopping
 from clpt.cli.scene_options import changed
 from clpt.colour.view import View
-from clpt.errors import SceneError
+from clpt.errors import DeviceError, SceneError
 from clpt.formats import load
+from clpt.images import exr_files
+from clpt.render.film import film_file
 from clpt.render.renderer import Renderer
 from clpt.spectra import read_sensor
 
 ROOT = Path(__file__).resolve().parents[2]
 CORNELL = str(ROOT / "scenes" / "cornell_box")
+SMALL = ["--size", "8x8", "--spp", "1", "--mode", "rgb"]
+render_module = importlib.import_module("clpt.cli.render")  # the package has the command
 
 
 def test_several_formats_and_the_facts_in_the_exr(tmp_path, capsys):
@@ -123,26 +128,80 @@ def test_targets_are_tried_before_anything_is_read(tmp_path, monkeypatch, capsys
     assert [path.name for path in tmp_path.iterdir()] == ["folder.png"]
 
 
-def test_a_target_that_fails_at_the_end(tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize("error", [OSError(28, "No space left on device"), MemoryError()], ids=str)
+def test_a_target_that_fails_at_the_end(tmp_path, monkeypatch, capsys, error):
     """The others are written, this one goes to the temporary folder, and the message says where."""
     monkeypatch.setattr(outputs.tempfile, "tempdir", str(tmp_path / "temporary"))
     (tmp_path / "temporary").mkdir()
     fine, full = tmp_path / "fine.png", tmp_path / "full.exr"
-    write_channels = images.write_channels
+    write_channels = exr_files.write_channels
 
     def write(path, *rest):
         if path == full:
-            raise OSError(28, "No space left on device")
+            raise error
         write_channels(path, *rest)
 
-    monkeypatch.setattr(images, "write_channels", write)
-    common = ["--size", "8x8", "--spp", "1", "--mode", "rgb"]
-    assert run(["render", CORNELL, "-o", str(full), "-o", str(fine), *common]) == 2
-    error = capsys.readouterr().err.splitlines()[-1]
+    monkeypatch.setattr(exr_files, "write_channels", write)
+    assert run(["render", CORNELL, "-o", str(full), "-o", str(fine), *SMALL]) == 2
+    said = capsys.readouterr().err.splitlines()[-1]
     (rescued,) = (tmp_path / "temporary").iterdir()
-    assert f"{full}: cannot be written: " in error and "No space left" in error
-    assert f"the picture is in {rescued}" in error
+    assert f"{full}: cannot be written: " in said
+    assert (str(error) or "memory has run out") in said
+    assert f"the picture is in {rescued}" in said
     assert images.read(rescued).shape == images.read(fine).shape == (8, 8, 3)
+
+
+def test_a_film_is_kept_where_no_picture_can_be_made(tmp_path, monkeypatch, capsys):
+    """In the cache folder, where the temporary one has no room either."""
+    monkeypatch.setattr(outputs.tempfile, "tempdir", str(tmp_path / "nowhere"))
+    monkeypatch.setattr(outputs.disk_cache, "folder", lambda: tmp_path)
+
+    def write(*_):
+        raise MemoryError
+
+    monkeypatch.setattr(outputs, "write", write)
+    assert run(["render", CORNELL, "-o", str(tmp_path / "a.png"), *SMALL]) == 2
+    said = capsys.readouterr().err.splitlines()[-1]
+    (film,) = tmp_path.glob("a-*.film")
+    assert f"memory has run out; the film is in {film}" in said
+    monkeypatch.undo()
+    assert run(["merge", str(film), "-o", str(tmp_path / "a.png")]) == 0
+    assert images.read(tmp_path / "a.png").shape == (8, 8, 3)
+
+
+def test_an_output_folder_that_vanishes(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(outputs.tempfile, "tempdir", str(tmp_path))
+    folder, samples = tmp_path / "folder", render_module.render_samples
+    folder.mkdir()
+
+    def render(*given, **named):
+        samples(*given, **named)
+        shutil.rmtree(folder)
+
+    monkeypatch.setattr(render_module, "render_samples", render)
+    command = ["render", CORNELL, "-o", str(folder / "a.exr"), *SMALL, "--checkpoint", "1h"]
+    assert run(command) == 2
+    told, said = capsys.readouterr().err.splitlines()[-2:]
+    (rescued,) = tmp_path.glob("a-*.exr")
+    assert "a.resume.exr: cannot be written" in told and f"the picture is in {rescued}" in said
+    assert images.read(rescued).shape == (8, 8, 3) and not folder.exists()
+
+
+@pytest.mark.parametrize("error", [DeviceError("the device is gone"), MemoryError(), ValueError(1)])
+def test_a_render_that_fails_keeps_what_it_has(tmp_path, monkeypatch, capsys, error):
+    samples = render_module.render_samples
+
+    def render(*given, **named):
+        samples(*given, **named)
+        raise error
+
+    monkeypatch.setattr(render_module, "render_samples", render)
+    command = ["render", CORNELL, "-o", str(tmp_path / "a.exr"), *SMALL, "--checkpoint", "1h"]
+    assert run(command) == (2 if isinstance(error, DeviceError) else 1)
+    said = capsys.readouterr().err
+    assert "--resume goes on from it" in said.splitlines()[-2] and str(error) in said
+    assert film_file.read(tmp_path / "a.resume.exr").film.taken == ((0, 1),)
+    assert images.read(tmp_path / "a.exr").shape == (8, 8, 3)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="bytes in file names")

@@ -27,7 +27,7 @@ def test_it_prints_one_line_and_ends_by_ctrl_c(tmp_path):
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, preexec_fn=heeds) as process:
         assert process.stdout is not None
         line = process.stdout.readline()
-        assert re.fullmatch(r"http://127\.0\.0\.1:\d+/\?token=[\w-]{43}\n", line)
+        assert re.fullmatch(r"http://127\.0\.0\.1:\d+/[\w-]{22}/\?token=[\w-]{43}\n", line)
         with urllib.request.urlopen(line.strip()) as answer:
             assert b"<!doctype html>" in answer.read()
         process.send_signal(signal.SIGINT)

@@ -51,21 +51,10 @@ def test_a_process_keeps_the_limit_while_it_writes(cache_folder, monkeypatch):
     assert sum(sizes) <= 8000 + 3000
 
 
-def test_what_a_killed_process_left_is_deleted(cache_folder):
-    disk_cache.store("entry", "{}", b"binary")
-    old, new = (cache_folder / "programs" / f"{PARTIAL}{name}" for name in ("old", "new"))
-    for path in (old, new):
-        path.touch()
-    os.utime(old, (1e9, 1e9))
-    disk_cache.prune(cache_folder)
-    assert not old.exists() and new.exists(), "another process may be writing it"
-    assert disk_cache.load("entry")
-
-
 def _churn(folder, seed):
     """Store, load and prune in the same folder as others; the exit status tells of an error."""
     disk_cache.folder = lambda: folder
-    for number in range(60):
+    for number in range(40):
         name = f"entry{(7 * number + seed) % 9}"
         disk_cache.store(name, "{}", name.encode() * 500)
         found = disk_cache.load(name)
@@ -76,12 +65,12 @@ def _churn(folder, seed):
 
 def test_several_processes(cache_folder):
     spawn = multiprocessing.get_context("fork" if os.name == "posix" else "spawn")
-    workers = [spawn.Process(target=_churn, args=(cache_folder, seed)) for seed in range(3)]
+    workers = [spawn.Process(target=_churn, args=(cache_folder, seed)) for seed in range(10)]
     for worker in workers:
         worker.start()
     for worker in workers:
         worker.join(60)
-    assert [worker.exitcode for worker in workers] == [0, 0, 0]
+    assert [worker.exitcode for worker in workers] == [0] * 10
     assert not list(cache_folder.rglob(f"{PARTIAL}*"))
 
 

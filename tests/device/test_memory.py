@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from clpt.device import memory
+from clpt import host_memory
 
 GIB = 2**30
 
@@ -23,6 +23,6 @@ def test_pages_of_files_do_not_count_as_used(tmp_path, monkeypatch, limit, usage
     (tmp_path / usage).write_text(f"{GIB - 100}\n")
     stat = (tmp_path / usage).with_name("memory.stat")
     stat.write_text(f"anon 5\n{inactive} {2**20}\nactive_file 7\n")
-    assert memory.host_available(tmp_path) == 100 + 2**20
+    assert host_memory.available(tmp_path) == 100 + 2**20
     (tmp_path / limit).write_text("max\n")
-    assert memory.host_available(tmp_path) == memory.host_available(tmp_path / "none")
+    assert host_memory.available(tmp_path) == host_memory.available(tmp_path / "none")

@@ -11,9 +11,9 @@ import OpenEXR
 import pytest
 
 import clpt
-from clpt import images
+from clpt import budget, images
 from clpt.errors import SceneError
-from clpt.images import budget, stored
+from clpt.images import stored
 from tests.images import files
 
 PACKAGE = Path(clpt.__file__).parent
@@ -32,28 +32,28 @@ def bombs(folder: Path) -> dict[str, Path]:
     return {path.name: path for path in sorted(folder.iterdir())}
 
 
-def test_what_takes_too_much_is_refused_by_its_header(tmp_path, monkeypatch):
-    monkeypatch.setattr(budget, "BYTES", 16 << 20)
+def test_what_takes_too_much_is_refused_by_its_header(tmp_path):
+    limits = budget.Budget(memory=16 << 20)
     for name, path in bombs(tmp_path).items():
         tracemalloc.start()
-        with pytest.raises(SceneError) as raised:
+        with pytest.raises(SceneError) as raised, budget.opened(limits):
             images.read(path)
         _, peak = tracemalloc.get_traced_memory()
         tracemalloc.stop()
         assert str(raised.value).startswith(f"{path}: "), name
-        assert "of memory to read, more than the 0.015625 GiB that an image gets" in str(
-            raised.value
-        )
+        assert "of memory, the limit is 16.0 MiB" in str(raised.value)
         assert peak < 4 << 20, name
 
 
-def test_channels_that_are_not_the_picture_cost_nothing(tmp_path, monkeypatch):
+def test_channels_that_are_not_the_picture_cost_nothing(tmp_path):
     plane = np.ones((500, 500), np.float32)
     channels = {"R": plane, "G": plane, "B": plane} | {f"z{i:02d}": plane for i in range(40)}
     OpenEXR.File(dict(PLAIN), channels).write(str(tmp_path / "a.exr"))
-    monkeypatch.setattr(budget, "BYTES", 3 * 8 * 500 * 500)
-    assert images.read(tmp_path / "a.exr").shape == (500, 500, 3)
-    with pytest.raises(SceneError, match="what its channels hold would take"):
+    limits = budget.Budget(memory=3 * 8 * 500 * 500)
+    with budget.opened(limits):
+        assert images.read(tmp_path / "a.exr").shape == (500, 500, 3)
+    refused = pytest.raises(SceneError, match="what its channels hold would take")
+    with refused, budget.opened(limits):
         images.read_channels(tmp_path / "a.exr")
 
 

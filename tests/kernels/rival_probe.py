@@ -88,7 +88,8 @@ VERTEX = f"""
 
 FROM_CAMERA = ("rival", "pending", "sharp", "met", "chosen", "merged")
 CAMERA = f"""{VERTEX}
-    Rival here = rival_of_camera(world, path, 0, v, sampler_start(0, 0, 0));
+    Sampler none = {{(natural)(0u), (natural)(0u)}};
+    Rival here = rival_of_camera(world, path, 0, v, none);
     mask hit = lamp_row < 1.5f;
 
     LightSample ls;

@@ -139,7 +139,7 @@ def test_same_functions_as_mitsuba(chosen):
     np.testing.assert_allclose(ours * scale, values, atol=within * abs(values[0]))
 
 
-@pytest.mark.parametrize("chosen", [scene.Mitchell(b=1e9), scene.Mitchell(b=1e300)])
+@pytest.mark.parametrize("chosen", [scene.Mitchell(b=1e9), scene.Mitchell(b=1e38)])
 def test_filters_without_an_integral(chosen):
     with pytest.raises(SceneError, match="integral"):
         filters.table(chosen)

@@ -22,6 +22,8 @@ from clpt.scene.integrators import (
     Tent,
     Zsobol,
 )
+from clpt.scene.shapes import Mesh
+from clpt.scene.textures import MeshAttribute
 from tests.renders.support import with_film
 
 SPP = 12
@@ -259,16 +261,30 @@ def test_no_first_sample(number):
 
 
 def test_sums_near_their_end_are_counted():
-    """Light of 2^42 is taken, and counted once a sum is near its end; of 2^45 it is refused."""
-    bright = dataclasses.replace(sky(), lights=[lights.Constant(radiance=(2.0**42, 0.0, 0.0))])
-    with clpt.Renderer(bright) as renderer:
+    """Light of 2^42 is taken, and counted once a sum is near its end; of 2^45 it is refused.
+
+    It is that of vertices, of which the host does not know how bright they are: the film's unit
+    follows light that it knows.
+    """
+
+    def painted(red: float) -> Scene:
+        corners = np.array([(-9, -9, 5), (-9, 9, 5), (9, 9, 5), (9, -9, 5)], np.float32)
+        colours = np.full((4, 3), (red, 0.0, 0.0), np.float32)
+        square = Mesh(
+            vertices=corners,
+            faces=np.array([(0, 1, 2), (0, 2, 3)]),
+            attributes={"vertex_color": colours},
+            emission=lights.Area(radiance=MeshAttribute()),
+        )
+        return dataclasses.replace(sky(), lights=[], shapes=[square])
+
+    with clpt.Renderer(painted(2.0**42)) as renderer:
         renderer.run(2)
-        np.testing.assert_array_equal(renderer.image()[..., 0], np.float32(2.0**42))
+        np.testing.assert_allclose(renderer.image()[..., 0], np.float32(2.0**42), 1e-6)
         assert renderer.wavefronts[0].counts.full == 0
         renderer.run(20)
         assert renderer.wavefronts[0].counts.full > 0
-        dazzling = [lights.Constant(radiance=(2.0**45, 0.0, 0.0))]
-        renderer.update(scene=dataclasses.replace(bright, lights=dazzling))
+        renderer.update(scene=painted(2.0**45))
         renderer.run(2)
         assert renderer.wavefronts[0].counts.rejected == 12 and not renderer.image().any()
 

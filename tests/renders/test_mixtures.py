@@ -17,7 +17,8 @@ import clpt
 from clpt.errors import SceneError
 from clpt.render.lowering import grids
 from clpt.render.lowering.encoder import Encoder
-from clpt.scene import media
+from clpt.scene import integrators, media
+from clpt.scene.cameras import Perspective
 from clpt.scene.lights import Constant, Spot
 from clpt.spectra import Tabulated
 from clpt.spectra.spectrum import gridded
@@ -139,6 +140,80 @@ def test_light_paths() -> None:
     pictures = [exposures(one, 16, 128).mean(axis=(1, 2), keepdims=True) for one in both]
     assert pictures[0].mean() > 0.01
     assert_agree(*pictures, "light paths and none", 2e-4)
+
+
+LAMP_AT = np.array([0.3, 0.9, 0.2])  # in all parts, not in the picture
+EYE, HALF = np.array([0.0, 0.0, 5.0]), 0.1  # looks along -z; half width of the picture at 1
+CONE = 50.0  # [degrees], about -y
+
+
+def density_at(medium: Any, points: np.ndarray) -> np.ndarray:
+    """The density at points (..., 3), in float64; what has no grid has one in the grids' box."""
+    values = np.asarray(getattr(medium, "density", np.ones((1, 1, 1))), float)
+    inverse = np.linalg.inv(TURNED)
+    unit = points @ inverse[:3, :3].T + inverse[:3, 3]
+    inside = ((unit >= 0.0) & (unit <= 1.0)).all(axis=-1)
+    size = np.array(values.shape)
+    at = np.clip(unit * size - 0.5, 0.0, size - 1.0)
+    low = np.minimum(at.astype(int), np.maximum(size - 2, 0))
+    found = np.zeros(points.shape[:-1])
+    for corner in np.ndindex(2, 2, 2):
+        weight = np.where(corner, at - low, 1.0 - (at - low)).prod(axis=-1)
+        found += weight * values[tuple(np.moveaxis(np.minimum(low + corner, size - 1), -1, 0))]
+    return found * inside
+
+
+def scattered_once(parts: tuple[Any, ...], intensity: float) -> np.ndarray:
+    """The mean of a picture of light that a lamp at LAMP_AT sends, and a mixture scatters once.
+
+    The integral along rays of transmittance, scattering and transmittance, by the midpoint rule.
+    """
+    rays, steps, on = 12, 160, 60
+    place = HALF * ((np.arange(rays) + 0.5) / rays * 2.0 - 1.0)
+    x, y = np.meshgrid(place, place)
+    d = np.stack([x, y, -np.ones_like(x)], axis=-1)[:, :, None]
+    d /= np.linalg.norm(d, axis=-1, keepdims=True)
+    near, far = (-(EYE[2] - z) / d[..., 2] for z in (2.0, -2.0))  # of the box
+    step = (far - near) / steps
+    p = EYE + (near + (np.arange(steps) + 0.5) * step)[..., None] * d
+    to = LAMP_AT - p
+    distance = np.linalg.norm(to, axis=-1)
+    along = p[..., None, :] + (np.arange(on) + 0.5)[:, None] / on * to[..., None, :]
+    depth: Any = np.zeros((*p.shape[:-1], 3))
+    shines: Any = np.zeros((*p.shape[:-1], 3))
+    for part in parts:
+        density = density_at(part, p)
+        absorbs, scatters = (one.to_rgb("unbounded") for one in part.coefficients(False))
+        before = (np.cumsum(density, axis=-1) - density / 2.0) * step
+        after = density_at(part, along).mean(axis=-1) * distance
+        depth += (before + after)[..., None] * (absorbs + scatters)
+        g = 0.7 if part.phase is FORWARD else 0.0
+        cosine = np.einsum("...i,...i->...", np.broadcast_to(d, to.shape), to) / distance
+        phase = (1.0 - g * g) / (1.0 + g * g - 2.0 * g * cosine) ** 1.5 / (4.0 * np.pi)
+        shines += (density * phase)[..., None] * scatters
+    lit = to[..., 1] / distance > np.cos(np.radians(CONE))
+    value = intensity * shines * np.exp(-depth) * (lit / distance**2)[..., None]
+    return (value.sum(axis=2) * step).mean(axis=(0, 1))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("way", ["path", "light paths", "vcm"])
+def test_around_a_spot(way: str) -> None:
+    """Light of a lamp in the mixture that is scattered once, from either end, is the integral."""
+    parts = (grid(2.0 * RANDOM, sigma_t=(0.2, 0.9, 1.7), albedo=0.7, phase=FORWARD), MIST)
+    scene = scene_of(media.Mixture(parts=parts), light=0.0)
+    given: dict[str, integrators.Integrator] = {
+        "path": integrators.Path(max_depth=2, light_paths=0),
+        "light paths": integrators.Path(max_depth=2, light_paths=1),
+        "vcm": integrators.Vcm(max_depth=2),
+    }
+    scene.integrator = given[way]
+    down = clpt.transforms.look_at(LAMP_AT, LAMP_AT - [0, 1, 0], [1, 0, 0])
+    scene.lights = [Spot(to_world=down, intensity=(20.0,) * 3, cutoff=CONE, beam_width=CONE - 1e-3)]
+    fov = 2.0 * float(np.degrees(np.arctan(HALF)))
+    eye = clpt.transforms.look_at(EYE, [0, 0, 0], [0, 1, 0])
+    scene.camera = Perspective(to_world=eye, fov=fov)
+    assert_mean(exposures(scene, 16, 256), scattered_once(parts, 20.0), 0.02, 0.01)
 
 
 @pytest.mark.parametrize("mode", ["rgb", "spectral"])

@@ -14,12 +14,21 @@ from clpt.scene import Film, Scene
 from clpt.scene.cameras import Lens, Perspective
 from clpt.scene.integrators import SAMPLERS, Vcm
 from clpt.scene.lights import Area, Envmap, Point
-from clpt.scene.materials import Dielectric, Diffuse, Fluorescent, Layer, Null, RoughConductor
+from clpt.scene.materials import (
+    Dielectric,
+    Diffuse,
+    Fluorescent,
+    Layer,
+    Null,
+    Phong,
+    RoughConductor,
+)
 from clpt.scene.media import Grid, HenyeyGreenstein, Homogeneous, Mixture
 from clpt.scene.shapes import Cube, Disk, Sphere
 from clpt.scene.textures import Checkers, Mix
+from clpt.spectra import Tabulated
 from tests.front_end import CLANG, errors
-from tests.together.builds import FORMS, Way, texts
+from tests.together.builds import Way, texts
 from tests.together.strategies import scenes, shown, ways
 
 SCENES = 60
@@ -28,6 +37,7 @@ pytestmark = pytest.mark.skipif(CLANG is None, reason="clang is not installed")
 
 FOG, CLOUD = Homogeneous(sigma_s=1.0), Grid(sigma_s=1.0)
 IMAGE = Envmap(image=np.ones((4, 8, 3), np.float32))
+TABLE = Tabulated(lambdas=(400.0, 700.0), values=(1.0, 3.0))
 COATED = RoughConductor(layers=(Layer(),))
 
 
@@ -64,6 +74,12 @@ MET: dict[str, dict[str, Any]] = {  # parts that once could not be in one scene
         }
         for cls in SAMPLERS
     },
+    "photons that diffuse surfaces leave": {
+        "shapes": [Sphere(emission=Area())], "integrator": Vcm(),
+    },
+    "a number mixed of spectra, all of it the first": {
+        "shapes": [Sphere(material=Phong(exponent=Mix(first=TABLE, amount=0.0)))]
+    },
 }
 
 
@@ -73,7 +89,8 @@ def test_parts_that_once_did_not_go_together(parts: str, mode: str) -> None:
     given = {"camera": Perspective(), **MET[parts]}
     film = Film(width=4, height=4, mode=mode, **given.pop("film", {}))
     features = lower(Scene(film=film, **given)).features
-    made = [text for form in FORMS[:2] for text in texts(features, Way(lanes=8, form=form))]
+    ways_ = Way(lanes=1, form="stages"), Way(lanes=8, form="loop")
+    made = [text for way in ways_ for text in texts(features, way)]
     assert errors(dict.fromkeys(made)) == [""] * len(dict.fromkeys(made))
 
 

@@ -34,8 +34,12 @@ class Recorder:
 def ask(
     server: Server, path: str, *headers: str, host: str | None = "", verb: str = "GET"
 ) -> tuple[int, dict[str, str], bytes]:
-    """Return status, headers and content of a request; host: by default the server's own."""
-    lines = [f"{verb} {path} HTTP/1.1"]
+    """Return status, headers and content of a request; host: by default the server's own.
+
+    path: within the page's folder, or with it.
+    """
+    room = server.access.room
+    lines = [f"{verb} {path if path.startswith(room) else room[:-1] + path} HTTP/1.1"]
     if host is not None:
         lines.append(f"Host: {host or f'127.0.0.1:{server.port}'}")
     return answer_to(server, "\r\n".join([*lines, *headers, "", ""]).encode())
@@ -73,7 +77,7 @@ def opened(
     """Yield a socket of a page; origin: by default the page's own, None for no such header."""
     own = f"127.0.0.1:{server.port}"
     headers = {"Cookie": with_cookie} if with_cookie else {}
-    address = f"ws://{host or own}/socket"
+    address = f"ws://{host or own}{server.access.room}socket"
     given = f"http://{own}" if origin == "" else origin
     raw = socket.create_connection((server.host, server.port), timeout=10)
     with connect(

@@ -52,7 +52,7 @@ def invalid(kind: Type) -> list[Any]:
         Choice: ["", "nothing", None, 0, ["none"], "a" * 50],
         Flag: [0, 1, "true", None],
         Name: ["", "a/b", "..", ".a", "a b", "-a", "a" * 41, "a\n", "é", "a\0", None, 1, "C:"],
-        Value: [{"file": "/etc/passwd"}, [{"a": {"file": "x"}}], deep, 1e308, [10**400]],
+        Value: [deep, 1e308, [10**400], [0] * 10_000, {"a": math.nan}],
     }
     return wrong[type(kind)]
 

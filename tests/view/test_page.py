@@ -5,8 +5,10 @@ from __future__ import annotations
 import base64
 import contextlib
 import dataclasses
+import http.server
 import io
 import json
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -25,6 +27,7 @@ from clpt.view import panels
 
 pytest.importorskip("websockets", reason="the extra clpt[view] is not installed")
 
+from clpt.view.saving import Folder
 from clpt.view.server import Server
 from clpt.view.session import Session
 from tests.view.browsers import launched
@@ -62,9 +65,9 @@ def wait(page: Any, expression: str) -> None:
 class Shown:
     """A session, its server, and a page that shows it."""
 
-    def __init__(self, browser: Any, on: device.Device):
+    def __init__(self, browser: Any, on: device.Device, scene: Scene | None = None, **how: Any):
         self.browser, self.server = browser, Server()
-        self.session = Session(small(), on, self.server)
+        self.session = Session(scene or small(), on, self.server, **how)
         self.server.show(self.session)
         self.session.start()
         self.contexts: list[Any] = []
@@ -112,6 +115,11 @@ def shown(browser: Any, on: device.Device) -> Iterator[Shown]:
     made = Shown(browser, on)
     yield made
     made.close()
+    check(made)
+
+
+def check(made: Shown) -> None:
+    """Assert that a page complained of nothing, and asked its own server alone."""
     assert made.errors == []
     assert all(url.startswith(("http://127.0.0.1:", "ws://127.0.0.1:")) for url in made.requests)
 
@@ -307,17 +315,160 @@ def test_a_page_elsewhere_reaches_nothing(shown: Shown) -> None:
         socket.onopen = () => done('open');
         socket.onerror = () => done('refused');
     })"""
-    assert page.evaluate(socket, f"ws://{own}/socket") == "refused"
+    own += shown.server.access.room  # let it be known
+    assert page.evaluate(socket, f"ws://{own}socket") == "refused"
     read = """(address) => fetch(address, {credentials: 'include'})
         .then(() => 'read', () => 'refused')"""
-    assert page.evaluate(read, f"http://{own}/") == "refused"
+    assert page.evaluate(read, f"http://{own}") == "refused"
     inside = """(address) => {
         const frame = document.createElement('iframe');
         frame.src = address;
         document.body.append(frame);
     }"""
-    page.evaluate(inside, f"http://{own}/")
+    page.evaluate(inside, f"http://{own}")
     page.wait_for_timeout(300)
     assert all("clpt" not in (frame.title() or "") for frame in page.frames)
     shown.errors.clear()
     page.close()
+
+
+EVIL = (
+    "<img src=x onerror=window.hacked=1>",
+    "</script><script>window.hacked=1</script>",
+    '"><svg onload=window.hacked=1>',
+    "'\"`;window.hacked=1;//${window.hacked=1}",
+    "javascript:window.hacked=1",
+    "<iframe srcdoc='<script>parent.hacked=1</script>'>",
+    "<style>*{display:none}</style><b>",
+    "\u202eexe.\u2066gnp\u200f<b>",
+    "a\0b\x1b[2J<b>\n<b>",
+    "<b>" * 30_000,
+)
+
+
+def with_names(scene: Scene, names: tuple[str, ...]) -> Scene:
+    """Return a scene whose shapes and materials have these names in turn, and their sum itself."""
+    made: dict[int, Any] = {}
+    named = []
+    for i, shape in enumerate([*scene.shapes, *scene.shapes]):
+        material = shape.material
+        name = names[len(made) % len(names)]
+        material = made.setdefault(id(material), dataclasses.replace(material, name=name))
+        named.append(dataclasses.replace(shape, name=names[i % len(names)], material=material))
+    return dataclasses.replace(scene, shapes=named, name=" ".join(names))
+
+
+def test_names_are_text_and_nothing_else(browser: Any, on: device.Device, tmp_path: Path) -> None:
+    """Of scenes, shapes, materials and files, in all tabs, notes and titles: no markup is made."""
+    scene = with_names(small(), EVIL)
+    folder = Folder(tmp_path, EVIL[0], lambda *_: None)
+    shown = Shown(browser, on, scene, folder=folder)
+    page = shown.page
+    try:
+        elements = "() => ['img', 'iframe', 'script', 'b', 'style', 'svg'].map("
+        elements += "(one) => document.querySelectorAll(one).length)"
+        assert page.evaluate(elements) == [0, 0, 1, 0, 0, 0]
+        assert page.title().startswith("<img src=x onerror=") and len(page.title()) < 100
+        page.click("#tab-scene")
+        page.evaluate("document.querySelectorAll('details').forEach((one) => { one.open = true; })")
+        page.wait_for_timeout(200)
+        text = page.inner_text("#pane-scene")
+        for name in (*EVIL[:7], "?exe.?gnp?<b>", "a?b?[2J<b>?<b>", "<b>" * 25 + "<b..."):
+            assert name in text, name
+        assert max(map(len, text.splitlines())) < 400
+        page.click("#tab-pixel")
+        box = page.locator("#picture").bounding_box()
+        for share in (0.1, 0.5, 0.9):
+            page.mouse.click(box["x"] + box["width"] / 2, box["y"] + share * box["height"])
+            page.wait_for_selector("#pane-pixel dt:has-text('material')")
+        page.click("#tab-render")
+        page.click("button:has-text('.png')")
+        page.wait_for_selector("#notes >> text=saved img_src_x_onerror_window_hacked_1-001.png")
+        for name in EVIL[:6]:
+            page.evaluate("(name) => clpt.connection.send(name)", name)
+            page.evaluate("(name) => clpt.connection.send('shows', {name})", name)
+            page.wait_for_selector("#notes li.error")
+        shown.server.message({"type": "error", "text": EVIL[0]})
+        shown.server.message({"type": "note", "text": EVIL[1]})
+        page.wait_for_selector("#notes >> text=<img src=x")
+        page.wait_for_timeout(300)
+        assert page.evaluate("window.hacked === undefined")
+        assert page.evaluate(elements)[:5] == [0, 0, 1, shown_bold(page), 0]
+        assert str(tmp_path) not in page.content()
+    finally:
+        shown.close()
+    check(shown)
+
+
+def shown_bold(page: Any) -> int:
+    """How many elements `b` the inspector itself makes, for the pixel's place."""
+    return page.evaluate("document.querySelectorAll('#pane-pixel .at b').length")
+
+
+def test_text_cannot_become_markup(shown: Shown) -> None:
+    """The page's policy refuses what would make markup of text, and scripts but its own."""
+    tries = """() => [
+        () => { document.body.innerHTML = '<i>x</i>'; },
+        () => { document.write('<i>x</i>'); },
+        () => { new DOMParser().parseFromString('<i>x</i>', 'text/html'); },
+        () => { document.createElement('script').src = 'x.js'; },
+        () => { setTimeout('window.hacked = 1'); },
+        () => { trustedTypes.createPolicy('mine', {}); },
+    ].map((one) => { try { one(); return 'done'; } catch { return 'refused'; } })"""
+    assert shown.page.evaluate(tries) == ["refused"] * 6
+    inline = """() => {
+        const element = document.createElement('a');
+        element.setAttribute('onclick', 'window.hacked = 1');
+        document.body.append(element);
+        element.click();
+        element.remove();
+        return window.hacked === undefined;
+    }"""
+    with contextlib.suppress(Exception):  # it may be refused already
+        assert shown.page.evaluate(inline)
+    assert shown.page.evaluate("window.hacked === undefined")
+    shown.errors.clear()  # the browser tells of each
+
+
+def test_a_stranger_on_another_port_gets_no_cookie(shown: Shown) -> None:
+    """Browsers send cookies to all ports of a host; those of the page are of its folder alone."""
+    heard: list[Any] = []
+
+    class Stranger(http.server.BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            heard.append(dict(self.headers.items()))
+            self.send_response(200)
+            self.end_headers()
+            self.wfile.write(b"<p>")
+
+        def log_message(self, *_: Any) -> None:
+            pass
+
+    with http.server.HTTPServer(("127.0.0.1", 0), Stranger) as stranger:
+        threading.Thread(target=stranger.serve_forever, daemon=True).start()
+        page = shown.contexts[0].new_page()
+        page.goto(f"http://127.0.0.1:{stranger.server_port}/")
+        page.evaluate("() => fetch('/x', {credentials: 'include'})")
+        page.close()
+        shown.page.evaluate(
+            "(url) => { window.open(url); }", f"http://127.0.0.1:{stranger.server_port}/y"
+        )
+        end = time.monotonic() + 20
+        while len(heard) < 3 and time.monotonic() < end:
+            shown.page.wait_for_timeout(50)
+        stranger.shutdown()
+    assert len(heard) >= 3
+    told = json.dumps(heard)
+    assert "Cookie" not in told and shown.server.access.room not in told
+    assert str(shown.server.port) not in told
+    assert shown.page.evaluate("clpt.connection.socket.readyState") == 1
+    shown.requests[:] = [url for url in shown.requests if "/y" not in url]
+
+
+def test_the_page_is_loaded_again(shown: Shown) -> None:
+    """By its address without the token, in the same browser; the token stands nowhere then."""
+    page = shown.page
+    assert "token" not in page.url and page.evaluate("document.referrer") == ""
+    page.reload()
+    wait(page, "window.clpt && clpt.picture.latest > 0")
+    assert "token" not in page.url

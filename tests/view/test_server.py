@@ -73,7 +73,7 @@ def test_a_token_opens_the_page_once(server: Server) -> None:
     status, headers, content = ask(server, path)
     assert status == 200 and b"<!doctype html>" in content
     name, *attributes = headers["set-cookie"].split("; ")
-    assert {"HttpOnly", "SameSite=Strict", "Path=/"} == set(attributes)
+    assert {"HttpOnly", "SameSite=Strict", f"Path={server.access.room}"} == set(attributes)
     assert ask(server, "/", f"Cookie: {name}")[0] == 200
     assert path.split("=", 1)[1] not in name
     again = ask(server, path)
@@ -207,8 +207,8 @@ def test_sixty_a_second_are_let_through(monkeypatch: pytest.MonkeyPatch) -> None
     viewer = serving.Viewer(None)  # type: ignore[arg-type]
     for _ in range(600):
         clock += 1 / serving.RATE
-        assert viewer.may_send()
-    allowed = sum(viewer.may_send() for _ in range(1000))
+        assert viewer.rate.allows()
+    allowed = sum(viewer.rate.allows() for _ in range(1000))
     assert serving.BURST - 2 < allowed <= serving.BURST
 
 
@@ -222,6 +222,149 @@ def test_there_is_room_for_eight(server: Server, key: str) -> None:
     wait_for(lambda: server.session.viewers == 0)  # type: ignore[union-attr]
     with opened(server, key) as client:
         assert message(client, "wheel")["viewers"] == 1
+
+
+def test_who_does_not_steer_invites_nobody(server: Server, key: str) -> None:
+    with opened(server, key) as first, opened(server, key) as second:
+        message(second, "wheel")
+        do(second, "invite")
+        assert "another viewer steers" in message(second, "error")["text"]
+        do(first, "invite")
+        assert server.access.room in message(first, "invitation")["address"]
+
+
+def raw_frame(opcode: int, payload: bytes = b"", fin: bool = True) -> bytes:
+    """A frame of a client, of at most 125 bytes; its mask is zero."""
+    return bytes([fin << 7 | opcode, 0x80 | len(payload)]) + bytes(4) + payload
+
+
+def closed_with(client: object) -> int | None:
+    """The code with which the server ends a socket; None if it just does."""
+    with pytest.raises(ConnectionClosed) as closed:
+        message(client, "never")  # type: ignore[arg-type]
+    return None if closed.value.rcvd is None else closed.value.rcvd.code
+
+
+def test_a_message_in_parts_is_taken(server: Server, key: str) -> None:
+    with opened(server, key) as client:
+        first, *middle, last = (raw_frame(0, part, False) for part in (b'{"do":', b" ", b'"x"}'))
+        client.socket.sendall(bytes([first[0] | 1]) + first[1:] + b"".join(middle))
+        client.socket.sendall(bytes([last[0] | 0x80]) + last[1:])
+        assert "there is no command" in message(client, "error")["text"]
+
+
+def test_parts_without_an_end_are_refused(server: Server, key: str) -> None:
+    """Empty parts of a message cost nothing to send, and each would take memory."""
+    with opened(server, key) as client:
+        client.socket.sendall(raw_frame(1, b"{", False) + raw_frame(0, b"", False) * 100)
+        assert closed_with(client) == 1008
+    wait_for(lambda: not server._viewers)
+
+
+def test_pings_whose_answers_nobody_reads_are_refused(server: Server, key: str) -> None:
+    with opened(server, key) as client:
+        message(client, "wheel")
+        with contextlib.suppress(OSError):
+            for _ in range(100):
+                client.socket.sendall(raw_frame(9, b"x" * 125) * 1000)
+        assert closed_with(client) in (1008, None)
+    wait_for(lambda: not server._viewers)
+
+
+def test_text_that_is_no_utf_8_ends_the_socket(server: Server, key: str) -> None:
+    with opened(server, key) as client:
+        client.socket.sendall(raw_frame(1, b"\xff\xfe{}"))
+        assert closed_with(client) == 1007
+    assert ask(server, "/", f"Cookie: {key}")[0] == 200
+
+
+@pytest.mark.parametrize(
+    "sent",
+    [
+        b"\xf1\x80" + bytes(4),  # reserved bits
+        b"\x83\x80" + bytes(4),  # a reserved opcode
+        raw_frame(0, b"x"),  # a part of nothing
+        b"\x81\x01x",  # no mask
+        b"\x89\xfe\x00\x80" + bytes(4 + 128),  # a ping that is too long
+    ],
+)
+def test_what_breaks_the_protocol_ends_the_socket(server: Server, key: str, sent: bytes) -> None:
+    with opened(server, key) as client:
+        client.socket.sendall(sent)
+        assert closed_with(client) == 1002
+    assert ask(server, "/", f"Cookie: {key}")[0] == 200
+
+
+@pytest.fixture
+def hasty(monkeypatch: pytest.MonkeyPatch) -> Iterator[Server]:
+    """A server that waits less than a second for anybody."""
+    monkeypatch.setattr(serving, "HELLO_SECONDS", 0.4)
+    monkeypatch.setattr(serving, "PING_SECONDS", 0.3)
+    made = Server()
+    made.show(Recorder())  # type: ignore[arg-type]
+    yield made
+    made.close()
+
+
+def test_who_says_nothing_is_left(hasty: Server) -> None:
+    with socket.create_connection((hasty.host, hasty.port), timeout=10) as silent:
+        with socket.create_connection((hasty.host, hasty.port), timeout=10) as slow:
+            slow.sendall(b"GET / HTTP/1.1\r\nHost:")
+            assert slow.recv(1) == b""
+        assert silent.recv(1) == b""
+    wait_for(lambda: not hasty._strangers)
+
+
+def test_who_answers_no_ping_is_left(hasty: Server) -> None:
+    """A socket whose other end is gone without a word, as a phone's out of reach."""
+    key = cookie(hasty)
+    head = (
+        f"GET {hasty.access.room}socket HTTP/1.1\r\nHost: 127.0.0.1:{hasty.port}\r\n"
+        f"Origin: http://127.0.0.1:{hasty.port}\r\nCookie: {key}\r\nConnection: Upgrade\r\n"
+        "Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
+        "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+    )
+    with socket.create_connection((hasty.host, hasty.port), timeout=10) as gone:
+        gone.sendall(head.encode())
+        assert gone.recv(65536).startswith(b"HTTP/1.1 101")
+        wait_for(lambda: hasty._viewers)
+        wait_for(lambda: not hasty._viewers)
+
+
+def test_many_strangers_keep_nobody_out(server: Server, key: str) -> None:
+    """The one that waits for longest is dropped; viewers are no strangers."""
+    with contextlib.ExitStack() as all_of_them, opened(server, key) as viewer:
+        message(viewer, "wheel")
+        for _ in range(3 * serving.MOST_STRANGERS):
+            all_of_them.enter_context(
+                socket.create_connection((server.host, server.port), timeout=10)
+            )
+            assert len(server._strangers) <= serving.MOST_STRANGERS
+        assert ask(server, "/", f"Cookie: {key}")[0] == 200
+        with opened(server, key) as another:
+            assert message(another, "wheel")["viewers"] == 2
+        do(viewer, "invite")
+        message(viewer, "invitation")
+
+
+def test_what_goes_wrong_in_the_server_is_an_answer(
+    server: Server, key: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object) -> None:
+        raise RuntimeError("a fault\nof two lines in /home/somebody/secret.py")
+
+    with opened(server, key) as client:
+        monkeypatch.setattr(server.session, "post", broken)
+        do(client, "pause", paused=True)
+        assert message(client, "error")["text"] == "a fault of clpt (RuntimeError)"
+        monkeypatch.undo()
+        do(client, "pause", paused=True)
+        wait_for(lambda: server.session.requests)  # type: ignore[union-attr]
+    monkeypatch.setattr(server.session, "state", broken)
+    for _ in range(MOST_VIEWERS + 1):  # a viewer that could not be welcomed takes no place
+        with opened(server, key) as client:
+            assert closed_with(client) == 1011
+    wait_for(lambda: not server._viewers)
 
 
 def test_one_steers(server: Server, key: str) -> None:
@@ -258,15 +401,31 @@ def test_a_slow_viewer_gets_the_newest_of_few_frames(server: Server, key: str) -
         assert frame(slow) == 100
 
 
-def test_a_viewer_who_reads_nothing_is_left(server: Server, key: str) -> None:
+def test_a_viewer_who_reads_nothing_is_left(
+    server: Server, key: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of what is true only now one message waits, and one frame; after a while it is left."""
+    monkeypatch.setattr(serving, "SEND_SECONDS", 0.5)
     with opened(server, key) as client:
         message(client, "wheel")
+        most, viewer = 0, server._viewers[0]
         for number in range(1, 1000):  # more than any buffer on the way holds
             server.picture({"frame": number}, b"x" * 1_000_000)
-            server.message({"type": "status", "text": "x" * 100_000})
+            for kind in serving.PRESENT:
+                server.message({"type": kind, "text": "x" * 100_000})
+            most = max(most, len(viewer.messages))
             if not server._viewers:
                 break
             time.sleep(0.005)
+        wait_for(lambda: not server._viewers)
+        assert most <= len(serving.PRESENT) + 1
+
+
+def test_a_viewer_who_reads_no_answers_is_left(server: Server, key: str) -> None:
+    with opened(server, key) as client:
+        message(client, "wheel")
+        for _ in range(1000):
+            server.message({"type": "note", "text": "x" * 100_000})
         wait_for(lambda: not server._viewers)
 
 
@@ -274,8 +433,8 @@ def test_ten_thousand_random_messages(
     server: Server, key: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Each gets a refusal or is a command; the server lives, and the last one is served."""
-    monkeypatch.setattr(serving, "RATE", 1e9)
-    monkeypatch.setattr(serving, "BURST", 1e9)
+    for name in ("RATE", "BURST", "FRAME_RATE", "FRAME_BURST"):
+        monkeypatch.setattr(serving, name, 1e9)
     monkeypatch.setattr(serving, "MOST_MESSAGES", 1 << 30)
     chance = random.Random(2)
     with opened(server, key) as client:

@@ -465,7 +465,11 @@ def test_a_view_is_copied_saved_and_opened(opened, audience, tmp_path) -> None:
         ({"camera": {"type": "perspectiv"}}, "did you mean 'perspective'"),
         ({"camera": {"type": "perspective", "fow": 3}}, "no 'fow'"),
         ({"camera": {"type": "perspective", "fov": -3}}, "fov"),
-        ({"camera": {"type": "perspective", "to_world": {"file": "x"}}}, "names a file"),
+        ({"camera": {"type": "perspective", "to_world": {"file": "x"}}}, "unknown transform"),
+        ({"camera": {"type": "perspective", "medium": "x"}}, "has no 'medium'"),
+        ({"camera": {"type": "lens", "lens": "/etc/passwd"}}, "has no 'lens'"),
+        ({"camera": {"type": "thin_lens", "glass": {"file": "x.yml"}}}, "names a file"),
+        ({"camera": {"type": []}}, "unknown camera"),
         ({"camera": {"type": "perspective"}, "display": {"exposure": 99}}, "-20 to 20"),
     ],
 )

@@ -1,4 +1,7 @@
-"""A camera that moves for long: the process does not grow. CLPT_SOAK_SECONDS=3600 is an hour."""
+"""A camera that moves for long, and random messages: the viewer goes on, and does not grow.
+
+CLPT_SOAK_SECONDS=3600 is an hour.
+"""
 
 from __future__ import annotations
 
@@ -20,11 +23,13 @@ pytest.importorskip("websockets", reason="the extra clpt[view] is not installed"
 
 from clpt.view.server import Server
 from clpt.view.session import Session
+from tests.view import campaign
 from tests.view.attacker import cookie, do, opened
 
 CORNELL = Path(__file__).resolve().parents[2] / "scenes" / "cornell_box"
 SECONDS = float(os.environ.get("CLPT_SOAK_SECONDS", "60"))
 WARM = 0.4  # of the time, in which caches fill
+RANDOM_GROWTH = 300.0  # [MiB] where kernels are built and renderers are made by chance
 GROWTH = 8.0  # [MiB] that the process may take more afterwards: of an allocator's whims
 
 
@@ -36,6 +41,31 @@ def resident() -> float:
     found = re.search(r"VmRSS:\s*(\d+) kB", status.read_text())
     assert found
     return int(found[1]) / 1024
+
+
+def check(tally: campaign.Tally) -> None:
+    """Assert that a viewer went on, answered all the time, and told of no fault and no folder."""
+    print(tally)
+    assert tally.status is None and tally.came["ended with 130 by Ctrl-C"] == 1
+    assert not tally.faults and not tally.paths
+    assert tally.answered > 2 and tally.sent["command"] > 50
+    assert not [kind for kind in tally.came if kind.startswith("watch closed")]
+
+
+def test_random_messages_end_nothing() -> None:
+    """Seven clients, quick, slow and broken, for some seconds."""
+    check(campaign.run(8.0))
+
+
+@pytest.mark.slow
+def test_random_messages_for_long() -> None:
+    """And the process does not grow: after a while a scene's kinds and renderers have all been."""
+    tally = campaign.run(2.0 * SECONDS, seed=1)
+    check(tally)
+    end = tally.memory[-1][0]
+    before = max(size for at, size in tally.memory if at < WARM * end)
+    after = max(size for at, size in tally.memory if at >= WARM * end)
+    assert after <= before + RANDOM_GROWTH and max(tally.handles) < 100
 
 
 @pytest.mark.slow

@@ -120,6 +120,40 @@ def test_what_is_no_command_is_told(widget: Any) -> None:
         until(widget, lambda content: content["type"] == "error")
 
 
+def test_any_content_is_answered(widget: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """JSON of any shape, and faults of any sort: one line; then it is steered as before."""
+    deep: Any = 0.0
+    for _ in range(900):
+        deep = [deep]
+    where = {"do": "edit", "target": "material", "index": 0, "key": "reflectance"}
+    view = {"do": "open_view", "exposure": 0, "tone": "none"}
+    for wrong in (
+        None, [], "x", 3, {"do": {}}, {"do": ["orbit"]},
+        {"do": "orbit", "dx": float("nan"), "dy": 0},
+        {**where, "value": deep}, {**where, "value": {"file": "/etc/passwd"}},
+        {**where, "value": {"type": "bitmap", "image": "/etc/passwd"}},
+        {**where, "value": [0] * 9999},
+        {**view, "camera": {"type": "lens", "lens": "/etc/passwd"}},
+        {**view, "camera": {"type": "perspective", "medium": "x"}}, {"do": "save", "what": "png"},
+        {"do": "invite"}, {"do": "steer"},
+    ):  # fmt: skip
+        widget._handle_custom_msg(wrong, [])
+        content, _ = until(widget, lambda content: content["type"] == "error")
+        assert len(content["text"]) <= 300 and content["text"].isprintable()
+        assert "/etc" not in content["text"] and "fault" not in content["text"]
+
+    def broken(*_: Any) -> None:
+        raise AttributeError("two\nlines")
+
+    monkeypatch.setattr(widget, "_watch", broken)
+    do(widget, "watch", watching=True)
+    content, _ = until(widget, lambda content: content["type"] == "error")
+    assert content["text"] == "a fault of clpt (AttributeError)"
+    monkeypatch.undo()
+    do(widget, "watch", watching=True)
+    until(widget, at_rest)
+
+
 def test_two_frames_at_most_wait_to_be_confirmed(widget: Any) -> None:
     do(widget, "watch", watching=True)
     for _ in range(6):
@@ -182,6 +216,42 @@ async (text) => {
 }
 """
 PIXELS = "() => view.picture.now.toDataURL('image/png')"
+
+
+def test_names_are_text_in_a_notebook_too() -> None:
+    """What messages hold becomes no markup; a notebook has no policy that would stop it."""
+    from tests.view.browsers import launched
+    from tests.view.test_page import EVIL
+
+    with launched() as browser:
+        page = browser.new_page()
+        page.goto("about:blank")
+        page.evaluate(MODEL)
+        page.evaluate(OPEN, joined())
+        page.evaluate("() => { view.inspector.at = {x: 1, y: 1}; }")
+        numbers = {"position": [0, 0, 0], "shading_normal": [0, 0, 1], "uv": [0, 0]}
+        hit = {
+            "type": "hit",
+            "shape": 0,
+            "primitive": 0,
+            "depth": 1.0,
+            "albedo": [1, 1, 1],
+            **numbers,
+        }
+        for name in EVIL:
+            named = {"object": {"name": name, "made_of": name, "material": None}}
+            for content in (
+                {"type": "error", "text": name},
+                {"type": "value", "x": 1, "y": 1, "rgb": [1, 1, 1], "samples": 1},
+                {**hit, "x": 1, "y": 1, **named},
+                {"type": "status", "phase": name, "samples": 1, "spp": 1, "seconds": 1},
+            ):
+                page.evaluate("(content) => window.tell(content)", content)
+        page.wait_for_timeout(200)
+        assert page.evaluate("window.hacked === undefined")
+        assert page.evaluate("document.querySelectorAll('img, iframe, script, style').length") == 0
+        page.evaluate("(content) => window.tell(content)", {"type": "error", "text": EVIL[0]})
+        assert EVIL[0] in page.evaluate("document.body.textContent")
 
 
 def test_the_module_shows_and_steers_in_a_browser(widget: Any, on: device.Device) -> None:

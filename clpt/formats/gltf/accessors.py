@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt import budget
 from clpt.formats.gltf import meshopt
 from clpt.formats.gltf.document import Document, Element
 
@@ -17,7 +18,7 @@ COMPONENTS: dict[int, np.dtype[Any]] = {
 }  # fmt: skip
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 INDEX_TYPES = (5121, 5123, 5125)
-LARGEST = 1 << 31  # bytes of an array without data, which is all zero
+PER_NUMBER = 16  # bytes that a number takes while it is read
 
 
 def integers(element: Element, key: str) -> NDArray[np.uint32]:
@@ -60,12 +61,12 @@ def stored(accessor: Element, types: tuple[str, ...]) -> NDArray[Any]:
     """Return an accessor's values (n, width) as they are stored, with the sparse ones."""
     width(accessor, types)
     form = _form(accessor)
+    what = f"{accessor.path} of {form.count} elements"
+    budget.check(PER_NUMBER * form.count * form.columns, what, accessor.document.file)
     sparse = accessor.child("sparse")
     if form.stride:
         data, _ = view(accessor)
         values = form.read(data)
-    elif form.count * form.size > LARGEST:
-        raise accessor.error(f"{form.count} elements without data are too many", "count")
     else:
         values = np.zeros((form.count, form.columns), form.dtype)
     return values if sparse is None else _with_sparse(accessor, sparse, values)
@@ -96,6 +97,7 @@ def view(element: Element, key: str = "bufferView") -> tuple[Any, Element]:
 
 def _floats(accessor: Element, types: tuple[str, ...]) -> NDArray[np.float32]:
     values = normalised(stored(accessor, types), accessor)
+    budget.take(values.nbytes, accessor.path, accessor.document.file)
     finite = np.isfinite(values)
     if not finite.all():
         bad = int(np.argmin(finite.reshape(-1))) // values.shape[1]

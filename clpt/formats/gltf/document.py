@@ -16,7 +16,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any, NoReturn, TypeVar
 from urllib.parse import unquote, unquote_to_bytes
 
-from clpt import text
+from clpt import budget, input_files, text
 from clpt.errors import SceneError
 from clpt.formats.missing import Missing
 
@@ -24,6 +24,7 @@ T = TypeVar("T")
 REQUIRED: Any = object()
 LARGEST = 2**53  # whole numbers that JSON's readers agree upon
 JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942
+PER_BYTE = 4  # bytes of memory for each of the file, while it is read
 SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
 DATA_URI = re.compile(r"data:([^,;]*)((?:;[^,;]*)*),", re.ASCII)
 
@@ -196,7 +197,8 @@ class Document:
         self.lumens, self.multiple_scattering = 1.0, 0.0  # see clpt.formats.gltf.load
         self.variant: int | None = None
         self._made: dict[Any, Any] = {}
-        data = _read(file)
+        data = input_files.read_bytes(file)
+        budget.check(PER_BYTE * len(data), "reading it", file)
         text, self.chunk = _split(file, data) if data[:4] == b"glTF" else (data, None)
         self.root = Element(self, "", _parsed(file, text))
         self._check_version()
@@ -225,12 +227,10 @@ class Document:
         uri = element.text(key)
         if uri[:5].lower() == "data:":
             return _data(element, key, uri)
-        path = self.beside(element, key)
         try:
-            return path.read_bytes()
-        except OSError as error:
-            message = f"{path.name!r} cannot be read: {error.strerror}"
-            raise element.error(message, key) from None
+            return input_files.read_bytes(self.beside(element, key))
+        except SceneError as error:
+            raise error if error.where else element.error(error.message, key) from None
 
     def beside(self, element: Element, key: str = "uri") -> Path:
         """Return the file that a relative URI names, and that is there. Raises SceneError."""
@@ -241,7 +241,10 @@ class Document:
             exists = False
         if not exists:
             raise element.error(f"there is no file {_shown(unquote(element.text(key)))}", key)
-        return path
+        try:
+            return input_files.named("gltf", self.file.parent, path)
+        except SceneError as error:
+            raise element.error(error.message, key) from None
 
     def path_of(self, element: Element, key: str = "uri") -> Path:
         """Return the path that a relative URI names. Raises SceneError for any other URI."""
@@ -278,13 +281,6 @@ class Document:
                 raise asset.error(f"{_shown(version)} is no version", key)
             if int(match[1]) != 2 or (key == "minVersion" and int(match[2]) > 0):
                 raise asset.error(f"glTF {version} is not supported, only 2.0", key)
-
-
-def _read(file: Path) -> bytes:
-    try:
-        return file.read_bytes()
-    except OSError as error:
-        raise SceneError(f"cannot be read: {error.strerror}", file=file) from None
 
 
 def _parsed(file: Path, data: bytes) -> Any:

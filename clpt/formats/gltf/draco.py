@@ -6,14 +6,15 @@ from typing import Any
 
 import numpy as np
 
+from clpt import budget
 from clpt.formats.gltf import accessors
 from clpt.formats.gltf.document import Element
 from clpt.formats.gltf.geometry import Geometry, attribute, types, warn_of_whole_numbers
 
 NAME = "KHR_draco_mesh_compression"
 HEADER = b"DRACO"
-EDGEBREAKER, METADATA = 1, 0x8000
-LARGEST, RATIO = 1 << 22, 256  # triangles that are believed in, and those for each byte
+VERSION, MESH, EDGEBREAKER, METADATA, DEEPEST = (2, 2), 1, 1, 0x8000, 16
+PER_TRIANGLE = 160  # bytes that Draco takes for each, as measured
 
 
 def attributes(primitive: Element, compressed: Element) -> Geometry:
@@ -53,11 +54,15 @@ def _decoded(compressed: Element) -> Any:
     import DracoPy  # imported where it is used: few files need it
 
     data = bytes(accessors.view(compressed)[0])
-    if data[:5] != HEADER:
+    if data[:5] != HEADER or len(data) < 12:
         raise compressed.error("its data are not Draco's")
+    if tuple(data[5:7]) != VERSION:
+        raise compressed.error(f"is of Draco's version {data[5]}.{data[6]}; 2.2 is read")
+    if data[7] != MESH:
+        raise compressed.error("Draco finds a point cloud in it, no triangles")
     faces = _claimed_faces(data)
-    if faces > max(LARGEST, RATIO * len(data)):
-        raise compressed.error(f"{len(data)} bytes cannot hold {faces} triangles")
+    what = f"{compressed.path} of {faces} triangles"
+    budget.check(PER_TRIANGLE * faces, what, compressed.document.file)
     try:
         mesh = DracoPy.decode(data)
     except Exception as error:  # DracoPy raises its own kinds, of no common base
@@ -70,13 +75,41 @@ def _decoded(compressed: Element) -> Any:
 
 def _claimed_faces(data: bytes) -> int:
     """What a mesh's header says before memory is taken for it (Draco bitstream 2.2, section 3)."""
-    if len(data) < 12 or data[8] != EDGEBREAKER or int.from_bytes(data[9:11], "little") & METADATA:
-        return 0
-    values, value, shift = [], 0, 0
-    for byte in data[12:24]:
-        value |= (byte & 127) << shift
-        shift += 7
-        if byte < 128:
-            values.append(value)
-            value = shift = 0
-    return values[1] if len(values) > 1 else 0
+    stream = _Stream(data, 11)
+    if int.from_bytes(data[9:11], "little") & METADATA:
+        for _ in range(stream.number()):
+            stream.number()
+            stream.skip_metadata()
+        stream.skip_metadata()
+    if data[8] == EDGEBREAKER:
+        stream.at += 1
+        stream.number()
+    return stream.number()
+
+
+class _Stream:
+    """Reads a header's bytes one after the other; beyond the end there are zeros."""
+
+    def __init__(self, data: bytes, at: int):
+        self.data, self.at = data, at
+
+    def number(self) -> int:
+        """Return a whole number, seven bits a byte."""
+        value = 0
+        for shift in range(0, 35, 7):
+            byte = self.data[self.at] if self.at < len(self.data) else 0
+            self.at += 1
+            value |= (byte & 127) << shift
+            if byte < 128:
+                break
+        return value
+
+    def skip_metadata(self, depth: int = 0) -> None:
+        """Pass over entries, and what is inside."""
+        for _ in range(min(self.number(), len(self.data))):
+            self.at += self.data[self.at] + 1 if self.at < len(self.data) else 1
+            size = self.number()
+            self.at += size
+        for _ in range(min(self.number(), len(self.data)) if depth < DEEPEST else 0):
+            self.at += self.data[self.at] + 1 if self.at < len(self.data) else 1
+            self.skip_metadata(depth + 1)

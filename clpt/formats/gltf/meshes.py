@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import transforms
+from clpt import budget, transforms
 from clpt.formats.gltf import materials, skins, variants, volume
 from clpt.formats.gltf.accessors import floats
 from clpt.formats.gltf.document import Element
@@ -24,6 +24,8 @@ from clpt.scene.media import Medium
 from clpt.scene.shapes import Group, Instance, Mesh, Shape
 from clpt.scene.textures import SECOND_UV
 
+PER_PART = 256  # moved vertices that count as a part
+BYTES = 2048  # of a copy in memory, about
 FLIPPED = np.array([1, -1], np.float32)
 INSTANCING = "EXT_mesh_gpu_instancing"
 INSTANCED = 20_000  # triangles that copies would add; fewer are traced faster as copies
@@ -67,7 +69,11 @@ def shapes(graph: Graph, *, instances: bool = True) -> list[Shape]:
             joints = None if skin is None else skins.matrices(skin, graph.to_world)
             posed[key] = Posed(_parts(mesh, weights, joints))
         own = np.eye(4) if skin is not None else graph.to_world[index]
-        posed[key].copies += [(node, matrix) for matrix in _transforms(node, own)]
+        copies = _transforms(node, own)
+        parts = len(copies) * max(len(posed[key].parts), 1)
+        budget.take_parts(parts, "copies of its meshes", graph.document.file)
+        budget.take(BYTES * parts, "copies of its meshes", graph.document.file)
+        posed[key].copies += [(node, matrix) for matrix in copies]
     return [shape for each in posed.values() for shape in _shapes(each, instances)]
 
 
@@ -150,6 +156,7 @@ def _morph(primitive: Element, made: Geometry, weights: tuple[float, ...]) -> No
     """Add the displacements of the targets, each times its weight."""
     for weight, target in zip(weights, made.targets, strict=False):
         for name, change in target.items():
+            budget.take_parts(len(change) // PER_PART, "morph targets", primitive.document.file)
             if weight != 0.0 and name in made.attributes:
                 base = made.attributes[name]
                 width = min(base.shape[1], change.shape[1])

@@ -12,10 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt import budget
 from clpt.formats.gltf import meshopt_filters, meshopt_indices
 from clpt.formats.gltf.document import Element
 
 EXTENSIONS = ("KHR_meshopt_compression", "EXT_meshopt_compression")
+PER_BYTE = 8  # bytes of memory for each that is unpacked, while it is
 GROUP = 16  # elements
 TAIL = {0: 32, 1: 24}  # bytes at least, by version
 # By control mode (version 1), or for version 0: the bits of a delta by the group's header bits.
@@ -37,6 +39,8 @@ def decode(element: Element, data: memoryview, length: int) -> bytes:
     count, stride = element.integer("count", low=1), element.integer("byteStride", low=1, high=256)
     if count * stride != length:
         raise element.error(f"{count} elements of {stride} bytes are not the view's {length}")
+    budget.check(PER_BYTE * length, element.json_path(), element.document.file)
+    budget.take(length, element.json_path(), element.document.file)
     mode = element.text("mode", choices=("ATTRIBUTES", "TRIANGLES", "INDICES"))
     chosen = element.text("filter", "NONE", meshopt_filters.FILTERS)
     stream = np.frombuffer(data, np.uint8)

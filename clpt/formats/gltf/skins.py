@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt import budget
 from clpt.formats.gltf.accessors import floats
 from clpt.formats.gltf.document import Element
 from clpt.formats.gltf.geometry import Geometry
 
+PER_VERTEX, PER_PART = 96, 256  # bytes that joints take, and vertices that count as a part
 CHUNK = 1 << 16  # vertices at a time: each takes a matrix
 
 
@@ -66,6 +68,10 @@ def _influences(
     pairs: list[tuple[NDArray[np.int64], NDArray[np.float64]]] = []
     while f"JOINTS_{len(pairs)}" in made.attributes and f"WEIGHTS_{len(pairs)}" in made.attributes:
         name = f"JOINTS_{len(pairs)}"
+        vertices = len(made.attributes[name])
+        size = PER_VERTEX * vertices * (len(pairs) + 1)
+        budget.check(size, f"{len(pairs) + 1} joints of its vertices", primitive.document.file)
+        budget.take_parts(vertices // PER_PART, "joints of its vertices", primitive.document.file)
         which = made.attributes[name].astype(np.int64)
         weights = made.attributes[f"WEIGHTS_{len(pairs)}"].astype(np.float64)
         which = np.where(weights == 0.0, 0, which)

@@ -5,14 +5,12 @@ from __future__ import annotations
 import math
 import os
 from concurrent.futures import Future, ThreadPoolExecutor
-from functools import partial
-from threading import Lock
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import images
+from clpt import budget, images
 from clpt.errors import SceneError
 from clpt.formats.gltf import accessors
 from clpt.formats.gltf.document import Document, Element
@@ -20,8 +18,6 @@ from clpt.formats.missing import EVEN, GREY, grey_for
 from clpt.scene.textures import Bitmap
 
 FORMATS = ("PNG", "JPEG", "WEBP")
-PIXELS = 1 << 26  # of an image: 8192 x 8192
-TOGETHER = 1 << 30  # of all images: 3 GB of colours
 WRAPS = {33071: "clamp", 33648: "mirror", 10497: "repeat"}
 NEAREST, FILTERS = 9728, (9728, 9729)
 # glTF counts v from the top of an image, clpt from its bottom, and so do the meshes it makes.
@@ -92,33 +88,19 @@ def _all(document: Document) -> dict[str, Future[images.Stored]]:
     """The images of all textures, decoded side by side; one that fails does where it is used."""
     sources = [_source(texture) for texture in document.root.children("textures")]
     distinct = {source.path: source for source in sources if source is not None}
-    budget = _Budget()
+    decode = budget.carried(_decoded)
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        return {path: pool.submit(_decoded, one, budget) for path, one in distinct.items()}
+        return {path: pool.submit(decode, one) for path, one in distinct.items()}
 
 
-class _Budget:
-    """How many pixels the images of a file may still have."""
-
-    def __init__(self) -> None:
-        self.left, self.lock = TOGETHER, Lock()
-
-    def spend(self, source: Element, width: int, height: int) -> None:
-        """Take an image's pixels out of it. Raises SceneError if that is too much."""
-        if width * height > PIXELS:
-            raise source.error(f"has {width}x{height} pixels, more than the {PIXELS} that are read")
-        with self.lock:
-            self.left -= width * height
-            if self.left < 0:
-                raise source.error(f"is one too many: images may have {TOGETHER} pixels together")
-
-
-def _decoded(source: Element, budget: _Budget) -> images.Stored:
+def _decoded(source: Element) -> images.Stored:
     """The image of a source; glTF has what the image says of its colours passed over."""
     inside = "uri" not in source
     data = bytes(accessors.view(source)[0]) if inside else source.document.resource(source)
     try:
-        return images.decoded(data, FORMATS, partial(budget.spend, source), profiled=False)
+        made = images.decoded(data, FORMATS, profiled=False)
+        budget.take(made.values.nbytes, "the images", source.document.file)
+        return made
     except SceneError as error:
         raise error if error.where else source.error(error.message) from None
     except Exception as error:  # Pillow raises its own, from struct.error to SyntaxError

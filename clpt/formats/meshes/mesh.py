@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import images, transforms
+from clpt import budget, images, transforms
 from clpt.errors import SceneError
 from clpt.formats.meshes import corners, mtl, obj, off, ply, stl
 from clpt.formats.meshes.named_files import find
@@ -143,6 +143,9 @@ def checked(
         warnings.append(f"{name or 'mesh'}: left out texture coordinates that are not finite")
         arrays["uvs"] = None
     whole = {**arrays, "faces": np.ascontiguousarray(faces, np.uint32)}
+    held = [a for a in (*whole.values(), *own.values()) if a is not None]
+    budget.take(sum(a.nbytes for a in held), f"the mesh {name!r}" if name else "a mesh", path)
+    budget.take_parts(1, "meshes", path)
     return whole if attributes is None else {**whole, "attributes": own}
 
 

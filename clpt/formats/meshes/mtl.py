@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import images, spectra, text
+from clpt import images, input_files, spectra, text
 from clpt.errors import SceneError
 from clpt.formats.meshes.named_files import find
 from clpt.formats.missing import EVEN, GREY, Missing, grey_for
@@ -108,10 +108,7 @@ def uncommented(line: str) -> str:
 
 def read(path: Path) -> dict[str, Statements]:
     """Read the statements of each material by its name. Raises SceneError."""
-    try:
-        data = text.plain(path.read_bytes())
-    except OSError as error:
-        raise SceneError(f"cannot be read: {error.strerror}", file=path) from None
+    data = text.plain(input_files.read_bytes(path))
     made: dict[str, Statements] = {}
     own: Statements = {}
     for number, line in enumerate(data.replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n")):

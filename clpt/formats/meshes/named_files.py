@@ -6,6 +6,8 @@ import os
 import unicodedata
 from pathlib import Path
 
+from clpt import input_files
+
 
 def find(folder: Path, name: str) -> Path | None:
     """Return the file that `name` means in `folder`, None where there is none.
@@ -19,9 +21,10 @@ def find(folder: Path, name: str) -> Path | None:
         name = name[1:-1].strip()
     for known in dict.fromkeys((name, name.replace("\\ ", " "), name.replace("\\", "/"))):
         if known and (found := _resolved(folder, known)) is not None:
-            return found
+            return input_files.named("mesh", folder, found)
     last = name.replace("\\", "/").rpartition("/")[2]
-    return _resolved(folder, last) if last else None
+    found = _resolved(folder, last) if last else None
+    return None if found is None else input_files.named("mesh", folder, found)
 
 
 def _resolved(folder: Path, name: str) -> Path | None:

@@ -15,9 +15,10 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import text
+from clpt import budget, input_files, text
 from clpt.errors import SceneError
 
+PER_BYTE = 8  # bytes of memory for each of the file, while it is read
 PIECE = 1 << 19  # bytes that are parsed at a time: they and their arrays fit a processor's cache
 BLANK, NEWLINE, HASH, SLASH, POINT = 32, 10, 35, 47, 46
 BLANKS = bytes(32 if code < 32 and code not in (9, 10, 13) else code for code in range(256))
@@ -71,11 +72,8 @@ class Contents:
 
 def read(path: Path) -> Contents:
     """Read a file. Raises SceneError with the line that is not as the format has it."""
-    try:
-        data = text.plain(path.read_bytes())
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise SceneError(f"cannot be read: {reason}", file=path) from None
+    data = text.plain(input_files.read_bytes(path))
+    budget.check(PER_BYTE * len(data), "its numbers", path)
     reader = _Reader(path, data)
     reader.read()
     return reader.contents()

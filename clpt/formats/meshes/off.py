@@ -13,13 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import text
+from clpt import budget, text
 from clpt.errors import SceneError
 from clpt.formats.gzip_file import read_bytes
 from clpt.formats.meshes.triangles import Triangles, indices, see_through
 from clpt.geometry.polygons import triangulate
 
 HEADER = re.compile(rb"\s*((?:ST)?C?N?4?n?(?:OFF|Off|off))?(\s+BINARY\b)?")
+PER_BYTE = 32  # bytes of memory for each of the file, while it is read
 COMMENT = re.compile(rb"#[^\r\n]*")
 COLOUR = ("red", "green", "blue", "alpha")
 GREY = (203, 0.6)  # of a mesh without colours: in bytes of sRGB, and linear
@@ -31,6 +32,7 @@ Integers = NDArray[np.int64]
 def read(path: Path) -> list[Triangles]:
     """Read a file. Raises SceneError with the line of what is no number."""
     data = COMMENT.sub(b"", text.plain(read_bytes(path))).rstrip(text.FILLING)
+    budget.check(PER_BYTE * len(data), "its numbers", path)
     try:
         return [_read(data)]
     except SceneError as error:

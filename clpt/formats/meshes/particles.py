@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import zipfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from clpt import output_files
+from clpt import numpy_files, output_files
 from clpt.errors import SceneError
 from clpt.scene.shapes import Spheres
 from clpt.scene.textures import ATTRIBUTES
@@ -18,11 +17,7 @@ ARRAYS = ("centers", "radii")
 
 def read(path: Path) -> dict[str, Any]:
     """Return the parameters of `spheres` that are in a file. Raises SceneError."""
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            found = {name: file[name] for name in file.files}
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile, AttributeError) as error:
-        raise SceneError(f"is no .npz file: {error}", file=path) from None
+    found = numpy_files.arrays(path)
     for name in found:
         if name not in ARRAYS and not name.startswith(ATTRIBUTES):
             message = (

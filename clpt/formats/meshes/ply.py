@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import text
+from clpt import budget, text
 from clpt.errors import SceneError
-from clpt.formats.gzip_file import LARGEST, read_bytes
+from clpt.formats.gzip_file import read_bytes
 from clpt.formats.meshes.ply_tables import Columns, Header, read_tables
 from clpt.formats.meshes.triangles import Triangles, indices, see_through
 from clpt.geometry.polygons import triangulate
@@ -25,15 +25,14 @@ CORNERS = ("vertex_indices", "vertex_index")
 ELEMENTS = ("vertex", "face", "tristrips")
 RESTART = -1  # between the strips of a list
 LEFT_OUT = ("material_index", "ambient_red", "specular_red", "specular_power")
+PER_BYTE = 8  # bytes of memory for each of the file, while it is read
 MOST_CORNERS = 1 << 16  # of one polygon
 
 
-def read(path: Path, largest: int = LARGEST) -> Triangles:
-    """Read a file; largest: bytes that one of gzip may have, unpacked.
-
-    Raises SceneError for one that is larger, broken, or has no vertices or faces.
-    """
-    data = text.plain(read_bytes(path, largest))
+def read(path: Path) -> Triangles:
+    """Read a file. Raises SceneError for one that is broken, or has no vertices or faces."""
+    data = text.plain(read_bytes(path))
+    budget.check(PER_BYTE * len(data), "its tables", path)
     try:
         return _triangles(*read_tables(data))
     except SceneError as error:

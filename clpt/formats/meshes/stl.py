@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import text
+from clpt import budget, text
 from clpt.errors import SceneError
 from clpt.formats.gzip_file import read_bytes
 from clpt.formats.meshes.triangles import Triangles
@@ -29,6 +29,7 @@ END = re.compile(rb"end[ \t]*\Z")
 ROW = (
     b"facet normal x y z outer loop vertex x y z vertex x y z vertex x y z endloop endfacet".split()
 )
+PER_BYTE = 16  # bytes of memory for each of the file, while it is read
 KEYWORDS = [i for i, word in enumerate(ROW) if word not in (b"x", b"y", b"z")]
 PLACES = [i for i, word in enumerate(ROW) if word in (b"x", b"y", b"z")][3:]
 PLAIN = 203  # of 255 in sRGB: the grey of a mesh without colours
@@ -38,6 +39,7 @@ OWN, RED, GREEN, BLUE = 1 << 15, 10, 5, 0  # of an attribute: a flag, and shifts
 def read(path: Path) -> list[Triangles]:
     """Read the solids of a file. Raises SceneError with the line of what is broken."""
     data = read_bytes(path)
+    budget.check(PER_BYTE * len(data), "its triangles", path)
     try:
         return _text(text.plain(data)) if _is_text(data) else [_binary(data)]
     except SceneError as error:

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from clpt import output_files, text
+from clpt import budget, input_files, output_files, text
 from clpt.errors import SceneError
 
-LARGEST = 1 << 30  # [bytes] of a file
+PER_BYTE = 64  # bytes of memory for each of the file, while it is read
 
 
 def read(path: Path) -> dict[str, Any]:
@@ -18,12 +18,9 @@ def read(path: Path) -> dict[str, Any]:
 
     Raises SceneError with the line for what is no row of four numbers, and for an empty file.
     """
-    try:
-        if path.stat().st_size > LARGEST:
-            raise SceneError(f"is larger than {LARGEST >> 30} GiB", file=path)
-        rows = [line.split() for line in text.plain(path.read_bytes()).split(b"\n")]
-    except OSError as error:
-        raise SceneError(f"cannot be read: {error.strerror}", file=path) from None
+    data = text.plain(input_files.read_bytes(path))
+    budget.check(PER_BYTE * len(data), "its points", path)
+    rows = [line.split() for line in data.split(b"\n")]
     columns = np.array([len(row) for row in rows])
     short = (columns > 0) & (columns < 4)
     if short.any():
@@ -42,6 +39,7 @@ def read(path: Path) -> dict[str, Any]:
     starts = np.flatnonzero(given & ~np.r_[False, given[:-1]])
     ends = np.flatnonzero(given & ~np.r_[given[1:], False])
     with np.errstate(over="ignore"):  # lowering refuses what is not finite
+        budget.take(4 * points.size, "its points", path)
         return {"points": points.astype(np.float32), "lengths": ends - starts + 1}
 
 

@@ -34,7 +34,6 @@ UNSUPPORTED = {
 FLAT_SIZE = 1e-5  # thickness over size of a shape that is flattened
 SEPARATOR = re.compile(r"[\s,]+")
 LARGEST_INTEGER = 2**31 - 1
-MAX_PARTS = 1000  # of one material or texture
 
 
 class Context:
@@ -58,8 +57,7 @@ class Context:
         self.layers: dict[str, None] = {}
         self.ids: dict[str, Element] = {}
         self._made: dict[int, Any] = {}
-        self._sizes: dict[int, int] = {}  # parts of each object that is made, counted at every use
-        self._open = [0]  # the same of objects that are being made, the outermost first
+        self._open = 0  # how many objects are being made, in each other
         for element in document.root.walk():
             name = element.attributes.get("as" if element.tag == "alias" else "id")
             if name is not None and element.tag != "ref":
@@ -82,21 +80,19 @@ class Context:
     def once(self, element: Element, make: Any) -> Any:
         """Return make(element), the same object for every reference to the element.
 
-        Raises SceneError where it refers to itself, or is nested too deep or too often.
+        Raises SceneError where it refers to itself, or is nested too deep.
         """
         key = id(element)
         if key not in self._made:
             self._made[key] = None
-            self._open.append(1)
-            if len(self._open) > MAX_NESTING:
+            self._open += 1
+            if self._open > MAX_NESTING:
                 raise element.error(f"nested deeper than {MAX_NESTING} objects, by references")
-            self._made[key] = make(element)
-            self._sizes[key] = self._open.pop()
-            if element.tag != "shape" and self._sizes[key] > MAX_PARTS:
-                raise element.error(f"has more than {MAX_PARTS} parts, by references")
+            with element.locating():
+                self._made[key] = make(element)
+            self._open -= 1
         if self._made[key] is None:
             raise element.error("refers to itself")
-        self._open[-1] += self._sizes[key]
         return self._made[key]
 
     def warn(self, element: Element, message: str) -> None:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt import budget, input_files
 from clpt.errors import SceneError
 from clpt.formats.meshes import mesh
 from clpt.scene.shapes import Mesh
@@ -20,9 +21,7 @@ from clpt.scene.shapes import Mesh
 MAGIC = 0x041C
 VERSIONS = (3, 4)
 NORMALS, UVS, COLOURS, FLAT, DOUBLE = 0x0001, 0x0002, 0x0008, 0x0010, 0x2000
-LARGEST = 1 << 31  # bytes of a file
-UNPACKED = 1 << 30  # bytes of a mesh, or RATIO times what it is packed to, if that is more
-RATIO = 16  # meshes are packed to a half or a fifth; deflate reaches 1032
+DEFLATE = 1032  # bytes at most that one of deflate stands for
 
 
 class _Stream:
@@ -30,12 +29,13 @@ class _Stream:
 
     def __init__(self, path: Path, packed: bytes):
         self.path, self.packed, self.inflate = path, packed, zlib.decompressobj()
-        self.left = min(1032 * len(packed), max(UNPACKED, RATIO * len(packed)))
+        self.left = DEFLATE * len(packed)
 
     def take(self, size: int) -> bytes:
         """Return the next bytes. Raises SceneError where there are fewer."""
         if size > self.left:
             raise SceneError("names more vertices or triangles than it can hold", file=self.path)
+        budget.check(2 * size, "a mesh in it", self.path)
         self.left -= size
         parts = []
         while size > 0:
@@ -69,7 +69,7 @@ def read(path: Path, index: int) -> tuple[Mesh, bool, list[str]]:
 
     Raises SceneError for a file that is missing or broken, or has no such mesh.
     """
-    data = _bytes(path)
+    data = input_files.read_bytes(path)
     first, end, version = _mesh_range(path, data, index)
     stream = _Stream(path, data[first + 4 : end])
     (flags,) = struct.unpack("<I", stream.take(4))
@@ -87,15 +87,6 @@ def read(path: Path, index: int) -> tuple[Mesh, bool, list[str]]:
     if not len(arrays["faces"]):
         raise SceneError("holds no triangles", file=path)
     return Mesh(name=name, **arrays), bool(flags & FLAT), warnings
-
-
-def _bytes(path: Path) -> bytes:
-    try:
-        if path.stat().st_size > LARGEST:
-            raise SceneError(f"is larger than {LARGEST >> 20} MiB", file=path)
-        return path.read_bytes()
-    except OSError as error:
-        raise SceneError(f"cannot be read: {error.strerror}", file=path) from None
 
 
 def _mesh_range(path: Path, data: bytes, index: int) -> tuple[int, int, int]:

@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import Any
 from xml.parsers import expat
 
+from clpt import budget, input_files
 from clpt.errors import SceneError
 from clpt.formats.located import Located
 
 MAX_NESTING = 64
 MAX_INCLUDES = 16  # of files inside each other
-MAX_FILES = 4096  # of one scene
-MAX_TEXT = 1 << 24  # characters of an attribute after its variables
+BYTES = 1024  # of an element in memory, about
 CAMERA = "camera"
 VARIABLE = re.compile(r"\\\$|\$(?:\{(\w+)\}|(\w*))")
 # Before Mitsuba 2, names were written in camel case.
@@ -122,10 +122,14 @@ def _first(
     for place in places:
         candidate = place / name
         try:
-            if is_one(candidate):
-                return candidate
+            found = is_one(candidate)
         except (OSError, ValueError):
             break
+        if found and what == "file":
+            with element.locating():
+                return input_files.named("mitsuba", element.file.parent, candidate)
+        if found:
+            return candidate
     raise element.error(f"there is no {what} {name!r}")
 
 
@@ -139,6 +143,8 @@ def _read(path: Path) -> Element:
         element = Element(RENAMED.get(tag, tag), attributes, path, parser.CurrentLineNumber)
         if len(stack) > MAX_NESTING:
             raise element.error(f"nested deeper than {MAX_NESTING} elements")
+        budget.take(BYTES + 4 * sum(map(len, attributes.values())), "its elements", path)
+        budget.take_parts(1, "its elements", path)
         stack[-1].children.append(element)
         stack.append(element)
 
@@ -150,7 +156,7 @@ def _read(path: Path) -> Element:
     parser.EndElementHandler = lambda tag: stack.pop()
     parser.StartDoctypeDeclHandler = doctype
     try:
-        parser.Parse(path.read_bytes(), True)
+        parser.Parse(input_files.read_bytes(path), True)
     except expat.ExpatError as error:
         reason = expat.errors.messages.get(error.code, "not XML")
         raise SceneError(f"broken XML: {reason}", file=path, line=error.lineno) from None
@@ -158,8 +164,6 @@ def _read(path: Path) -> Element:
         raise
     except (LookupError, ValueError) as error:
         raise SceneError(f"broken XML: {error}", file=path, line=1) from None
-    except OSError as error:
-        raise SceneError(f"cannot be read: {error.strerror}", file=path) from None
     return top.children[0]
 
 
@@ -170,7 +174,7 @@ class _Expander:
         self.values = {name: _as_text(value) for name, value in variables.items()}
         self.used: set[str] = set()
         self.folders = [path.parent]
-        self.files = 1
+        self.longest = max(map(len, self.values), default=0)
 
     def expand(self, element: Element, includes: int) -> None:
         kept: list[Element] = []
@@ -202,18 +206,18 @@ class _Expander:
         if "$" not in text:
             return text
         size = len(text) + sum(len(value(match)) for match in VARIABLE.finditer(text))
-        if size > MAX_TEXT:
-            raise element.error(f"is longer than {MAX_TEXT} characters with its variables")
+        budget.take(4 * size, f"{element.label()} with its variables", element.file)
         return VARIABLE.sub(value, text)
 
     def prefix(self, word: str) -> str:
         """Return the longest variable that a word begins with, as Mitsuba does; or ""."""
-        ends = range(len(word), 0, -1)
+        ends = range(min(len(word), self.longest), 0, -1)
         return next((word[:end] for end in ends if word[:end] in self.values), "")
 
     def define(self, element: Element) -> None:
         name = element.attribute("name")
         self.values.setdefault(name, element.attribute("value"))
+        self.longest = max(self.longest, len(name))
 
     def add_folder(self, element: Element) -> None:
         """Add a folder that lies beside the file, or else in one of the folders so far."""
@@ -224,9 +228,6 @@ class _Expander:
     def include(self, element: Element, depth: int) -> list[Element]:
         if depth > MAX_INCLUDES:
             raise element.error(f"more than {MAX_INCLUDES} files include each other")
-        self.files += 1
-        if self.files > MAX_FILES:
-            raise element.error(f"more than {MAX_FILES} files are included")
         path = _find(element, element.attribute("filename"), self.folders)
         root = _read(path)
         holder = root if root.tag == "scene" else Element("", {}, path, 0, [root])

@@ -14,11 +14,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from clpt import budget
 from clpt import text as text_files
 from clpt.errors import SceneError, UnusedParameterError
 from clpt.formats.located import Located
 
 LARGEST_INTEGER = 2**31 - 1
+PER_LETTER = 16  # bytes of memory for each letter of JSON, while it is read
 SKIPPED = re.compile(r"[\s,:]*")
 NAMES = {
     dict: "an object", list: "a list", str: "a string", bool: "true or false", float: "a number",
@@ -37,11 +39,12 @@ class DuplicateKey:
 class Cursor(Located):
     """A value of a JSON file and the keys that lead to it.
 
+    file: None for a value that comes from no file: it can name none either.
     confined: whether it can name only files of its own folder.
     """
 
     value: Any
-    file: Path
+    file: Path | None
     text: str
     path: tuple[str | int, ...] = ()
     confined: bool = False
@@ -124,6 +127,7 @@ def parse(path: Path, confined: bool = False) -> Cursor:
     """
     text = text_files.read(path)
     try:
+        budget.check(PER_LETTER * len(text), "its JSON", path)
         value = json.loads(text, object_pairs_hook=_object)
     except json.JSONDecodeError as error:
         raise SceneError(f"is not JSON: {error.msg}", file=path, line=error.lineno) from None

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import io
-import zipfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from clpt import output_files
+from clpt import numpy_files, output_files
 from clpt.formats.native.cursor import Cursor
 from clpt.formats.native.json_schema import NUMBER, NUMBERS, STRING, Schema, object_of, ref
 from clpt.formats.native.spectra import find_file
@@ -103,11 +102,8 @@ def deformation(cursor: Cursor) -> Deformation | None:
 def _from_file(cursor: Cursor) -> Deformation:
     """Return the keys of points in a .npz file."""
     path = find_file(cursor)
-    try:
-        with np.load(path, allow_pickle=False) as held:
-            arrays = {name: held[name] for name in ("times", *POINTS) if name in held.files}
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise cursor.error(f"is no .npz file: {error}") from None
+    with cursor.locating():
+        arrays: dict[str, Any] = numpy_files.arrays(path, ("times", *POINTS))
     for name in ("times", "points"):
         if name not in arrays:
             raise cursor.error(f"has no array {name!r}")

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from clpt import measured, spectra
+from clpt import budget, measured, spectra
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
 from clpt.formats import volumes
 from clpt.formats.missing import EVEN, GREY, Missing, grey_for
@@ -86,7 +86,8 @@ class _Reader:
             self.named_medium(name, cursor)
         for name, cursor in root.at("groups").items() if "groups" in root.value else ():
             self.named_group(name, cursor)
-        parts.setdefault("name", root.file.stem)
+        if root.file is not None:
+            parts.setdefault("name", root.file.stem)
         with root.locating():
             return Scene(**parts, warnings=self.warnings, extra={"format": "native"})
 
@@ -99,6 +100,7 @@ class _Reader:
 
     def object_of(self, cursor: Cursor, cls: type[Kind], other_keys: tuple[str, ...] = ()) -> Any:
         """Read an object of a kind; `other_keys` are no parameters, and are not read."""
+        budget.take_parts(1, "its objects", cursor.file)
         declared = params(cls)
         shortcut = ("metal",) if {"eta", "k"} <= declared.keys() else ()
         values: dict[str, Any] = {}
@@ -214,7 +216,7 @@ class _Reader:
             cursor = self._entry(table, f"{family} name", name, referrer)
             known[name] = None
             made = self.kind(cursor, family)
-            known[name] = made if made.name else dataclasses.replace(made, name=name)
+            known[name] = made if "name" in cursor.value else dataclasses.replace(made, name=name)
         if known[name] is None:
             raise referrer.error(f"the {family} {name!r} refers to itself")
         return known[name]

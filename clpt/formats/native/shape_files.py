@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from clpt import budget, numpy_files
 from clpt.formats import ies
 from clpt.formats.meshes import mesh, particles, strands
 from clpt.formats.meshes.triangles import TANGENTS
@@ -20,6 +21,7 @@ from clpt.formats.volumes import distances
 from clpt.scene import lights, shapes
 from clpt.scene.params import Kind
 
+PER_INSTANCE = 1024  # bytes of memory, about
 MESH_ARRAYS = ("vertices", "faces", "normals", "uvs", "tangents")
 
 
@@ -97,13 +99,11 @@ def read_meshes(path: Path, missing: Missing) -> mesh.MeshFile:
 def read_transforms(cursor: Cursor) -> np.ndarray:
     """Read the matrices (n, 3, 4) of a .npy; return them as (n, 4, 4) float64."""
     path = find_file(cursor)
-    try:
-        rows = np.load(path, mmap_mode="r", allow_pickle=False)  # a wrong header claims no memory
-    except (OSError, ValueError, EOFError) as error:
-        raise cursor.error(f"is no .npy file: {error}") from None
-    valid = isinstance(rows, np.ndarray) and rows.dtype.kind == "f" and rows.shape[1:] == (3, 4)
-    if not valid:
+    rows = numpy_files.array(path)
+    if rows.dtype.kind != "f" or rows.shape[1:] != (3, 4):
         raise cursor.error("must hold matrices, (n, 3, 4) of float")
+    budget.take_parts(len(rows), "its instances", path)
+    budget.take(PER_INSTANCE * len(rows), "its instances", path)
     matrices = np.tile(np.eye(4), (len(rows), 1, 1))
     matrices[:, :3] = rows
     return matrices

@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from clpt import spectra
+from clpt import input_files, spectra
 from clpt.errors import UnknownKindError
 from clpt.formats.colour import COLOURS, colour
 from clpt.formats.native.cursor import Cursor
@@ -129,12 +129,16 @@ def find_file(cursor: Cursor, name: str | None = None) -> Any:
     name: of the file, None where it is all that stands there.
     """
     name = cursor.expect(str) if name is None else name
+    if cursor.file is None:
+        raise cursor.error("names a file, which cannot be done here")
     path = cursor.file.parent / name
     if cursor.confined and path.name != name:
         raise cursor.error(f"{name!r} is not in the folder of this file")
     try:
-        if path.is_file():
-            return path
+        exists = path.is_file()
     except (OSError, ValueError):
-        pass
+        exists = False
+    if exists:
+        with cursor.locating():
+            return input_files.named("json", cursor.file.parent, path)
     raise cursor.error(f"there is no file {name!r}")

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-import io
 import json
 import os
 import re
 import shutil
+from collections import Counter
 from collections.abc import Callable, Container, Sequence
 from itertools import groupby
 from pathlib import Path
@@ -75,12 +75,14 @@ class _Writer:
         self.materials: dict[str, Any] = {}
         self.media: dict[str, Any] = {}
         self.names: dict[int, str] = {}  # of materials and media
+        self.shared: set[int] = set()  # those of them that have no name
         self.groups: dict[str, Any] = {}
         self.group_names: dict[int, str] = {}
         self.files: dict[Any, str] = {}  # names by what they hold
 
     def scene(self, scene: Scene) -> dict[str, Any]:
         """Write the whole file."""
+        self.shared = _shared(scene)
         document: dict[str, Any] = {"name": scene.name} if scene.name else {}
         document |= {
             "camera": self.kind(scene.camera),
@@ -170,16 +172,15 @@ class _Writer:
 
     def _named(self, thing: Any, table: dict[str, Any]) -> Any:
         """Return a thing, or its name in the table where it is written once."""
-        if not thing.name:
+        if not thing.name and id(thing) not in self.shared:
             return self.kind(thing)
         if id(thing) not in self.names:
-            key = unused_name(thing.name, table)
+            key = unused_name(thing.name or thing.kind, table)
             self.names[id(thing)] = key
             table[key] = None
-            written = self.kind(thing)
+            table[key] = {**self.kind(thing), "name": thing.name}
             if key == thing.name:
-                del written["name"]
-            table[key] = written
+                del table[key]["name"]
         return self.names[id(thing)]
 
     def file_name(self, label: str, suffix: str) -> str:
@@ -236,7 +237,8 @@ class _Writer:
         key = os.path.realpath(path)
         if key not in self.files:
             name = self.file_name("image", path.suffix.lstrip("."))
-            shutil.copyfile(path, self.path.parent / name)
+            with output_files.replacing(self.path.parent / name) as partial:
+                shutil.copyfile(path, partial)
             self.files[key] = name
         return self.files[key]
 
@@ -267,9 +269,7 @@ class _Writer:
     def sdf_grid(self, grid: shapes.SdfGrid) -> str:
         """Write signed distances; return the file's name."""
         name = self.file_name(grid.name or "distances", "npy")
-        file = io.BytesIO()
-        np.save(file, np.asarray(grid.values, np.float32))
-        output_files.write(self.path.parent / name, file.getvalue())
+        images.write_npy(self.path.parent / name, np.asarray(grid.values, np.float32))
         self.files[name] = name
         return name
 
@@ -281,6 +281,35 @@ class _Writer:
             output_files.write(self.path.parent / name, _ply(mesh))
             self.files[key] = name
         return self.files[key]
+
+
+def _shared(scene: Scene) -> set[int]:
+    """Return the ids of nameless materials and media that stand at several places.
+
+    It matters that they are one: a medium may have several shapes around it.
+    """
+    counts: Counter[int] = Counter()
+    waiting: list[Any] = [scene.camera, *scene.shapes]
+    while waiting:
+        thing = waiting.pop()
+        if isinstance(thing, (tuple, list)) and thing and isinstance(thing[0], Kind):
+            waiting += thing
+        if isinstance(thing, shapes.Instance):
+            thing = thing.group
+        if isinstance(thing, (materials.Material, Medium, shapes.Group)):
+            counts[id(thing)] += 1
+            if counts[id(thing)] > 1:
+                continue
+        if isinstance(thing, shapes.Group):
+            waiting += thing.shapes
+        if isinstance(thing, Kind):
+            usual = defaults(type(thing))
+            waiting += [
+                given
+                for name in params(type(thing))
+                if (given := getattr(thing, name)) is not usual[name]
+            ]
+    return {one for one, count in counts.items() if count > 1}
 
 
 def unused_name(name: str, used: Container[str]) -> str:

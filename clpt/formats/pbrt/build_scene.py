@@ -10,7 +10,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from clpt import transforms
+from clpt import budget, transforms
 from clpt.formats.pbrt.curves import joined
 from clpt.formats.pbrt.files import Contents
 from clpt.formats.pbrt.layered import body
@@ -68,7 +68,7 @@ def _make_all(definitions: list[Definition], progress: Progress | None) -> list[
     workers = min(8, os.cpu_count() or 1)
     with ThreadPoolExecutor(workers) as pool:
         try:
-            geometries = pool.map(geometry, definitions)
+            geometries = pool.map(budget.carried(geometry), definitions)
             for definition, body in zip(definitions, geometries, strict=True):
                 made.append(_shape(definition, body))
                 if progress is not None:

@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from clpt import budget
 from clpt.formats.located import Located
 from clpt.formats.pbrt.lexer import Lexer
 from clpt.formats.pbrt.state import Definition, Shared, State
 
+BYTES = 1024  # of a directive in memory, about
 DEEPEST = 32  # files that include each other
-MOST_FILES = 100_000
-MOST_BYTES = 4 << 30  # of all files together, each as often as it is included
 
 
 @dataclass(eq=False)
@@ -37,7 +37,6 @@ class Files(Located):
         self.contents = Contents(Shared(path.parent))
         self.state = State(self.contents.shared, path.parent)
         self.files: list[Path] = []
-        self.count = self.bytes = 0
         self.warned: set[str] = set()
         self.lexer: Lexer
         self.name = ""
@@ -51,16 +50,15 @@ class Files(Located):
         real = path.resolve()
         if real in self.files:
             raise self.lexer.error(f"{path.name} includes itself")
-        if len(self.files) >= DEEPEST or self.count >= MOST_FILES:
-            raise self.lexer.error(f"{path.name} is included too deep, or too many files are")
+        if len(self.files) >= DEEPEST:
+            raise self.lexer.error(f"{path.name} is included too deep: {DEEPEST} files in others")
         outer, lexer = getattr(self, "lexer", None), Lexer(path)
-        self.count, self.bytes = self.count + 1, self.bytes + len(lexer.data)
-        if self.bytes > MOST_BYTES:
-            raise lexer.error(f"its files together are larger than {MOST_BYTES >> 30} GiB")
         self.files.append(real)
         self.lexer, before = lexer, self.state.file_folder
         self.state.file_folder = path.parent
         while lexer.peek():
+            budget.take(BYTES, "its directives", path)
+            budget.take_parts(1, "its directives", path)
             self.directive()
         self.files.pop()
         self.state.file_folder = before

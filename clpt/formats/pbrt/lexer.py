@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import text
+from clpt import budget, text
 from clpt.errors import SceneError
 from clpt.formats.gzip_file import read_bytes
 from clpt.formats.pbrt.params import ALIASES, TYPES, Parameter
@@ -117,9 +117,11 @@ class Lexer:
         start = self.at + 1
         end = self.data.find(b"]", start)
         inside = self.data[start:end] if end >= 0 else b""
+        budget.check(12 * len(inside), "a list of numbers", self.path)
         if end >= 0 and b"#" not in inside and b'"' not in inside:
             values = _floats(inside)
             if values is not None:
+                budget.take(values.nbytes, "its lists of numbers", self.path)
                 self.at, self._ahead = end + 1, None
                 return values
         self.next("[")

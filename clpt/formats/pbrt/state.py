@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from clpt import transforms
-from clpt.errors import SceneError
+from clpt import input_files, transforms
+from clpt.errors import LONGEST_NAME, SceneError
 from clpt.formats.missing import Missing, grey_for
 from clpt.formats.pbrt.params import Parameter, Parameters
 from clpt.scene.materials import Material
@@ -121,7 +121,7 @@ class State:
         """Return `file(name)`. Raises SceneError if it is missing, with all others that are."""
         path = self.file(name)
         if path.is_file():
-            return path
+            return input_files.named("pbrt", self.shared.folder, path)
         named = self.shared.files.items()
         missing = [n for n, state in named if n != name and not state.file(n).is_file()]
         nor = f"; nor are there {', '.join(map(repr, missing))}" if missing else ""
@@ -158,5 +158,5 @@ class State:
 
 def nearest(name: str, known: Any) -> str:
     """Return the end of a message about an unknown name: the nearest known ones."""
-    near = difflib.get_close_matches(name, sorted(known), n=3, cutoff=0.5)
+    near = difflib.get_close_matches(name[:LONGEST_NAME], sorted(known), n=3, cutoff=0.5)
     return "; did you mean " + " or ".join(map(repr, near)) + "?" if near else ""

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt import budget, numpy_files
 from clpt.errors import SceneError
 from clpt.formats.volumes import nvdb, vdb, vol
 from clpt.scene.volumes import Volume, check_density
 from clpt.spectra import RGBUnbounded
 from clpt.transforms import IDENTITY
 
-MOST_BYTES = 1 << 32  # of a file
 _GREY = 1e-4  # share by which colours may differ from multiples of one
 
 
@@ -89,13 +89,9 @@ def distances(path: Path) -> np.ndarray:
 
 @contextlib.contextmanager
 def _reading(path: Path) -> Iterator[None]:
-    """Name the file in what goes wrong while it is read; refuse one that is too large."""
+    """Name the file in what goes wrong while it is read."""
     try:
-        if path.stat().st_size > MOST_BYTES:
-            raise SceneError(f"is larger than {MOST_BYTES >> 30} GiB")
         yield
-    except OSError as error:
-        raise SceneError(f"cannot be read: {error.strerror or error}", file=path) from None
     except MemoryError:
         raise SceneError("does not fit in memory", file=path) from None
     except SceneError as error:
@@ -110,15 +106,14 @@ def _npy(path: Path, grid: str = "", axes: int = 3) -> Volume:
 
 def _array(path: Path, axes: int = 3) -> np.ndarray:
     """The numbers of a .npy file, of three axes, or of four with colours."""
-    try:
-        values = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (ValueError, EOFError) as error:
-        raise SceneError(f"is no .npy file: {error}") from None
-    if not isinstance(values, np.ndarray) or values.ndim != axes or not values.size:
+    values = numpy_files.array(path)
+    if values.ndim != axes or not values.size:
         wanted = "(nx, ny, nz)" if axes == 3 else "(nx, ny, nz, 3)"
-        raise SceneError(f"must hold an array {wanted}, not {getattr(values, 'shape', '')}")
+        raise SceneError(f"must hold an array {wanted}, not {values.shape}")
     if values.dtype.kind not in "fui":
         raise SceneError(f"must hold numbers, not {values.dtype}")
+    budget.check(12 * values.size, "its values")
+    budget.take(4 * values.size, "its values")
     return values
 
 

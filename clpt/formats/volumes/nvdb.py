@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt import budget, input_files
 from clpt.errors import SceneError
 from clpt.formats.volumes import packing, sparse
 from clpt.scene.volumes import Volume
@@ -26,10 +27,10 @@ BARE = b"NanoVDB1"  # a grid without segments
 MAJOR = 32
 CODECS = ("none", "ZIP", "BLOSC")
 METADATA, GRID, TREE, TILE = 176, 672, 64, 32
+DEFLATE = 1032  # bytes at most that one of deflate stands for
 UPPER, LOWER = 270_400, 33_856
 UPPER_TABLE, LOWER_TABLE = 8_256, 1_088  # where a node's children are told
 MINIMUM, FLAGS, CODES = 80, 15, 96  # of a leaf whose numbers are packed
-MOST_BYTES = 1 << 31  # of a grid, unpacked
 LEVEL_SET = 1
 TYPES = (
     "unknown", "float", "double", "int16", "int32", "int64", "vec3f", "vec3d", "mask", "half",
@@ -77,7 +78,7 @@ def read(path: Path, grid: str = "") -> Volume:
 
     grid: its name, "" is "density", else the first. Raises SceneError, OSError.
     """
-    data = path.read_bytes()
+    data = input_files.read_bytes(path)
     try:
         entries = list(_entries(data))
         chosen = sparse.chosen([entry.name for entry in entries], grid)
@@ -91,7 +92,7 @@ def read(path: Path, grid: str = "") -> Volume:
 def names(path: Path) -> tuple[str, ...]:
     """Return the names of the grids of a file. Raises SceneError, OSError."""
     try:
-        return tuple(entry.name for entry in _entries(path.read_bytes()))
+        return tuple(entry.name for entry in _entries(input_files.read_bytes(path)))
     except SceneError:
         raise
     except (struct.error, IndexError, ValueError):
@@ -125,7 +126,7 @@ def _entries(data: bytes) -> Iterator[_Entry]:
         for name, size, packed, codec in heads:
             if at + packed > len(data):
                 raise SceneError(f"is damaged: the grid {name!r} goes beyond its end")
-            if not GRID + TREE + ROOT <= size <= MOST_BYTES:
+            if not GRID + TREE + ROOT <= size <= DEFLATE * max(packed, 1):
                 raise SceneError(f"the grid {name!r} cannot have {size:,} bytes")
             yield _Entry(name, codec, at, at + packed, size)
             at += packed
@@ -138,6 +139,7 @@ def _unpacked(data: bytes, entry: _Entry) -> bytes:
     if CODECS[entry.codec] == "none":
         made = data[entry.begin : entry.end]
     else:
+        budget.check(2 * entry.size, f"the grid {entry.name!r}")
         zipped = CODECS[entry.codec] == "ZIP"
         unpack = packing.inflated if zipped else packing.blosc_unpacker()
         chunks: list[bytes] = []
@@ -237,6 +239,7 @@ class _Found:
                                  node + table)  # fmt: skip
         for j, low in zip(used, at, strict=True):
             if not child[j]:
+                budget.take_parts(1, "its tiles")
                 value = float(of_table[8 // self._number * j])
                 self.tiles.append(sparse.Tile(low, side, value))
         inner = child[used]

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt import budget
 from clpt.errors import SceneError
 from clpt.scene.volumes import Volume
 
 SIDE = 8  # of a leaf
-MOST_VALUES = 1 << 28  # of the box of a grid
+PER_VALUE = 16  # bytes of memory for each value of the box, while it is read
 MOST_AXIS = 1 << 16
 
 
@@ -42,10 +44,10 @@ def check_box(low: NDArray[np.int64], high: NDArray[np.int64]) -> None:
     size = high - low + 1
     if not (size > 0).all():
         raise SceneError("has no active values")
-    if np.prod(size.astype(float)) > MOST_VALUES or (size > MOST_AXIS).any():
-        shape = " x ".join(map(str, size))
-        message = f"its box is {shape}; at most {MOST_VALUES:,} values are read, {MOST_AXIS:,}"
-        raise SceneError(f"{message} along an axis")
+    shape = " x ".join(map(str, size))
+    if (size > MOST_AXIS).any():
+        raise SceneError(f"its box is {shape}; at most {MOST_AXIS:,} values along an axis are read")
+    budget.check(PER_VALUE * math.prod(map(int, size + 2 * SIDE)), f"its box of {shape}")
 
 
 def volume(
@@ -64,6 +66,7 @@ def volume(
     Raises SceneError for a box that is empty or too large, and for a matrix without an inverse.
     """
     check_box(low, high)
+    budget.take(4 * math.prod(map(int, high - low + 3)), "its values")
     if not np.isfinite(to_world).all() or abs(np.linalg.det(to_world)) == 0.0:
         raise SceneError("is damaged: its transform has no inverse")
     first = (low - 1) // SIDE

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt import budget, input_files
 from clpt.errors import SceneError
 from clpt.formats.volumes import packing, sparse
 from clpt.scene.volumes import Volume
@@ -27,7 +28,7 @@ HALF = "_HalfFloat"
 TYPES = {"Tree_float_5_4_3": "f", "Tree_double_5_4_3": "d"}  # of numbers
 UPPER, LOWER, LEAF = 32, 16, 8  # children, or values, along a side
 MASK = LEAF**3 // 8  # bytes
-MOST_LEAVES = 2 * sparse.MOST_VALUES // LEAF**3
+PER_LEAF = 6 * LEAF**3  # bytes of a leaf's values, and of which of them it stores
 # What a node tells of its inactive values, before its active ones.
 ONE_INACTIVE, TWO_INACTIVE, MASKED, ALL_VALUES = (2, 4, 5), 5, (3, 4, 5), 6
 
@@ -80,7 +81,7 @@ def read(path: Path, grid: str = "") -> Volume:
 
     grid: its name, "" is "density", else the first. Raises SceneError, OSError.
     """
-    data = path.read_bytes()
+    data = input_files.read_bytes(path)
     try:
         entries = list(_entries(data))
         chosen = sparse.chosen([entry.name for entry in entries], grid)
@@ -183,22 +184,30 @@ class _Tree:
             raise SceneError("is damaged: its tree has several buffers")
         (self.background,) = self._number()
         tiles, children = stream.take("II")
+        places: set[tuple[int, ...]] = set()
         for _ in range(tiles):
-            low = np.array(stream.take("3i"), np.int64)
+            low = self._place(places)
             (value,) = self._number()
             self._tile(low, UPPER * LOWER * LEAF, value, bool(*stream.take("B")))
         for _ in range(children):
-            upper = np.array(stream.take("3i"), np.int64)
+            upper = self._place(places)
             for lower in upper + LOWER * LEAF * self._children(upper, UPPER, LOWER * LEAF):
                 own = lower + LEAF * self._children(lower, LOWER, LEAF)
                 self.leaves += len(own)
-                if self.leaves > MOST_LEAVES:
-                    raise SceneError(f"has more leaves than {MOST_LEAVES:,}, which are read")
+                budget.check(PER_LEAF * self.leaves, f"its {self.leaves:,} leaves")
                 origins.append(own)
                 masks.append(stream.array("u1", MASK * len(own)))
         none = [np.zeros((0, 3), np.int64)]
         self.origins = np.concatenate(origins or none)
         self.masks = np.concatenate([*masks, np.zeros(0, np.uint8)]).reshape(-1, MASK)
+
+    def _place(self, places: set[tuple[int, ...]]) -> NDArray[np.int64]:
+        """Read the lowest index (3,) of one of the root's tiles or nodes, which overlap nowhere."""
+        low = self._stream.take("3i")
+        if low in places or any(n % (UPPER * LOWER * LEAF) for n in low):
+            raise SceneError("is damaged: two of its nodes have one place")
+        places.add(low)
+        return np.array(low, np.int64)
 
     def box(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Return the lowest and the highest index (3,) of what is active."""
@@ -248,6 +257,7 @@ class _Tree:
         if active:
             self._active.append((low, low + side - 1))
         if active or value != self.background:
+            budget.take_parts(1, "its tiles")
             self.tiles.append(sparse.Tile(low, side, value))
 
     def _children(self, low: NDArray[np.int64], count: int, side: int) -> NDArray[np.int64]:

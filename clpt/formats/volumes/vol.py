@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from clpt import transforms
+from clpt import budget, input_files, transforms
 from clpt.errors import SceneError
 from clpt.scene.volumes import Volume
 
@@ -28,7 +28,8 @@ def read_channels(path: Path) -> tuple[np.ndarray, transforms.Matrix]:
 
     Raises SceneError, OSError.
     """
-    data = path.read_bytes()
+    data = input_files.read_bytes(path)
+    budget.take(len(data), "its values", path)
     if len(data) < HEADER.size or data[:3] != b"VOL":
         raise SceneError("is no .vol file: it does not begin with VOL")
     _, version, encoding, nx, ny, nz, channels, *box = HEADER.unpack_from(data)

@@ -14,7 +14,7 @@ from clpt.render.contract import shape_records
 from clpt.render.contract.features import Features
 from clpt.render.contract.layer_names import LayerNames
 from clpt.render.contract.parameter_words import row_words
-from clpt.render.lowering import photons
+from clpt.render.lowering import open_boundaries, photons
 from clpt.render.lowering.bodies import BodyWords, matter_of
 from clpt.render.lowering.camera import cameras, filters
 from clpt.render.lowering.camera.colour import sensor
@@ -180,7 +180,7 @@ def lower(
     glass_rows = _lower_camera(index, encoder)
     ambient_row = _lower_ambient(index, encoder)
     warnings = (
-        *_warnings(index), *noted,
+        *_warnings(index), *noted, *open_boundaries.warnings_of(index, cache),
         *sorted(encoder.warnings), *geometry.warnings,
         *encoder.textures.finish(),
     )  # fmt: skip

@@ -7,7 +7,7 @@ import { Picture } from "./picture.js";
 import { Socket } from "./socket.js";
 import { GESTURES, Steering } from "./steering.js";
 
-history.replaceState(null, "", "/"); // the token is used up; nobody need see it
+history.replaceState(null, "", location.pathname); // the token is used up; nobody need see it
 
 const $ = (id) => document.getElementById(id);
 const connection = new Socket();

@@ -128,7 +128,7 @@ export function renderPane(state, connection, figures) {
         state.look.region ? h("button", { onclick: () => connection.send("region") }, "whole picture") : null)),
     section("Save", true,
       h("div", { class: "buttons" }, save("png", ".png", "as it is shown"), save("exr", ".exr", "linear, with all bands"), save("scene", "scene.json", "with all edits"), save("view", "view", "the camera and the display")),
-      state.folder ? h("p", { class: "doc" }, `new files in ${state.folder}`) : null),
+      state.saves ? h("p", { class: "doc" }, "new files in the folder that clpt view was given") : null),
     difference ? section("Against the kept picture", true, list([
       ["mean difference", `${short(100 * difference.relative_mean, 3)} %`], ["root mean square", `${short(100 * difference.relative_rms, 3)} %`],
       ["brighter by", `${short(100 * difference.bias, 3)} %`]])) : null,

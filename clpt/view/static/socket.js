@@ -12,8 +12,9 @@ export class Socket extends Connection {
   }
 
   open() {
-    const scheme = location.protocol === "https:" ? "wss" : "ws";
-    this.socket = new WebSocket(`${scheme}://${location.host}/socket`);
+    const address = new URL("socket", location);
+    address.protocol = location.protocol === "https:" ? "wss:" : "ws:";
+    this.socket = new WebSocket(address);
     this.socket.binaryType = "arraybuffer";
     this.socket.onopen = () => { this.tries = 0; this.emit("open"); };
     this.socket.onmessage = ({ data }) => this.receive(data);

@@ -8,6 +8,7 @@ import struct
 import numpy as np
 import pytest
 
+from clpt import budget
 from clpt.errors import SceneError
 from clpt.formats.meshes import ply
 from clpt.formats.meshes.triangles import attributes
@@ -102,8 +103,9 @@ def test_what_is_packed_has_a_limit(tmp_path):
     path = tmp_path / "a.ply"
     path.write_bytes(gzip.compress(content("ascii", MIXED) + b"\n" * (1 << 21)))
     assert len(ply.read(path).faces)
-    with pytest.raises(SceneError, match="larger than 1 MiB when unpacked"):
-        ply.read(path, largest=1 << 20)
+    limits = budget.Budget(memory=1 << 20)
+    with pytest.raises(SceneError, match="unpacking it would take"), budget.opened(limits):
+        ply.read(path)
 
 
 @pytest.mark.parametrize("form", FORMS)

@@ -216,7 +216,7 @@ BOMBS = {
     "variables": (
         '<default name="v0" value="xxxxxxxx"/>'
         + "".join(f'<default name="v{i}" value="$v{i - 1}$v{i - 1}"/>' for i in range(1, 60)),
-        "longer than 16777216 characters",
+        "with its variables would take",
     ),
     "materials": (
         _doubled("bsdf", "diffuse", "twosided", ("", ""), 40),
@@ -263,7 +263,7 @@ def test_includes_are_counted(read, tmp_path):
             '<scene version="3.0.0">' + f'<include filename="i{i + 1}.xml"/>' * 8 + "</scene>"
         )
     (tmp_path / "i12.xml").write_text('<scene version="3.0.0"/>')
-    with pytest.raises(SceneError, match="more than 4096 files"):
+    with pytest.raises(SceneError, match="parts, most of them repeated"):
         read('<include filename="i0.xml"/>')
 
 

@@ -190,16 +190,20 @@ def _loaded(image: Any, where: str, notes: list[str]) -> Array:
         raise SceneError("spectral images can be an envmap only", where=where)
     if image is None:
         raise SceneError("an image is needed: a path, or an array (h, w, 3)", where=where)
+    values: NDArray[Any]
     if isinstance(image, (str, Path)):
         stored = images.read_stored(image)
         notes += [f"{image}: {note}" for note in stored.notes_of(raw=False)]
         values = stored.decoded()
     else:
-        values = np.asarray(on_host(image), np.float32)
+        values = np.asarray(on_host(image))
     if values.ndim == 2:
         values = values[..., None]
     if values.ndim != 3 or values.shape[2] not in (1, 3, 4) or 0 in values.shape:
         raise SceneError(f"must be (h, w, 3), found {values.shape}", where=where)
+    if values.dtype == np.uint8:  # as the files have it to which such an array is saved
+        values = images.Stored(values, True).decoded()
+    values = values.astype(np.float32, copy=False)
     values = np.repeat(values, 3, axis=2) if values.shape[2] == 1 else values[..., :3]
     if not np.isfinite(values).all():
         raise SceneError("has a texel that is not finite", where=where)

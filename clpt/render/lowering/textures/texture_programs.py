@@ -48,7 +48,8 @@ def folded(value: Any, role: str) -> Any:
         amount = folded(value.amount, "real")
         a, b, t = _number(first, role), _number(second, role), _number(amount, "real")
         if t in (0.0, 1.0):
-            return second if t else first
+            end, number = (second, b) if t else (first, a)
+            return end if role != "real" or number is None else Constant(number)
         if a is not None and b is not None and t is not None and role != "emission":
             return Constant(a + (b - a) * t)
         return Mix(first=first, second=second, amount=amount if t is None else t)

@@ -1,0 +1,233 @@
+"""What a load may take: memory, seconds and parts. Whoever takes by what a file says asks first.
+
+A file of a few bytes can announce gigabytes. So each reader asks here, before it allocates, and the
+whole of a load has one account. What files hold themselves is always allowed, as far as there is
+memory; what grows out of little is limited. Outside of a load each thing that is read has the
+machine's limit alone.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypeVar
+
+from clpt import host_memory
+from clpt.errors import SceneError
+
+FREE, RATIO = 768 << 20, 256  # bytes that a load may take anyway, and for each byte of its files
+PARTS, PER_PART = 50_000, 4  # the same of parts: one for so many bytes of its files
+PER_REPEAT = 256  # bytes of a file that is read once more, which count as a part
+SECONDS = 600.0
+SHARE = 2  # of the memory that is available, one part in so many
+UNKNOWN = 4 << 30  # bytes, where the system tells nothing
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True)
+class Budget:
+    """What `clpt.load` may take at most; None: the usual.
+
+    memory: [bytes], by default half of what is available, and 768 MiB and 256 bytes for each byte
+    of the files read; seconds: 600 by default; parts: elements, shapes, instances and textures, by
+    default 50 000 and one for each 4 bytes of the files read, repeated ones counted each time.
+
+    Raises SceneError for what is not above 0.
+    """
+
+    memory: int | None = None
+    seconds: float | None = None
+    parts: int | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("memory", "seconds", "parts"):
+            value = getattr(self, name)
+            if value is not None and not value > 0:
+                raise SceneError(f"a budget's {name} must be above 0, not {value!r}")
+
+
+@dataclass(eq=False)
+class _Account:
+    """What a load has taken so far."""
+
+    limits: Budget
+    available: int
+    alone: bool = False  # of one thing, outside of a load
+    began: float = field(default_factory=time.monotonic)
+    held: int = 0
+    parts: int = 0
+    read: int = 0  # bytes of files, each counted once
+    files: set[tuple[int, int]] = field(default_factory=set)
+    lent: int = 0  # bytes that are soon given back
+    lock: threading.Condition = field(default_factory=threading.Condition)
+
+    @property
+    def memory(self) -> int:
+        """How many bytes may be held."""
+        if self.limits.memory is not None:
+            return self.limits.memory
+        return self.available if self.alone else min(self.available, FREE + RATIO * self.read)
+
+    @property
+    def most_parts(self) -> int:
+        """How many parts there may be."""
+        given = self.limits.parts
+        return PARTS + self.read // PER_PART if given is None else given
+
+
+usual = Budget()  # of loads that are given none
+_account: ContextVar[_Account | None] = ContextVar("account", default=None)
+
+
+def set_usual(limits: Budget) -> None:
+    """Set what loads may take that are given no budget: the command line's."""
+    global usual
+    usual = limits
+
+
+@contextmanager
+def opened(limits: Budget | None = None) -> Iterator[None]:
+    """Open the account of a load; one inside another has that one's account."""
+    if _account.get() is not None:
+        yield
+        return
+    token = _account.set(_Account(usual if limits is None else limits, _available()))
+    try:
+        yield
+    finally:
+        _account.reset(token)
+
+
+def carried(function: Callable[..., Result]) -> Callable[..., Result]:
+    """Return the function such that it draws from this account in other threads too."""
+    account = _account.get()
+
+    def carrying(*arguments: object) -> Result:
+        token = _account.set(account)
+        try:
+            return function(*arguments)
+        finally:
+            _account.reset(token)
+
+    return carrying
+
+
+def take(size: int, what: str, file: Path | None = None) -> None:
+    """Ask for memory [bytes] that the load keeps. what: a noun phrase, subject of the message.
+
+    Raises SceneError where there is no more of it, or no more time.
+    """
+    account = _account.get()
+    if account is None:
+        check(size, what, file)
+        return
+    with account.lock:
+        _check(account, size, what, file)
+        account.held += size
+    check_time(file)
+
+
+def check(size: int, what: str, file: Path | None = None) -> None:
+    """Ask for memory [bytes] that is soon given back. Raises as `take` does."""
+    account = _account.get()
+    if account is None:
+        account = _Account(usual, _available(), alone=True)
+    _check(account, size, what, file)
+    check_time(file)
+
+
+@contextmanager
+def lending(size: int, what: str, file: Path | None = None) -> Iterator[None]:
+    """Lend memory [bytes] inside, which threads of one load have together; they wait for it.
+
+    Raises as `take` does. What is inside must not ask for any itself.
+    """
+    check(size, what, file)
+    account = _account.get()
+    if account is None:
+        yield
+        return
+    with account.lock:
+        account.lock.wait_for(
+            lambda: not account.lent or account.held + account.lent + size <= account.memory
+        )
+        account.lent += size
+    try:
+        yield
+    finally:
+        with account.lock:
+            account.lent -= size
+            account.lock.notify_all()
+
+
+def take_parts(count: int, what: str, file: Path | None = None) -> None:
+    """Ask for elements, shapes, instances or textures. Raises as `take` does."""
+    account = _account.get()
+    if account is None:
+        return
+    with account.lock:
+        account.parts += count
+        parts, most = account.parts, account.most_parts
+    if parts > most:
+        message = f"{what}: more than {most} parts, most of them repeated: {_advice('parts')}"
+        raise SceneError(message, file=file)
+    check_time(file)
+
+
+def check_time(file: Path | None = None) -> None:
+    """Raise SceneError where the load has no more time."""
+    account = _account.get()
+    if account is None:
+        return
+    seconds = SECONDS if account.limits.seconds is None else account.limits.seconds
+    if time.monotonic() - account.began > seconds:
+        message = f"reading the scene takes more than {seconds:g} s: {_advice('seconds')}"
+        raise SceneError(message, file=file)
+
+
+def reads(status: os.stat_result) -> None:
+    """Note that a file is read: what it holds itself is allowed, but not once more each time.
+
+    Raises SceneError where the same is read again and again.
+    """
+    account = _account.get()
+    if account is None:
+        return
+    key = status.st_dev, status.st_ino
+    with account.lock:
+        again = key in account.files
+        if not again:
+            account.files.add(key)
+            account.read += status.st_size
+    if again:
+        take_parts(1 + status.st_size // PER_REPEAT, "files are read again and again")
+
+
+def _check(account: _Account, size: int, what: str, file: Path | None) -> None:
+    limit = account.memory
+    if account.held + size > limit:
+        so_far = f", {_shown(account.held)} are taken" if account.held else ""
+        message = (
+            f"{what} would take {_shown(size)} of memory, the limit is {_shown(limit)}{so_far}"
+        )
+        raise SceneError(f"{message}: {_advice('memory')}", file=file)
+
+
+def _advice(what: str) -> str:
+    return f"if you trust the file, raise --load-{what} or clpt.Budget({what}=...)"
+
+
+def _shown(size: int) -> str:
+    return f"{size / 2**30:.1f} GiB" if size >= 1 << 29 else f"{size / 2**20:.1f} MiB"
+
+
+def _available() -> int:
+    """Return the share of the memory that is left that one load may have [bytes]."""
+    available = host_memory.available()
+    return UNKNOWN if available is None else available // SHARE
