@@ -15,7 +15,7 @@ from clpt.cluster.crew import Crew
 from clpt.cluster.device_worker import DeviceWorker
 from clpt.cluster.multi_noise import AdaptiveCrew
 from clpt.errors import ClusterError, DeviceError, MemoryBudgetError, SceneError
-from clpt.render.film.contents import Contents
+from clpt.render.contents import Contents
 from clpt.render.film.film_keeping import FilmKeeping
 from clpt.render.film.saved_film import Origin, PictureForm, SavedFilm, Session
 from clpt.render.locking import synchronized

@@ -14,8 +14,8 @@ from clpt.cluster.device_worker import DeviceWorker, Once, SharingRenderer, devi
 from clpt.cluster.multi_film import MultiFilm
 from clpt.cluster.multi_noise import CrewTracer
 from clpt.errors import DeviceError
+from clpt.render.contents import Contents
 from clpt.render.editing.scene_edit import MaterialKey, ShapeKey
-from clpt.render.film.contents import Contents
 from clpt.render.locking import Stop, healing, synchronized
 from clpt.render.options import RenderOptions, check_options, check_scene
 from clpt.render.progress import Progress

@@ -14,7 +14,7 @@ from clpt import device as dev
 from clpt import images
 from clpt.colour.view import View
 from clpt.errors import ClptError, SceneError
-from clpt.render.film.contents import FilmOwner
+from clpt.render.contents import FilmOwner
 from clpt.render.film.layers import layers_of
 from clpt.render.film.resolve import Resolve
 from clpt.render.film.saved_film import PictureForm

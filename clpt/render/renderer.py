@@ -14,6 +14,7 @@ import pyopencl as cl
 from clpt import device as dev
 from clpt.denoise import needs
 from clpt.errors import DeviceError, MemoryBudgetError, SceneError
+from clpt.render.contents import Change, Contents
 from clpt.render.editing import parameter_patch, rebuild
 from clpt.render.editing.blurring import between
 from clpt.render.editing.moving import Moving
@@ -26,7 +27,6 @@ from clpt.render.editing.scene_edit import (
     match_replacements,
     resolve_device_arrays,
 )
-from clpt.render.film.contents import Change, Contents
 from clpt.render.locking import Stop, healing, synchronized
 from clpt.render.lowering.bodies import matter_of
 from clpt.render.lowering.camera.surroundings import bodies_around, media_around
@@ -202,9 +202,9 @@ class Renderer(Resumable):
         such as 0.02; `samples` is then the most that a pixel gets, see
         clpt.render.wavefront.adaptive. A renderer with `denoise` counts what is left after that.
         progress: called every few milliseconds to seconds; if it returns False the run stops soon,
-        as after `cancel`. Returns whether it came to its end. What progress raises, or Ctrl+C in
-        it, is raised when the paths in flight have ended. The film is whole after a stop too: its
-        pixels have fewer samples, and the numbers of those that were left out are not used again.
+        as after `cancel`. Returns whether it came to its end. What progress raises, or Ctrl+C at
+        any line, is raised when the paths in flight have ended. The film is whole after a stop too:
+        its pixels have fewer samples, and the numbers of those left out are not used again.
 
         Raises SceneError for noise that makes no sense with the scene, and for more than 2^31 - 1
         samples.

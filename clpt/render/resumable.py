@@ -12,9 +12,9 @@ import numpy as np
 
 from clpt import device as dev
 from clpt.errors import SceneError
+from clpt.render.contents import Contents
 from clpt.render.contract import custom_materials
 from clpt.render.editing.scene_edit import resolve_device_arrays
-from clpt.render.film.contents import Contents
 from clpt.render.film.denoised_noise import DenoisedNoise
 from clpt.render.film.film_keeping import FilmKeeping
 from clpt.render.film.layers import white_paper
