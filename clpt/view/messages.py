@@ -11,13 +11,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from clpt.errors import ClptError, KernelBuildError, SceneError
+from clpt.errors import ClptError, KernelBuildError, SceneError, one_line
 
 log = logging.getLogger(__name__)
 
-LONGEST_TEXT = 300  # characters of an error
 QUOTED_FOLDER = re.compile(r"""(?<=['"])(?:[A-Za-z]:)?[/\\][^'"\n]*[/\\]""")
 FOLDER = re.compile(r"""(?<![\w.~-])(?:[A-Za-z]:)?[/\\][^\s'"]*[/\\]""")
+CUT_FOLDER = re.compile(r"""(?<= \.\.\. )[^'"]*[/\\]""")  # where `one_line` has cut its beginning
 
 Reply = Callable[[dict[str, Any]], None]
 
@@ -40,16 +40,14 @@ def finite(value: Any) -> Any:
 
 
 def error_message(error: BaseException, before: str = "") -> dict[str, Any]:
-    """Return what a viewer is told of an error: one line of at most LONGEST_TEXT characters.
+    """Return what a viewer is told of an error, on one line.
 
     before: begins the line. Of a file only the name is told, not its folder.
     """
-    text = " ".join(f"{before}{_reason(error)}".split())
-    text = FOLDER.sub("", QUOTED_FOLDER.sub("", text))
-    text = "".join(one if one.isprintable() else "?" for one in text)
-    if len(text) > LONGEST_TEXT:
-        text = f"{text[: LONGEST_TEXT - 3]}..."
-    return {"type": "error", "text": text}
+    text = f"{before}{_reason(error)}"
+    for folder in (QUOTED_FOLDER, FOLDER, CUT_FOLDER):
+        text = folder.sub("", text)
+    return {"type": "error", "text": one_line(text)}
 
 
 @contextmanager
