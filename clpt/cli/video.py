@@ -98,8 +98,8 @@ def _encode(ffmpeg: str, path: Path, frames: Sequence[Path], fps: float) -> None
             raise KeyboardInterrupt(*stopped)
         if process.returncode:
             said.seek(0)
-            told = said.read().decode("utf-8", "replace").strip().splitlines()
-            raise OSError(told[-1] if told else f"ffmpeg ended with status {process.returncode}")
+            lines = said.read().decode("utf-8", "replace").strip().splitlines()
+            raise OSError(lines[-1] if lines else f"ffmpeg ended with status {process.returncode}")
 
 
 def _read(path: Path) -> np.ndarray:
