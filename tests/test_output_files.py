@@ -106,7 +106,7 @@ def in_a_child(folder: Path, event: str, *before: str) -> dict[str, Any]:
 
 WRITES = {
     "write_text", "write_bytes", "savefig", "save", "savez", "savez_compressed", "savetxt",
-    "tofile", "touch", "copy", "copy2", "copyfile", "copyfileobj", "imwrite", "fdopen", "mkstemp",
+    "tofile", "touch", "copy", "copy2", "copyfile", "copyfileobj", "imwrite", "mkstemp",
 }  # fmt: skip
 MODULES = {"np", "shutil", "os", "tempfile"}  # whose functions of these names write
 ELSEWHERE = {
@@ -115,6 +115,8 @@ ELSEWHERE = {
     ("cluster/bundle.py", "copyfile"),  # into a folder of its own, in the place of a link
     ("device/compiler_process.py", "fdopen"),  # to a pipe
     ("images/exr_files.py", "write"),  # of films, in their `replacing`
+    ("view/saving.py", "write_bytes"),  # of new files, in their `replacing`
+    ("view/saving.py", "write_text"),
 }
 OF_NUMPY = {"save", "savez", "savez_compressed", "savetxt", "copy", "copy2"}
 
@@ -142,7 +144,8 @@ def writing_calls(tree: ast.AST) -> Iterator[tuple[str, int]]:
         if given and (ast.unparse(given[0]) in buffers or "os.devnull" in ast.unparse(given[0])):
             continue
         modes = [one.value for one in given if isinstance(one, ast.Constant)]
-        opens = name == "open" and any(re.fullmatch(r"[rbt]*[wax+][bt+]*", str(m)) for m in modes)
+        writing = any(re.fullmatch(r"[rbt]*[wax+][bt+]*", str(mode)) for mode in modes)
+        opens = name in ("open", "fdopen") and writing
         flagged = name == "open" and re.search("O_(WRONLY|RDWR|CREAT)", ast.unparse(call))
         exr = name == "write" and owner.startswith("OpenEXR.")
         named = name in WRITES and (name not in OF_NUMPY or owner in MODULES)
