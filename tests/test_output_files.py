@@ -111,7 +111,6 @@ WRITES = {
 MODULES = {"np", "shutil", "os", "tempfile"}  # whose functions of these names write
 ELSEWHERE = {
     ("cli/standard_output.py", "copyfileobj"),  # to the standard output
-    ("cli/streams.py", "fdopen"),  # to nowhere
     ("cluster/bundle.py", "copyfile"),  # into a folder of its own, in the place of a link
     ("device/compiler_process.py", "fdopen"),  # to a pipe
     ("images/exr_files.py", "write"),  # of films, in their `replacing`
