@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, KERNELS = ROOT / "clpt", ROOT / "kernels"
 
 BASE = {
-    "colour", "errors", "layout", "measured", "records", "transforms", "images",
+    "child_processes", "colour", "errors", "layout", "measured", "records", "transforms", "images",
     "output_files", "spectra", "text",
     "spectral_exr", "tev", "version",
 }  # fmt: skip

@@ -46,8 +46,8 @@ class Where(click.ParamType):
 
     def convert(self, value: Any, param: Any, ctx: Any) -> str:
         text = str(value)
-        if not re.fullmatch(r"local:[1-9]\d{0,2}|(tcp|tls)://.+:\d+", text):
-            self.fail(f"{text!r} is neither tls://HOST:PORT, tcp://HOST:PORT nor local:N")
+        if not re.fullmatch(r"local:[1-9]\d{0,2}|tls://.+:\d+", text):
+            self.fail(f"{text!r} is neither tls://HOST:PORT nor local:N")
         return text
 
 
@@ -178,7 +178,7 @@ def connected(
     processes.configure()
     from distributed import Client
 
-    security = cluster_keys.security(where, keys)
+    security = cluster_keys.security(keys)
     with shown.phase(f"connecting to {where}"):
         try:
             client = Client(where, security=security, timeout=10)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import os
-import pickle
 import sys
 import threading
 import time
@@ -231,19 +230,6 @@ def test_no_worker_that_can(two):
         renderer._job = dataclasses.replace(renderer._job, text=text)
         with pytest.raises(ClusterError, match=r"no worker can render this: .* is no job of clpt"):
             renderer.run(1)
-
-
-def test_functions_of_others_are_refused(two):
-    """Through every door that Dask has."""
-    client = two.client
-    future = client.submit(os.getpid, pure=False)
-    with pytest.raises(Exception, match=r"refused by clpt|[Dd]eserial"):
-        future.result(timeout=20)
-    with pytest.raises(pickle.UnpicklingError, match="refused by clpt"):
-        client.run(os.getpid)
-    with pytest.raises((OSError, AssertionError)):  # the scheduler hangs up
-        client.run_on_scheduler(os.getpid)
-    assert len(client.nthreads()) == 2
 
 
 def test_a_task_that_nobody_waits_for_ends(two):

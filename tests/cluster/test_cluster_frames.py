@@ -53,13 +53,13 @@ def check_frames(numbers, *how: str) -> None:
 
 def test_frames_are_those_of_one_process(hub, folder, capsys):
     command = ["render", "turn.xml", "--frames", "1:4", *TURN, *SIZE, "--spp", "6"]
-    assert run([*command, "--cluster", hub.address]) == 0
+    assert run([*command, *hub.on]) == 0
     told = capsys.readouterr().err
     assert "frame 4 (" in told and "6 spp" in told and "2 workers; blocks lost 0" in told
     assert told.count(" renders\n") == 2
     check_frames((1, 2, 4), "--spp", "6")
     (folder / "turn.0002.exr").unlink()
-    assert run([*command, "--cluster", hub.address]) == 0
+    assert run([*command, *hub.on]) == 0
     assert capsys.readouterr().err.count("is complete") == 3
     check_frames((2,), "--spp", "6")
 
@@ -67,7 +67,7 @@ def test_frames_are_those_of_one_process(hub, folder, capsys):
 def test_frames_with_noise(hub, folder, capsys):
     how = ["--noise", "0.1", "--spp", "200"]
     command = ["render", "turn.xml", "--frames", "1:3", *TURN, *SIZE, *how]
-    assert run([*command, "--cluster", hub.address]) == 0
+    assert run([*command, *hub.on]) == 0
     check_frames((1, 3), *how)
 
 
@@ -100,7 +100,7 @@ def test_frames_go_on_after_an_end(how, hub, folder):
     third = hub.start()
     hub.wait(3)
     command = ["render", "turn.xml", "--frames", "1:6", *TURN, *SIZE, "--spp", "1500"]
-    command += ["--cluster", hub.address]
+    command += [*hub.on]
     with client_of(command, folder) as client:
         wait_until((folder / "turn.0001.exr").exists, "a frame")
         hub.end(third)

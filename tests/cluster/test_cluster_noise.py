@@ -242,7 +242,7 @@ def test_a_client_that_ends_goes_on(how, two, tmp_path, monkeypatch):
     two.wait(3)
     noisy = ["--noise", "0.01", "--spp", "6000", "-o", "a.film", "--checkpoint", "1s"]
     command = ["render", str(ROOT / "scenes/cornell_box"), "--size", "32x24", *noisy]
-    command += ["--cluster", two.address]
+    command += [*two.on]
     with client_of(command, tmp_path) as client:
         wait_until((tmp_path / "a.resume.exr").exists, "a checkpoint")
         two.end(third)
@@ -281,7 +281,7 @@ def test_a_limit_after_denoising_is_that_of_one_process(method, two, tmp_path, m
         assert (one.film_state().samples != samples).any()
     monkeypatch.chdir(tmp_path)
     noisy = ["--noise", "0.1", "--spp", "200", "--denoise", method]
-    assert render(*noisy, "--cluster", two.address, "-o", "a.film") == 0
+    assert render(*noisy, *two.on, "-o", "a.film") == 0
     assert render(*noisy, "-o", "b.film") == 0
     films = [film_file.read(name).film for name in ("a.film", "b.film")]
     assert tasks.film_digest(films[0]) == tasks.film_digest(films[1])
@@ -289,7 +289,7 @@ def test_a_limit_after_denoising_is_that_of_one_process(method, two, tmp_path, m
 
 def test_the_command_line(two, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    on = ["--cluster", two.address]
+    on = [*two.on]
     noisy = ["--noise", "0.05", "--spp", "200"]
     assert render(*noisy, *on, "-o", "a.exr", "-o", "a.film", "--checkpoint", "1h") == 0
     told = capsys.readouterr().err
