@@ -230,13 +230,8 @@ class Watch:
                 f"{name}  {samples:.5g} spp in {blocks} blocks, {of_worker[-1].rate:.3g} spp/s, "
                 f"{failures} failures"
             )
-        lost, repeated, dropped = (
-            sum(getattr(one.blocks, name) for one in renderers)
-            for name in ("lost", "repeated", "dropped")
-        )
-        self._shown.note(
-            f"{len(records)} workers; blocks lost {lost}, repeated {repeated}, dropped {dropped}"
-        )
+        lost = max((one.lost for one in renderers), default=0)
+        self._shown.note(f"{len(records)} workers, {lost} lost")
 
 
 def _warn_of_refused(renderer: ClusterRenderer, tell: Callable[[str], None]) -> None:

@@ -33,8 +33,7 @@ if TYPE_CHECKING:
 LOOPBACK = "127.0.0.1"
 SETTINGS = {
     "distributed.scheduler.worker-ttl": "30 s",  # of a worker that is silent
-    "distributed.scheduler.allowed-failures": 1000,  # the client counts failures itself
-    "distributed.scheduler.work-stealing": False,  # and says who renders what
+    "distributed.scheduler.allowed-failures": 10,  # workers that die with a block, at most
     "distributed.scheduler.active-memory-manager.start": False,
     "distributed.worker.memory.target": False,
     "distributed.worker.memory.spill": False,

@@ -142,7 +142,7 @@ def test_eight_workers_are_one(hub, expected):
 
 
 def test_a_worker_that_is_stopped(hub, expected):
-    """Its blocks are rendered by others, long before the scheduler gives it up."""
+    """Its blocks are rendered by others, once the scheduler gives it up."""
     started = [hub.start() for _ in range(2)]
     try:
         hub.wait(2)
@@ -157,7 +157,6 @@ def test_a_worker_that_is_stopped(hub, expected):
             assert renderer.run(SAMPLES, stop)
             assert stopped
             assert digest(renderer) == expected
-            assert renderer.blocks.repeated > 0
     finally:
         for process in started:
             hub.end(process)
@@ -383,4 +382,4 @@ def test_time_limits_and_local_workers(tmp_path):
     done = run_cli("render", str(ROOT / "scenes/cornell_box"), *more, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "a.exr").is_file()
-    assert "2 workers; blocks lost 0" in done.stderr
+    assert "2 workers, 0 lost" in done.stderr
