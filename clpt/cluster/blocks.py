@@ -117,9 +117,9 @@ class Blocks:
         self.workers[worker].note(block.samples, seconds)
 
     def _leaves_to_others(self, record: WorkerRecord) -> bool:
-        """Whether others do all that is left before this worker does one sample."""
-        others = self.rate - record.rate
-        return record.rate > 0.0 and self.left * record.rate < others
+        """Whether the fastest does all that is left before this worker does one sample."""
+        fastest = max(other.rate for other in self.workers.values())
+        return record.rate > 0.0 and self.left * record.rate < fastest
 
     def _size(self, record: WorkerRecord) -> int:
         """How many samples the next block of a worker has."""

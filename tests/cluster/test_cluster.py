@@ -205,7 +205,7 @@ def test_a_worker_with_two_devices(more, two, expected, tmp_path):
                 record.kind for name, record in renderer.workers.items() if name in known
             }
             for _ in range(10):
-                assert renderer.run(1000)
+                assert renderer.run(4000)
                 if renderer.workers[third_address].samples and gone.exists() == bool(more):
                     break
             assert renderer.workers[third_address].samples > 0
