@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 from clpt import device as dev
 from clpt.cluster import tasks
+from clpt.cluster.admission import Job
 from clpt.cluster.blocks import WorkerRecord
 from clpt.cluster.bundle import pack
 from clpt.cluster.cluster_film import ClusterFilm, FilmSum
-from clpt.cluster.farm import Farm, Film, Job
+from clpt.cluster.farm import Farm, Film
 from clpt.denoise import needs
 from clpt.errors import ClusterError, SceneError
 from clpt.render.options import check_options, check_scene
@@ -76,7 +77,7 @@ class ClusterRenderer(ClusterFilm):
         super().__init__(scene, device, first_sample, options)
         self.farm = Farm(client, mixed=mixed, patience=patience)
         if beside is not None:
-            self.farm.agreed = beside.farm.agreed
+            self.farm.known.agreed = beside.farm.known.agreed
         self._stop = threading.Event()
         self._error: ClusterError | None = None
         self._pack()
@@ -98,17 +99,17 @@ class ClusterRenderer(ClusterFilm):
     @property
     def workers(self) -> dict[str, WorkerRecord]:
         """What is known of each worker, by its address: its rate, blocks, samples, failures."""
-        return dict(self.farm.workers)
+        return dict(self.farm.known.records)
 
     @property
     def refused(self) -> dict[str, str]:
         """Why workers take no part, by their addresses."""
-        return dict(self.farm.refused)
+        return dict(self.farm.known.refused)
 
     @property
     def lost(self) -> int:
         """How many workers are gone."""
-        return self.farm.lost
+        return self.farm.known.lost
 
     def run(
         self, samples: int, progress: OnProgress | None = None, *, noise: float | None = None
@@ -216,7 +217,7 @@ class ClusterRenderer(ClusterFilm):
     def _note(self, seconds: float) -> None:
         """Note how long the film has been rendered, and by which classes of devices."""
         self._seconds_rendered = seconds
-        self._note_classes(self.farm.classes)
+        self._note_classes(self.farm.known.classes)
 
     def _so_far(self, total: int, seconds: float) -> Progress:
         totals, samples = self._sum.totals, float(self.samples - self._first_sample)

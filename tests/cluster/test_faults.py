@@ -378,7 +378,7 @@ def test_ctrl_c_writes_the_picture_so_far(tmp_path):
 
 
 def test_time_limits_and_local_workers(tmp_path):
-    more = ["--cluster", "local:2", "--time", "12s", "--size", "32x24", "-o", "a.exr"]
+    more = ["--cluster", "local:2", "--time", "20s", "--size", "32x24", "-o", "a.exr"]
     done = run_cli("render", str(ROOT / "scenes/cornell_box"), *more, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "a.exr").is_file()

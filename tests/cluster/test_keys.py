@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import functools
 import os
 import socket
@@ -10,6 +11,7 @@ import ssl
 import subprocess
 import sys
 import tempfile
+import threading
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -203,6 +205,53 @@ def test_whatever_dask_can_do_is_behind_the_keys(tmp_path, capsys):
     print(*names, sep="\n")
     assert {"Scheduler.identity", "Worker.run", "Worker.update_data"} <= set(names)
     assert len(names) > 100
+
+
+def recording(port: int, said: list[bytearray]) -> socket.socket:
+    """A listener that passes one connection on to a port, and notes what its client says."""
+    there = socket.create_server(("127.0.0.1", 0))
+
+    def copy(source, target, note):
+        with contextlib.suppress(OSError):
+            while data := source.recv(65536):
+                note(data)
+                target.sendall(data)
+        target.close()
+
+    def serve():
+        with contextlib.suppress(OSError):
+            while True:
+                one, other = there.accept()[0], socket.create_connection(("127.0.0.1", port))
+                said.append(bytearray())
+                for ends in ((one, other, said[-1].extend), (other, one, len)):
+                    threading.Thread(target=copy, args=ends, daemon=True).start()
+
+    threading.Thread(target=serve, daemon=True).start()
+    return there
+
+
+def tell_again(path: Path) -> None:
+    """Write a word more into a file."""
+    with path.open("a") as file:
+        file.write("once")
+
+
+def test_what_was_said_cannot_be_said_again(tmp_path):
+    """All that a client with the keys sends, sent again by a stranger who has listened."""
+    from distributed import Client
+
+    told, said = tmp_path / "told", []
+    with processes.local_scheduler() as (client, folder):
+        port = int(client.scheduler.address.rpartition(":")[2])
+        with recording(port, said) as there:
+            address = f"tls://127.0.0.1:{there.getsockname()[1]}"
+            with Client(address, security=keys.security(folder)) as other:
+                other.run_on_scheduler(tell_again, told)
+        assert told.read_text() == "once" and sum(map(len, said)) > 2000
+        for bytes_of_one in said:
+            answer(port, None, bytes_of_one)
+        assert client.run_on_scheduler(lambda: 3) == 3
+    assert told.read_text() == "once"
 
 
 def test_who_has_the_keys_may_do_what_dask_does():
