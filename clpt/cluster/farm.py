@@ -191,11 +191,11 @@ class _Run:
                 return
             block = self._again.pop(0) if self._again else self._next()
             block.at = self.workers.fit.keys() - block.failed_at or set(self.workers.fit)
-            call = self.calls.at(
+            asked = self.calls.at(
                 block.at, tasks.render_block, self.job.digest, block.first, block.end,
                 self._selection,
             )  # fmt: skip
-            self._flights[self.calls.begin(call)] = block
+            self._flights[self.calls.begin(asked)] = block
 
     def _next(self) -> _Block:
         """Cut a block off what is left."""
