@@ -281,4 +281,4 @@ def test_the_command_line(two, tmp_path, monkeypatch, capsys):
         assert found[0] == found[1]
     np.testing.assert_array_equal(images.read("a.exr"), images.read("b.exr"))
     assert render("--noise", "0.05", "--samples", "0:4", *on, "-o", "a.film") == 2
-    assert render("--noise", "0.05", *on, "-o", "c.exr", "--time", "3s") == 0
+    assert render("--noise", "0.05", *on, "-o", "c.exr", "--time", "10s") == 0
