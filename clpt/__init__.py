@@ -7,6 +7,13 @@
 """
 
 import logging
+import os
+import sys
+
+if sys.argv[:1] == ["-m"] and "clpt" in sys.orig_argv:  # python -m clpt: Python has put the current
+    # folder first, from which nothing is imported unless clpt itself is there
+    _home = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+    sys.path[:1] = [path for path in sys.path[:1] if path == _home]
 
 from clpt.budget import Budget
 from clpt.cluster.multi_renderer import MultiRenderer

@@ -9,9 +9,7 @@ from __future__ import annotations
 import json
 import os
 import re
-import site
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
@@ -19,12 +17,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from clpt import output_files
+from clpt import child_processes, output_files
 from clpt.errors import DeviceError
 
 from .figures import SECONDS, Figure
 
-PACKAGE = Path(__file__).parents[1]
 CACHES = (  # what tells clpt and drivers where to keep what they compiled
     "HOME", "XDG_CACHE_HOME", "POCL_CACHE_DIR", "CUDA_CACHE_PATH", "cl_cache_dir",
     "NEO_CACHE_DIR", "AMD_COMGR_CACHE_DIR",
@@ -45,15 +42,10 @@ def run(command: Sequence[str], caches: Path, **environment: str) -> Process:
     variables = {name: str(caches / name.lower()) for name in CACHES}
     for folder in variables.values():
         os.makedirs(folder, exist_ok=True)
-    paths = [str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")]
-    own = {
-        "PYTHONUSERBASE": site.getuserbase(),  # which else follows HOME
-        "PYTHONPATH": os.pathsep.join(filter(None, paths)),
-    }
     with tempfile.TemporaryFile("w+") as output:
         start = time.perf_counter()
         process = subprocess.Popen(
-            command, env={**os.environ, **own, **variables, **environment},
+            command, env={**os.environ, **variables, **environment},
             stdout=output, stderr=output,
         )  # fmt: skip
         cpu = float("nan")
@@ -79,7 +71,8 @@ def measure(
     """
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "report.json"
-        command = [sys.executable, "-m", __name__, str(report), scene, mode or "", str(device)]
+        main = f"from {__name__} import main; main(*sys.argv[1:])"
+        command = child_processes.command(main, str(report), scene, mode or "", str(device))
         for what, times in (("cold", 1), ("warm", rounds)):
             taken, stats = [], []
             for _ in range(times):
@@ -101,7 +94,7 @@ def _figure(name: str, taken: list[Process], stats: list[dict[str, Any]], scene:
     )
 
 
-def _main(target: str, scene: str, mode: str, which: str) -> None:
+def main(target: str, scene: str, mode: str, which: str) -> None:
     """The process that is measured: one small picture, and what it took."""
     start = time.perf_counter()
     import dataclasses
@@ -138,7 +131,3 @@ def _peak() -> int:
     except OSError:
         found = None
     return int(found[1]) * 1024 if found else 0
-
-
-if __name__ == "__main__":
-    _main(*sys.argv[1:])

@@ -17,25 +17,28 @@ def cluster() -> None:
 @cluster.command()
 @click.option(
     "--host", default="127.0.0.1", show_default=True,
-    help="Address to listen at; another than this machine's own needs --keys.",
+    help="Address to listen at; that of this machine in a network lets other machines connect.",
 )  # fmt: skip
 @click.option("--port", type=click.IntRange(0, 65535), default=8786, show_default=True)
 @click.option(
     "--keys", type=click.Path(path_type=Path),
-    help="Folder of the keys; they are made if it has none. Connections are encrypted then.",
+    help="Folder of the keys, which are made if it has none.  [default: one of your own]",
 )  # fmt: skip
 @verbose_option("Log more; twice for everything.")
 def start(host: str, port: int, keys: Path | None, verbose: int) -> int:
     """Run the scheduler of a cluster, until Ctrl-C.
 
-    It prints its address, for `clpt worker` and `clpt render --cluster`. With --keys, who has the
-    folder may render; copy it to the other machines.
+    It prints its address, for `clpt worker` and `clpt render --cluster`. Who has the folder of its
+    keys may use the cluster, as you may: copy it to other machines, and to nobody else. On this
+    machine commands of yours find it by themselves.
     """
     from ..cluster import processes
+    from ..cluster.keys import default_folder
 
     def tell(address: str) -> None:
         keyed = "" if keys is None else f" --keys {keys}"
         click.echo(address)
+        click.echo(f"keys:     {default_folder() if keys is None else keys}", err=True)
         click.echo(f"workers:  clpt worker {address}{keyed}", err=True)
         click.echo(f"pictures: clpt render SCENE --cluster {address}{keyed}", err=True)
 

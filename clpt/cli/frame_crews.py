@@ -86,7 +86,7 @@ class ClusterCrew(Crew):
         others = [one.renderer for one in self._crews if one.renderer and one is not self]
         beside = others[0] if others else None
         self.renderer = ClusterRenderer(scene, self._client, beside=beside, **self._made)
-        self.renderer.farm.waits = self._waits
+        self.renderer.farm.priority = self._priority
         return self.renderer
 
     def pass_seconds(self, scene: Scene) -> float:
@@ -97,15 +97,9 @@ class ClusterCrew(Crew):
         """Tell of workers that come and go."""
         self.watch.look()
 
-    def _waits(self) -> bool:
-        """Whether an earlier frame has blocks for workers, or soon will."""
-        return any(one.frame < self.frame and one.needs_workers for one in self._crews)
-
-    @property
-    def needs_workers(self) -> bool:
-        """Whether there are blocks that no worker has, or none yet."""
-        blocks = None if self.renderer is None else self.renderer.blocks
-        return blocks is None or not blocks.end or blocks.waiting
+    def _priority(self) -> float:
+        """That of this frame's blocks among those of the others: earlier frames come first."""
+        return -self.frame
 
 
 def device_crews(

@@ -46,8 +46,8 @@ class Where(click.ParamType):
 
     def convert(self, value: Any, param: Any, ctx: Any) -> str:
         text = str(value)
-        if not re.fullmatch(r"local:[1-9]\d{0,2}|(tcp|tls)://.+:\d+", text):
-            self.fail(f"{text!r} is neither tls://HOST:PORT, tcp://HOST:PORT nor local:N")
+        if not re.fullmatch(r"local:[1-9]\d{0,2}|tls://.+:\d+", text):
+            self.fail(f"{text!r} is neither tls://HOST:PORT nor local:N")
         return text
 
 
@@ -178,7 +178,7 @@ def connected(
     processes.configure()
     from distributed import Client
 
-    security = cluster_keys.security(where, keys)
+    security = cluster_keys.security(keys)
     with shown.phase(f"connecting to {where}"):
         try:
             client = Client(where, security=security, timeout=10)
@@ -230,13 +230,8 @@ class Watch:
                 f"{name}  {samples:.5g} spp in {blocks} blocks, {of_worker[-1].rate:.3g} spp/s, "
                 f"{failures} failures"
             )
-        lost, repeated, dropped = (
-            sum(getattr(one.blocks, name) for one in renderers)
-            for name in ("lost", "repeated", "dropped")
-        )
-        self._shown.note(
-            f"{len(records)} workers; blocks lost {lost}, repeated {repeated}, dropped {dropped}"
-        )
+        lost = max((one.lost for one in renderers), default=0)
+        self._shown.note(f"{len(records)} workers, {lost} lost")
 
 
 def _warn_of_refused(renderer: ClusterRenderer, tell: Callable[[str], None]) -> None:

@@ -126,8 +126,9 @@ class Period(Duration):
     "--cluster", type=Where(), help="Render on the workers of tls://HOST:PORT, or of local:N."
 )
 @click.option(
-    "--keys", type=click.Path(path_type=Path), help="Folder of the cluster's keys, for tls://."
-)
+    "--keys", type=click.Path(path_type=Path),
+    help="Folder of the cluster's keys.  [default: that of clpt cluster start on this machine]",
+)  # fmt: skip
 @click.option(
     "--tev", type=Address(), is_flag=False, flag_value=EVERYWHERE,
     help="Show the picture in tev or HDRView while it is rendered.  [default: 127.0.0.1:14158]",

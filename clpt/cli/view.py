@@ -52,8 +52,9 @@ OF_GRADING = ("exposure", "tone", "view", "display", "look", "ocio")
 )  # fmt: skip
 @click.option("--cluster", type=Where(), help="Render on workers, as of `clpt render`.")
 @click.option(
-    "--keys", type=click.Path(path_type=Path), help="Folder of the cluster's keys, for tls://."
-)
+    "--keys", type=click.Path(path_type=Path),
+    help="Folder of the cluster's keys.  [default: that of clpt cluster start on this machine]",
+)  # fmt: skip
 @click.option("--spp", type=click.IntRange(1, 2**31 - 1), help="Samples per pixel.")
 @click.option("--noise", type=click.FloatRange(0.0), metavar="SHARE", help="As of `clpt render`.")
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), help="Seed of the random numbers.")

@@ -18,8 +18,9 @@ from .verbosity import verbose_option
 @click.option("--threads", type=click.IntRange(1), help="Cores of a CPU to use, at most.")
 @click.option("--host", metavar="ADDRESS", help="Address of this machine for the others.")
 @click.option(
-    "--keys", type=click.Path(path_type=Path), help="Folder of the cluster's keys, for tls://."
-)
+    "--keys", type=click.Path(path_type=Path),
+    help="Folder of the cluster's keys.  [default: that of clpt cluster start on this machine]",
+)  # fmt: skip
 @click.option("--name", help="What the worker is called.  [default: its address]")
 @verbose_option("Log more; twice for everything.")
 @click.option("--quiet", is_flag=True, help="Print nothing.")
@@ -35,8 +36,8 @@ def worker(
 ) -> int:
     """Render for the scheduler at ADDRESS, such as tls://192.168.1.5:8786, until it ends.
 
-    It renders with one device, or with several: --device all, gpu, or 0,2. It runs nothing but
-    clpt.
+    It renders with one device, or with several: --device all, gpu, or 0,2. Who has the keys of the
+    cluster can run any program here, as you can.
     """
     from ..cluster import processes, tasks
 

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 from clpt import device as dev
 from clpt.cluster import tasks
-from clpt.cluster.blocks import Blocks, WorkerRecord
+from clpt.cluster.admission import Job
+from clpt.cluster.blocks import WorkerRecord
 from clpt.cluster.bundle import pack
 from clpt.cluster.cluster_film import ClusterFilm, FilmSum
-from clpt.cluster.farm import Farm
-from clpt.cluster.feeding import Film, Job
+from clpt.cluster.farm import Farm, Film
 from clpt.denoise import needs
 from clpt.errors import ClusterError, SceneError
 from clpt.render.options import check_options, check_scene
@@ -30,7 +30,6 @@ from clpt.scene import Scene
 if TYPE_CHECKING:
     from distributed import Client
 
-CHECK_EVERY = 64  # of the blocks, one in so many is rendered by two workers and compared
 TELL_SECONDS = 0.2  # between calls of `progress`
 NO_WORKER_SECONDS = 300.0  # without any worker, until the render ends
 
@@ -42,10 +41,9 @@ class ClusterRenderer(ClusterFilm):
 
     client: of Dask, of any cluster whose workers have clpt installed. mixed: whether workers of
     different classes of device may take part; the last bits of the picture then depend on who
-    rendered what. check_every: of the blocks, one in so many is rendered by two workers and
-    compared, beside the first block of each worker; 0: none. first_sample: the number of the first
-    sample. device: where pictures are made of the film, and its noise is measured, on this machine.
-    beside: a renderer of the same cluster, at whose side this one renders, by devices of one class.
+    rendered what. first_sample: the number of the first sample. device: where pictures are made of
+    the film, and its noise is measured, on this machine. beside: a renderer of the same cluster, at
+    whose side this one renders, by devices of one class.
     options: halves, layout, queued, looped, slots, texture_budget, tree_quality, denoise, as of
     `Renderer`.
 
@@ -63,7 +61,6 @@ class ClusterRenderer(ClusterFilm):
         *,
         device: dev.Device | str | int | None = None,
         mixed: bool = False,
-        check_every: int = CHECK_EVERY,
         patience: float = NO_WORKER_SECONDS,
         first_sample: int = 0,
         beside: ClusterRenderer | None = None,
@@ -78,9 +75,9 @@ class ClusterRenderer(ClusterFilm):
         if unknown:
             raise TypeError(f"the option {min(unknown)!r} is of one device, not of a cluster")
         super().__init__(scene, device, first_sample, options)
-        self.farm = Farm(client, mixed=mixed, check_every=check_every, patience=patience)
+        self.farm = Farm(client, mixed=mixed, patience=patience)
         if beside is not None:
-            self.farm.chosen = beside.farm.chosen
+            self.farm.known.agreed = beside.farm.known.agreed
         self._stop = threading.Event()
         self._error: ClusterError | None = None
         self._pack()
@@ -102,17 +99,17 @@ class ClusterRenderer(ClusterFilm):
     @property
     def workers(self) -> dict[str, WorkerRecord]:
         """What is known of each worker, by its address: its rate, blocks, samples, failures."""
-        return self.blocks.known  # type: ignore[return-value]
+        return dict(self.farm.known.records)
 
     @property
     def refused(self) -> dict[str, str]:
         """Why workers take no part, by their addresses."""
-        return dict(self.blocks.refused)  # type: ignore[arg-type]
+        return dict(self.farm.known.refused)
 
     @property
-    def blocks(self) -> Blocks:
-        """Who renders what; see clpt.cluster.blocks. To be read only."""
-        return self.farm.blocks
+    def lost(self) -> int:
+        """How many workers are gone."""
+        return self.farm.known.lost
 
     def run(
         self, samples: int, progress: OnProgress | None = None, *, noise: float | None = None
@@ -220,7 +217,7 @@ class ClusterRenderer(ClusterFilm):
     def _note(self, seconds: float) -> None:
         """Note how long the film has been rendered, and by which classes of devices."""
         self._seconds_rendered = seconds
-        self._note_classes(self.farm.classes)
+        self._note_classes(self.farm.known.classes)
 
     def _so_far(self, total: int, seconds: float) -> Progress:
         totals, samples = self._sum.totals, float(self.samples - self._first_sample)
@@ -241,7 +238,6 @@ class ClusterRenderer(ClusterFilm):
         check_scene(scene)
         scene = needs.prepared(scene, self.denoise)
         former, self.scene = self._folder, scene
-        self.farm.blocks = Blocks(0, before=self.blocks)
         self._pack()
         former.cleanup()
         if self._local is not None:

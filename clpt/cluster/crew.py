@@ -175,15 +175,11 @@ class Crew:
         """Add ranges of a selection's samples once, perhaps with losses."""
         end = ranges[-1][1]
         others = tuple(gaps(ranges, 0, end))
-        # Films that are added cannot be dropped: there is one copy of a block.
-        blocks = Blocks(end, others, seconds=BLOCK_SECONDS, copies=1)
+        blocks = Blocks(end, others, seconds=BLOCK_SECONDS)
         self._ending = False
         for worker in self.workers:
-            blocks.join(worker, worker.name)
-            size = int(BLOCK_SECONDS * worker.rate / selection.pixels)
-            blocks.workers[worker] = WorkerRecord(
-                worker.name, worker.rate / selection.pixels, size=size
-            )
+            rate = worker.rate / selection.pixels
+            blocks.join(worker, WorkerRecord(worker.name, rate, size=BLOCK_SECONDS * rate))
         self._threads = [
             threading.Thread(target=self._work, args=(worker, blocks, selection), daemon=True)
             for worker in self.workers
@@ -247,7 +243,7 @@ class Crew:
         """Wait for a block; return None when there is nothing more to do."""
         with self._changed:
             while self._goes_on() and not blocks.done:
-                block = blocks.take(worker, time.perf_counter())
+                block = blocks.take(worker)
                 if block is not None:
                     return block
                 self._changed.wait()
@@ -267,7 +263,7 @@ class Crew:
             worker.unsaved.append((selection, block.first, block.end))
             worker.unsaved_seconds += seconds
             if finished:
-                blocks.finish(worker, block, time.perf_counter(), seconds=seconds)
+                blocks.finish(worker, seconds)
                 worker.paths += block.samples * selection.pixels
                 worker.rate = blocks.workers[worker].rate * selection.pixels
             self._tell()

@@ -1,4 +1,8 @@
-"""The processes of a cluster: a scheduler, workers, and both on this machine."""
+"""The processes of a cluster: a scheduler, workers, and both on this machine.
+
+Dask trusts whoever can connect, so nobody connects without the keys: every socket that listens asks
+for a certificate. Dask's web servers do not, and are left out.
+"""
 
 from __future__ import annotations
 
@@ -10,26 +14,26 @@ import os
 import signal
 import socket
 import subprocess
-import sys
 import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from clpt.cluster import keys, restricted
+from clpt import child_processes
+from clpt.cluster import keys
 from clpt.errors import ClusterError
 
 if TYPE_CHECKING:
-    from distributed import Client
+    from distributed import Client, Scheduler, Worker
 
 LOOPBACK = "127.0.0.1"
 SETTINGS = {
     "distributed.scheduler.worker-ttl": "30 s",  # of a worker that is silent
-    "distributed.scheduler.allowed-failures": 1000,  # the client counts failures itself
-    "distributed.scheduler.work-stealing": False,  # and says who renders what
+    "distributed.scheduler.allowed-failures": 10,  # workers that die with a block, at most
     "distributed.scheduler.active-memory-manager.start": False,
     "distributed.worker.memory.target": False,
     "distributed.worker.memory.spill": False,
@@ -47,14 +51,13 @@ END_SECONDS = 5.0  # in which a process ends by itself
 
 
 def configure() -> None:
-    """Set Dask's options, and restrict what this process accepts. Raises ClusterError."""
+    """Set Dask's options. Raises ClusterError where it is not installed."""
     try:
         import dask
         import distributed  # noqa: F401
     except ImportError:
         raise ClusterError("a cluster needs Dask: pip install 'clpt[cluster]'") from None
     dask.config.set(SETTINGS)
-    restricted.restrict()
     for name in ("distributed", "tornado", "asyncio"):  # clpt says what there is to know
         logging.getLogger(name).setLevel(max(logging.WARNING, logging.getLogger().level))
     logging.getLogger("asyncio").addFilter(_is_no_left_over)
@@ -77,8 +80,11 @@ def run_worker(
 ) -> int:
     """Render for a scheduler until it ends, or a signal comes; return the exit status.
 
-    host: the address of this machine at which others reach it; folder: of the keys, for tls://.
+    host: the address of this machine at which others reach it; folder: of the keys, by default that
+    of this user. Raises ClusterError without keys, and where there is no scheduler.
     """
+    if not address.startswith("tls://"):
+        raise ClusterError(f"{address} is no tls://HOST:PORT, as clpt cluster start prints it")
     configure()
     return asyncio.run(_worker(address, host, folder, name, tell))
 
@@ -86,15 +92,9 @@ def run_worker(
 async def _worker(
     address: str, host: str | None, folder: Path | None, name: str | None, tell: Any
 ) -> int:
-    from distributed import Worker
-
-    with tempfile.TemporaryDirectory(prefix="clpt-worker-") as scratch:
-        worker = Worker(
-            address, nthreads=1, host=host or (LOOPBACK if is_loopback(address) else None),
-            name=name, security=keys.security(address, folder), memory_limit=0, dashboard=False,
-            dashboard_address=f"{LOOPBACK}:0", local_directory=scratch,
-            death_timeout=START_SECONDS,
-        )  # fmt: skip
+    with _scratch() as scratch:
+        host = host or (LOOPBACK if is_loopback(address) else None)
+        worker = new_worker(address, folder, scratch, host=host, name=name)
         signals = _signals()
         try:
             await worker
@@ -108,6 +108,31 @@ async def _worker(
         status = 0 if signals.number is None else 128 + signals.number
         await worker.close(reason="clpt worker ends")
         return status
+
+
+def new_worker(address: str, folder: Path | None, scratch: str, **options: Any) -> Worker:
+    """Return a worker that the keys of a folder are needed for; scratch: its own folder."""
+    import distributed
+
+    return _without_web_server(distributed.Worker)(
+        address, nthreads=1, memory_limit=0, dashboard=False, local_directory=scratch,
+        death_timeout=START_SECONDS, security=keys.security(folder), **options,
+    )  # fmt: skip
+
+
+def _without_web_server(node: Any) -> Any:
+    """Return Dask's scheduler or worker without its web server, which asks nobody for keys."""
+    return type(node.__name__, (node,), {"start_http_server": lambda *_, **__: None})
+
+
+@contextmanager
+def _scratch() -> Iterator[str]:
+    """Yield a new folder that only this user can enter.
+
+    By default Dask takes a folder in the temporary one, whoever has made it, and imports from it.
+    """
+    with tempfile.TemporaryDirectory(prefix="clpt-cluster-", ignore_cleanup_errors=True) as folder:
+        yield folder
 
 
 class _Signals:
@@ -151,36 +176,39 @@ def run_scheduler(
 ) -> int:
     """Run a scheduler until a signal comes; return the exit status.
 
-    folder: of the keys, which are made where they are missing; without, connections are not
-    encrypted. tell: is called with the address. Raises ClusterError for a host of other machines
-    without keys, and where the port is not free.
+    folder: of the keys, which are made where they are missing; by default that of this user. tell:
+    is called with the address. Raises ClusterError where keys cannot be made, and where the port is
+    not free.
     """
     configure()
+    folder = keys.default_folder() if folder is None else folder
+    keys.make(folder)
     return asyncio.run(_scheduler(host, port, folder, tell))
 
 
-async def _scheduler(host: str, port: int, folder: Path | None, tell: Any) -> int:
-    from distributed import Scheduler
+async def _scheduler(host: str, port: int, folder: Path, tell: Any) -> int:
+    with _scratch() as scratch:
+        try:
+            scheduler = new_scheduler(host, port, folder, scratch)
+            await scheduler
+        except OSError as error:
+            raise ClusterError(f"{host}:{port} cannot be used: {error.strerror or error}") from None
+        signals = _signals()
+        tell(scheduler.address)
+        await signals.wait()
+        _leave_soon()
+        await scheduler.close()
+        return 128 + (signals.number or 0)
 
-    if folder is not None:
-        keys.make(folder)
-    elif not is_loopback(host):
-        raise ClusterError(f"{host} is not this machine alone: give a folder for keys")
-    protocol = "tcp" if folder is None else "tls"
-    try:
-        scheduler = Scheduler(
-            host=host, port=port, protocol=f"{protocol}://", dashboard=False,
-            dashboard_address=f"{LOOPBACK}:0", security=keys.security(f"{protocol}://", folder),
-        )  # fmt: skip
-        await scheduler
-    except OSError as error:
-        raise ClusterError(f"{host}:{port} cannot be used: {error.strerror or error}") from None
-    signals = _signals()
-    tell(scheduler.address)
-    await signals.wait()
-    _leave_soon()
-    await scheduler.close()
-    return 128 + (signals.number or 0)
+
+def new_scheduler(host: str, port: int, folder: Path, scratch: str) -> Scheduler:
+    """Return a scheduler that the keys of a folder are needed for; scratch: its own folder."""
+    import distributed
+
+    return _without_web_server(distributed.Scheduler)(
+        host=host, port=port, protocol="tls://", dashboard=False, local_directory=scratch,
+        security=keys.security(folder),
+    )  # fmt: skip
 
 
 def is_loopback(address: str) -> bool:
@@ -200,29 +228,43 @@ def local_cluster(
     """Yield a client of a scheduler in this process, and its workers on this machine.
 
     threads: of each worker; by default the cores are divided. All of it listens on the loopback
-    interface alone, and ends with the context, or with this process.
+    interface alone, to those who have keys that are made here and are gone at the end.
     """
-    configure()
-    from distributed import Client, LocalCluster
-
     each = threads or max(1, _cores() // workers)
     options = ["--threads", str(each)] + (["--device", device] if device else [])
-    with LocalCluster(
-        n_workers=0, host=LOOPBACK, dashboard_address=f"{LOOPBACK}:0", silence_logs=False
-    ) as cluster:
-        address = cluster.scheduler_address
-        started = [start_worker(address, *options) for _ in range(workers)]
+    with local_scheduler() as (client, folder):
+        started: list[subprocess.Popen[bytes]] = []
         try:
-            with Client(address) as client:
-                yield client, started
+            for _ in range(workers):
+                started.append(start_worker(client.scheduler.address, folder, *options))
+            yield client, started
         finally:
             end(started)
 
 
-def start_worker(address: str, *options: str, **more: Any) -> subprocess.Popen[bytes]:
-    """Start a process that works for a scheduler."""
-    command = [sys.executable, "-m", "clpt", "worker", address, *options, "--quiet"]
-    return subprocess.Popen(command, **more)
+@contextmanager
+def local_scheduler() -> Iterator[tuple[Client, Path]]:
+    """Yield a client of a scheduler in this process, and the folder of its keys, made for it."""
+    configure()
+    from distributed import Client, SpecCluster
+
+    with _scratch() as scratch:
+        folder = Path(scratch) / "keys"
+        keys.make(folder)
+        security = keys.security(folder)
+        spec = {"cls": partial(new_scheduler, LOOPBACK, 0, folder, scratch)}
+        with (
+            SpecCluster(scheduler=spec, security=security, silence_logs=False) as cluster,
+            Client(cluster.scheduler_address, security=security) as client,
+        ):
+            yield client, folder
+
+
+def start_worker(address: str, keys: Path, *options: str, **more: Any) -> subprocess.Popen[bytes]:
+    """Start a process that works for a scheduler; keys: the folder of its keys."""
+    words = ["worker", address, "--keys", str(keys), *options, "--quiet"]
+    main = "from clpt.__main__ import main; main()"
+    return subprocess.Popen(child_processes.command(main, *words), **more)
 
 
 def end(processes: list[subprocess.Popen[bytes]]) -> None:

@@ -31,9 +31,10 @@ class SteeredCluster:
         self._of = client, device, {k: v for k, v in options.items() if v is not None}
         self._renderer = self._new(scene)
 
-    def _new(self, scene: Scene) -> ClusterRenderer:
+    def _new(self, scene: Scene, former: ClusterRenderer | None = None) -> ClusterRenderer:
         client, device, options = self._of
-        return ClusterRenderer(scene, client, device=device, mixed=True, **options)
+        options = {**options, "device": device, "mixed": True}
+        return ClusterRenderer(scene, client, beside=former, **options)
 
     def update(
         self, *, camera: Camera | None = None, materials: Any = None, scene: Scene | None = None
@@ -42,7 +43,8 @@ class SteeredCluster:
         if materials is not None:
             raise SceneError("give the whole scene", where="materials")
         new = self.scene if scene is None else scene
-        made = self._new(new if camera is None else dataclasses.replace(new, camera=camera))
+        new = new if camera is None else dataclasses.replace(new, camera=camera)
+        made = self._new(new, self._renderer)
         self._renderer.close()
         self._renderer = made
 

@@ -222,20 +222,27 @@ def _close_oldest() -> None:
 def render_block(digest: str, first: int, end: int, selection: Reply | None = None) -> Reply:
     """Render samples first to end - 1 of a job that `open_job` opened.
 
-    selection: which ones, from `pack_selection`; None: those of every pixel. Returns the arrays of
-    `state_to_arrays`; "whole", whether it came to its end; "seconds" and counts of samples, rays,
-    and of what the film refused. Or "closed": the job is not open here; or "error": what went
-    wrong.
+    selection: which ones, from `pack_selection`; None: those of every pixel. Returns "worker", the
+    address of this one, and the arrays of `state_to_arrays`; "whole", whether it came to its end;
+    "seconds" and counts of samples, rays, and of what the film refused. Or "closed": the job is not
+    open here; or "error": what went wrong.
     """
+    wanted, address = _wanted()
     try:
         job = _open.get(digest)
         if job is None or digest in _stopped:
-            return {"closed": True}
+            return {"worker": address, "closed": True}
         _open[digest] = _open.pop(digest)
-        wanted = _wanted()
-        return job.block(first, end, selection, lambda: digest not in _stopped and wanted())
+        block = job.block(first, end, selection, lambda: digest not in _stopped and wanted())
+        return {"worker": address, **block}
     except Exception as error:
-        return {"error": _told(error)}
+        return {"worker": address, "error": _told(error)}
+
+
+def render_trial(digest: str) -> Reply:
+    """Render the first sample of a job; return what `render_block` does but for the film."""
+    reply = render_block(digest, 0, 1)
+    return {name: value for name, value in reply.items() if name not in DIMENSIONS}
 
 
 def stop_job(digest: str) -> None:
@@ -329,8 +336,9 @@ def _parsed(job: str) -> dict[str, Any]:
     return document
 
 
-def _wanted() -> Callable[[], bool]:
-    """Return a function that tells whether somebody waits for the task of this thread.
+def _wanted() -> tuple[Callable[[], bool], str]:
+    """Return a function that tells whether somebody waits for the task of this thread, and the
+    address of this worker.
 
     A task whose client is gone, or has the block from another worker, is told so by nothing but the
     state that Dask's worker has noted for it.
@@ -341,7 +349,7 @@ def _wanted() -> Callable[[], bool]:
     try:
         worker, key = get_worker(), thread_state.key
     except (ValueError, AttributeError):  # called without Dask
-        return lambda: True
+        return lambda: True, ""
 
     def wanted() -> bool:
         task = worker.state.tasks.get(key)
@@ -349,7 +357,7 @@ def _wanted() -> Callable[[], bool]:
             return False
         return worker.status in (Status.running, Status.paused)
 
-    return wanted
+    return wanted, worker.address
 
 
 def _told(error: Exception) -> str:

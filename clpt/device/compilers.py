@@ -10,7 +10,6 @@ import logging
 import os
 import pickle
 import subprocess
-import sys
 import threading
 import weakref
 from collections import deque
@@ -20,6 +19,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from clpt import child_processes
 from clpt.device import runtimes
 
 log = logging.getLogger(__name__)
@@ -197,9 +197,8 @@ def spare_cores() -> int:
 
 
 def _command() -> list[str]:
-    """The command of a process, which finds modules where this one does."""
-    main = f"runpy.run_path({str(_PROGRAM)!r})['main']()"
-    return [sys.executable, "-c", f"import runpy, sys; sys.path[:] = {sys.path!r}; {main}"]
+    """The command of a process that compiles."""
+    return child_processes.command(f"import runpy; runpy.run_path({str(_PROGRAM)!r})['main']()")
 
 
 def _answer(process: subprocess.Popen[bytes], job: Job) -> bytes | None:

@@ -36,14 +36,19 @@ def digest_of_one_process(samples, plan=None):
 class Machines:
     """Workers of a scheduler, started and ended by tests."""
 
-    def __init__(self, client, address):
-        self.client, self.address = client, address
+    def __init__(self, client, keys):
+        self.client, self.keys, self.address = client, keys, client.scheduler.address
         self.started: list[subprocess.Popen] = []
+
+    @property
+    def on(self) -> list[str]:
+        """The options of a command that renders here."""
+        return ["--cluster", self.address, "--keys", str(self.keys)]
 
     def start(self, code: str = "") -> subprocess.Popen:
         """Start a worker; code: what its process does first, to misbehave."""
         program = f"{code}\nimport clpt.__main__ as m\nm.main()"
-        arguments = ["worker", self.address, "--threads", "1", "--quiet"]
+        arguments = ["worker", *self.on[1:], "--threads", "1", "--quiet"]
         process = subprocess.Popen(
             [sys.executable, "-c", program, *arguments], env=ENVIRONMENT,
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
@@ -88,16 +93,8 @@ def client_of(command: list[str], folder: Path) -> Iterator[subprocess.Popen]:
 @contextmanager
 def machines(workers: int = 0) -> Iterator[Machines]:
     """Yield a scheduler in this process with workers in others; end them all."""
-    processes.configure()
-    from distributed import Client, LocalCluster
-
-    with (
-        LocalCluster(
-            n_workers=0, host="127.0.0.1", dashboard_address="127.0.0.1:0", silence_logs=False
-        ) as cluster,
-        Client(cluster.scheduler_address) as client,
-    ):
-        found = Machines(client, cluster.scheduler_address)
+    with processes.local_scheduler() as (client, keys):
+        found = Machines(client, keys)
         try:
             for _ in range(workers):
                 found.start()

@@ -66,14 +66,14 @@ def test_the_picture_so_far_and_a_part_of_it(hub, folder, monkeypatch):
 
     monkeypatch.setattr(outputs, "write", count)
     more = ["--every", "0.01s", "--crop", "25%:75%,4:"]
-    assert render("--spp", "20", "--cluster", hub.address, *more) == 0
+    assert render("--spp", "20", *hub.on, *more) == 0
     assert len(written) > 1 and written == sorted(written) and written[-1] == 20.0
     np.testing.assert_array_equal(np.load("a.npy"), whole(20)[4:, 8:24])
 
 
 def test_a_cluster_goes_on_where_it_was_saved(hub, folder, capsys):
     """With more samples, with none, by one process: to the bit."""
-    on = ["--cluster", hub.address]
+    on = [*hub.on]
     assert render("--spp", "20", *on, "--checkpoint", "1h") == 0
     saved = film_file.read(SAVED)
     assert saved.film.taken == ((0, 20),)
@@ -97,7 +97,7 @@ def test_a_cluster_goes_on_where_it_was_saved(hub, folder, capsys):
 
 
 def test_ranges_of_a_cluster_are_merged(hub, folder, capsys):
-    on = ["--cluster", hub.address, "--size", "32x24"]
+    on = [*hub.on, "--size", "32x24"]
     assert run(["render", BOX, *on, "--samples", "0:7", "-o", "a.film"]) == 0
     assert run(["render", BOX, *on, "--samples", "7:30", "-o", "b.film"]) == 0
     assert film_file.read("b.film").film.taken == ((7, 30),)
@@ -120,7 +120,7 @@ def test_gaps_are_filled(hub, folder, capsys):
     assert render("--spp", "20") == 2
     told = capsys.readouterr().err
     assert "samples 0 to 2, 8 to 11, not those from 0 on" in told and "--cluster local:1" in told
-    on = ["--cluster", hub.address]
+    on = [*hub.on]
     assert render("--spp", "4", *on, "--samples", "9:12") == 2
     assert render("--samples", "1:30", *on) == 2
     assert "not those from 1 on" in capsys.readouterr().err
@@ -172,7 +172,7 @@ def started(folder: Path, *more: str) -> subprocess.Popen:
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
 def test_a_client_that_ends_goes_on(how, hub, folder, capsys):
     """Killed, or told to stop: what was saved is whole, and the rest is that of one process."""
-    process = started(folder, "--cluster", hub.address)
+    process = started(folder, *hub.on)
     time.sleep(1.5)
     process.send_signal(how)
     told = process.communicate(timeout=LONGEST)[1]
@@ -182,7 +182,7 @@ def test_a_client_that_ends_goes_on(how, hub, folder, capsys):
     done = sum(end - first for first, end in saved.taken)
     assert done > 0 and np.all(saved.samples == done)
     last = saved.taken[-1][1]
-    assert render("--spp", str(last + 10), "--cluster", hub.address, "--resume") == 0
+    assert render("--spp", str(last + 10), *hub.on, "--resume") == 0
     assert "of the pixels have a sample" not in capsys.readouterr().err
     assert film_file.read(SAVED).film.taken == ((0, last + 10),)
     np.testing.assert_array_equal(np.load("a.npy"), whole(last + 10))
@@ -191,16 +191,17 @@ def test_a_client_that_ends_goes_on(how, hub, folder, capsys):
 @pytest.mark.slow
 def test_a_lost_scheduler(hub, folder, capsys):
     """The command ends with a message and the film, also without checkpoints; it goes on."""
-    command = [sys.executable, "-m", "clpt", "cluster", "start", "--port", "0"]
+    keyed = ["--keys", str(folder / "keys")]
+    command = [sys.executable, "-m", "clpt", "cluster", "start", "--port", "0", *keyed]
     more = {"env": ENVIRONMENT, "stderr": subprocess.DEVNULL, "text": True}
     scheduler = subprocess.Popen(command, stdout=subprocess.PIPE, **more)
     ended = [scheduler]
     try:
         address = scheduler.stdout.readline().strip()
-        ended.append(processes.start_worker(address, "--threads", "1", env=ENVIRONMENT))
+        ended.append(processes.start_worker(address, folder / "keys", "--threads", "1"))
         command = [sys.executable, "-m", "clpt", "render", BOX, *COMMON, "--spp", "1000000"]
         client = subprocess.Popen(
-            [*command, "--cluster", address, "--checkpoint", "0"], cwd=folder,
+            [*command, "--cluster", address, *keyed, "--checkpoint", "0"], cwd=folder,
             **more | {"stderr": subprocess.PIPE},
         )  # fmt: skip
         ended.append(client)
@@ -215,6 +216,6 @@ def test_a_lost_scheduler(hub, folder, capsys):
     assert client.returncode == 2, told
     assert "scheduler is gone" in told and f"{SAVED}  --resume goes on from it" in told
     last = film_file.read(SAVED).film.taken[-1][1]
-    assert render("--spp", str(last + 5), "--cluster", hub.address, "--resume") == 0
+    assert render("--spp", str(last + 5), *hub.on, "--resume") == 0
     assert "of the pixels have a sample" not in capsys.readouterr().err
     np.testing.assert_array_equal(np.load("a.npy"), whole(last + 5))

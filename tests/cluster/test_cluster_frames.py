@@ -19,7 +19,6 @@ from machines import LONGEST, client_of, machines, wait_until  # noqa: E402
 from clpt import images  # noqa: E402
 from clpt.__main__ import run  # noqa: E402
 from clpt.cli.frame_crews import ClusterCrew  # noqa: E402
-from clpt.cluster.blocks import Blocks  # noqa: E402
 
 SIZE = ["--size", "16x12", "--mode", "rgb"]
 TURN = ["-D", "angle={10*(frame-2)}"]
@@ -53,13 +52,13 @@ def check_frames(numbers, *how: str) -> None:
 
 def test_frames_are_those_of_one_process(hub, folder, capsys):
     command = ["render", "turn.xml", "--frames", "1:4", *TURN, *SIZE, "--spp", "6"]
-    assert run([*command, "--cluster", hub.address]) == 0
+    assert run([*command, *hub.on]) == 0
     told = capsys.readouterr().err
-    assert "frame 4 (" in told and "6 spp" in told and "2 workers; blocks lost 0" in told
+    assert "frame 4 (" in told and "6 spp" in told and "2 workers, 0 lost" in told
     assert told.count(" renders\n") == 2
     check_frames((1, 2, 4), "--spp", "6")
     (folder / "turn.0002.exr").unlink()
-    assert run([*command, "--cluster", hub.address]) == 0
+    assert run([*command, *hub.on]) == 0
     assert capsys.readouterr().err.count("is complete") == 3
     check_frames((2,), "--spp", "6")
 
@@ -67,30 +66,17 @@ def test_frames_are_those_of_one_process(hub, folder, capsys):
 def test_frames_with_noise(hub, folder, capsys):
     how = ["--noise", "0.1", "--spp", "200"]
     command = ["render", "turn.xml", "--frames", "1:3", *TURN, *SIZE, *how]
-    assert run([*command, "--cluster", hub.address]) == 0
+    assert run([*command, *hub.on]) == 0
     check_frames((1, 3), *how)
 
 
 def test_an_earlier_frame_comes_first():
-    class Renderer:
-        """Has samples that nobody has."""
-
-        blocks = Blocks(8)
-
     crews: list[ClusterCrew] = []
     crews += [ClusterCrew("", None, crews, {}) for _ in range(2)]
-    crews[1].frame = 8
-    assert not crews[1]._waits()  # the other has no frame
-    crews[0].frame = 7
-    assert crews[1]._waits() and not crews[0]._waits()  # it will have blocks
-    crews[0].renderer = crews[1].renderer = Renderer
-    assert crews[1]._waits() and not crews[0]._waits()
+    crews[0].frame, crews[1].frame = 7, 8
+    assert crews[0]._priority() > crews[1]._priority()
     crews[0].frame = 9
-    assert crews[0]._waits() and not crews[1]._waits()
-    Renderer.blocks.join("a")
-    while Renderer.blocks.take("a", 0.0):
-        assert crews[0]._waits() == Renderer.blocks.waiting
-    assert not crews[0]._waits()
+    assert crews[0]._priority() < crews[1]._priority()
 
 
 @pytest.mark.slow
@@ -100,7 +86,7 @@ def test_frames_go_on_after_an_end(how, hub, folder):
     third = hub.start()
     hub.wait(3)
     command = ["render", "turn.xml", "--frames", "1:6", *TURN, *SIZE, "--spp", "1500"]
-    command += ["--cluster", hub.address]
+    command += [*hub.on]
     with client_of(command, folder) as client:
         wait_until((folder / "turn.0001.exr").exists, "a frame")
         hub.end(third)

@@ -20,7 +20,7 @@ from machines import LONGEST, ROOT, client_of, machines, scene, wait_until  # no
 import clpt  # noqa: E402
 from clpt import images  # noqa: E402
 from clpt.__main__ import run  # noqa: E402
-from clpt.cluster import blocks, tasks  # noqa: E402
+from clpt.cluster import tasks  # noqa: E402
 from clpt.cluster.cluster_renderer import ClusterRenderer  # noqa: E402
 from clpt.errors import ClusterError, SceneError  # noqa: E402
 from clpt.render.film import film_file  # noqa: E402
@@ -82,7 +82,7 @@ def test_the_film_is_that_of_one_process(kind, two, expected):
         assert digest(renderer) == expected[f"{kind} at once"]
         assert renderer.counts[0].samples == expected[f"{kind} samples"]
         assert told == sorted(told, key=lambda pair: pair[0]) and told[-1][1] < 1.0
-        assert renderer.samples == MOST and renderer.blocks.dropped == 0
+        assert renderer.samples == MOST
     with ClusterRenderer(plan(kind), two.client) as renderer:
         renderer.run(3)
         renderer.run(60, noise=NOISE)
@@ -105,7 +105,7 @@ def test_a_worker_with_two_devices(kind, two, expected):
     [address] = set(two.client.nthreads()) - known
     try:
         for _ in range(20):
-            with ClusterRenderer(plan(kind), two.client, check_every=1) as renderer:
+            with ClusterRenderer(plan(kind), two.client) as renderer:
                 assert renderer.run(MOST, noise=NOISE)
                 assert digest(renderer) == expected[f"{kind} at once"]
                 assert not renderer.refused
@@ -170,28 +170,6 @@ def test_selections_that_are_none(two):
     assert tasks.unpack_selection({"paths": "lights", "pixels": 3, "ends": b""}).ends is None
 
 
-def test_workers_are_known_from_one_run_to_the_next():
-    """And those that are gone are not waited for."""
-    first = blocks.Blocks(100)
-    for name in ("a", "b"):
-        first.join(name, "cpu")
-    block = first.take("a", 0.0)
-    first.finish("a", block, 1.0, seconds=0.5)
-    second = blocks.Blocks(100, first=40, share=0.25, before=first, check_every=1)
-    assert second.known.keys() == {"a", "b"} and not second.workers
-    second.lose("b")
-    second.join("a", "cpu")
-    assert second.workers["a"].rate == 2.0 * block.samples
-    again = second.take("a", 0.0)
-    assert again.samples > 1 and again.first == 40
-    assert second.finish("a", again, 1.0, digest="x") is blocks.Outcome.ADD  # there is no other
-    assert second.workers["a"].samples == block.samples + 0.25 * again.samples
-    second.join("a", "gpu")
-    third = blocks.Blocks(100, before=second)
-    third.join("a", "gpu")
-    assert third.workers["a"].rate == 0.0  # it is another device
-
-
 LONG = {"samples": 8000, "noise": 0.005}
 
 
@@ -242,7 +220,7 @@ def test_a_client_that_ends_goes_on(how, two, tmp_path, monkeypatch):
     two.wait(3)
     noisy = ["--noise", "0.01", "--spp", "6000", "-o", "a.film", "--checkpoint", "1s"]
     command = ["render", str(ROOT / "scenes/cornell_box"), "--size", "32x24", *noisy]
-    command += ["--cluster", two.address]
+    command += [*two.on]
     with client_of(command, tmp_path) as client:
         wait_until((tmp_path / "a.resume.exr").exists, "a checkpoint")
         two.end(third)
@@ -281,7 +259,7 @@ def test_a_limit_after_denoising_is_that_of_one_process(method, two, tmp_path, m
         assert (one.film_state().samples != samples).any()
     monkeypatch.chdir(tmp_path)
     noisy = ["--noise", "0.1", "--spp", "200", "--denoise", method]
-    assert render(*noisy, "--cluster", two.address, "-o", "a.film") == 0
+    assert render(*noisy, *two.on, "-o", "a.film") == 0
     assert render(*noisy, "-o", "b.film") == 0
     films = [film_file.read(name).film for name in ("a.film", "b.film")]
     assert tasks.film_digest(films[0]) == tasks.film_digest(films[1])
@@ -289,11 +267,11 @@ def test_a_limit_after_denoising_is_that_of_one_process(method, two, tmp_path, m
 
 def test_the_command_line(two, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    on = ["--cluster", two.address]
+    on = [*two.on]
     noisy = ["--noise", "0.05", "--spp", "200"]
     assert render(*noisy, *on, "-o", "a.exr", "-o", "a.film", "--checkpoint", "1h") == 0
     told = capsys.readouterr().err
-    assert "2 workers; blocks lost 0" in told
+    assert "2 workers, 0 lost" in told
     assert render(*noisy, "-o", "b.exr", "-o", "b.film") == 0
     films = [film_file.read(name).film for name in ("a.film", "b.film", "a.resume.exr")]
     assert len({tasks.film_digest(film) for film in films}) == 1
@@ -303,4 +281,4 @@ def test_the_command_line(two, tmp_path, monkeypatch, capsys):
         assert found[0] == found[1]
     np.testing.assert_array_equal(images.read("a.exr"), images.read("b.exr"))
     assert render("--noise", "0.05", "--samples", "0:4", *on, "-o", "a.film") == 2
-    assert render("--noise", "0.05", *on, "-o", "c.exr", "--time", "3s") == 0
+    assert render("--noise", "0.05", *on, "-o", "c.exr", "--time", "10s") == 0

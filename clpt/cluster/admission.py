@@ -1,0 +1,236 @@
+"""Which workers of a cluster take part in a render: those that can, and compute what others do."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import logging
+import time
+from collections import Counter
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from clpt.cluster import tasks
+from clpt.cluster.blocks import WorkerRecord
+from clpt.cluster.bundle import Bundle
+from clpt.cluster.calls import Call, Calls, reply_of
+from clpt.errors import ClusterError
+from clpt.scene.fingerprint import Plain
+
+log = logging.getLogger(__name__)
+
+LOOK_SECONDS = 0.5  # between looks at which workers there are
+ANSWER_SECONDS = 30.0  # in which a scheduler answers
+GONE = "the scheduler is gone"
+
+
+@dataclass(frozen=True)
+class Job:
+    """What workers render: text, from `tasks.describe_job`; the bundle of its scene; and the folder
+    that holds the files of the bundle.
+    """
+
+    text: str
+    bundle: Bundle
+    folder: Path
+
+    @cached_property
+    def digest(self) -> str:
+        """The SHA-256 by which workers know it: of scene, options, kernels and version."""
+        return tasks.digest_of(self.text)
+
+
+@dataclass
+class Agreed:
+    """What renderers know alike that render side by side.
+
+    kind: the class of device that takes part, that of the first worker; "" before there is one.
+    checked: workers whose sample was that of another one.
+    """
+
+    kind: str = ""
+    checked: set[str] = field(default_factory=set)
+
+
+@dataclass
+class Known:
+    """What is known of workers, from one run to the next.
+
+    mixed: whether several classes of devices take part; patience: seconds without a worker, until
+    the render ends. records: of the workers that take part, by address; refused: why others do not;
+    lost: how many are gone; classes: of devices that take part, by what they are called.
+    """
+
+    mixed: bool
+    patience: float
+    records: dict[str, WorkerRecord] = field(default_factory=dict)
+    refused: dict[str, str] = field(default_factory=dict)
+    lost: int = 0
+    classes: dict[str, dict[str, Plain]] = field(default_factory=dict)
+    agreed: Agreed = field(default_factory=Agreed)
+
+
+class Admission:
+    """The workers that may render in one run.
+
+    fit: their classes, by address, with the job open; opening: calls of those that get ready;
+    there: all that the scheduler knows.
+    """
+
+    def __init__(self, calls: Calls, job: Job, known: Known):
+        self.calls, self.job, self.known = calls, job, known
+        self.fit: dict[str, str] = {}
+        self.opening: dict[Call, str] = {}
+        self.there: set[str] = set()
+        self._trials: dict[str, tuple[str, str]] = {}  # class, and film of one sample
+        self._looked, self._seen = -LOOK_SECONDS, time.monotonic()
+
+    def admit(self) -> None:
+        """Take in workers that have got ready."""
+        for call in [call for call in self.opening if call.done()]:
+            self._admit(self.opening.pop(call), reply_of(call))
+
+    def reopen(self, address: str) -> None:
+        """Note that a worker has the job no longer."""
+        self.fit.pop(address, None)
+        self._trials.pop(address, None)
+
+    def follow(self) -> None:
+        """Open the job at workers that came; forget those that went.
+
+        Raises ClusterError without a scheduler, and where nobody renders and nobody will.
+        """
+        if time.monotonic() < self._looked + LOOK_SECONDS:
+            return
+        addresses = self.look()
+        known = self.known
+        for address in known.records.keys() - addresses:
+            log.warning("the worker %s is gone; others render its samples", address)
+            self.calls.hang_up(address)
+            known.lost += 1
+            del known.records[address]
+            self.fit.pop(address, None)
+        for call in [call for call, address in self.opening.items() if address not in addresses]:
+            call.cancel()
+            del self.opening[call]
+        for address in sorted(addresses - self.fit.keys() - known.refused.keys()):
+            if address not in self.opening.values() and address not in self._trials:
+                self.opening[self.calls.begin(self._open(address))] = address
+        self._judge()
+        if self.fit or self.opening:
+            self._seen = time.monotonic()
+        if addresses and addresses <= known.refused.keys():
+            named = "; ".join(f"{name}: {why}" for name, why in list(known.refused.items())[:4])
+            raise ClusterError(f"no worker can render this: {named}")
+        if time.monotonic() - self._seen > known.patience:
+            raise ClusterError(f"for {known.patience:.0f} s there was no worker")
+
+    def look(self) -> set[str]:
+        """The workers that the scheduler knows. Raises ClusterError without a scheduler."""
+        try:
+            asked = self.calls.begin(self.calls.client.scheduler.ncores())
+            addresses = set(asked.result(ANSWER_SECONDS))
+        except (OSError, TimeoutError, concurrent.futures.TimeoutError, AttributeError) as error:
+            raise ClusterError(f"{GONE}; what was rendered so far is kept") from error
+        self._looked, self.there = time.monotonic(), addresses
+        self._trials = {name: trial for name, trial in self._trials.items() if name in addresses}
+        return addresses
+
+    async def _open(self, address: str) -> tasks.Reply:
+        """Open the job at a worker, with one sample of one that was not checked; its answer."""
+        at = [address]
+        reply = await self.calls.at(at, tasks.open_job, self.job.text, {})
+        if "lacks" in reply:
+            files = self._files(reply["lacks"])
+            reply = await self.calls.at(at, tasks.open_job, self.job.text, files)
+        reason = reply.get("refused") or reply.get("error")
+        if reason is None and "kind" not in reply:
+            reason = "it cannot keep the scene's files"
+        if reason is not None:
+            return {"refused": reason}
+        return reply if address in self.known.agreed.checked else await self._try(address, reply)
+
+    async def _try(self, address: str, opened: tasks.Reply) -> tasks.Reply:
+        """Let a worker render one sample, and tell only the digest of its film."""
+        reply = await self.calls.at([address], tasks.render_trial, self.job.digest)
+        if "error" in reply:
+            return reply
+        return {**opened, "trial": reply.get("sha256"), "took": reply.get("seconds")}
+
+    def _files(self, digests: list[str]) -> dict[str, Any]:
+        """Tasks whose results are files of the bundle; workers get them from each other."""
+        named = self.job.bundle.files.items()
+        paths = {digest: self.job.folder / name for name, digest in named}
+        return {
+            digest: self.calls.client.submit(
+                tasks.give, paths[digest].read_bytes(), key=f"clpt-file-{digest}"
+            )
+            for digest in digests
+            if digest in paths
+        }
+
+    def _admit(self, address: str, reply: tasks.Reply) -> None:
+        """Let a worker render that has the job open, if it may, and its sample is right."""
+        agreed, kind = self.known.agreed, str(reply.get("kind", ""))
+        reason = reply.get("refused") or reply.get("error")
+        if reason is not None:
+            self.refuse(address, str(reason))
+            return
+        if not self.known.mixed:
+            agreed.kind = agreed.kind or kind
+            if kind != agreed.kind:
+                reason = f"it is of another class of device: {kind}, others: {agreed.kind}"
+                self.refuse(address, reason)
+                return
+        self.known.classes[kind] = dict(reply["class"])
+        record = self.known.records.setdefault(address, WorkerRecord())
+        record.kind = kind
+        if reply.get("trial"):
+            record.rate = record.rate or 1.0 / max(float(reply["took"]), 1e-6)
+            self._trials[address] = kind, str(reply["trial"])
+            self._judge()
+        elif address in agreed.checked:
+            self.fit[address] = kind
+
+    def _judge(self) -> None:
+        """Compare the samples of workers of each class, and refuse those whose sample is wrong.
+
+        Of two equal ones both are right; a worker without an equal is believed. Raises ClusterError
+        where it cannot be told whose is wrong, and nobody comes who might.
+        """
+        checked = self.known.agreed.checked
+        for kind in {kind for kind, _ in self._trials.values()}:
+            films = {name: film for name, (of, film) in self._trials.items() if of == kind}
+            peers = [name for name, of in self.fit.items() if of == kind and name not in films]
+            if len(films) == 1 and peers:  # what do those have that were checked before it came?
+                if peers[0] not in self.opening.values():
+                    opened = {"kind": kind, "class": self.known.classes[kind]}
+                    self.opening[self.calls.begin(self._try(peers[0], opened))] = peers[0]
+                continue
+            votes: Counter[str] = Counter()
+            for name, film in films.items():
+                votes[film] += 2 if name in checked else 1
+            (best, most), (_, second) = [*votes.most_common(2), ("", 0)][:2]
+            if self.opening and (most < 2 or most == second):
+                continue  # for another one that gets ready
+            if most == second:
+                raise ClusterError(
+                    f"{' and '.join(films)} have different films of a sample, though they are of "
+                    "one kind; one of them computes wrongly"
+                )
+            for name, film in films.items():
+                if film != best:
+                    self.refuse(name, "its film of a sample is wrong")
+                    continue
+                self.fit[name] = kind
+                if most > 1:
+                    checked.add(name)
+
+    def refuse(self, address: str, reason: str) -> None:
+        """Take nothing more from a worker."""
+        log.warning("the worker %s is refused: %s", address, reason)
+        self.known.refused[address] = reason
+        self.known.records.pop(address, None)
+        self.fit.pop(address, None)
+        self._trials.pop(address, None)
