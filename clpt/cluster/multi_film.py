@@ -90,7 +90,7 @@ class MultiFilm(FilmKeeping, Pictures):
             state = self._on_first(lambda first: first.renderer.film_state())
             return dataclasses.replace(state, taken=taken)
         if self._crew.workers:
-            self._crew.save()
+            self._on_first(lambda first: None)  # the host has all that they have
         if self._crew.saved is not None:
             return self._crew.saved
         return self._on_first(lambda first: first.renderer.film_state())
@@ -264,14 +264,21 @@ class MultiFilm(FilmKeeping, Pictures):
     @synchronized
     def _on_first(self, action: Callable[[DeviceWorker], _Result]) -> _Result:
         """Do something on the first device, whose film holds the picture; or else on the next."""
-        while True:
-            first = self._show()
-            try:
-                return action(first)
-            except SceneError:
-                raise
-            except Exception as error:
-                self._crew.drop(first, error)
+        try:
+            while True:
+                first = self._show()
+                try:
+                    return action(first)
+                except SceneError:
+                    raise
+                except Exception as error:
+                    self._crew.drop(first, error)
+        except Exception:
+            raise
+        except BaseException:  # on the way films are moved between devices and the host
+            if isinstance(self._contents, Contents):
+                self._contents = self.change("gathering of films", heals=False)
+            raise
 
     def _show(self) -> DeviceWorker:
         """Let the film of the first device hold the picture; return that device."""
