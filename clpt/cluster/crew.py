@@ -10,14 +10,14 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Iterable
-from contextlib import suppress
 from dataclasses import replace
-from queue import Empty, SimpleQueue
+from functools import partial
 from typing import NoReturn
 
 from clpt.cluster.blocks import Block, Blocks, WorkerRecord
 from clpt.cluster.device_worker import DeviceWorker, added
 from clpt.cluster.sample_ranges import gaps
+from clpt.cluster.threads import TICK, Threads
 from clpt.errors import ClusterError
 from clpt.render.locking import Stop
 from clpt.render.wavefront.film_state import FilmState, Ranges, join_ranges
@@ -28,7 +28,6 @@ log = logging.getLogger(__name__)
 
 BLOCK_SECONDS = 1.0  # that a block should take
 SAVE_SECONDS = 60.0  # of a device's work, after which its film goes to the host: no more is lost
-TICK = 0.05  # seconds between two looks at the progress
 
 
 class LostPicture(Exception):
@@ -51,13 +50,9 @@ class Crew:
         self.saved_ranges: Ranges = ()
         self.lost: list[tuple[Selection, int, int]] = []
         self.keeper: DeviceWorker | None = None
-        # Ctrl-C may come while the main thread takes a Condition, and leave it taken for ever; a
-        # lock and a queue of the interpreter it cannot.
         self._lock = threading.RLock()
-        self._changed = threading.Condition(self._lock)
-        self._news: SimpleQueue[None] = SimpleQueue()  # for who waits for all devices
-        self._threads: list[threading.Thread] = []
-        self._ending = False
+        self._changed = threading.Condition(self._lock)  # only threads of devices wait for it
+        self._threads = Threads()
         self._past = [Counts() for _ in self.workers[0].past]  # of devices that failed
 
     @property
@@ -158,7 +153,7 @@ class Crew:
             self.workers.remove(worker)
             self.failed.append((worker, error))
             if worker is self.keeper:
-                self._ending = True
+                self._threads.over = True
             else:
                 self.lost += worker.unsaved
             self._past = [added(*pair) for pair in zip(self._past, worker.past, strict=True)]
@@ -176,20 +171,15 @@ class Crew:
         end = ranges[-1][1]
         others = tuple(gaps(ranges, 0, end))
         blocks = Blocks(end, others, seconds=BLOCK_SECONDS)
-        self._ending = False
         for worker in self.workers:
             rate = worker.rate / selection.pixels
             blocks.join(worker, WorkerRecord(worker.name, rate, size=BLOCK_SECONDS * rate))
-        self._threads = [
-            threading.Thread(target=self._work, args=(worker, blocks, selection), daemon=True)
-            for worker in self.workers
-        ]
+        threads = self._threads = Threads()
         try:
-            for thread in self._threads:
-                thread.start()
+            for worker in list(self.workers):
+                threads.start(partial(self._work, worker, blocks, selection, threads))
             while not self._over(blocks):
-                with suppress(Empty):
-                    self._news.get(timeout=TICK)
+                threads.wait()
                 if not tick():
                     break
         finally:
@@ -202,30 +192,31 @@ class Crew:
         return blocks.done
 
     def _over(self, blocks: Blocks) -> bool:
-        return self._ending or self.stop.is_set() or blocks.done or not self.workers
+        return self._threads.over or self.stop.is_set() or blocks.done or not self.workers
 
     def rest(self) -> None:
         """Let devices end what they do, and wait for them."""
-        with self._lock:
-            self._ending = True
-            self._tell()
-        for thread in self._threads:
-            if thread.ident is not None:  # it was started
-                thread.join()
+        self._threads.end()
 
     def _tell(self) -> None:
         """Wake up all who wait for a change."""
         self._changed.notify_all()
-        self._news.put(None)
+        self._threads.tell()
 
-    def _work(self, worker: DeviceWorker, blocks: Blocks, selection: Selection) -> None:
-        """Take blocks until none is left: a device's thread."""
+    def _work(
+        self, worker: DeviceWorker, blocks: Blocks, selection: Selection, threads: Threads
+    ) -> None:
+        """Take blocks until none is left: a device's thread, one of these."""
+
+        def goes_on(_: object = None) -> bool:
+            return not (threads.over or self.stop.is_set())
+
         try:
             if worker.shows and worker is not self.keeper:
                 worker.clear()
-            while (block := self._next(worker, blocks)) is not None:
+            while (block := self._next(worker, blocks, goes_on)) is not None:
                 began = time.perf_counter()
-                finished = worker.do(selection, block.first, block.end, lambda _: self._goes_on())
+                finished = worker.do(selection, block.first, block.end, goes_on)
                 seconds = time.perf_counter() - began
                 self._note(worker, blocks, selection, block, seconds, finished)
                 if worker.unsaved_seconds > SAVE_SECONDS and self.keeper is None:
@@ -236,17 +227,16 @@ class Crew:
                 blocks.lose(worker)
                 self._tell()
 
-    def _goes_on(self) -> bool:
-        return not (self._ending or self.stop.is_set())
-
-    def _next(self, worker: DeviceWorker, blocks: Blocks) -> Block | None:
+    def _next(
+        self, worker: DeviceWorker, blocks: Blocks, goes_on: Callable[[], bool]
+    ) -> Block | None:
         """Wait for a block; return None when there is nothing more to do."""
         with self._changed:
-            while self._goes_on() and not blocks.done:
+            while goes_on() and not blocks.done:
                 block = blocks.take(worker)
                 if block is not None:
                     return block
-                self._changed.wait()
+                self._changed.wait(TICK)  # the main thread tells nobody that they are over
         return None
 
     def _note(

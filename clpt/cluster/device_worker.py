@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
+from clpt.cluster.threads import on_all
 from clpt.device import Device
 from clpt.errors import SceneError
+from clpt.render.contents import Contents
 from clpt.render.editing.scene_edit import MaterialKey, Replacements, ShapeKey
 from clpt.render.lowering.scene import Lowered
 from clpt.render.renderer import Renderer
@@ -50,6 +51,10 @@ class SharingRenderer(Renderer):
     def __init__(self, scene: Scene, device: Device, shared: Once, **options: Any):
         self.shared = shared
         super().__init__(scene, device, **options)
+
+    def _emptied(self, *, recover: bool = False) -> Contents:
+        """As for `Renderer`; the crew uses its film without a change, so it may need to recover."""
+        return super()._emptied(recover=True)
 
     def _lower(self, scene: Scene, former: Lowered | None = None) -> Lowered:
         lower = super()._lower
@@ -151,21 +156,13 @@ def device_names(devices: list[Device]) -> list[str]:
     ]
 
 
-def on_all(action: Callable[[Any], Any], items: list[Any]) -> list[Any]:
+def where_it_works(action: Callable[[Any], Any], items: list[Any]) -> list[Any]:
     """Do something with every item at once; return the results, for some of them exceptions.
 
     Raises what was raised for the first item, if it is bad input or if all failed.
     """
-
-    def tried(item: Any) -> Any:
-        try:
-            return action(item)
-        except Exception as error:
-            return error
-
-    with ThreadPoolExecutor(len(items)) as pool:
-        results = list(pool.map(tried, items))
-    errors = [result for result in results if isinstance(result, Exception)]
+    results = on_all(action, items)
+    errors = [result for result in results if isinstance(result, BaseException)]
     for error in errors:
         if isinstance(error, (SceneError, TypeError)):
             raise error

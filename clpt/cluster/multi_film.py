@@ -15,7 +15,7 @@ from clpt.cluster.crew import Crew
 from clpt.cluster.device_worker import DeviceWorker
 from clpt.cluster.multi_noise import AdaptiveCrew
 from clpt.errors import ClusterError, DeviceError, MemoryBudgetError, SceneError
-from clpt.render.contents import Contents
+from clpt.render.contents import Change, Contents
 from clpt.render.film.film_keeping import FilmKeeping
 from clpt.render.film.saved_film import Origin, PictureForm, SavedFilm, Session
 from clpt.render.locking import synchronized
@@ -264,24 +264,37 @@ class MultiFilm(FilmKeeping, Pictures):
     @synchronized
     def _on_first(self, action: Callable[[DeviceWorker], _Result]) -> _Result:
         """Do something on the first device, whose film holds the picture; or else on the next."""
-        try:
-            while True:
-                first = self._show()
-                try:
-                    return action(first)
-                except SceneError:
-                    raise
-                except Exception as error:
-                    self._crew.drop(first, error)
-        except Exception:
-            raise
-        except BaseException:  # on the way films are moved between devices and the host
-            if isinstance(self._contents, Contents):
-                self._contents = self.change("gathering of films", heals=False)
-            raise
+        while True:
+            first = self._show()
+            try:
+                return action(first)
+            except SceneError:
+                raise
+            except Exception as error:
+                self._crew.drop(first, error)
 
     def _show(self) -> DeviceWorker:
         """Let the film of the first device hold the picture; return that device."""
+        crew = self._crew
+        if isinstance(self._contents, Change):  # of who asks
+            return self._gathered()
+        moves = self._noise is not None or any(worker.unsaved for worker in crew.workers)
+        if not moves and crew.workers and (crew.first.shows or crew.saved is None):
+            return crew.first
+        now = self.contents
+
+        def finish(error: BaseException) -> Contents:
+            if isinstance(error, Exception):
+                return now  # the last device has failed
+            raise error  # samples may be in two films, or in none
+
+        with self.change("gathering of films", finish):
+            first = self._gathered()
+            self._contents = now
+        return first
+
+    def _gathered(self) -> DeviceWorker:
+        """Move what devices have to the host, and from there to the first; return that device."""
         crew = self._crew
         if self._noise is not None:
             return self._noise.shown()

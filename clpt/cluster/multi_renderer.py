@@ -10,7 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 from clpt import device as dev
 from clpt.cluster.crew import Crew
-from clpt.cluster.device_worker import DeviceWorker, Once, SharingRenderer, device_names, on_all
+from clpt.cluster.device_worker import (
+    DeviceWorker,
+    Once,
+    SharingRenderer,
+    device_names,
+    where_it_works,
+)
 from clpt.cluster.multi_film import MultiFilm
 from clpt.cluster.multi_noise import CrewTracer
 from clpt.errors import DeviceError
@@ -22,7 +28,7 @@ from clpt.render.progress import Progress
 from clpt.render.renderer import next_range, texture_budget_of
 from clpt.render.stats import RenderStats
 from clpt.render.wavefront import adaptive
-from clpt.render.wavefront.film_state import join_ranges
+from clpt.render.wavefront.film_state import FilmState, join_ranges
 from clpt.render.wavefront.tracer import Tracer
 from clpt.render.wavefront.wavefront import Counts
 from clpt.scene import Scene
@@ -89,7 +95,7 @@ class MultiRenderer(MultiFilm):
             return SharingRenderer(scene, device, shared, **options)
 
         names = device_names(chosen)
-        made = on_all(make, chosen)
+        made = where_it_works(make, chosen)
         workers = []
         for name, result in zip(names, made, strict=True):
             if isinstance(result, SharingRenderer):
@@ -193,29 +199,35 @@ class MultiRenderer(MultiFilm):
         if self._stop.is_set():  # before it began: nothing is taken
             self._stop.clear()
             return False
+        base: FilmState | None = None  # that adaptive sampling begins over
         if noise is not None:
             noise = adaptive.checked(noise, self._crew.first.renderer.wavefronts[0].features)
-            self._noise = self._noise or self._adaptively(self.film_state(), {})
+            if self._noise is None:
+                base = self.film_state()
         raised: list[BaseException] = []
         tick = self._ticker(end, progress, raised)
-        now, chosen, began = self.contents, self._noise, time.perf_counter()
+        now, began = self.contents, time.perf_counter()
+        plain = noise is None and self._noise is None
         more = dataclasses.replace(now, taken=join_ranges(now.taken, ((first, end),)))
 
         def finish(error: BaseException) -> Contents:
             self._crew.rest()
-            if chosen is None:
+            if plain:
                 return dataclasses.replace(now, taken=self._crew.ranges)
             if isinstance(error, Exception):
-                return more
+                return now if self._noise is None else more
             raise error  # cells of some devices may be in no film
 
         try:
             with self.change("run", finish):
-                if chosen is None:
+                if plain:
                     finished = self._crew.run(self._crew.whole, ((first, end),), tick)
                     self._contents = dataclasses.replace(now, taken=self._crew.ranges)
                 else:
-                    finished = chosen.run((first, end, noise), tick)
+                    if self._noise is None:
+                        assert base is not None, "it begins with this run"
+                        self._noise = self._adaptively(base, {})
+                    finished = self._noise.run((first, end, noise), tick)
                     self._contents = more
         finally:
             self._telling = False
@@ -333,8 +345,8 @@ class MultiRenderer(MultiFilm):
         Raises SceneError, TypeError as the first device does.
         """
         workers = list(self._crew.workers)
-        results = on_all(lambda worker: action(worker.renderer), workers)
+        results = where_it_works(lambda worker: action(worker.renderer), workers)
         for worker, result in zip(workers, results, strict=True):
-            if isinstance(result, Exception):
+            if isinstance(result, BaseException):
                 worker.unsaved.clear()  # of the picture that ends
                 self._crew.drop(worker, result)
