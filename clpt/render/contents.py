@@ -68,15 +68,13 @@ class Change:
 
     @contextmanager
     def beginning_unless(self, *refusals: type[BaseException]) -> Iterator[None]:
-        """Begin when what is inside ends, but not where one of these ends it: nothing changes."""
+        """Begin with what is inside, unless one of these ends it: nothing has changed then."""
+        self.begin()
         try:
             yield
         except refusals:
+            self._began = False
             raise
-        except BaseException:
-            self.begin()
-            raise
-        self.begin()
 
     def __enter__(self) -> Change:
         self._owner._contents = self

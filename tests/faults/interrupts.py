@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import clpt
+from clpt import device as dev
 from clpt.render.film import film_file
 from clpt.render.lowering.geometry import shapes as placing
 from clpt.render.wavefront.film_state import FilmState, Ranges
@@ -130,7 +131,7 @@ class Known:
 class Trial:
     """A renderer that is interrupted and looked at; outcomes: how often each came."""
 
-    def __init__(self, make: Callable[[], clpt.Renderer]):
+    def __init__(self, make: Callable[[], clpt.Renderer | clpt.MultiRenderer]):
         self.make, self.renderer = make, make()
         self.known = Known(self.renderer)
         self.outcomes: collections.Counter[str] = collections.Counter()
@@ -160,7 +161,10 @@ class Trial:
 
     def _check_broken(self, what: str, told: str) -> None:
         assert "is broken" in told, f"{what}: {told}"
-        for use in (self.renderer.image, lambda: self.renderer.run(1), self.renderer.step):
+        uses = [self.renderer.image, lambda: self.renderer.run(1)]
+        if isinstance(self.renderer, clpt.Renderer):
+            uses.append(self.renderer.step)
+        for use in uses:
             try:
                 use()
             except clpt.DeviceError as error:
@@ -202,7 +206,7 @@ def changes(trial: Trial) -> dict[str, Callable[[], Any]]:
     same = dataclasses.replace(scene.camera)
     shape = next(shape for shape in scene.shapes if shape.name == "floor")
     place = placing.placement(shape)
-    return {
+    found = {
         "run": lambda: trial.renderer.run(4),
         "run by noise": lambda: trial.renderer.run(NUMBERS - 2, noise=0.2),
         "step": lambda: trial.renderer.step(4),
@@ -215,6 +219,10 @@ def changes(trial: Trial) -> dict[str, Callable[[], Any]]:
         "update of the scene": lambda: trial.renderer.update(scene=scene),
         "update of a place": lambda: trial.renderer.update(transforms={shape.name: place}),
     }
+    if isinstance(renderer, clpt.MultiRenderer):  # whose films come together for a picture
+        del found["step"]
+        found["image"] = lambda: trial.renderer.image()
+    return found
 
 
 def every_line(trial: Trial, name: str, act: Callable[[], Any], most: int) -> int:
@@ -264,8 +272,13 @@ def signals(trial: Trial, count: int, seed: int = 0) -> int:
 def main() -> None:
     """Interrupt a Cornell box."""
     scene = small(clpt.load(Path(__file__).parents[1] / "scenes" / "cornell.xml"))
-    for options in ({}, {"looped": True}, {"looped": False}):
-        trial = Trial(lambda options=options: clpt.Renderer(scene, slots=128, **options))
+    device = dev.choose()
+    for options in ({}, {"looped": True}, {"looped": False}, "two queues"):
+        if isinstance(options, str):
+            pair = [device, dev.choose()]
+            trial = Trial(lambda pair=pair: clpt.MultiRenderer(scene, pair, slots=128))
+        else:
+            trial = Trial(lambda options=options: clpt.Renderer(scene, slots=128, **options))
         start = time.perf_counter()
         for name, act in changes(trial).items():
             lines = every_line(trial, name, act, 200 if "scene" in name else 2000)
