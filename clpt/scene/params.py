@@ -314,6 +314,11 @@ def defaults(cls: type) -> dict[str, Any]:
     }
 
 
+def fields_of(kind: Kind) -> dict[str, Any]:
+    """Return the values of an object's fields by name."""
+    return {field.name: getattr(kind, field.name) for field in dataclasses.fields(kind)}
+
+
 def device_params(cls: type) -> Mapping[str, Param]:
     """Return the parameters that the kernels read."""
     return _declared_of(cls, *DEVICE_ROLES)

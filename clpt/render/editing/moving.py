@@ -26,6 +26,7 @@ from clpt.render.lowering.geometry import analytic, shapes, strands, triangles
 from clpt.render.lowering.geometry.tessellate import keeps_its_kind
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene import Scene
+from clpt.scene.params import fields_of
 from clpt.scene.shapes import Curves, Instance, Mesh, Shape, Spheres
 
 _ROOT = "motion/place_vertices.cl"
@@ -384,7 +385,7 @@ def _check_fields(old: Any, new: Any) -> None:
     """Raise CannotMove if more than what moves differs between two shapes."""
     if not isinstance(new, Shape) or type(old) is not type(new):
         raise CannotMove(f"{_name(old)} becomes something else")
-    changed = {name for name, value in vars(new).items() if value is not vars(old)[name]}
+    changed = {name for name, value in fields_of(new).items() if value is not getattr(old, name)}
     if changed - _MOVABLE:
         raise CannotMove(f"{_name(new)} has another {' and '.join(sorted(changed - _MOVABLE))}")
 

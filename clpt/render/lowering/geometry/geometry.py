@@ -23,6 +23,7 @@ from clpt.render.lowering.lights.lights import Emitter
 from clpt.render.lowering.materials.material_words import MaterialWords
 from clpt.render.lowering.motion import Motions
 from clpt.render.lowering.textures.attributes import Owner
+from clpt.scene.params import fields_of
 from clpt.scene.shapes import Shape
 
 LEAST_RADIUS = 1e-12  # of a sphere around a scene [m]
@@ -187,7 +188,7 @@ class _Builder:
         if shape.emission is not None:
             count = len(times) if _in_triangles(shape) else 1
             self.emitters.append(Emitter(shape, len(self.rows), *corners, keys=max(count, 1)))
-            values = vars(shape.emission).values()
+            values = fields_of(shape.emission).values()
             self.uvs |= any(getattr(value, "is_texture", False) for value in values)
         self.rows.append(row)
 

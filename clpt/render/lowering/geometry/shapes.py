@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.errors import SceneError
 from clpt.render.lowering.device_arrays import on_host
+from clpt.scene.params import fields_of
 from clpt.scene.shapes import Shape
 
 Points = NDArray[np.float32]
@@ -25,7 +26,7 @@ def where(shape: Shape) -> str:
 
 def geometry(shape: Shape) -> tuple[Any, ...]:
     """Return all that the triangles of a shape follow from: its fields but for the surface."""
-    own = (value for name, value in vars(shape).items() if name not in ("material", "emission"))
+    own = (value for name, value in fields_of(shape).items() if name not in ("material", "emission"))
     return type(shape), *own
 
 
