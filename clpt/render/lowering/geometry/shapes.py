@@ -26,8 +26,8 @@ def where(shape: Shape) -> str:
 
 def geometry(shape: Shape) -> tuple[Any, ...]:
     """Return all that the triangles of a shape follow from: its fields but for the surface."""
-    own = (value for name, value in fields_of(shape).items() if name not in ("material", "emission"))
-    return type(shape), *own
+    own = fields_of(shape)
+    return type(shape), *(own[name] for name in own if name not in ("material", "emission"))
 
 
 def placement(shape: Shape) -> NDArray[np.float64]:
