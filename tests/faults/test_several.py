@@ -35,7 +35,7 @@ def trial(scenes: Path) -> Iterator[Trial]:
     made.renderer.close()
 
 
-@pytest.mark.parametrize("most", [8, pytest.param(2000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("most", [8, pytest.param(400, marks=pytest.mark.slow)])
 def test_an_error_at_any_line(trial: Trial, most: int) -> None:
     """Of all that changes the film, and of what brings films together."""
     for name, act in changes(trial).items():
