@@ -159,6 +159,6 @@ def test_python_is_started_in_one_place() -> None:
     named = [
         path.relative_to(ROOT).as_posix()
         for path in sorted((ROOT / "clpt").rglob("*.py"))
-        if re.search(r"sys\.executable|multiprocessing|ProcessPoolExecutor", path.read_text())
+        if re.search(r"sys\.executable|import multiprocessing|ProcessPoolExecutor", path.read_text())
     ]
     assert named == ["clpt/child_processes.py"]
