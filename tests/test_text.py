@@ -32,7 +32,7 @@ def test_utf_16_of_the_other_order():
 
 def test_no_such_file(tmp_path):
     for path in (tmp_path / "no", tmp_path, "a\0b"):
-        with pytest.raises(SceneError, match="cannot be read|is a folder"):
+        with pytest.raises(SceneError, match=r"cannot be read|is a folder"):
             text.read(path)
 
 

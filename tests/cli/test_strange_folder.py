@@ -156,9 +156,10 @@ def test_a_child_finds_what_this_process_does(folder: Path, monkeypatch) -> None
 
 def test_python_is_started_in_one_place() -> None:
     """A module that starts a Python does so by `child_processes`."""
+    starts = re.compile(r"sys\.executable|import multiprocessing|ProcessPoolExecutor")
     named = [
         path.relative_to(ROOT).as_posix()
         for path in sorted((ROOT / "clpt").rglob("*.py"))
-        if re.search(r"sys\.executable|import multiprocessing|ProcessPoolExecutor", path.read_text())
+        if starts.search(path.read_text())
     ]
     assert named == ["clpt/child_processes.py"]

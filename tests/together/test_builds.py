@@ -18,6 +18,7 @@ from clpt.scene.materials import (
     Dielectric,
     Diffuse,
     Fluorescent,
+    Hair,
     Layer,
     Null,
     Phong,
@@ -65,6 +66,9 @@ MET: dict[str, dict[str, Any]] = {  # parts that once could not be in one scene
     "textures of textures": {
         "shapes": [Sphere(material=Diffuse(reflectance=Mix(first=0.2, second=Checkers())))],
         "lights": [Point(position=(0.0, 0.0, 3.0))],
+    },
+    "a factor of textures": {
+        "shapes": [Sphere(material=Hair(sigma_a=Mix(first=0.2, second=Checkers())))],
     },
     **{
         f"photons, and the sampler {cls.kind}": {

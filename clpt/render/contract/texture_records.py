@@ -105,4 +105,4 @@ OPERATIONS = {"push": 0, "multiply": 8, "mix": 16}
 
 END = 32
 
-ROLES = ("reflectance", "emission", "index", "real")
+ROLES = ("reflectance", "emission", "index", "factor", "real")
