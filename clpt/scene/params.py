@@ -316,7 +316,12 @@ def defaults(cls: type) -> dict[str, Any]:
 
 def fields_of(kind: Kind) -> dict[str, Any]:
     """Return the values of an object's fields by name."""
-    return {field.name: getattr(kind, field.name) for field in dataclasses.fields(kind)}
+    return {name: getattr(kind, name) for name in _field_names(type(kind))}
+
+
+@cache
+def _field_names(cls: type[Kind]) -> tuple[str, ...]:
+    return tuple(field.name for field in dataclasses.fields(cls))
 
 
 def device_params(cls: type) -> Mapping[str, Param]:

@@ -118,7 +118,7 @@ def value(rng: Random, document: Any) -> Any:
         owner, key = rng.choice(places)
         way = rng.randrange(5)
         if way == 0:
-            owner[key] = rng.choice(VALUES)
+            owner[key] = copy.deepcopy(rng.choice(VALUES))
         elif way == 1:
             owner[key] = copy.deepcopy(rng.choice(places)[0])
         elif way == 2 and isinstance(owner, list):

