@@ -320,7 +320,7 @@ def fields_of(kind: Kind) -> dict[str, Any]:
 
 
 @cache
-def _field_names(cls: type[Kind]) -> tuple[str, ...]:
+def _field_names(cls: Any) -> tuple[str, ...]:
     return tuple(field.name for field in dataclasses.fields(cls))
 
 
