@@ -316,7 +316,8 @@ def defaults(cls: type) -> dict[str, Any]:
 
 def fields_of(kind: Kind) -> dict[str, Any]:
     """Return the values of an object's fields by name."""
-    return {name: getattr(kind, name) for name in _field_names(type(kind))}
+    cls: Any = type(kind)
+    return {name: getattr(kind, name) for name in _field_names(cls)}
 
 
 @cache
