@@ -73,6 +73,11 @@ class Tally:
                 self.faults[message["text"]] += 1
 
 
+def _interruptible() -> None:
+    """Let Ctrl-C end this process, which a shell may have switched off in the background."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 class View:
     """A `clpt view` in a process of its own; folder: for what is saved."""
 
@@ -81,6 +86,7 @@ class View:
         self.process = subprocess.Popen(
             [sys.executable, "-m", "clpt", "view", str(CORNELL), *options, "-o", str(folder)],
             stdout=subprocess.PIPE, text=True,
+            preexec_fn=_interruptible,
         )  # fmt: skip
         assert self.process.stdout
         address = self.process.stdout.readline().strip()
