@@ -38,7 +38,7 @@ class Budget:
     of the files read; seconds: 600 by default; parts: elements, shapes, instances and textures, by
     default 50 000 and one for each 4 bytes of the files read, repeated ones counted each time.
 
-    Raises SceneError for what is not above 0.
+    Raises SceneError for a limit that is not above 0.
     """
 
     memory: int | None = None

@@ -21,7 +21,7 @@ _SUFFIX = ".npy"  # of the members of an .npz
 def array(path: Path) -> NDArray[Any]:
     """Return the array of a .npy file, which stays on the disk until it is looked at.
 
-    Raises SceneError for what is no such file.
+    Raises SceneError if it is not such a file.
     """
     with input_files.opened(path) as file:
         try:
@@ -38,7 +38,7 @@ def array(path: Path) -> NDArray[Any]:
 def arrays(path: Path, names: Collection[str] | None = None) -> dict[str, NDArray[Any]]:
     """Return the arrays of an .npz file by name, those of `names` alone if it is given.
 
-    Raises SceneError for what is no such file, and where they would take too much memory.
+    Raises SceneError if it is not such a file, and where they would take too much memory.
     """
     with input_files.opened(path) as file:
         try:

@@ -33,7 +33,7 @@ def plain(data: bytes) -> bytes:
 
 
 def decode(data: bytes) -> str:
-    """Return a text, or a part of a plain one, as a string; what is no UTF-8 is Latin-1."""
+    """Return a text, or a part of a plain one, as a string: UTF-8, or else Latin-1."""
     data = plain(data)
     try:
         return data.decode("utf-8")

@@ -45,7 +45,8 @@ class RayMeshIntersector:
     origin in float64 first, so that its coordinates may be large; hits are located in float64.
     scale_to_box: a parameter of trimesh's intersector, without effect.
 
-    Raises SceneError for what is no Trimesh. A copy of the mesh has trimesh's own intersector.
+    Raises SceneError for an object that is not a Trimesh. A copy of the mesh has trimesh's own
+    intersector.
     """
 
     def __init__(self, geometry: Any, queue: Any = None, *, scale_to_box: bool = True):

@@ -69,7 +69,7 @@ class Calls:
             future.release()
             if getting is not None:
                 getting.add_done_callback(_outcome)
-        return reply if isinstance(reply, dict) else {"error": "it sent what is no reply"}
+        return reply if isinstance(reply, dict) else {"error": "it sent no reply that can be read"}
 
 
 def reply_of(call: Call) -> tasks.Reply:

@@ -188,7 +188,7 @@ def read(path: Path) -> bytes:
 def own_file(path: Path) -> int:
     """Open a file of this user for reading; return its handle.
 
-    Raises OSError for a link, for what is no file, and for a file of another user.
+    Raises OSError for a link, a folder or a pipe, and for a file of another user.
     """
     flags = os.O_RDONLY | getattr(os, "O_BINARY", 0)
     if os.name != "posix":

@@ -55,7 +55,7 @@ class _Header:
 
 
 def read(path: Path) -> Stored:
-    """Read a file. Raises SceneError for what is no Radiance picture, or is broken."""
+    """Read a file. Raises SceneError if it is not a Radiance picture, or is broken."""
     with path.open("rb") as file:
         header = _parsed(path, file.read(HEADER_BYTES))
     rows, columns = header.size

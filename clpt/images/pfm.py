@@ -26,7 +26,7 @@ CHANNELS = {b"Pf": 1, b"PF": 3, b"PF4": 4}
 
 
 def read(path: Path) -> Stored:
-    """Read a file. Raises SceneError for what is no PFM, or ends early."""
+    """Read a file. Raises SceneError if it is not a PFM, or ends early."""
     with path.open("rb") as file:
         header = HEADER.match(file.read(HEADER_BYTES))
     if header is None:

@@ -52,7 +52,7 @@ def decoded(
     are more than those of any image. profiled: heed what
     the file says of its colours and its orientation; else all of it is passed over in silence.
 
-    Raises SceneError for what is no such image or takes too much memory, else what Pillow does.
+    Raises SceneError if it is not such an image or takes too much memory, else Pillow's errors.
     """
     with _opened(source, formats) as image:
         (admit or partial(sizes.check_size, _file(source)))(image.width, image.height)

@@ -81,7 +81,7 @@ class Mesh(Shape):
         parameters: further ones of the mesh, such as material, to_world, name, or normals="smooth";
         without normals the triangles are flat.
 
-        Raises SceneError for what is no Trimesh.
+        Raises SceneError for an object that is not a Trimesh.
         """
         if not (hasattr(geometry, "faces") and hasattr(geometry, "vertices")):
             message = f"must be a trimesh.Trimesh, not {type(geometry).__name__}; "

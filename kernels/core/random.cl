@@ -20,5 +20,5 @@ inline natural reverse_bits(natural x)
     return ((x & 0x55555555u) << 1u) | ((x & 0xaaaaaaaau) >> 1u);
 }
 
-/* Whence the numbers of one sample of a pixel come; each sampler has its own use of both. */
+/* What the random numbers of one sample of a pixel follow from; each sampler uses both in its own way. */
 typedef struct { natural seed, index; } Sampler;

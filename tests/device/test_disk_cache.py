@@ -17,19 +17,6 @@ from clpt.output_files import PARTIAL
 posix = pytest.mark.skipif(os.name != "posix", reason="of users and permissions")
 
 
-@pytest.fixture
-def user(tmp_path, monkeypatch):
-    """A user's cache folder, and a folder for temporary files beside it."""
-    (tmp_path / "temporary").mkdir()
-    monkeypatch.setattr(disk_cache.tempfile, "tempdir", str(tmp_path / "temporary"))
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "user"))
-    for cached in (disk_cache.private_folder, disk_cache.temporary_folder):
-        cached.cache_clear()
-    yield tmp_path / "user" / "clpt"
-    for cached in (disk_cache.private_folder, disk_cache.temporary_folder):
-        cached.cache_clear()
-
-
 def test_what_was_used_last_stays(cache_folder):
     for number in range(4):
         disk_cache.store(f"entry{number}", "{}", bytes(1000))

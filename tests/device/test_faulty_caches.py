@@ -129,34 +129,23 @@ FAULTS = (
 )  # fmt: skip
 
 
-@pytest.fixture
-def own(tmp_path, monkeypatch) -> Path:
-    """A user's cache folder."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "user"))
-    for cached in (disk_cache.private_folder, disk_cache.temporary_folder):
-        cached.cache_clear()
-    yield tmp_path / "user" / "clpt"
-    for cached in (disk_cache.private_folder, disk_cache.temporary_folder):
-        cached.cache_clear()
-
-
 @each_cache
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.__name__)
 def test_a_file_that_is_not_what_was_kept(
-    own: Path, use: Callable[[Path], Path], fault: Callable[[Path], None], caplog
+    user: Path, use: Callable[[Path], Path], fault: Callable[[Path], None], caplog
 ) -> None:
-    path = use(own)
+    path = use(user)
     whole = path.read_bytes()
     fault(path)
-    outside = list(own.parent.parent.glob("outside"))
+    outside = list(user.parent.parent.glob("outside"))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         for _ in range(2):
-            use(own)
+            use(user)
     assert path.read_bytes() == whole and not path.is_symlink()
     assert path.lstat().st_uid == os.getuid()
     assert all(one.read_bytes() == whole for one in outside)
-    assert not caplog.records and not list(own.rglob(f"{output_files.PARTIAL}*"))
+    assert not caplog.records and not list(user.rglob(f"{output_files.PARTIAL}*"))
 
 
 @each_cache
@@ -165,7 +154,7 @@ def test_a_file_that_is_not_what_was_kept(
 )
 @pytest.mark.parametrize("call", ["open", "fsync", "replace", "flock"])
 def test_a_disk_that_refuses(
-    own: Path, use: Callable[[Path], Path], call: str, number: int, monkeypatch, caplog
+    user: Path, use: Callable[[Path], Path], call: str, number: int, monkeypatch, caplog
 ) -> None:
     """Nothing is kept, and nothing fails but what has to be kept."""
     disk_cache.folder()
@@ -183,59 +172,59 @@ def test_a_disk_that_refuses(
         monkeypatch.setattr("fcntl.flock", refused)
     else:
         monkeypatch.setattr(output_files.os, call, refused)
-    use(own)
+    use(user)
     monkeypatch.undo()
-    kept = [path for path in own.rglob("*") if path.is_file()]
+    kept = [path for path in user.rglob("*") if path.is_file()]
     assert bool(kept) is (call == "flock") and not caplog.records
 
 
-def _race(own: Path, seed: int) -> None:
+def _race(user: Path, seed: int) -> None:
     """Use every cache while others do, and while files are damaged and deleted."""
     rng = random.Random(seed)
     for _ in range(12):
         for use in (program, vendors, bundle):
             try:
-                path = use(own)
+                path = use(user)
                 if use is not vendors:
                     rng.choice((gone, swapped, lambda path: None))(path)
             except (ClusterError, SceneError, FileNotFoundError):  # another's doing, in between
                 continue
 
 
-def test_ten_processes_and_damage(own: Path) -> None:
+def test_ten_processes_and_damage(user: Path) -> None:
     """What comes out of a cache is right, or is missing."""
     disk_cache.folder()
     fork = multiprocessing.get_context("fork")
-    workers = [fork.Process(target=_race, args=(own, seed)) for seed in range(10)]
+    workers = [fork.Process(target=_race, args=(user, seed)) for seed in range(10)]
     for worker in workers:
         worker.start()
     for worker in workers:
         worker.join(60)
     assert [worker.exitcode for worker in workers] == [0] * 10
     for use in CACHES.values():
-        use(own)
-    assert not list(own.rglob(f"{output_files.PARTIAL}*"))
+        use(user)
+    assert not list(user.rglob(f"{output_files.PARTIAL}*"))
 
 
-def test_a_file_of_a_scene_that_is_swapped_is_missing(own: Path) -> None:
+def test_a_file_of_a_scene_that_is_swapped_is_missing(user: Path) -> None:
     """Between the check of its digest and its use."""
     store, asked = Store(), Bundle({"scene.json": DIGEST})
-    path = bundle(own)
+    path = bundle(user)
     linked(path)
     with pytest.raises(ClusterError, match="is missing"), store.opened(asked):
         pass
 
 
-def test_a_render_with_damaged_programs(own: Path, caplog) -> None:
+def test_a_render_with_damaged_programs(user: Path, caplog) -> None:
     """Whatever the driver's own cache holds, clpt's is only looked at where its files are whole."""
     scene = clpt.load(Path(__file__).resolve().parents[2] / "scenes" / "cornell_box")
     scene = dataclasses.replace(scene, film=dataclasses.replace(scene.film, width=8, height=8))
     made = []
     for _ in range(2):
-        on = device.Device.open(device.choose().info)  # its own context, without programs
+        on = device.Device.open(device.choose().info)  # its user context, without programs
         with device.Compilers(1, wait_for_kept=True) as on.compilers:
             made.append(clpt.render(scene, 1, device=on))
-        kept = [path for path in (own / "programs").iterdir() if path.is_file()]
+        kept = [path for path in (user / "programs").iterdir() if path.is_file()]
         assert kept
         for number, path in enumerate(kept):
             (cut, flipped, emptied, linked)[number % 4](path)

@@ -201,7 +201,7 @@ def frame(opcode: int, payload: bytes = b"", fin: bool = True) -> bytes:
 
 
 def misbehave(client: ClientConnection, chance: random.Random) -> str:
-    """Send what ends the socket or what is no command; return what that was."""
+    """Send bytes that end the socket or are not a command; return their name."""
     raw = client.socket
     kind = chance.choice(
         ["bytes", "json", "deep", "parts", "pings", "flood", "utf-8", "noise", "long"]

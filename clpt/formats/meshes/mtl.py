@@ -195,7 +195,7 @@ class _Maker:
         emission = self.emission()
         if opacity is not None:
             surface = Mask(material=surface, opacity=opacity)
-            if emission is not None:  # what is not there does not shine
+            if emission is not None:  # a surface that is cut away does not shine
                 radiance = Product(first=emission.radiance, second=opacity)
                 emission = dataclasses.replace(emission, radiance=radiance)
         self.tell_rest()

@@ -30,7 +30,7 @@ Integers = NDArray[np.int64]
 
 
 def read(path: Path) -> list[Triangles]:
-    """Read a file. Raises SceneError with the line of what is no number."""
+    """Read a file. Raises SceneError with the line of a word that is not a number."""
     data = COMMENT.sub(b"", text.plain(read_bytes(path))).rstrip(text.FILLING)
     budget.check(PER_BYTE * len(data), "its numbers", path)
     try:

@@ -86,7 +86,7 @@ def linear(colours: NDArray[Any]) -> NDArray[np.float32]:
 
 
 def indices(values: NDArray[Any]) -> NDArray[np.int64]:
-    """Return numbers of vertices. Raises SceneError for what is no whole number."""
+    """Return numbers of vertices. Raises SceneError for a number that is not whole."""
     if values.dtype.kind == "f":
         whole = np.abs(values) < LARGEST_INDEX  # false for nan
         whole[whole] = values[whole] == np.trunc(values[whole])

@@ -164,7 +164,7 @@ class Adaptive:
         return True
 
     def finish(self) -> None:
-        """Take out of the film what is not of the picture, wherever an interrupt has left `run`."""
+        """Take paths of learning out of the film, wherever an interrupt has left `run`."""
         if self._has_guides:
             self._restore_film()
         self.next = np.maximum(self.next, self._begun)

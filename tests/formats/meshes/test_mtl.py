@@ -223,7 +223,7 @@ def test_emission(read):
     one, warnings = read("Ke 0 0 0\nmap_Ke red.png")
     assert one.emission.radiance.kind == "bitmap"
     assert warnings == ["material 'a': Ke is 0 beside map_Ke: the image alone counts"]
-    one, _ = read("Ke 5 5 5\nd .3")  # what is not there does not shine
+    one, _ = read("Ke 5 5 5\nd .3")  # a surface that is cut away does not shine
     assert one.emission.radiance.second.value == 0.3
 
 

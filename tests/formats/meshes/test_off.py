@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 
 from clpt.errors import SceneError
-from clpt.formats.meshes import mesh
 
 CORNERS = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
 POINTS = "0 0 0\n1 0 0\n0 1 0\n"
 
 
 @pytest.fixture
-def read(tmp_path):
-    def of(content):
-        data = content if isinstance(content, bytes) else content.encode()
-        (tmp_path / "a.off").write_bytes(data)
-        return mesh.read_mesh(tmp_path / "a.off")
-
-    return of
+def read(read_as):
+    return partial(read_as, ".off")
 
 
 FILES = {

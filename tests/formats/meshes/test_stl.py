@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import gzip
+from functools import partial
 
 import numpy as np
 import pytest
 
 from clpt.errors import SceneError
-from clpt.formats.meshes import mesh, stl
+from clpt.formats.meshes import stl
 
 PLACES = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 0, 5], [1, 0, 5], [0, 1, 5.5]]])
 
@@ -31,13 +32,8 @@ def binary(head=b"made by hand", places=PLACES, attributes=0, count=None):
 
 
 @pytest.fixture
-def read(tmp_path):
-    def of(content):
-        data = content if isinstance(content, bytes) else content.encode()
-        (tmp_path / "a.stl").write_bytes(data)
-        return mesh.read_mesh(tmp_path / "a.stl")
-
-    return of
+def read(read_as):
+    return partial(read_as, ".stl")
 
 
 TEXTS = {
