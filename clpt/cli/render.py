@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -249,14 +249,10 @@ def render(
             so_far.after_pass()
             show_picture()
 
-        try:
-            with shown.rendering():
-                render_samples(
-                    renderer, end, left, shown.show, renderer.scene.noise, stopped, after_pass
-                )
-        except Exception:
-            _rescue(writer, renderer, targets, stats_so_far, graded, shown)
-            raise
+        with _rescuing(writer, renderer, targets, stats_so_far, graded, shown), shown.rendering():
+            render_samples(
+                renderer, end, left, shown.show, renderer.scene.noise, stopped, after_pass
+            )
         writer.save(bool(stopped))
         stats = stats_so_far()
         outputs.write_all(targets, renderer, stats, graded, shown.note)
@@ -279,15 +275,16 @@ def render(
     return STATUS + stopped[0] if stopped else 0
 
 
-def _rescue(
+@contextmanager
+def _rescuing(
     writer: checkpoints.Checkpoints,
     renderer: AnyRenderer,
     targets: tuple[Path, ...],
     stats: Callable[[], dict[str, str | int | float]],
     graded: Grading,
     shown: Display,
-) -> None:
-    """Write the film and the picture so far of a render that fails, as far as they can be read."""
+) -> Iterator[None]:
+    """Write the film and the picture so far, where they can be read, if a render fails inside."""
 
     def write_film() -> None:
         writer.save(False, failed=True)
@@ -296,9 +293,13 @@ def _rescue(
         if any(counts.samples for counts in renderer.counts):
             outputs.write_all(targets, renderer, stats(), graded, shown.note)
 
-    for step in write_film, write_picture:
-        try:
-            step()
-        except outputs.FAILURES as error:
-            shown.note(f"clpt: warning: {error}")
-    writer.finish(True)
+    try:
+        yield
+    except Exception:
+        for step in write_film, write_picture:
+            try:
+                step()
+            except outputs.FAILURES as error:
+                shown.note(f"clpt: warning: {error}")
+        writer.finish(True)
+        raise

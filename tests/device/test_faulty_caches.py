@@ -221,7 +221,7 @@ def test_a_render_with_damaged_programs(user: Path, caplog) -> None:
     scene = dataclasses.replace(scene, film=dataclasses.replace(scene.film, width=8, height=8))
     made = []
     for _ in range(2):
-        on = device.Device.open(device.choose().info)  # its user context, without programs
+        on = device.Device.open(device.choose().info)  # its own context, without programs
         with device.Compilers(1, wait_for_kept=True) as on.compilers:
             made.append(clpt.render(scene, 1, device=on))
         kept = [path for path in (user / "programs").iterdir() if path.is_file()]
