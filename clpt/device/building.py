@@ -26,6 +26,7 @@ log = logging.getLogger(__name__)
 
 OPTIONS = ("-cl-std=CL1.2", "-cl-kernel-arg-info", "-w")
 _PART = "a part, to be linked"
+_COUNTED = re.compile(r"^<kernel>:(\d+):")
 
 
 def build(device: Device, source: Source, options: Sequence[str] = ()) -> Program:
@@ -275,7 +276,11 @@ def _build_error(source: Source, log: str) -> KernelBuildError:
     """The first error of a compiler's log with our file and line; the text is written to disk."""
     names = "|".join(rf"(?:kernels/)?{re.escape(name)}" for name in source.files)
     location = re.compile(rf"""(?<![\w/.])({names})["']?(?::|, line |\()(\d+)""")
-    rows = (row for row in log.splitlines() if re.search(r"\berror\b", row))
+    rows = [row for row in log.splitlines() if re.search(r"\berror\b", row)]
     first = next(filter(None, map(location.search, rows)), None)
-    file, line = (first[1], int(first[2])) if first else (None, None)
+    if first:
+        file, line = first[1], int(first[2])
+    else:  # NVIDIA's compiler reads no `#line`: it counts the rows of the whole text
+        counted = next(filter(None, map(_COUNTED.search, rows)), None)
+        file, line = source.place(int(counted[1])) if counted else (None, None)
     return KernelBuildError(source.name, file, line, log, disk_cache.keep_failed(source))

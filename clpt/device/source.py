@@ -12,6 +12,7 @@ from typing import NoReturn
 from ..errors import KernelBuildError
 
 _INCLUDE = re.compile(r'\s*#\s*include\s+"([^"]+)"\s*(?://.*|/\*.*\*/\s*)?$')
+_LINE = re.compile(r'\s*#\s*line (\d+) "([^"]+)"')
 _WORD = re.compile(r"\w+")
 _OPEN_IF = re.compile(r"\s*#\s*if")
 _FUNCTION = re.compile(  # at the beginning of a line: type, name, and a first argument or "void"
@@ -37,6 +38,19 @@ class Source:
     name: str
     text: str
     files: tuple[str, ...]
+
+    def place(self, row: int) -> tuple[str | None, int | None]:
+        """Return the file and line that a row of the text comes from, counted from 1.
+
+        It does what a compiler does with `#line`; both are None above the first.
+        """
+        file, line = None, None
+        for text in self.text.splitlines()[: row - 1]:
+            if told := _LINE.match(text):
+                file, line = told[2].removeprefix("kernels/"), int(told[1])
+            elif line is not None:
+                line += 1
+        return file, line
 
     def with_static(self) -> Source:
         """Return a source whose functions and constants are static.

@@ -52,12 +52,12 @@ kernel NO_VECTORIZE void compact_nodes(global const float8 *restrict nodes, glob
     compact_child_slots(nodes, nodes[roots[place.x]], children, found, slots);
     global uint *node = compact + (ulong)w * COMPACT_WORDS;
     uint numbers[8], base = firsts[place.x].x, own = 0;
-    union { uint words[2]; uchar at[8]; } meta = {{0, 0}};
+    ulong meta = 0; /* no array of bytes: NVIDIA's compiler of driver 580 put one in the place of `slots` */
     for (uint i = 0; i < found; i++) {
         float8 child = nodes[children[i]];
         numbers[i] = base + next;
         if (node_is_leaf(child)) {
-            meta.at[slots[i]] = (uchar)(own | (0xe0u >> (3 - node_count(child)) & 0xe0u));
+            meta |= (ulong)(own | (0xe0u >> (3 - node_count(child)) & 0xe0u)) << 8 * slots[i];
             for (uint k = 0; k < node_count(child); k++, own++) {
                 uint at = place.y + own, prim = item_index(items[node_link(child) + k]);
                 if (tags) {
@@ -67,7 +67,7 @@ kernel NO_VECTORIZE void compact_nodes(global const float8 *restrict nodes, glob
                 }
             }
         } else {
-            meta.at[slots[i]] = (uchar)(0x20u | (24 + slots[i]));
+            meta |= (ulong)(0x20u | (24 + slots[i])) << 8 * slots[i];
             mask |= 1u << slots[i];
             next++;
         }
@@ -75,8 +75,8 @@ kernel NO_VECTORIZE void compact_nodes(global const float8 *restrict nodes, glob
     node[3] = mask << 24;
     node[4] = base;
     node[5] = place.y;
-    node[6] = meta.words[0];
-    node[7] = meta.words[1];
+    node[6] = (uint)meta;
+    node[7] = (uint)(meta >> 32);
     uint item = place.y + own, position = base;
     for (uint slot = 0; slot < 8; slot++) {
         if (!(mask >> slot & 1)) continue;

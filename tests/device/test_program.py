@@ -138,6 +138,19 @@ def test_an_error_names_our_file_and_line(device, cache_folder):
         assert kept.read() == broken.text
 
 
+def test_a_log_that_counts_rows_of_the_whole_text(device, monkeypatch):
+    """NVIDIA's compiler reads no `#line`."""
+    text = source('#include "part.cl"\n', **{"part.cl": "\nconstant int broken = nothing;\n"})
+    row = 1 + text.text.splitlines().index("constant int broken = nothing;")
+
+    def refuse(*_):
+        raise cl.Error(f"warnings\n<kernel>:{row}:23: error: use of undeclared identifier 'nothing'")
+
+    monkeypatch.setattr(native_programs, "build", refuse)
+    with pytest.raises(KernelBuildError, match=r"at part\.cl:2: <kernel>"):
+        build(device, text)
+
+
 def test_an_unwritable_cache_does_not_hide_the_error(device, tmp_path, monkeypatch):
     (tmp_path / "file").write_text("in the way")
     monkeypatch.setattr(disk_cache, "folder", lambda: tmp_path / "file")

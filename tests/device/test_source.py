@@ -28,18 +28,12 @@ def test_each_file_once_even_in_a_circle():
 
 def test_lines_are_counted_past_an_include():
     virtual = {"a": 'one\n#include "b"\nthree\n#include "b"\nfive', "b": "x\ny"}
-    rows = assemble("a", virtual).text.splitlines()
-    file, line, places = None, 0, {}
-    for row in rows:
-        if row.startswith("#line"):
-            _, number, file = row.split()
-            line = int(number)
-        else:
-            places[row] = (file, line)
-            line += 1
-    assert places["y"] == ('"b"', 2)
-    assert places["three"] == ('"a"', 3)
-    assert places["five"] == ('"a"', 5)
+    source = assemble("a", virtual, {"one": 1})
+    places = {text: source.place(row) for row, text in enumerate(source.text.splitlines(), 1)}
+    assert places["y"] == ("b", 2)
+    assert places["three"] == ("a", 3)
+    assert places["five"] == ("a", 5)
+    assert places["#define one 1"] == (None, None)
 
 
 def test_defines_come_first_if_the_text_names_them():
