@@ -24,8 +24,8 @@ from rich.table import Table
 import clpt
 from bench import machine
 from bench.cluster import processor_time
-from clpt.cli.checkpoints import PERIOD, Checkpoints, path_of
-from clpt.cli.rendering import PASS_SECONDS
+from clpt.cli.files.checkpoints import PERIOD, Checkpoints, path_of
+from clpt.cli.render.passes import PASS_SECONDS
 from clpt.cluster import processes
 from clpt.cluster.cluster_renderer import ClusterRenderer
 from clpt.render.film import film_file

@@ -21,7 +21,7 @@ from rich.table import Table
 import clpt
 from bench import machine
 from clpt import device as dev
-from clpt.cli.scene_options import changed
+from clpt.cli.options.scene_options import changed
 
 SCENES = ("scenes/cornell_box", "tests/scenes/textures.xml")
 

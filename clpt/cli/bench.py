@@ -18,8 +18,8 @@ from ..benchmark.comparing import Ratio
 from ..benchmark.figures import Figure
 from ..bvh import TREES
 from ..device.context import trial
-from .extras import extra
-from .output_console import output_console
+from .printing.console import output_console
+from .process.extras import extra
 
 SLOWER = 3  # the exit status if a figure was refused, or is below --fail-below
 STAGES = (
@@ -83,7 +83,9 @@ def bench(
         raise click.UsageError("--fail-below compares: give --compare FILE too")
     if plot is not None:
         with extra("plot", "a plot"):
-            from . import bench_plot  # here: matplotlib is an extra, and slow to import
+            from .plots import (
+                bench as bench_plot,  # here: matplotlib is an extra, and slow to import
+            )
 
         bench_plot.check(plot)
     before = None if record is None else records.read(record)

@@ -10,8 +10,8 @@ from rich.table import Table
 from .. import lenses
 from ..errors import SceneError
 from ..lenses.glasses import LINE_C, LINE_D, LINE_F
-from .extras import extra
-from .output_console import output_console
+from .printing.console import output_console
+from .process.extras import extra
 
 
 @click.command()
@@ -69,7 +69,7 @@ def lens(
     console.print(spots)
     if plot is not None:
         with extra("plot", "a plot"):
-            from . import lens_plot  # here: matplotlib is an extra, and slow to import
+            from .plots import lens as lens_plot  # here: matplotlib is an extra, and slow to import
 
         lens_plot.write(plot, made, waves, angles)
         click.echo(str(plot), err=True)

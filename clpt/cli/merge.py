@@ -12,9 +12,9 @@ from ..errors import SceneError
 from ..render.film import film_file
 from ..render.film.host_picture import HostPicture
 from ..render.film.saved_film import SavedFilm, other_devices
-from . import checkpoints, outputs
-from .grading import grading, grading_options, names_option
-from .scene_options import denoise_option
+from .files import checkpoints, outputs
+from .options.grading import grading, grading_options, names_option
+from .options.scene_options import denoise_option
 
 
 @click.command()

@@ -13,8 +13,8 @@ from .. import mie as theory
 from .. import output_files, spectra
 from ..errors import SceneError
 from ..formats.native.write import write_medium
-from .extras import extra
-from .output_console import output_console
+from .printing.console import output_console
+from .process.extras import extra
 
 DIGITS = 6  # of the table in a file
 
@@ -85,7 +85,7 @@ def mie(
         click.echo(str(output), err=True)
     if plot is not None:
         with extra("plot", "a plot"):
-            from . import mie_plot  # here: matplotlib is an extra, and slow to import
+            from .plots import mie as mie_plot  # here: matplotlib is an extra, and slow to import
 
         mie_plot.write(plot, medium, f"{law}, {radius:g} um, {index} in {host}")
         click.echo(str(plot), err=True)

@@ -15,14 +15,14 @@ import click
 from ..cluster.multi_renderer import MultiRenderer
 from ..formats import load, locate
 from ..scene import Scene
-from . import outputs
-from .display import display
-from .extras import extra
-from .grading import Grading, grading, grading_options
-from .on_cluster import Where, connected
-from .scene_options import changed, open_scene, scene_options
-from .stopping import STATUS, stops
-from .verbosity import verbose_option
+from .files import outputs
+from .options.grading import Grading, grading, grading_options
+from .options.scene_options import changed, open_scene, scene_options
+from .options.verbosity import verbose_option
+from .printing.display import display
+from .process.extras import extra
+from .process.stopping import STATUS, stops
+from .render.on_cluster import Where, connected
 
 if TYPE_CHECKING:
     from ..view.session import Source

@@ -9,9 +9,9 @@ from typing import Any
 
 import click
 
-from .display import display
-from .scene_options import denoise_option, open_renderer, scene_options
-from .verbosity import verbose_option
+from .options.scene_options import denoise_option, open_renderer, scene_options
+from .options.verbosity import verbose_option
+from .printing.display import display
 
 
 @click.command()

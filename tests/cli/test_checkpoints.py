@@ -14,7 +14,8 @@ import pytest
 
 from clpt import images, output_files
 from clpt.__main__ import run
-from clpt.cli import checkpoints, outputs, rendering
+from clpt.cli.files import checkpoints, outputs
+from clpt.cli.render import passes as rendering
 from clpt.errors import MemoryBudgetError, SceneError
 from clpt.output_files import PARTIAL
 from clpt.render.film import film_file
@@ -243,7 +244,7 @@ def test_a_film_without_a_pass(tmp_path):
 
 
 def killing_scene():
-    from clpt.cli.scene_options import changed
+    from clpt.cli.options.scene_options import changed
     from clpt.formats import load
 
     return changed(load(killing.SCENE), size=(8, 8), mode="rgb")

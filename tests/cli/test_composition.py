@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from clpt import images, transforms
 from clpt.__main__ import run
-from clpt.cli.composition import CameraType, CropType, Orbit, composed, up_of
-from clpt.cli.scene_options import changed
+from clpt.cli.options.composition import CameraType, CropType, Orbit, composed, up_of
+from clpt.cli.options.scene_options import changed
 from clpt.errors import SceneError
 from clpt.formats import load
 from clpt.formats.meshes import framing

@@ -13,9 +13,9 @@ import pytest
 
 from clpt import device, images
 from clpt.__main__ import run
-from clpt.cli import frame_crews
-from clpt.cli import frames as frames_module
-from clpt.cli.frame_values import Frames, expanded, numbered
+from clpt.cli.render import crews as frame_crews
+from clpt.cli.render import frames as frames_module
+from clpt.cli.render.frame_values import Frames, expanded, numbered
 from clpt.device.stream import Stream
 
 SIZE = ["--size", "16x12", "--spp", "2", "--mode", "rgb"]

@@ -14,7 +14,9 @@ import pytest
 
 from clpt import images
 from clpt.__main__ import run
-from clpt.cli import checkpoints, outputs, scene_options, stopping
+from clpt.cli.files import checkpoints, outputs
+from clpt.cli.options import scene_options
+from clpt.cli.process import stopping
 from tests.cli import interrupting
 
 render_module = importlib.import_module("clpt.cli.render")
@@ -73,7 +75,7 @@ def test_a_signal_at_each_point(tmp_path, monkeypatch, capsys, heeded, point, nu
 
 BUILDING = """
 import hashlib, sys
-import clpt.cli.scene_options as options
+import clpt.cli.options.scene_options as options
 from clpt.__main__ import main
 def build(*_, **__):  # C, that no signal ends
     print("builds", file=sys.stderr, flush=True)

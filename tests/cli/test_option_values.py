@@ -9,13 +9,21 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from clpt.cli.composition import CameraType, CropType
-from clpt.cli.frame_values import Frames
 from clpt.cli.inspect import PixelType
-from clpt.cli.on_cluster import Where
+from clpt.cli.options.composition import CameraType, CropType
+from clpt.cli.options.scene_options import (
+    Bytes,
+    LightPaths,
+    Names,
+    SensorName,
+    Size,
+    White,
+    changed,
+)
 from clpt.cli.render import Duration, Period, SampleRange
-from clpt.cli.scene_options import Bytes, LightPaths, Names, SensorName, Size, White, changed
-from clpt.cli.tev_viewer import Address
+from clpt.cli.render.frame_values import Frames
+from clpt.cli.render.on_cluster import Where
+from clpt.cli.render.tev_viewer import Address
 from clpt.errors import SceneError
 from clpt.scene import Scene
 from clpt.scene.cameras import Perspective

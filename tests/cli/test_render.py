@@ -19,8 +19,9 @@ import pytest
 
 from clpt import __version__, device, images, spectral_exr
 from clpt.__main__ import run
-from clpt.cli import outputs, stopping
-from clpt.cli.scene_options import changed
+from clpt.cli.files import outputs
+from clpt.cli.options.scene_options import changed
+from clpt.cli.process import stopping
 from clpt.colour.view import View
 from clpt.errors import DeviceError, SceneError
 from clpt.formats import load
@@ -113,7 +114,7 @@ def test_targets_are_tried_before_anything_is_read(tmp_path, monkeypatch, capsys
     def refuse(*_, **__):
         raise AssertionError("the scene is read")
 
-    monkeypatch.setattr(sys.modules["clpt.cli.scene_options"], "load", refuse)
+    monkeypatch.setattr(sys.modules["clpt.cli.options.scene_options"], "load", refuse)
     targets = {tmp_path / "no" / "a.png": "its folder does not exist"}
     (tmp_path / "folder.png").mkdir()
     targets[tmp_path / "folder.png"] = "it is a folder"
@@ -298,7 +299,7 @@ def test_the_renderer_gets_the_tree_that_was_asked_for(given, told, monkeypatch,
     def refuse(*_, tree_quality, layout, **__):
         raise SceneError(f"{tree_quality} {layout}")
 
-    monkeypatch.setattr(sys.modules["clpt.cli.scene_options"], "Renderer", refuse)
+    monkeypatch.setattr(sys.modules["clpt.cli.options.scene_options"], "Renderer", refuse)
     assert run(["render", CORNELL, "--quiet", *given]) == 2
     assert f"clpt: error: {told}" in capsys.readouterr().err
 

@@ -10,9 +10,10 @@ import time
 import pytest
 from rich.console import Console
 
-from clpt.cli import rendering, stopping
-from clpt.cli.display import Bar, Lines, clock, figures
-from clpt.cli.rendering import pass_size, render_samples
+from clpt.cli.printing.display import Bar, Lines, clock, figures
+from clpt.cli.process import stopping
+from clpt.cli.render import passes as rendering
+from clpt.cli.render.passes import pass_size, render_samples
 from clpt.render.progress import Progress
 
 

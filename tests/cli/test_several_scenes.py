@@ -10,7 +10,8 @@ import pytest
 
 from clpt import images
 from clpt.__main__ import run
-from clpt.cli import outputs, stopping
+from clpt.cli.files import outputs
+from clpt.cli.process import stopping
 
 CORNELL = str(Path(__file__).resolve().parents[2] / "scenes" / "cornell_box")
 COMMON = ["--size", "8x6", "--spp", "1", "--mode", "rgb"]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import click
 
-from ..cluster.multi_renderer import MultiRenderer
-from .scene_options import AnyRenderer
+from ...cluster.multi_renderer import MultiRenderer
+from ..options.scene_options import AnyRenderer
 
 
 def before(renderer: AnyRenderer, loading: float) -> None:

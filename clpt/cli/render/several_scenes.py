@@ -13,10 +13,11 @@ from typing import Any
 
 import click
 
-from ..errors import SceneError
-from ..formats import load
-from . import failures, outputs
-from .standard_output import STANDARD, standard_output
+from ...errors import SceneError
+from ...formats import load
+from ..files import outputs
+from ..files.standard_output import STANDARD, standard_output
+from ..process import failures
 
 NAME = "{scene}"  # in the name of an output, the scene's
 CAMERA = "{camera}"  # the camera's, or its number

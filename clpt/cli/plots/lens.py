@@ -9,11 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
-from ..errors import SceneError
-from ..lenses import Prescription, cardinal, spots
-from ..lenses.glasses import AIR, LINE_D
-from ..lenses.tracing import Rays, intersect, refract, sag
-from .plots import FAINT, FORMATS, INK, LINES, PAPER, save, strip
+from ...errors import SceneError
+from ...lenses import Prescription, cardinal, spots
+from ...lenses.glasses import AIR, LINE_D
+from ...lenses.tracing import Rays, intersect, refract, sag
+from .pixels import FAINT, FORMATS, INK, LINES, PAPER, save, strip
 
 GLASS = "#cfe3ee"
 RAYS = 7  # drawn of each point

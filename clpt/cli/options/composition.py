@@ -12,12 +12,12 @@ from typing import Any
 import click
 import numpy as np
 
-from .. import images, transforms
-from ..errors import SceneError
-from ..formats.meshes import framing
-from ..scene import Scene
-from ..scene.lights import Envmap
-from ..view.navigation import upright
+from ... import images, transforms
+from ...errors import SceneError
+from ...formats.meshes import framing
+from ...scene import Scene
+from ...scene.lights import Envmap
+from ...view.navigation import upright
 from .option_sets import Command, with_options
 
 NEAREST, FARTHEST = 1e-3, 1e6  # of an orbit, in distances that frame the scene

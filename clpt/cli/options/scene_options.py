@@ -15,26 +15,26 @@ from typing import Any, TypeAlias, get_args
 
 import click
 
-from .. import device as dev
-from ..bvh import LAYOUTS, Quality
-from ..cluster.multi_renderer import MultiRenderer
-from ..denoise.needs import METHODS, prepared
-from ..errors import nearest
-from ..formats import load
-from ..formats.missing import Missing
-from ..render.lowering.checks import check
-from ..render.renderer import Renderer
-from ..scene import Scene, kinds
-from ..scene.integrators import AUTO, MOST_LIGHT_PATHS, NO_AOV, Auto
-from ..scene.layers import LAYERS
-from ..scene.params import Kind, params
-from ..spectra import read_sensor, spaces
-from ..spectra.sensors import OBSERVERS
+from ... import device as dev
+from ...bvh import LAYOUTS, Quality
+from ...cluster.multi_renderer import MultiRenderer
+from ...denoise.needs import METHODS, prepared
+from ...errors import nearest
+from ...formats import load
+from ...formats.missing import Missing
+from ...render.lowering.checks import check
+from ...render.renderer import Renderer
+from ...scene import Scene, kinds
+from ...scene.integrators import AUTO, MOST_LIGHT_PATHS, NO_AOV, Auto
+from ...scene.layers import LAYERS
+from ...scene.params import Kind, params
+from ...spectra import read_sensor, spaces
+from ...spectra.sensors import OBSERVERS
+from ..printing.display import Display
+from ..process.stopping import prompt
 from .composition import Orbit, Span, composed, composition_options
-from .display import Display
 from .loading_options import Bytes, loading_options
 from .option_sets import Command, with_options
-from .stopping import prompt
 
 LARGEST = 65536  # pixels of a side
 

@@ -8,14 +8,14 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .. import device as dev
-from ..cluster.cluster_renderer import ClusterRenderer
-from ..render.progress import Progress
-from ..scene import Scene
-from .display import Display
+from ... import device as dev
+from ...cluster.cluster_renderer import ClusterRenderer
+from ...render.progress import Progress
+from ...scene import Scene
+from ..options.scene_options import AnyRenderer, choose_devices, new_renderer, share_compilers
+from ..printing.display import Display
 from .on_cluster import Watch, connected, pass_seconds, picture_device
-from .rendering import PASS_SECONDS
-from .scene_options import AnyRenderer, choose_devices, new_renderer, share_compilers
+from .passes import PASS_SECONDS
 
 if TYPE_CHECKING:
     from distributed import Client

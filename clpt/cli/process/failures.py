@@ -8,9 +8,9 @@ from pathlib import Path
 import click
 import platformdirs
 
-from .. import output_files
-from ..device import disk_cache
-from ..errors import ClptError
+from ... import output_files
+from ...device import disk_cache
+from ...errors import ClptError
 
 BAD_INPUT, BUG = 2, 1
 

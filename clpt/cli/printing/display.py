@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from ..render.progress import Progress
+from ...render.progress import Progress
 
 EVERY = 5.0  # seconds between lines
 PATIENCE = 1.0  # seconds of reading a scene before there is a bar

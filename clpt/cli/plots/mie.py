@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..errors import SceneError
-from .plots import FAINT, FORMATS, INK, PAPER, save, strip
+from ...errors import SceneError
+from .pixels import FAINT, FORMATS, INK, PAPER, save, strip
 
 MOST_CURVES = 12
 

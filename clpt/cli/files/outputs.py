@@ -9,15 +9,15 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from .. import __version__, images, output_files
-from ..cluster.cluster_renderer import ClusterRenderer
-from ..device import disk_cache
-from ..errors import ClptError, SceneError
-from ..render.film import film_file, layer_channels
-from ..render.film.denoised_picture import DenoisedPicture
-from ..render.film.host_picture import HostPicture
-from .grading import Grading
-from .scene_options import AnyRenderer
+from ... import __version__, images, output_files
+from ...cluster.cluster_renderer import ClusterRenderer
+from ...device import disk_cache
+from ...errors import ClptError, SceneError
+from ...render.film import film_file, layer_channels
+from ...render.film.denoised_picture import DenoisedPicture
+from ...render.film.host_picture import HostPicture
+from ..options.grading import Grading
+from ..options.scene_options import AnyRenderer
 from .standard_output import is_standard
 
 FILM = ".film"  # suffix of films, which hold all that a picture was made of

@@ -7,8 +7,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from . import outputs
-from .grading import Grading
+from ..files import outputs
+from ..options.grading import Grading
 
 
 class PictureSoFar:

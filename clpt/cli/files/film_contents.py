@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from ..render.film import film_file
-from ..render.film.host_picture import HostPicture
-from ..render.film.layer_channels import channels_of
+from ...render.film import film_file
+from ...render.film.host_picture import HostPicture
+from ...render.film.layer_channels import channels_of
+from ..printing.console import shown
 from . import checkpoints
 from .image_contents import ImageContents, size_text
-from .output_console import shown
 from .outputs import FILM
 
 

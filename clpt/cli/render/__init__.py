@@ -11,23 +11,24 @@ from typing import Any
 
 import click
 
-from ..render.renderer import MOST_SAMPLES
-from ..scene import Scene
-from . import checkpoints, outputs, report
-from .display import Display
-from .display import display as display_of
+from ...render.renderer import MOST_SAMPLES
+from ...scene import Scene
+from ..files import checkpoints, outputs
+from ..files.standard_output import FORMATS
+from ..options.grading import Grading, grading, grading_options, names_option
+from ..options.scene_options import AnyRenderer, denoise_option, open_renderer, scene_options
+from ..options.verbosity import verbose_option
+from ..printing.display import Display
+from ..printing.display import display as display_of
+from ..process.stopping import STATUS, stops
+from . import report
 from .frame_values import Frames
 from .frames import render_frames
-from .grading import Grading, grading, grading_options, names_option
 from .on_cluster import Where, render_on_cluster
-from .rendering import render_samples
-from .scene_options import AnyRenderer, denoise_option, open_renderer, scene_options
+from .passes import render_samples
 from .several_scenes import one_by_one
 from .so_far import PictureSoFar
-from .standard_output import FORMATS
-from .stopping import STATUS, stops
 from .tev_viewer import EVERYWHERE, Address, showing
-from .verbosity import verbose_option
 
 
 class SampleRange(click.ParamType):

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import click
 
-from ..colour.tones import TONES
-from ..colour.view import DEFAULT_CONFIG, View
-from ..render.film.layer_channels import SETS
+from ...colour.tones import TONES
+from ...colour.view import DEFAULT_CONFIG, View
+from ...render.film.layer_channels import SETS
 from .option_sets import Command, with_options
 
 

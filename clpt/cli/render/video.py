@@ -15,10 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import images, output_files
-from ..errors import SceneError
-from .extras import extra
-from .stopping import stops
+from ... import images, output_files
+from ...errors import SceneError
+from ..process.extras import extra
+from ..process.stopping import stops
 
 LOOK = 0.02  # seconds between two looks at ffmpeg
 FORMATS = (".mp4", ".mov", ".mkv", ".webm")

@@ -8,16 +8,16 @@ import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from .. import output_files
-from ..cluster.cluster_renderer import ClusterRenderer
-from ..errors import MemoryBudgetError, SceneError
-from ..render.film import film_file
-from ..render.film.saved_film import SavedFilm, differences_text, ranges_text
-from ..scene import Scene
-from ..scene.fingerprint import fingerprint
+from ... import output_files
+from ...cluster.cluster_renderer import ClusterRenderer
+from ...errors import MemoryBudgetError, SceneError
+from ...render.film import film_file
+from ...render.film.saved_film import SavedFilm, differences_text, ranges_text
+from ...scene import Scene
+from ...scene.fingerprint import fingerprint
+from ..options.scene_options import AnyRenderer
+from ..printing.display import clock
 from . import outputs
-from .display import clock
-from .scene_options import AnyRenderer
 from .standard_output import is_standard
 
 SUFFIX = ".resume.exr"

@@ -10,9 +10,9 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import tev
-from ..render.film.layer_channels import channels_of
-from .outputs import Film
+from ... import tev
+from ...render.film.layer_channels import channels_of
+from ..files.outputs import Film
 
 EVERYWHERE = tev.HOST  # what --tev without a value means
 

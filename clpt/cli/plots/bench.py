@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Sheet
 from matplotlib.lines import Line2D
 
-from ..benchmark import PARTS
-from ..benchmark.figures import SECONDS, Figure
-from ..errors import SceneError
-from .plots import FAINT, FORMATS, INK, LINES, PAPER, save
+from ...benchmark import PARTS
+from ...benchmark.figures import SECONDS, Figure
+from ...errors import SceneError
+from .pixels import FAINT, FORMATS, INK, LINES, PAPER, save
 
 SPAN = 30.0  # between the smallest and the largest stage, from which the scale is logarithmic
 BAR, HEAD = 0.25, 0.9  # [inches] of a figure, and of a panel's title and axis

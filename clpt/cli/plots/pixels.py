@@ -11,11 +11,11 @@ from matplotlib.figure import Figure
 from matplotlib.legend_handler import HandlerTuple
 from matplotlib.patches import Patch
 
-from .. import output_files
-from ..errors import SceneError
-from ..images import to_srgb8
-from ..spectra import cie_xyz, xyz_to_rgb
-from .image_contents import ImageContents, Pixel
+from ... import output_files
+from ...errors import SceneError
+from ...images import to_srgb8
+from ...spectra import cie_xyz, xyz_to_rgb
+from ..files.image_contents import ImageContents, Pixel
 
 FORMATS = (".png", ".svg", ".pdf")
 INK, FAINT, PAPER = "#22262b", "#d9dde2", "#ffffff"

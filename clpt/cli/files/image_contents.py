@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from .. import images, spectral_exr
-from ..errors import SceneError
-from ..spectra.spaces import SPACES, chromaticities
+from ... import images, spectral_exr
+from ...errors import SceneError
+from ...spectra.spaces import SPACES, chromaticities
 
 Pixel = tuple[int, int]  # x, y from the top left
 LAYOUT = (

@@ -13,23 +13,23 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .. import device as dev
-from ..cluster import keys as cluster_keys
-from ..cluster import processes
-from ..cluster.blocks import WorkerRecord
-from ..cluster.cluster_renderer import ClusterRenderer
-from ..errors import ClusterError
-from ..formats import load
-from ..render.film.saved_film import SavedFilm
-from ..render.lowering.checks import check
-from ..render.progress import Progress
-from . import checkpoints, outputs
-from .display import Display
-from .grading import Grading
-from .rendering import render_samples
-from .scene_options import changed
+from ... import device as dev
+from ...cluster import keys as cluster_keys
+from ...cluster import processes
+from ...cluster.blocks import WorkerRecord
+from ...cluster.cluster_renderer import ClusterRenderer
+from ...errors import ClusterError
+from ...formats import load
+from ...render.film.saved_film import SavedFilm
+from ...render.lowering.checks import check
+from ...render.progress import Progress
+from ..files import checkpoints, outputs
+from ..options.grading import Grading
+from ..options.scene_options import changed
+from ..printing.display import Display
+from ..process.stopping import STATUS, stops
+from .passes import render_samples
 from .so_far import PictureSoFar
-from .stopping import STATUS, stops
 
 if TYPE_CHECKING:
     from distributed import Client

@@ -17,21 +17,22 @@ from typing import Any
 
 import click
 
-from .. import __version__, images
-from ..cluster.cluster_renderer import ClusterRenderer
-from ..errors import ClusterError, SceneError
-from ..formats import load
-from ..render.lowering.checks import check
-from ..scene import Scene
-from ..scene.fingerprint import fingerprint
-from . import outputs, video
-from .display import Display, clock
-from .frame_crews import Crew, cluster_crews, device_crews
+from ... import __version__, images
+from ...cluster.cluster_renderer import ClusterRenderer
+from ...errors import ClusterError, SceneError
+from ...formats import load
+from ...render.lowering.checks import check
+from ...scene import Scene
+from ...scene.fingerprint import fingerprint
+from ..files import outputs
+from ..options.grading import Grading
+from ..options.scene_options import AnyRenderer, changed
+from ..printing.display import Display, clock
+from ..process.stopping import STATUS, stops
+from . import video
+from .crews import Crew, cluster_crews, device_crews
 from .frame_values import expanded, has_number, numbered, varies
-from .grading import Grading
-from .rendering import render_samples
-from .scene_options import AnyRenderer, changed
-from .stopping import STATUS, stops
+from .passes import render_samples
 
 KEPT = (".exr", ".png")  # formats that keep a frame's fingerprint
 LOOK = 0.1  # seconds between two looks at signals

@@ -7,10 +7,10 @@ import math
 import time
 from collections.abc import Callable, Sequence
 
-from ..cluster.cluster_renderer import ClusterRenderer
-from ..render.progress import Progress
-from ..render.renderer import MOST_SAMPLES
-from .scene_options import AnyRenderer
+from ...cluster.cluster_renderer import ClusterRenderer
+from ...render.progress import Progress
+from ...render.renderer import MOST_SAMPLES
+from ..options.scene_options import AnyRenderer
 
 PASS_SECONDS = 3.0  # at the end of a pass few paths are left; only at its end is there a checkpoint
 GROWTH = 3  # times what has been rendered so far
@@ -33,7 +33,7 @@ def render_samples(
     pass has come to its end; pass_seconds: of a pass, infinite for a single one.
 
     It ends soon after the limit, perhaps before every pixel has a sample, and within a second when
-    `stopped` gets an entry, see clpt.cli.stopping.
+    `stopped` gets an entry, see clpt.cli.process.stopping.
     """
     began = time.perf_counter()
     first, last = renderer.first_sample, end or MOST_SAMPLES
