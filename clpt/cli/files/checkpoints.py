@@ -9,21 +9,20 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from ... import output_files
-from ...cluster.cluster_renderer import ClusterRenderer
 from ...errors import MemoryBudgetError, SceneError
 from ...render.film import film_file
 from ...render.film.saved_film import SavedFilm, differences_text, ranges_text
 from ...scene import Scene
 from ...scene.fingerprint import fingerprint
-from ..options.scene_options import AnyRenderer
+from ..opening.makers import AnyRenderer
 from ..printing.display import clock
 from . import outputs
 from .standard_output import is_standard
+from .targets import FILM, default
 
 SUFFIX = ".resume.exr"
 PERIOD = 300.0  # seconds from one checkpoint to the next
 PATIENCE = 600.0  # seconds of a render after which it has checkpoints unasked
-Saving = AnyRenderer | ClusterRenderer
 ADVICE = "render that again, or begin anew with --no-resume"
 
 
@@ -33,7 +32,7 @@ def path_of(scene: Path, targets: tuple[Path, ...]) -> Path:
     Of a picture for the standard output alone they have the scene's name.
     """
     files = [path for path in targets if not is_standard(path)]
-    target = (files or outputs.default(scene))[0]
+    target = (files or default(scene))[0]
     return target.with_name(target.stem + SUFFIX)
 
 
@@ -108,7 +107,7 @@ def check(
         raise SceneError(message, file=path)
 
 
-def go_on(renderer: Saving, saved: SavedFilm, path: Path, note: Callable[[str], None]) -> None:
+def go_on(renderer: AnyRenderer, saved: SavedFilm, path: Path, note: Callable[[str], None]) -> None:
     """Let a renderer go on from a film, and say so. Raises SceneError, which says what differs."""
     known = len(renderer.warnings)
     refuse(saved.origin.differences(renderer.origin()), path)
@@ -130,7 +129,7 @@ class Checkpoints:
 
     def __init__(
         self,
-        renderer: Saving,
+        renderer: AnyRenderer,
         path: Path,
         period: float | None,
         resumed: bool,
@@ -142,7 +141,7 @@ class Checkpoints:
         self._keep = bool(period) or (resumed and period is None)
         now = time.monotonic()
         self._due = now + (self._period if self._keep else PATIENCE)
-        holds = self._keep or any(target.suffix.lower() == outputs.FILM for target in targets)
+        holds = self._keep or any(target.suffix.lower() == FILM for target in targets)
         self._holds_from = now if holds else self._due
         if period == 0.0:
             self._due = math.inf

@@ -13,7 +13,7 @@ from ...render.film.layer_channels import channels_of
 from ..printing.console import shown
 from . import checkpoints
 from .image_contents import ImageContents, size_text
-from .outputs import FILM
+from .targets import FILM
 
 
 def is_film(path: Path) -> bool:

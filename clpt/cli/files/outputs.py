@@ -9,52 +9,30 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from ... import __version__, images, output_files
+from ... import __version__, images
 from ...cluster.cluster_renderer import ClusterRenderer
 from ...device import disk_cache
 from ...errors import ClptError, SceneError
 from ...render.film import film_file, layer_channels
 from ...render.film.denoised_picture import DenoisedPicture
 from ...render.film.host_picture import HostPicture
+from ..opening.makers import AnyRenderer, OfDevices
 from ..options.grading import Grading
-from ..options.scene_options import AnyRenderer
 from .standard_output import is_standard
+from .targets import FILM
 
-FILM = ".film"  # suffix of films, which hold all that a picture was made of
-Film = AnyRenderer | ClusterRenderer | HostPicture  # what pictures are taken of
+Film = AnyRenderer | HostPicture  # what pictures are taken of
 Source = Film | DenoisedPicture
 
 
-def default(scene: Path) -> tuple[Path, ...]:
-    """Return where a scene's picture is written by default: in this folder, by the scene's name."""
-    path = scene.resolve()
-    stem = path.name.removesuffix(".gz").rpartition(".")[0] or path.name
-    name = path.parent.name if stem == "scene" else stem
-    return Path(f"{name}.exr"), Path(f"{name}.png")
-
-
-def checked(paths: tuple[Path, ...]) -> tuple[Path, ...]:
-    """Return the paths if files of these names can be written there. Raises SceneError."""
-    for path in paths:
-        if path.suffix.lower() != FILM:
-            images.check_output(path)
-        try:
-            output_files.check_writable(path)
-        except OSError as error:
-            raise SceneError(f"cannot be written: {error}", file=path) from error
-    return paths
-
-
-def metadata(
-    renderer: AnyRenderer | ClusterRenderer, scene: Path, seconds: float
-) -> dict[str, str | int | float]:
+def metadata(renderer: AnyRenderer, scene: Path, seconds: float) -> dict[str, str | int | float]:
     """Return the metadata of an .exr: how it was made. spp is the mean over all pixels.
 
     seconds: of this session; those of former ones are added.
     """
     plan, devices = renderer.scene, ""
     if isinstance(renderer, ClusterRenderer):
-        pictured: AnyRenderer = renderer.developed()
+        pictured: OfDevices = renderer.developed()
         devices = "; ".join(sorted({record.kind for record in renderer.workers.values()}))
     else:
         pictured = renderer

@@ -18,7 +18,7 @@ from ...formats.meshes import framing
 from ...scene import Scene
 from ...scene.lights import Envmap
 from ...view.navigation import upright
-from .option_sets import Command, with_options
+from .records import Command, with_options
 
 NEAREST, FARTHEST = 1e-3, 1e6  # of an orbit, in distances that frame the scene
 # The scene's up from +y, by its axis and sign; the front is +z where up is +y, -y where it is +z.
@@ -65,6 +65,19 @@ class Span:
             message = f"{first}:{end} is no part of the picture's {size} pixels"
             raise click.BadParameter(message, param_hint="--crop")
         return first, end - first
+
+
+@dataclass(frozen=True)
+class Composition:
+    """From where a scene is seen, which part of the picture, and the image that surrounds it.
+
+    env_rotation: of the image about the vertical [degrees].
+    """
+
+    camera: Orbit | None = None
+    crop: tuple[Span, Span] | None = None
+    env: Path | None = None
+    env_rotation: float | None = None
 
 
 class CameraType(click.ParamType):
@@ -155,30 +168,24 @@ _OPTIONS = (
 
 
 def composition_options(command: Command) -> Command:
-    """Give a command the options that `composed` takes."""
+    """Give a command the options of which `Composition` is the record."""
     return with_options(command, _OPTIONS)
 
 
-def composed(
-    scene: Scene,
-    *,
-    camera: Orbit | None,
-    crop: tuple[Span, Span] | None,
-    env: Path | None,
-    env_rotation: float | None,
-) -> Scene:
+def composed(scene: Scene, composition: Composition) -> Scene:
     """Return the scene as these options want it. Raises click.BadParameter, SceneError."""
-    if env is None and env_rotation is not None:
+    camera, env, rotation = composition.camera, composition.env, composition.env_rotation
+    if env is None and rotation is not None:
         raise click.BadParameter("there is no --env to turn", param_hint="--env-rotation")
     if camera is not None or env is not None:
         up = up_of(scene)
         if camera is not None:
             scene = dataclasses.replace(scene, camera=_orbiting(scene, camera, up))
         if env is not None:
-            scene = _surrounded(scene, env, up, env_rotation or 0.0)
-    if crop is not None:
-        film = scene.film
-        (x, width), (y, height) = crop[0].of(film.width), crop[1].of(film.height)
+            scene = _surrounded(scene, env, up, rotation or 0.0)
+    if composition.crop is not None:
+        film, (columns, rows) = scene.film, composition.crop
+        (x, width), (y, height) = columns.of(film.width), rows.of(film.height)
         film = dataclasses.replace(film, crop=(x, y, width, height))
         scene = dataclasses.replace(scene, film=film)
     return scene

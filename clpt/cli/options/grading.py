@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import click
 
 from ...colour.tones import TONES
 from ...colour.view import DEFAULT_CONFIG, View
 from ...render.film.layer_channels import SETS
-from .option_sets import Command, with_options
+from .records import Command, with_options
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,31 @@ class Grading:
     tone: str = "none"
     view: View | None = None
     names: str = SETS[0]
+
+
+@dataclass(frozen=True)
+class GradingOptions:
+    """What the options of `grading_options` and `names_option` say."""
+
+    exposure: float
+    tone: str | None
+    view: str | None
+    display: str | None
+    look: str | None
+    ocio: str
+    names: str = SETS[0]
+
+    @cached_property
+    def grading(self) -> Grading:
+        """How files say a picture. Raises SceneError, click.UsageError."""
+        if not (self.view or self.display or self.look):
+            if self.ocio != DEFAULT_CONFIG:
+                raise click.UsageError("--ocio needs --view or --display")
+            return Grading(self.exposure, self.tone or "none", names=self.names)
+        if self.tone is not None:
+            raise click.UsageError("a view has its own tone curve; leave out --tone")
+        seen = View(self.view, display=self.display, look=self.look, config=self.ocio)
+        return Grading(self.exposure, view=seen, names=self.names)
 
 
 _OPTIONS = (
@@ -49,26 +75,5 @@ names_option = click.option(
 
 
 def grading_options(command: Command) -> Command:
-    """Give a command the options that `grading` takes."""
+    """Give a command the options of which `GradingOptions` is the record."""
     return with_options(command, _OPTIONS)
-
-
-def grading(
-    *,
-    exposure: float,
-    tone: str | None,
-    view: str | None,
-    display: str | None,
-    look: str | None,
-    ocio: str,
-    names: str = SETS[0],
-) -> Grading:
-    """Return what these options say. Raises SceneError, click.UsageError."""
-    if not (view or display or look):
-        if ocio != DEFAULT_CONFIG:
-            raise click.UsageError("--ocio needs --view or --display")
-        return Grading(exposure, tone or "none", names=names)
-    if tone is not None:
-        raise click.UsageError("a view has its own tone curve; leave out --tone")
-    seen = View(view, display=display, look=look, config=ocio)
-    return Grading(exposure, view=seen, names=names)

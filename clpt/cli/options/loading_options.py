@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from ... import budget
-from .option_sets import Command, with_options
+from .records import Command, with_options
 from .scene_variables import scene_variables
 
 

@@ -1,106 +1,81 @@
-"""What `clpt render` and `clpt warm` share: options that say what is rendered and where, and how a
-renderer is made of them.
-"""
+"""Options that say what is rendered, and by what: of `clpt render`, `view`, `warm` and others."""
 
 from __future__ import annotations
 
-import dataclasses
-import re
-import time
-from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeAlias, get_args
+from typing import Any, get_args
 
 import click
 
-from ... import device as dev
-from ...bvh import LAYOUTS, Quality
-from ...cluster.multi_renderer import MultiRenderer
-from ...denoise.needs import METHODS, prepared
-from ...errors import nearest
+from ...bvh.layouts import LAYOUTS, Quality
+from ...denoise.needs import METHODS
 from ...formats import load
 from ...formats.missing import Missing
-from ...render.lowering.checks import check
-from ...render.renderer import Renderer
 from ...scene import Scene, kinds
-from ...scene.integrators import AUTO, MOST_LIGHT_PATHS, NO_AOV, Auto
 from ...scene.layers import LAYERS
-from ...scene.params import Kind, params
-from ...spectra import read_sensor, spaces
-from ...spectra.sensors import OBSERVERS
-from ..printing.display import Display
-from ..process.stopping import prompt
-from .composition import Orbit, Span, composed, composition_options
+from ...spectra import spaces
+from .changes import SceneChanges, changed
+from .composition import composition_options
 from .loading_options import Bytes, loading_options
-from .option_sets import Command, with_options
-
-LARGEST = 65536  # pixels of a side
-
-AnyRenderer: TypeAlias = Renderer | MultiRenderer
+from .records import Command, with_options
+from .values import LightPaths, Names, SensorName, Size, White
 
 
-class Size(click.ParamType):
-    """WIDTHxHEIGHT in pixels."""
+@dataclass(frozen=True)
+class Loading:
+    """How a scene's file is read: see `clpt.load`."""
 
-    name = "WxH"
+    variables: dict[str, Any]
+    missing_textures: Missing = "error"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[int, int]:
-        found = re.fullmatch(r"(\d{1,9})x(\d{1,9})", str(value).strip().lower())
-        if not found:
-            self.fail(f"{value!r} does not look like 640x480", param, ctx)
-        width, height = int(found[1]), int(found[2])
-        if not (1 <= width <= LARGEST and 1 <= height <= LARGEST):
-            self.fail(f"{width}x{height}: each side can be 1 to {LARGEST} pixels", param, ctx)
-        return width, height
-
-
-class SensorName(click.ParamType):
-    """An observer's name, or the file of a camera's curves."""
-
-    name = "NAME-OR-FILE"
-
-    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        return value if value in OBSERVERS else read_sensor(value)
+    def read(self, file: Path, progress: Callable[[float, str], None] | None = None) -> Scene:
+        """Return the scene of a file. Raises SceneError."""
+        return load(
+            file, progress=progress, missing_textures=self.missing_textures, **self.variables
+        )
 
 
-class LightPaths(click.ParamType):
-    """A number of light paths, or auto."""
+@dataclass(frozen=True)
+class Machine:
+    """Devices of this machine, by what --device says, and the cores that one may use.
 
-    name = "N-OR-AUTO"
+    profiling: whether stages are timed; keep: wait for what compilers keep for the next time.
+    """
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        return AUTO if value == AUTO else click.FloatRange(0.0, MOST_LIGHT_PATHS)(value, param, ctx)
-
-
-class Names(click.ParamType):
-    """Names of a table, with commas between them."""
-
-    name = "NAMES"
-
-    def __init__(self, known: Iterable[str]):
-        self.known = tuple(known)
-
-    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        given = tuple(str(value).split(","))
-        for name in given:
-            if name not in self.known:
-                self.fail(f"{name!r} is unknown{nearest(name, self.known)}", param, ctx)
-        return given
+    device: str | None = None
+    threads: int | None = None
+    profiling: bool = False
+    keep: bool = False
 
 
-class White(click.ParamType):
-    """none, an illuminant, a colour temperature in K such as 3200, or a chromaticity x,y."""
+@dataclass(frozen=True)
+class Build:
+    """How a renderer is built: see `RenderOptions`."""
 
-    name = "WHITE"
+    layout: str | None = None
+    tree_quality: Quality = "high"
+    texture_budget: int | None = None
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        try:
-            numbers = [float(part) for part in str(value).split(",")]
-        except ValueError:
-            return value
-        return numbers[0] if len(numbers) == 1 else tuple(numbers)
+
+@dataclass(frozen=True)
+class SceneOptions:
+    """What is rendered and by what, as the options of `scene_options` say it."""
+
+    loading: Loading
+    changes: SceneChanges
+    machine: Machine
+    build: Build
+
+    @property
+    def made(self) -> dict[str, Any]:
+        """The options of renderers, by their names there."""
+        return {**vars(self.build), "denoise": self.changes.denoise}
+
+    def scene(self, file: Path, progress: Callable[[float, str], None] | None = None) -> Scene:
+        """Return the scene of a file, changed. Raises SceneError, click.BadParameter."""
+        return changed(self.loading.read(file, progress), self.changes)
 
 
 denoise_option = click.option(
@@ -186,170 +161,5 @@ _OPTIONS = (
 
 
 def scene_options(command: Command) -> Command:
-    """Give a command the options that `open_renderer` takes."""
+    """Give a command the options of which `SceneOptions` is the record."""
     return with_options(composition_options(command), _OPTIONS)
-
-
-def open_renderer(
-    scene: Path,
-    shown: Display,
-    resources: ExitStack,
-    accept: Callable[[Scene], None] | None = None,
-    *,
-    first_sample: int = 0,
-    layout: str | None,
-    tree_quality: Quality,
-    texture_budget: int | None,
-    **options: Any,
-) -> tuple[AnyRenderer, float]:
-    """Return a renderer of a scene file, and the seconds that the file took.
-
-    accept: called with the scene, before anything is built for it; first_sample: see
-    `RenderOptions`; the others as of `open_scene`.
-    """
-    made: dict[str, Any] = {
-        "texture_budget": texture_budget, "layout": layout, "tree_quality": tree_quality,
-        "first_sample": first_sample, "denoise": options["denoise"],
-    }  # fmt: skip
-    with prompt(dev.kill_compilers):
-        plan, devices, loading = open_scene(scene, shown, resources, accept, **options)
-        with shown.phase(f"building kernels for {' and '.join(on.info.name for on in devices)}"):
-            renderer = new_renderer(plan, devices, **made)
-    for warning in renderer.warnings:
-        shown.note(f"clpt: warning: {warning}")
-    return renderer, loading
-
-
-def open_scene(
-    scene: Path,
-    shown: Display,
-    resources: ExitStack,
-    accept: Callable[[Scene], None] | None = None,
-    *,
-    profiling: bool = False,
-    keep: bool = False,
-    device: str | None,
-    threads: int | None,
-    variables: dict[str, Any],
-    missing_textures: Missing,
-    **changes: Any,
-) -> tuple[Scene, list[dev.Device], float]:
-    """Return the scene of a file, the devices, and the seconds that the file took.
-
-    resources: get the processes that compile beside this one; accept: called with the scene; keep:
-    wait for what they keep for the next time; changes: see `changed`.
-    """
-    began = time.perf_counter()
-    with ThreadPoolExecutor(max_workers=1) as beside:
-        chosen = beside.submit(choose_devices, device, profiling=profiling, threads=threads)
-        with shown.loading(scene.name) as tell:
-            loaded = load(scene, progress=tell, missing_textures=missing_textures, **variables)
-            plan = changed(loaded, **changes)
-        loading = time.perf_counter() - began
-        if accept is not None:
-            accept(plan)
-        check(plan)
-        devices = chosen.result()
-    share_compilers(devices, threads, resources, keep=keep)
-    for warning in plan.warnings:
-        shown.note(f"clpt: warning: {warning}")
-    if plan.film.filtering != loaded.film.filtering:
-        shown.note("for the denoiser each pixel has its own samples: film.filtering is importance")
-    return plan, devices, loading
-
-
-def new_renderer(plan: Scene, devices: list[dev.Device], **made: Any) -> AnyRenderer:
-    """Return a renderer on one device, or on several."""
-    if len(devices) > 1:
-        return MultiRenderer(plan, devices, **made)
-    return Renderer(plan, devices[0], **made)
-
-
-def choose_devices(which: str | None, *, profiling: bool, threads: int | None) -> list[dev.Device]:
-    """Open what --device names."""
-    if which is not None and dev.names_several(which):
-        return dev.choose_all(which, profiling=profiling, threads=threads)
-    return [dev.choose(which, profiling=profiling, threads=threads)]
-
-
-def share_compilers(
-    devices: list[dev.Device], threads: int | None, resources: ExitStack, *, keep: bool = False
-) -> None:
-    """Let other processes compile for devices whose driver compiles one text at a time."""
-    slow = [on for on in devices if on.info.compiles_singly]
-    spare = min([dev.spare_cores(), *((threads or on.info.compute_units) - 1 for on in slow)])
-    if slow and spare > 0:
-        compilers = resources.enter_context(dev.Compilers(spare, wait_for_kept=keep))
-        for on in slow:
-            on.compilers = compilers
-
-
-def changed(
-    scene: Scene,
-    *,
-    mode: str | None = None,
-    spp: int | None = None,
-    noise: float | None = None,
-    size: tuple[int, int] | None = None,
-    seed: int | None = None,
-    integrator: str | None = None,
-    sampler: str | None = None,
-    max_depth: int | None = None,
-    light_paths: float | str | None = None,
-    radius: float | None = None,
-    guiding: bool | None = None,
-    camera: Orbit | None = None,
-    crop: tuple[Span, Span] | None = None,
-    env: Path | None = None,
-    env_rotation: float | None = None,
-    denoise: str | None = None,
-    **film: Any,
-) -> Scene:
-    """Return the scene with those settings replaced that are not None; `film`: of its film.
-
-    camera, crop, env, env_rotation: see `composition.composed`.
-
-    Raises click.BadParameter, and SceneError for an invalid film.
-    """
-    film = {name: value for name, value in {"mode": mode, **film}.items() if value is not None}
-    film |= {} if size is None else {"width": size[0], "height": size[1]}
-    film |= {} if crop is None else {"crop": None}  # that of the file may not fit the new size
-    if noise is not None:
-        scene = dataclasses.replace(scene, noise=noise or None)
-    given: dict[str, Any] = {"spp": spp, "seed": seed}
-    given["sampler"] = None if sampler is None else kinds("sampler")[sampler]()
-    given["film"] = dataclasses.replace(scene.film, **film)
-    if integrator is not None and integrator != scene.integrator.kind:
-        given["integrator"] = _integrator(integrator, scene.integrator)
-    how: Any = given.get("integrator", scene.integrator)
-    if isinstance(how, Auto):  # a number of light paths, or a radius, is a choice
-        of_path = light_paths is not None or guiding is not None
-        wanted = "vcm" if radius is not None else "path" if of_path else "auto"
-        how = _integrator(wanted, how)
-    for name, value, what in (
-        ("max_depth", max_depth, "depth"), ("light_paths", light_paths, "light paths beside it"),
-        ("radius", radius, "photons"), ("guiding", guiding, "guiding"),
-    ):  # fmt: skip
-        if value is None:
-            continue
-        if not hasattr(how, name):
-            message = f"the integrator {how.kind} has no {what}"
-            raise click.BadParameter(message, param_hint=f"--{name.replace('_', '-')}")
-        how = given["integrator"] = dataclasses.replace(how, **{name: value})
-    scene = dataclasses.replace(scene, **{k: v for k, v in given.items() if v is not None})
-    scene = composed(scene, camera=camera, crop=crop, env=env, env_rotation=env_rotation)
-    return prepared(scene, denoise)
-
-
-def _integrator(name: str, old: Kind) -> Any:
-    """Return an integrator of another kind, with the parameters that both have."""
-    known = kinds("integrator")
-    if name not in known:
-        message = NO_AOV if name == "aov" else f"{name!r} is none of {', '.join(known)}"
-        raise click.BadParameter(message, param_hint="--integrator")
-    shared = params(known[name]).keys() & params(type(old)).keys()
-    given = {key: getattr(old, key) for key in shared}
-    if name == "vcm" and "light_paths" in given:  # a whole number, 1 or more
-        number = given.pop("light_paths")
-        given |= {} if number == AUTO else {"light_paths": max(round(number), 1)}
-    return known[name](**given)

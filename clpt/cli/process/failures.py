@@ -6,10 +6,8 @@ import traceback
 from pathlib import Path
 
 import click
-import platformdirs
 
 from ... import output_files
-from ...device import disk_cache
 from ...errors import ClptError
 
 BAD_INPUT, BUG = 2, 1
@@ -34,6 +32,10 @@ def complain(message: str) -> None:
 
 def _keep_traceback() -> str:
     """Write the current traceback to clpt's log folder; a phrase that tells where."""
+    import platformdirs
+
+    from ...device import disk_cache  # here: most commands end without a fault, some without OpenCL
+
     try:
         logs = Path(platformdirs.user_log_dir("clpt", appauthor=False))
     except RuntimeError:  # a user without a home

@@ -11,55 +11,72 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import click
 
 from ... import __version__, images
-from ...cluster.cluster_renderer import ClusterRenderer
 from ...errors import ClusterError, SceneError
-from ...formats import load
 from ...render.lowering.checks import check
 from ...scene import Scene
 from ...scene.fingerprint import fingerprint
-from ..files import outputs
-from ..options.grading import Grading
-from ..options.scene_options import AnyRenderer, changed
+from ..files import outputs, targets
+from ..opening.devices import choose_devices, share_compilers
+from ..opening.makers import AnyRenderer, Maker, cluster_makers, device_makers
+from ..options.changes import changed
 from ..printing.display import Display, clock
 from ..process.stopping import STATUS, stops
 from . import video
-from .crews import Crew, cluster_crews, device_crews
 from .frame_values import expanded, has_number, numbered, varies
-from .passes import render_samples
+from .passes import End, render_samples
+from .refused import refusals
+from .settings import Job
 
 KEPT = (".exr", ".png")  # formats that keep a frame's fingerprint
 LOOK = 0.1  # seconds between two looks at signals
 
 
 @dataclass(frozen=True)
-class Animation:
-    """What is rendered for each frame.
+class _Frames:
+    """What is rendered for each frame of a job; outputs: names with a place for its number."""
 
-    scene, outputs: names with a place for the frame's number; variables: values perhaps with
-    expressions; changes: see `scene_options.changed`; limit: seconds of a frame; spp: samples, None
-    where the limit or the noise ends a frame.
-    """
-
-    scene: Path
+    job: Job
+    numbers: range
     outputs: tuple[Path, ...]
-    frames: range
-    fps: float
-    variables: Mapping[str, str]
-    missing_textures: Any
-    changes: Mapping[str, Any]
-    grading: Grading
-    limit: float | None
+
+    @classmethod
+    def of(cls, job: Job) -> _Frames:
+        """Return the frames of a job. Raises click.UsageError, SceneError."""
+        numbers, scene = job.animation.frames or range(0), job.scene
+        if not varies(job.options.loading.variables) and not has_number(scene):
+            raise click.UsageError(
+                "all frames would be the same: let a variable depend on them, as -D 'time={time}', "
+                "or give a scene of each frame, as scene.####.json"
+            )
+        named = numbered(scene, numbers[0]) if has_number(scene) else scene
+        outputs = job.output.paths or targets.default(named)
+        if not job.output.paths and job.animation.video is None:
+            outputs = outputs[:1]  # .exr
+        frames = cls(job, numbers, outputs)
+        if job.animation.video is not None:
+            if not frames.pictures:
+                raise click.UsageError("--video is made of .png: add -o NAME.png")
+            video.check(job.animation.video)
+        targets.checked(frames.targets(numbers[0]))
+        return frames
+
+    @property
+    def pictures(self) -> list[Path]:
+        """The .png files of the first path that is one, of all frames."""
+        found = [path for path in self.outputs if path.suffix.lower() == ".png"]
+        return [numbered(path, frame) for path in found[:1] for frame in self.numbers]
 
     def file(self, frame: int) -> Path:
         """Return the scene file of a frame."""
-        return numbered(self.scene, frame) if has_number(self.scene) else self.scene
+        scene = self.job.scene
+        return numbered(scene, frame) if has_number(scene) else scene
 
     def targets(self, frame: int) -> tuple[Path, ...]:
         """Return the files of a frame's picture."""
@@ -67,21 +84,17 @@ class Animation:
 
     def load(self, frame: int) -> tuple[Scene, str]:
         """Return a frame's scene, and the fingerprint of all that decides its picture."""
-        variables: dict[str, Any] = {**expanded(self.variables, frame, self.fps)}
-        loaded = load(self.file(frame), missing_textures=self.missing_textures, **variables)
-        plan = changed(loaded, **self.changes)
-        check(plan)
+        loading, changes = self.job.options.loading, self.job.options.changes
+        values = expanded(loading.variables, frame, self.job.animation.fps)
+        scene = changed(replace(loading, variables=values).read(self.file(frame)), changes)
+        check(scene)
         decides = {
-            "scene": fingerprint(plan).digest, "spp": self.spp(plan), "noise": plan.noise,
-            "time": self.limit, "grading": repr(self.grading), "version": __version__,
-            "denoise": self.changes["denoise"],
+            "scene": fingerprint(scene).digest, "spp": self.job.until.end(scene),
+            "noise": scene.noise, "time": self.job.until.limit,
+            "grading": repr(self.job.graded.grading), "version": __version__,
+            "denoise": changes.denoise,
         }  # fmt: skip
-        return plan, hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
-
-    def spp(self, plan: Scene) -> int | None:
-        """Return how many samples a frame gets, None for any number."""
-        free = self.limit is not None or self.changes["noise"]
-        return self.changes["spp"] if free else plan.spp
+        return scene, hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
 
     def is_complete(self, frame: int, digest: str) -> bool:
         """Whether a frame's files are there, and of this fingerprint."""
@@ -90,78 +103,50 @@ class Animation:
         return bool(kept) and set(kept) == {digest} and all(path.is_file() for path in paths)
 
 
-def render_frames(
-    scene: Path,
-    paths: tuple[Path, ...],
-    frames: range,
-    fps: float,
-    film: Path | None,
-    graded: Grading,
-    limit: float | None,
-    shown: Display,
-    *,
-    cluster: str | None,
-    keys: Path | None,
-    device: str | None,
-    threads: int | None,
-    variables: Mapping[str, str],
-    missing_textures: Any,
-    profiling: bool = False,
-    **options: Any,
-) -> int:
-    """Render frames that are not complete; return the exit status.
-
-    film: of all frames; cluster, keys: see `on_cluster.render_on_cluster`.
-    """
-    given = paths or outputs.default(scene if not has_number(scene) else numbered(scene, frames[0]))
-    if not paths and film is None:
-        given = given[:1]  # .exr
-    if not varies(variables) and not has_number(scene):
-        raise click.UsageError(
-            "all frames would be the same: let a variable depend on them, as -D 'time={time}', or "
-            "give a scene of each frame, as scene.####.json"
-        )
-    if film is not None:
-        pictures = [path for path in given if path.suffix.lower() == ".png"]
-        if not pictures:
-            raise click.UsageError("--video is made of .png: add -o NAME.png")
-        video.check(film)
-    outputs.checked(tuple(numbered(path, frames[0]) for path in given))
-    made = {name: options.pop(name) for name in ("layout", "tree_quality", "texture_budget")}
-    made["denoise"] = options["denoise"]
-    plan = Animation(scene, given, frames, fps, variables, missing_textures, options, graded, limit)
+def render_frames(job: Job, shown: Display) -> int:
+    """Render frames that are not complete; return the exit status."""
+    frames = _Frames.of(job)
     with ExitStack() as resources, stops() as stopped:
-        if cluster is None:
-            crews = device_crews(device, threads, len(frames), profiling, made, resources)
-        else:
-            together = 1 if limit is not None else len(frames)  # its time is a frame's own
-            several = cluster_crews(cluster, keys, device, threads, together, made, shown)
-            crews = resources.enter_context(several)
-        _FrameLoop(plan, crews, shown, stopped).run()
+        makers = _makers(job, len(frames.numbers), shown, resources)
+        _FrameLoop(frames, makers, shown, stopped).run()
+        makers[0].report()
         if stopped:
-            for crew in crews:
-                crew.stop()
+            for maker in makers:
+                maker.stop()
             return STATUS + stopped[0]
+    film, fps = job.animation.video, job.animation.fps
     if film is not None:
         with shown.phase(f"writing {film}"):
-            video.write(film, [numbered(pictures[0], frame) for frame in frames], fps)
-        shown.note(f"{film}  {len(frames)} frames, {len(frames) / fps:.3g} s")
+            video.write(film, frames.pictures, fps)
+        count = len(frames.numbers)
+        shown.note(f"{film}  {count} frames, {count / fps:.3g} s")
     return 0
 
 
+def _makers(job: Job, frames: int, shown: Display, resources: ExitStack) -> Sequence[Maker]:
+    """Return who renders frames: devices, or the workers of a cluster."""
+    if job.workers.cluster is not None:
+        together = 1 if job.until.limit is not None else frames  # its time is a frame's own
+        several = cluster_makers(job.workers, job.options, together, shown)
+        return resources.enter_context(several)
+    devices = choose_devices(job.options.machine)
+    share_compilers(devices, job.options.machine, resources)
+    return device_makers(devices, job.options, frames)
+
+
 class _FrameLoop:
-    """Threads that take frames, one for each crew, and one that reads scenes ahead."""
+    """Threads that take frames, one for each maker, and one that reads scenes ahead."""
 
     def __init__(
         self,
-        plan: Animation,
-        crews: list[Crew],
+        frames: _Frames,
+        makers: Sequence[Maker],
         shown: Display,
         stopped: Sequence[int],
     ):
-        self.plan, self.crews, self.shown, self.stopped = plan, crews, shown, stopped
+        self.plan, self.makers, self.shown, self.stopped = frames, [*makers], shown, stopped
         self.errors: list[BaseException] = []
-        self._left = deque(plan.frames)
+        self._left = deque(frames.numbers)
         self._ahead: deque[tuple[int, Future[tuple[Scene, str]]]] = deque()
         self._lock = threading.Lock()
         self._done = self._rendered = 0
@@ -173,8 +158,8 @@ class _FrameLoop:
         with ThreadPoolExecutor(1) as reader:
             while (self._left or self._ahead) and not (self.errors or self.stopped):
                 threads = [
-                    threading.Thread(target=self._work, args=(crew, reader), daemon=True)
-                    for crew in self.crews
+                    threading.Thread(target=self._work, args=(maker, reader), daemon=True)
+                    for maker in self.makers
                 ]
                 for thread in threads:
                     thread.start()
@@ -191,55 +176,55 @@ class _FrameLoop:
         with self._lock:
             if self.errors or self.stopped:
                 return None
-            while self._left and len(self._ahead) <= len(self.crews):
+            while self._left and len(self._ahead) <= len(self.makers):
                 frame = self._left.popleft()
                 self._ahead.append((frame, reader.submit(self.plan.load, frame)))
             return self._ahead.popleft() if self._ahead else None
 
-    def _work(self, crew: Crew, reader: ThreadPoolExecutor) -> None:
-        """Let a crew render frames, till none is left."""
-        renderer: AnyRenderer | ClusterRenderer | None = None
+    def _work(self, maker: Maker, reader: ThreadPoolExecutor) -> None:
+        """Let a maker render frames, till none is left."""
+        renderer: AnyRenderer | None = None
         try:
             while (taken := self._take(reader)) is not None:
                 frame, scene = taken
                 try:
-                    renderer = self._frame(frame, *scene.result(), crew, renderer)
+                    renderer = self._frame(frame, *scene.result(), maker, renderer)
                 except (SceneError, ClusterError, OSError, click.ClickException):
                     raise
                 except Exception as error:
-                    if not self._lose(crew, error, taken):
+                    if not self._lose(maker, error, taken):
                         raise
                     return
         except BaseException as error:
             self.errors.append(error)
         finally:
-            crew.frame = math.inf
+            maker.frame = math.inf
             if renderer is not None:
                 renderer.close()
 
     def _lose(
         self,
-        lost: Crew,
+        lost: Maker,
         error: BaseException,
         taken: tuple[int, Future[tuple[Scene, str]]],
     ) -> bool:
-        """Leave a crew out, of which others get the frame; return whether there are others."""
+        """Leave a maker out, of which others get the frame; return whether there are others."""
         with self._lock:
-            self.crews = [crew for crew in self.crews if crew is not lost]
+            self.makers = [maker for maker in self.makers if maker is not lost]
             self._ahead.appendleft(taken)
         what = f"{lost.name} failed and is left out, others do its part: {error}"
-        if self.crews:
+        if self.makers:
             self.shown.note(f"clpt: warning: {what}")
-        return bool(self.crews)
+        return bool(self.makers)
 
     def _frame(
         self,
         frame: int,
         scene: Scene,
         digest: str,
-        crew: Crew,
-        renderer: AnyRenderer | ClusterRenderer | None,
-    ) -> AnyRenderer | ClusterRenderer | None:
+        maker: Maker,
+        renderer: AnyRenderer | None,
+    ) -> AnyRenderer | None:
         """Render a frame unless it is complete; return the renderer for the next one."""
         plan = self.plan
         if plan.is_complete(frame, digest):
@@ -248,13 +233,12 @@ class _FrameLoop:
         stale = [path for path in plan.targets(frame) if path.is_file()]
         if any(_fingerprint_of(path) not in (None, digest) for path in stale):
             self.shown.note(f"frame {frame}: the scene or an option has changed since {stale[0]}")
-        crew.frame = frame
-        renderer = _showing(scene, crew, renderer, self.shown)
-        began = time.perf_counter()
-        render_samples(
-            renderer, plan.spp(scene), plan.limit, crew.tell, scene.noise, self.stopped,
-            pass_seconds=crew.pass_seconds(scene),
-        )  # fmt: skip
+        maker.frame = frame
+        renderer = _showing(scene, maker, renderer, self.shown)
+        began, until = time.perf_counter(), plan.job.until
+        end = End(until.end(scene), until.limit, scene.noise, self.stopped)
+        seconds = maker.pass_seconds(scene.noise is not None)
+        render_samples(renderer, end, maker.look, pass_seconds=seconds)
         if self.stopped:
             return renderer  # what it has so far is no frame
         if not any(counts.samples for counts in renderer.counts):
@@ -263,10 +247,10 @@ class _FrameLoop:
         seconds = time.perf_counter() - began
         stats = outputs.metadata(renderer, plan.file(frame), seconds)
         stats |= {"frame": frame, "fingerprint": digest}
-        outputs.write_all(plan.targets(frame), renderer, stats, plan.grading, lambda text: None)
-        rejected = sum(counts.rejected for counts in renderer.counts)
-        bad = f", {rejected} samples were not finite, or too bright" if rejected else ""
-        done = f"{plan.targets(frame)[0]}  {stats['spp']:.4g} spp, {seconds:.1f} s{bad}"
+        grading, paths = plan.job.graded.grading, plan.targets(frame)
+        outputs.write_all(paths, renderer, stats, grading, lambda text: None)
+        bad = "".join(f", {text}" for text in refusals(renderer))
+        done = f"{paths[0]}  {stats['spp']:.4g} spp, {seconds:.1f} s{bad}"
         self._tell(frame, done, time.perf_counter() - began)
         return renderer
 
@@ -275,16 +259,16 @@ class _FrameLoop:
         with self._lock:
             self._done += 1
             self._rendered += seconds > 0.0
-            left = len(self.plan.frames) - self._done
+            left = len(self.plan.numbers) - self._done
             passed = time.perf_counter() - self._began
             rest = f"; {clock(passed / self._rendered * left)} left" if self._rendered else ""
-            number = f"{self._done} of {len(self.plan.frames)}"
+            number = f"{self._done} of {len(self.plan.numbers)}"
         self.shown.note(f"frame {frame} ({number}): {what}{rest if left else ''}")
 
 
 def _showing(
-    scene: Scene, crew: Crew, renderer: AnyRenderer | ClusterRenderer | None, shown: Display
-) -> AnyRenderer | ClusterRenderer:
+    scene: Scene, maker: Maker, renderer: AnyRenderer | None, shown: Display
+) -> AnyRenderer:
     """Return a renderer of a scene: the one that there is, if it can take the scene."""
     if renderer is not None:
         try:
@@ -292,10 +276,9 @@ def _showing(
             return renderer
         except SceneError:  # a film of another form
             renderer.close()
-    renderer = crew.make(scene, shown)
-    for warning in (*scene.warnings, *renderer.warnings):
+    for warning in scene.warnings:
         shown.note(f"clpt: warning: {warning}")
-    return renderer
+    return maker.make(scene, shown)
 
 
 def _fingerprint_of(path: Path) -> str | None:

@@ -6,38 +6,48 @@ import dataclasses
 import math
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
-from ...cluster.cluster_renderer import ClusterRenderer
 from ...render.progress import Progress
 from ...render.renderer import MOST_SAMPLES
-from ..options.scene_options import AnyRenderer
+from ..opening.makers import DEVICE_SECONDS, AnyRenderer
 
-PASS_SECONDS = 3.0  # at the end of a pass few paths are left; only at its end is there a checkpoint
 GROWTH = 3  # times what has been rendered so far
 
 
+@dataclass(frozen=True)
+class End:
+    """When a render ends: the first of these that comes; None means no limit.
+
+    samples: the number of the next sample; seconds: of the render; noise: that no pixel has more
+    of; stopped: gets an entry at a signal, see clpt.cli.process.stopping.
+    """
+
+    samples: int | None = None
+    seconds: float | None = None
+    noise: float | None = None
+    stopped: Sequence[int] = ()
+
+
 def render_samples(
-    renderer: AnyRenderer | ClusterRenderer,
-    end: int | None,
-    limit: float | None,
+    renderer: AnyRenderer,
+    end: End,
     show: Callable[[Progress], None],
-    noise: float | None = None,
-    stopped: Sequence[int] = (),
     after_pass: Callable[[], None] = lambda: None,
     *,
-    pass_seconds: float = PASS_SECONDS,
+    pass_seconds: float = DEVICE_SECONDS,
 ) -> None:
-    """Render until the next sample is number `end` or `limit` [s] is over; None means no limit.
+    """Render until the end.
 
-    With `noise` the rendering also ends when no pixel has more noise. after_pass: is called when a
-    pass has come to its end; pass_seconds: of a pass, infinite for a single one.
+    after_pass: is called when a pass has come to its end; pass_seconds: of a pass, infinite for a
+    single one.
 
-    It ends soon after the limit, perhaps before every pixel has a sample, and within a second when
-    `stopped` gets an entry, see clpt.cli.process.stopping.
+    It ends soon after the limit, perhaps before every pixel has a sample, and within a second of a
+    signal.
     """
     began = time.perf_counter()
-    first, last = renderer.first_sample, end or MOST_SAMPLES
-    total = 0 if end is None else end - first
+    first, last, limit = renderer.first_sample, end.samples or MOST_SAMPLES, end.seconds
+    total = 0 if end.samples is None else end.samples - first
     others = renderer.counts if renderer.samples > first else ()  # who rendered before
     former = sum(counts.samples for counts in others), sum(counts.rays for counts in others)
 
@@ -46,17 +56,17 @@ def render_samples(
         paths, rays = progress.paths - former[0], progress.rays - former[1]
         show(dataclasses.replace(progress, total=total, seconds=seconds, paths=paths, rays=rays))
         over = limit is not None and seconds >= limit
-        return not (stopped or over)
+        return not (end.stopped or over)
 
     if renderer.samples >= last:
         return
     size, now = 1 if math.isfinite(pass_seconds) else last - renderer.samples, began
-    while renderer.run(size, tell, noise=noise):
+    while renderer.run(size, tell, noise=end.noise):
         after_pass()
         start, now = now, time.perf_counter()
         seconds_left = math.inf if limit is None else began + limit - now
         samples_left = last - renderer.samples
-        if stopped or samples_left <= 0 or seconds_left <= 0 or renderer.active == 0.0:
+        if end.stopped or samples_left <= 0 or seconds_left <= 0 or renderer.active == 0.0:
             break
         rate = size / max(now - start, 1e-9)
         done = renderer.samples - first
@@ -68,7 +78,7 @@ def pass_size(
     rate: float,
     samples_left: float,
     seconds_left: float,
-    seconds: float = PASS_SECONDS,
+    seconds: float = DEVICE_SECONDS,
 ) -> int:
     """Return the samples of the next pass, after `samples`, at `rate` [1/s]; seconds: that it takes
     at the most.

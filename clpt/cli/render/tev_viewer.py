@@ -4,31 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
 
-import click
 import numpy as np
 from numpy.typing import NDArray
 
 from ... import tev
 from ...render.film.layer_channels import channels_of
 from ..files.outputs import Film
-
-EVERYWHERE = tev.HOST  # what --tev without a value means
-
-
-class Address(click.ParamType):
-    """HOST, HOST:PORT or :PORT."""
-
-    name = "HOST:PORT"
-
-    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        if not isinstance(value, str):
-            return value
-        try:
-            return tev.address(value)
-        except ValueError as error:
-            self.fail(f"{value!r} is no address of a viewer: {error}", param, ctx)
 
 
 @contextmanager
