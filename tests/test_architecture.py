@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ast
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -40,6 +42,10 @@ MAY_IMPORT = {
 OPENCL = {"device", "bvh", "denoise", "rays", "render"}  # only these import pyopencl
 # clpt/render/<room>: arrows point down; rooms of one floor do not know each other.
 FLOORS = ({"contract"}, {"lowering", "codegen"}, {"wavefront"}, {"editing", "film"})
+# clpt/cli/<room>: the same; commands stand on top of all.
+ROOMS_OF_COMMANDS = (
+    {"process"}, {"printing", "options"}, {"opening"}, {"files"}, {"plots"}, {"render", "view"},
+)  # fmt: skip
 # What kinds share, by what a reader looks for.
 SHARED = {
     "colour", "core", "denoising", "film", "guiding", "interface", "lighting", "merging", "optics",
@@ -137,6 +143,16 @@ def test_rooms_of_render_know_only_lower_floors(path: Path) -> None:
     assert not found - known, f"{parts[2]} imports {', '.join(sorted(found - known))}"
 
 
+def test_rooms_of_commands_know_only_lower_floors() -> None:
+    wrong = []
+    for path in sorted((PACKAGE / "cli").glob("*/*.py")):
+        floor = next(i for i, rooms in enumerate(ROOMS_OF_COMMANDS) if path.parent.name in rooms)
+        known = {path.parent.name}.union(*ROOMS_OF_COMMANDS[:floor])
+        found = {name.split(".")[2] for name in imports(path) if name.startswith("clpt.cli.")}
+        wrong += [f"{path.relative_to(ROOT)} imports {room}" for room in sorted(found - known)]
+    assert not wrong
+
+
 def test_a_circle_is_found() -> None:
     assert circle({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == []
     assert circle({"a": {"b"}, "b": {"c", "d"}, "c": set(), "d": {"b"}}) == ["b", "d", "b"]
@@ -207,14 +223,36 @@ def test_public_names() -> None:
     tree = ast.parse((PACKAGE / "__init__.py").read_text(encoding="utf-8"))
     imported = {
         alias.asname or alias.name
-        for node in tree.body
+        for node in ast.walk(tree)
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("clpt")
         for alias in node.names
     }
-    assert set(clpt.__all__) == imported | {"__version__"}
+    assert set(clpt.__all__) == imported == set(clpt._HOMES)
     for name in clpt.__all__:
         assert hasattr(clpt, name)
         assert getattr(clpt, name).__doc__ or name == "__version__"
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("clpt"):
+            for alias in node.names:
+                home = node.module.removeprefix("clpt."), alias.name
+                assert clpt._HOMES[alias.asname or alias.name] == home  # where types are read
+
+
+def test_the_front_page_is_imported_as_it_is_used() -> None:
+    """`clpt.render` is the function, whoever imports the package of that name."""
+    code = """
+import sys, clpt
+assert "numpy" not in sys.modules
+from clpt.render.film import layers
+import clpt.render.options
+assert callable(clpt.render) and clpt.render is clpt.render.__globals__["render"]
+assert clpt.rays.Accel is clpt.Accel and "Scene" in dir(clpt)
+assert not hasattr(clpt, "nothing") and not hasattr(clpt, "_nothing")
+from clpt import images, render, Renderer
+assert callable(render) and images.write is clpt.write_image
+"""
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
 
 
 def kernel_files() -> list[Path]:
