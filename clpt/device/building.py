@@ -9,11 +9,12 @@ import re
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 import pyopencl as cl
 from pyopencl.characterize import has_src_build_cache
 
-from clpt.device import disk_cache, native_programs
+from clpt.device import declarations, disk_cache, native_programs
 
 from ..errors import DeviceError, KernelBuildError
 from .compilers import Job
@@ -94,7 +95,8 @@ def compile_ahead(device: Device, sources: Mapping[str, Source], main: str) -> N
     for source in sources.values():
         part = _entry(device, source, [*flags, _PART])
         if not disk_cache.holds(part):
-            job = Job(device.info.platform, device.info.name, " ".join(flags), source.text)
+            text, options = next(declarations.forms(device, source.text, flags))
+            job = Job(device.info.platform, device.info.name, " ".join(options), text)
             device.compilers.submit(part, job)
 
 
@@ -137,9 +139,8 @@ def _part(device: Device, source: Source, flags: list[str]) -> cl.Program:
 def _compiled(device: Device, source: Source, flags: list[str]) -> cl.Program:
     """Return a part of a program that this process compiles. Raises KernelBuildError."""
     try:
-        part = native_programs.compile_part(
-            device.context, device.info.cl_device, source.text, flags
-        )
+        make = partial(native_programs.compile_part, device.context, device.info.cl_device)
+        part = declarations.built(device, source.text, flags, make)
     except cl.Error as error:
         raise _build_error(source, str(error)) from error
     if _has_binaries(device):
@@ -215,7 +216,8 @@ def _is_oclgrind(device: Device) -> bool:
 
 def _from_source(device: Device, source: Source, flags: list[str]) -> Program:
     try:
-        built = native_programs.build(device.context, device.info.cl_device, source.text, flags)
+        make = partial(native_programs.build, device.context, device.info.cl_device)
+        built = declarations.built(device, source.text, flags, make)
     except cl.Error as error:
         raise _build_error(source, str(error)) from error
     try:
