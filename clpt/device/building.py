@@ -255,9 +255,10 @@ def _build_error(source: Source, log: str) -> KernelBuildError:
     location = re.compile(rf"""(?<![\w/.])({names})["']?(?::|, line |\()(\d+)""")
     rows = [row for row in log.splitlines() if re.search(r"\berror\b", row)]
     first = next(filter(None, map(location.search, rows)), None)
+    file: str | None = None
+    line: int | None = None
     if first:
         file, line = first[1], int(first[2])
-    else:  # NVIDIA's compiler reads no `#line`: it counts the rows of the whole text
-        counted = next(filter(None, map(_COUNTED.search, rows)), None)
-        file, line = source.place(int(counted[1])) if counted else (None, None)
+    elif counted := next(filter(None, map(_COUNTED.search, rows)), None):
+        file, line = source.place(int(counted[1]))  # NVIDIA's compiler reads no `#line`
     return KernelBuildError(source.name, file, line, log, disk_cache.keep_failed(source))

@@ -52,7 +52,7 @@ def _device(platform: str, device: str) -> cl.Device:
 
 
 def _compile(context: cl.Context, options: str, text: str) -> bytes:
-    program = _cl._Program(context, text)
+    program: Any = _cl._Program(context, text)
     program.compile(options.encode(), context.devices, [])
     binary: bytes = program.get_info(cl.program_info.BINARIES)[0]
     return binary
