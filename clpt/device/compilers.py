@@ -30,7 +30,7 @@ _MOST = 4  # processes: more than parts of a loop that take long
 
 @dataclass(frozen=True)
 class Job:
-    """What a process does: "compile" a text to a binary, or "link" binaries and keep the result.
+    """A task of a process: "compile" a text to a binary, or "link" binaries and keep the result.
 
     platform, device: their names; options: of the compiler; place: in the cache folder, as
     `disk_cache.store` takes it, of a result that is kept.
