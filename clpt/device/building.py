@@ -101,7 +101,7 @@ def compile_ahead(device: Device, sources: Mapping[str, Source], main: str) -> N
 
 
 def _whole(sources: Mapping[str, Source], main: str) -> Source:
-    """What the texts of a linked program are together, for its key and for errors."""
+    """Join the texts of a linked program into one, for its key and for errors."""
     files = dict.fromkeys(file for source in sources.values() for file in source.files)
     text = "\n".join(source.text for source in sources.values())
     return Source(sources[main].name, text, tuple(files))

@@ -1,4 +1,4 @@
-"""How the parameters of a kind are declared.
+"""Declarations of the parameters of a kind.
 
 A kind is a frozen dataclass that derives from `Kind`. One of the functions below declares each
 field and gives it a role. The role decides which values it accepts, its type in the kernels, and

@@ -28,7 +28,7 @@ from clpt import device as dev
 from clpt.render.film import film_file
 from clpt.render.lowering.geometry import shapes as placing
 from clpt.render.wavefront.film_state import FilmState, Ranges
-from tests.renders.support import with_film
+from tests.pictures.support import with_film
 
 CODE = str(Path(clpt.__file__).parent)
 NUMBERS = 8  # samples whose films are known one by one

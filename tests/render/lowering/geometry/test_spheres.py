@@ -21,7 +21,7 @@ from clpt.render.lowering.scene import lower
 from clpt.scene import Scene, cameras, integrators, lights, materials, shapes
 from clpt.scene.textures import MeshAttribute
 from tests.kernels.harness import opened
-from tests.renders.support import layers_of
+from tests.pictures.support import layers_of
 
 RNG = np.random.default_rng(11)
 PLACE = T.translate([0.1, -0.2, 0.3]) @ T.rotate([1, 2, 3], 40.0) @ T.scale(1.2)
