@@ -27,11 +27,6 @@ def on_device(values: Any) -> bool:
     return isinstance(values, (cl_array.Array, cl.Buffer))
 
 
-def on_host(values: Any) -> Any:
-    """Return values in host memory; of an array on a device a copy, for which it waits."""
-    return values.get() if isinstance(values, cl_array.Array) else values
-
-
 def is_table(values: Any, kind: str) -> bool:
     """Return whether values are an array on a device as a table is, of words of a numpy kind."""
     return (

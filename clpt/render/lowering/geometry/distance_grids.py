@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import on_host
 from clpt.errors import SceneError
-from clpt.render.lowering.device_arrays import on_host
 from clpt.scene.shapes import SdfGrid
 
 Floats = NDArray[np.float64]

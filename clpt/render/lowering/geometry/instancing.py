@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
+from clpt.arrays import on_host
 from clpt.errors import SceneError
 from clpt.records import INSTANCE
 from clpt.render.contract import shape_records
-from clpt.render.lowering.device_arrays import on_host
 from clpt.render.lowering.geometry import analytic, shapes
 from clpt.render.lowering.geometry.tessellate import keeps_its_kind, tessellate
 from clpt.render.lowering.geometry.tubes import Tubes, as_tubes

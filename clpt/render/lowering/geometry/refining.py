@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.errors import SceneError
-from clpt.render.lowering.textures.texels import pixels
 from clpt.scene import subdivision
+from clpt.scene.pixels import pixels
 from clpt.scene.shapes import Mesh
 from clpt.scene.textures import Bitmap
 

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
+from clpt.arrays import on_host
 from clpt.errors import SceneError
-from clpt.render.lowering.device_arrays import on_host
 from clpt.render.lowering.geometry import analytic, shapes, triangles
 from clpt.scene.shapes import Shape, Spheres
 

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
+from clpt.arrays import on_host
 from clpt.errors import SceneError
 from clpt.render.contract.shape_records import ONE_OF
-from clpt.render.lowering.device_arrays import on_host
 from clpt.render.lowering.geometry import distance_grids, refining
 from clpt.render.lowering.geometry.shapes import Faces, Points, Words, placement, where
 from clpt.render.lowering.geometry.tubes import tubes
