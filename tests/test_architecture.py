@@ -16,22 +16,22 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, KERNELS = ROOT / "clpt", ROOT / "kernels"
 
 BASE = {
-    "arrays", "budget", "child_processes", "colour", "errors", "host_memory", "images", "input_files",
-    "layout", "measured", "numpy_files", "output_files", "records", "spectra", "text", "transforms",
-    "spectral_exr", "tev", "version",
+    "arrays", "budget", "child_processes", "colour", "errors", "host_memory", "images",
+    "input_files", "layout", "measured", "numpy_files", "output_files", "records", "spectra",
+    "spectral_exr", "tev", "text", "transforms", "version",
 }  # fmt: skip
 # What a part may import of the others; itself always.
 MAY_IMPORT = {
     **dict.fromkeys(BASE, BASE),
     "lenses": BASE,
-    "geometry": BASE,
     "scene": BASE | {"lenses"},
+    "geometry": BASE | {"scene"},
     "device": BASE,
     "bvh": BASE | {"device"},
     "denoise": BASE | {"scene", "device"},
     "rays": BASE | {"device", "bvh"},
     "trimesh_ray": BASE | {"device", "rays"},
-    "render": BASE | {"lenses", "scene", "device", "bvh", "denoise"},
+    "render": BASE | {"lenses", "scene", "geometry", "device", "bvh", "denoise"},
     "formats": BASE | {"lenses", "geometry", "scene"},
     "mie": BASE | {"scene"},
     "view": BASE | {"scene", "device", "denoise", "render", "formats"},

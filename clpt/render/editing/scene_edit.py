@@ -11,9 +11,9 @@ import numpy as np
 import pyopencl as cl
 
 from clpt.errors import SceneError
+from clpt.geometry import shapes
+from clpt.geometry.instancing import distinct
 from clpt.render.lowering.device_arrays import fresh_view, on_device, readable
-from clpt.render.lowering.geometry import shapes
-from clpt.render.lowering.geometry.instancing import distinct
 from clpt.scene import Scene
 from clpt.scene.materials import Material, inner, parts
 from clpt.scene.shapes import SMOOTH, Group, Instance, Shape

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.errors import SceneError
+from clpt.geometry import shapes
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.geometry import shapes
 from clpt.render.lowering.materials.material_words import CLEAR, MaterialWords
 from clpt.render.lowering.media import MediumWords
 from clpt.scene.materials import Dielectric, Material, Null, RoughDielectric

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any, NoReturn
 
 from clpt.errors import SceneError
+from clpt.geometry import shapes
+from clpt.geometry.instancing import distinct
 from clpt.render.lowering.bodies import check_bodies
 from clpt.render.lowering.camera.cameras import CONNECTED, dispersive_glasses
-from clpt.render.lowering.geometry import shapes
-from clpt.render.lowering.geometry.instancing import distinct
 from clpt.render.lowering.motion import Motions
 from clpt.render.lowering.motion import check as check_motion
 from clpt.scene import Scene

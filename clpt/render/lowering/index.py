@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from clpt.errors import SceneError
+from clpt.geometry import instancing, shapes
+from clpt.geometry.instancing import Placed, Prototype
 from clpt.render.contract import custom_materials
 from clpt.render.lowering.camera import cameras, filters
-from clpt.render.lowering.geometry import instancing, shapes
-from clpt.render.lowering.geometry.instancing import Placed, Prototype
 from clpt.render.lowering.motion import Motions
 from clpt.scene import Scene
 from clpt.scene import materials as mt

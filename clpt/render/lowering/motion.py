@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from clpt import transforms
 from clpt.errors import SceneError
-from clpt.render.lowering.geometry import shapes, triangles
+from clpt.geometry import shapes, triangles
 from clpt.render.lowering.tables import TableStore
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera, Matrix, Orthographic

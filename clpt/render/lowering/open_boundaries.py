@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.geometry import shapes
 from clpt.render.lowering.camera.surroundings import every, triangles_of
 from clpt.render.lowering.device_arrays import on_device
-from clpt.render.lowering.geometry import shapes
 from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.materials.material_words import CLEAR
 from clpt.scene import materials as mt

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from clpt import transforms
 from clpt.errors import SceneError
-from clpt.render.contract import shape_records
+from clpt.geometry import shape_records, shapes
+from clpt.geometry.instancing import Instances
+from clpt.geometry.refining import is_refined
 from clpt.render.contract.features import Features
 from clpt.render.contract.layer_names import LayerNames
 from clpt.render.contract.parameter_words import row_words
@@ -32,15 +34,12 @@ from clpt.render.lowering.device_arrays import is_table
 from clpt.render.lowering.device_grids import DeviceGrid
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.features import features_of
-from clpt.render.lowering.geometry import shapes
-from clpt.render.lowering.geometry.geometry import (
+from clpt.render.lowering.geometry import (
     SHAPE_ONE_LIGHT,
     Geometry,
     lower_geometry,
     shape_words,
 )
-from clpt.render.lowering.geometry.instancing import Instances
-from clpt.render.lowering.geometry.refining import is_refined
 from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.layer_names import lower_names
 from clpt.render.lowering.lights.aims import aims

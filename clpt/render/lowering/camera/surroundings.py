@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
+from clpt.geometry import analytic, shapes, spheres
+from clpt.geometry.tessellate import keeps_its_kind, tessellate
+from clpt.geometry.triangles import at_time, counted, triangulate
 from clpt.render.lowering.camera.cameras import origin_of
-from clpt.render.lowering.geometry import analytic, shapes, spheres
-from clpt.render.lowering.geometry.tessellate import keeps_its_kind, tessellate
-from clpt.render.lowering.geometry.triangles import at_time, counted, triangulate
 from clpt.render.lowering.motion import AT_ONCE, corners
 from clpt.scene import Scene
 from clpt.scene.media import Medium

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.render.contract import shape_records
-from clpt.render.lowering.geometry.geometry import Geometry
+from clpt.geometry import shape_records
+from clpt.render.lowering.geometry import Geometry
 from clpt.render.lowering.index import SceneIndex
 from clpt.scene import materials as mt
 

@@ -15,11 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.render.contract import shape_records
+from clpt.geometry import analytic, shape_records, shapes, triangles
 from clpt.render.lowering.camera import cameras, surroundings
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.geometry import analytic, shapes, triangles
-from clpt.render.lowering.geometry.geometry import Geometry
+from clpt.render.lowering.geometry import Geometry
 from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.lights import image_lights, light_bounds, sky
 from clpt.render.lowering.lights.aims import is_sharp, sharp_pieces

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
+from clpt.geometry import analytic, shapes
 from clpt.render.lowering.bodies import BodyWords, matter_of
 from clpt.render.lowering.camera import surroundings
-from clpt.render.lowering.geometry import analytic, shapes
-from clpt.render.lowering.geometry.geometry import Geometry
+from clpt.render.lowering.geometry import Geometry
 from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.lights import light_bounds
 from clpt.render.lowering.lights.lights import Emitter, LightRows, row_order

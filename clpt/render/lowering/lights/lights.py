@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt.errors import SceneError
+from clpt.geometry import analytic, shape_records, shapes, spheres, triangles
 from clpt.records import LIGHT
-from clpt.render.contract import shape_records
 from clpt.render.contract.light_records import ALONG, BOTH, FRONT, INFINITE, KINDS, VOLUME
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.geometry import analytic, shapes, spheres, triangles
 from clpt.render.lowering.lights import light_bounds, light_tree
 from clpt.render.lowering.lights.brick_lights import BrickLights
 from clpt.render.lowering.lights.non_shape_lights import blank_row, brightness, lower_lamp

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from clpt.errors import SceneError
+from clpt.geometry import shapes
 from clpt.render.contract.parameter_words import MIXTURE
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.geometry import shapes
 from clpt.render.lowering.index import any_of
 from clpt.render.lowering.materials.normal_maps import NormalPerturbation
 from clpt.scene import materials as mt

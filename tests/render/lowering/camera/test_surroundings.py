@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from clpt import transforms as tf
+from clpt.geometry.tessellate import tessellate
+from clpt.geometry.triangles import triangulate
 from clpt.render.lowering.camera.surroundings import media_around, warnings_of, winding_number
-from clpt.render.lowering.geometry.tessellate import tessellate
-from clpt.render.lowering.geometry.triangles import triangulate
 from clpt.scene import Scene, cameras, media
 from clpt.scene.materials import Diffuse, Null
 from clpt.scene.shapes import Cube, Cylinder, Disk, Group, Instance, Shape, Sphere, Spheres

@@ -7,7 +7,7 @@ import pytest
 from scipy.interpolate import BSpline
 
 from clpt.errors import SceneError
-from clpt.render.lowering.geometry import analytic, triangles, tubes
+from clpt.geometry import analytic, triangles, tubes
 from clpt.scene.shapes import Curves
 
 POINTS = np.array(

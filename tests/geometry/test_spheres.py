@@ -15,8 +15,8 @@ from clpt import transforms as T
 from clpt.cli.info import summary
 from clpt.errors import SceneError
 from clpt.formats.native import load, save
+from clpt.geometry import spheres
 from clpt.records import LIGHT
-from clpt.render.lowering.geometry import spheres
 from clpt.render.lowering.scene import lower
 from clpt.scene import Scene, cameras, integrators, lights, materials, shapes
 from clpt.scene.textures import MeshAttribute

@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.bvh.build import MOST
 from clpt.errors import SceneError
+from clpt.geometry import analytic, instancing, shape_records, shapes, spheres, strands, triangles
+from clpt.geometry.instancing import Instances, Placed, Prototype
 from clpt.records import SHAPE
-from clpt.render.contract import shape_records
 from clpt.render.lowering import motion
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.geometry import analytic, instancing, shapes, spheres, strands, triangles
-from clpt.render.lowering.geometry.instancing import Instances, Placed, Prototype
 from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.lights.lights import Emitter
 from clpt.render.lowering.materials.material_words import MaterialWords

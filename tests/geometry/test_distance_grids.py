@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from clpt.errors import SceneError
 from clpt.formats import load
-from clpt.render.lowering.geometry import distance_grids, triangles
+from clpt.geometry import distance_grids, triangles
 from clpt.scene.shapes import SdfGrid
 
 RNG = np.random.default_rng(4)

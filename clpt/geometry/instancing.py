@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.arrays import on_host
 from clpt.errors import SceneError
+from clpt.geometry import analytic, shape_records, shapes
+from clpt.geometry.tessellate import keeps_its_kind, tessellate
+from clpt.geometry.tubes import Tubes, as_tubes
 from clpt.records import INSTANCE
-from clpt.render.contract import shape_records
-from clpt.render.lowering.geometry import analytic, shapes
-from clpt.render.lowering.geometry.tessellate import keeps_its_kind, tessellate
-from clpt.render.lowering.geometry.tubes import Tubes, as_tubes
 from clpt.scene.shapes import Curves, Group, Instance, Shape
 
 Matrices = NDArray[np.floating]

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.arrays import on_host
 from clpt.errors import SceneError
-from clpt.render.contract.shape_records import ONE_OF
-from clpt.render.lowering.geometry import distance_grids, refining
-from clpt.render.lowering.geometry.shapes import Faces, Points, Words, placement, where
-from clpt.render.lowering.geometry.tubes import tubes
+from clpt.geometry import distance_grids, refining
+from clpt.geometry.shape_records import ONE_OF
+from clpt.geometry.shapes import Faces, Points, Words, placement, where
+from clpt.geometry.tubes import tubes
 from clpt.scene import shapes
 from clpt.scene.motion import Deformation
 from clpt.scene.shapes import Shape

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from clpt.errors import SceneError
-from clpt.render.lowering.geometry.analytic import across, row
+from clpt.geometry.analytic import across, row
 from clpt.scene.shapes import Cylinder, Mesh, Shape, Sphere
 
 AROUND, ALONG = 96, 48  # steps of the azimuth, and of a sphere's polar angle

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from clpt import transforms
 from clpt.errors import SceneError
-from clpt.render.lowering.geometry import analytic, shapes, tubes
+from clpt.geometry import analytic, shapes, tubes
 from clpt.scene.shapes import Curves
 
 CONTROL, WORDS = 16, 24  # words of a piece: its control points, and all

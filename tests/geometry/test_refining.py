@@ -7,7 +7,7 @@ import pytest
 
 from clpt.errors import SceneError
 from clpt.formats import load
-from clpt.render.lowering.geometry import refining, triangles
+from clpt.geometry import refining, triangles
 from clpt.scene import subdivision
 from clpt.scene.shapes import Mesh
 from clpt.scene.textures import Bitmap

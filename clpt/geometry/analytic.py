@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt import transforms
 from clpt.errors import SceneError
-from clpt.render.contract.shape_records import ANALYTIC, ONE_OF, RECORDS, ROWS
-from clpt.render.lowering.geometry.shapes import Points, Words, placement, where
-from clpt.render.lowering.geometry.triangles import triangle_areas, triangulate
+from clpt.geometry.shape_records import ANALYTIC, ONE_OF, RECORDS, ROWS
+from clpt.geometry.shapes import Points, Words, placement, where
+from clpt.geometry.triangles import triangle_areas, triangulate
 from clpt.scene import shapes
 from clpt.scene.shapes import Shape
 

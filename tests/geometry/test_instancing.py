@@ -14,10 +14,10 @@ from clpt import transforms as tf
 from clpt.cli.info import info
 from clpt.errors import SceneError
 from clpt.formats.native import save
+from clpt.geometry import instancing
+from clpt.geometry.tessellate import tessellate
+from clpt.geometry.triangles import triangulate
 from clpt.records import INSTANCE, SHAPE
-from clpt.render.lowering.geometry import instancing
-from clpt.render.lowering.geometry.tessellate import tessellate
-from clpt.render.lowering.geometry.triangles import triangulate
 from clpt.render.lowering.scene import lower
 from clpt.scene import Scene
 from clpt.scene.cameras import Perspective

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.arrays import on_host
 from clpt.errors import SceneError
-from clpt.render.lowering.geometry import analytic, shapes, triangles
+from clpt.geometry import analytic, shapes, triangles
 from clpt.scene.shapes import Shape, Spheres
 
 Balls = NDArray[np.float32]  # (n, 4): centre and radius
