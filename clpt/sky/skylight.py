@@ -4,7 +4,7 @@ Light scattered once is integrated along each ray. What comes after is a field o
 heights and sun angles around the observer, its moments in spherical harmonics up to DEGREE, which
 are all that air needs and most of what haze does. It is found order by order on rays from those
 places. The ground reflects evenly. Lengths are in km, radiance is per irradiance of the sun above
-the air [1/sr]. How far that is from walks of light: docs/sky.md, tests/render/lowering/lights.
+the air [1/sr]. How far that is from walks of light: docs/sky.md, tests/sky.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.render.lowering.lights import atmosphere
-from clpt.render.lowering.lights.atmosphere import TOP
+from clpt.sky import atmosphere
+from clpt.sky.atmosphere import TOP
 from clpt.spectra.air import DEPOLARISED, EARTH, LAMBDAS, Atmosphere, densities
 
 Floats = NDArray[np.float64]

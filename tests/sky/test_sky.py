@@ -9,15 +9,15 @@ import pytest
 
 import clpt
 from clpt.errors import SceneError
-from clpt.render.lowering.lights import atmosphere, sky, skylight
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Perspective
 from clpt.scene.lights import Sky
+from clpt.sky import atmosphere, dome, skylight
 from clpt.spectra import air, cie
 from clpt.spectra.air import EARTH, LAMBDAS, SUNLIGHT, Atmosphere, densities
 from tests.kernels.light_probe import lit
 from tests.kernels.test_lights import SIGMAS, TURNED, irradiance
-from tests.render.lowering.lights import sky_walk
+from tests.sky import sky_walk
 
 CLEAR = Atmosphere(aerosol=0.1, exponent=1.3, aerosol_albedo=0.95, asymmetry=0.76, ozone=300.0)
 LUMENS = 683.002
@@ -25,7 +25,7 @@ LUMENS = 683.002
 
 @cache
 def image(elevation: float, **more: float) -> tuple[np.ndarray, np.ndarray]:
-    return sky.sky_image(Sky(sun_elevation=elevation, **more))
+    return dome.sky_image(Sky(sun_elevation=elevation, **more))
 
 
 def xyz(spectra: np.ndarray) -> np.ndarray:
@@ -45,13 +45,13 @@ def cie_bars() -> np.ndarray:
 def flux(elevation: float) -> tuple[np.ndarray, np.ndarray]:
     """Irradiance of level ground by the sky and by the sun, (n,) [W m^-2 nm^-1]."""
     around, disc = image(elevation)
-    at = sky.horizon(0.0)
-    row = (np.arange(sky.ROWS * 8) + 0.5) / (sky.ROWS * 8)
-    angles = sky.elevations(at, row)
+    at = dome.horizon(0.0)
+    row = (np.arange(dome.ROWS * 8) + 0.5) / (dome.ROWS * 8)
+    angles = dome.elevations(at, row)
     step = 2.0 * (1.0 - row) * (0.5 * np.pi - at) / len(row)
     mean = 0.5 * (around[0, :, 1:] + around[0, :, :-1]).mean(axis=1)
-    low = np.clip((row * sky.ROWS).astype(int), 0, sky.ROWS - 1)
-    x = (row * sky.ROWS - low)[:, None]
+    low = np.clip((row * dome.ROWS).astype(int), 0, dome.ROWS - 1)
+    x = (row * dome.ROWS - low)[:, None]
     radiance = mean[low] * (1.0 - x) + mean[low + 1] * x
     weight = np.maximum(np.sin(angles), 0.0) * np.cos(angles) * step * 2.0 * np.pi
     b = np.linspace(-1.0, 1.0, 201)
@@ -59,10 +59,10 @@ def flux(elevation: float) -> tuple[np.ndarray, np.ndarray]:
     inside = np.maximum(1.0 - a * a - b * b, 0.0)
     on = inside > 0.0
     seen = disc[
-        np.rint((0.5 + 0.5 * b[on]) * (sky.SUN_ROWS - 1)).astype(int),
-        np.rint(np.sqrt(inside[on]) * (sky.SUN_COLUMNS - 1)).astype(int),
+        np.rint((0.5 + 0.5 * b[on]) * (dome.SUN_ROWS - 1)).astype(int),
+        np.rint(np.sqrt(inside[on]) * (dome.SUN_COLUMNS - 1)).astype(int),
     ].mean(axis=0)
-    sun = seen * np.pi * np.sin(sky.SUN_RADIUS) ** 2 * max(np.sin(np.radians(elevation)), 0.0)
+    sun = seen * np.pi * np.sin(dome.SUN_RADIUS) ** 2 * max(np.sin(np.radians(elevation)), 0.0)
     return weight @ radiance, sun
 
 
@@ -117,11 +117,11 @@ def test_colours_of_the_hours():
 def test_the_sun_is_as_bright_as_above_the_air_without_air():
     """Limb darkening moves light over the disc: its sum stays, within the table's 1 %."""
     none = Sky(sun_elevation=90.0, aerosol=0.0, ozone=0.0, altitude=60000.0, ground=0.0)
-    disc = sky.sky_image(none)[1].mean(axis=0)  # (columns, n), even in all rows
-    mu = np.linspace(0.0, 1.0, sky.SUN_COLUMNS)
+    disc = dome.sky_image(none)[1].mean(axis=0)  # (columns, n), even in all rows
+    mu = np.linspace(0.0, 1.0, dome.SUN_COLUMNS)
     fine = np.linspace(0.0, 1.0, 2001)
     values = np.stack([np.interp(fine, mu, band) for band in disc.T], axis=1)
-    area = np.pi * np.sin(sky.SUN_RADIUS) ** 2
+    area = np.pi * np.sin(dome.SUN_RADIUS) ** 2
     mean = (values * (2.0 * fine)[:, None]).mean(axis=0) * area
     np.testing.assert_allclose(mean, SUNLIGHT, rtol=0.01)
 

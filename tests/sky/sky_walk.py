@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from clpt.render.lowering.lights import atmosphere
-from clpt.render.lowering.lights.atmosphere import TOP
+from clpt.sky import atmosphere
+from clpt.sky.atmosphere import TOP
 from clpt.spectra.air import EARTH, OZONE_MIDDLE, Atmosphere, densities
 
 FEW = 1e-3  # throughput at which a walk goes on by chance
