@@ -19,7 +19,7 @@ from clpt.render.codegen import textures as texture_text
 from clpt.render.codegen.signatures import scene_text
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.lights import lights
-from clpt.render.lowering.spectra_table import STEP
+from clpt.render.lowering.spectra.spectra_table import STEP
 from tests.kernels.harness import opened
 
 LAMBDAS = (450.0, 520.0, 580.0, 640.0)  # of the spectral mode's probes [nm]

@@ -12,15 +12,22 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.bvh.build import MOST
 from clpt.errors import SceneError
-from clpt.geometry import analytic, instancing, shape_records, shapes, spheres, strands, triangles
+from clpt.geometry import (
+    analytic,
+    instancing,
+    motion,
+    shape_records,
+    shapes,
+    spheres,
+    strands,
+    triangles,
+)
 from clpt.geometry.instancing import Instances, Placed, Prototype
+from clpt.geometry.motion import Motions
 from clpt.records import SHAPE
-from clpt.render.lowering import motion
+from clpt.render.analysis.index import SceneIndex
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.index import SceneIndex
-from clpt.render.lowering.lights.lights import Emitter
 from clpt.render.lowering.materials.material_words import MaterialWords
-from clpt.render.lowering.motion import Motions
 from clpt.render.lowering.textures.attributes import Owner
 from clpt.scene.params import fields_of
 from clpt.scene.shapes import Shape
@@ -31,6 +38,23 @@ SHAPE_NORMALS, SHAPE_UVS, SHAPE_TWO_SIDED, SHAPE_ONE_LIGHT, SHAPE_MANY = 1, 2, 4
 SHAPE_TANGENTS, SHAPE_DEFORMS = 32, 64
 
 Triangles = tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.uint32]]
+
+
+@dataclass(frozen=True)
+class Emitter:
+    """A shape with an `emission`.
+
+    shape_row: its row in `shapes`; vertices, faces, uvs: its triangles as `shapes.triangles` gave
+    them, needed for a mesh and a cube; of `spheres`, vertices are their balls; keys: rows of each
+    vertex, as of `triangles.keyed`.
+    """
+
+    shape: Shape
+    shape_row: int
+    vertices: shapes.Points | None = None
+    faces: shapes.Faces | None = None
+    uvs: shapes.Points | None = None
+    keys: int = 1
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.records import PHOTON
-from clpt.render.lowering.camera import cameras
+from clpt.render.analysis import cameras
 from clpt.render.lowering.geometry import Geometry
 from clpt.scene.cameras import Camera
 from clpt.scene.integrators import Vcm

@@ -14,7 +14,7 @@ import numpy as np
 from clpt.errors import SceneError
 from clpt.render.contract.parameter_words import SPECTRUM_WORDS
 from clpt.render.contract.texture_records import KINDS, PROGRAM, RECORDS
-from clpt.render.lowering.spectra_table import SpectraTable
+from clpt.render.lowering.spectra.spectra_table import SpectraTable
 from clpt.render.lowering.tables import TableStore
 from clpt.render.lowering.textures import noise
 from clpt.render.lowering.textures.bitmaps import Images, has_levels, identity

@@ -9,9 +9,9 @@ from typing import Any
 from clpt.errors import SceneError
 from clpt.geometry import instancing, shapes
 from clpt.geometry.instancing import Placed, Prototype
+from clpt.geometry.motion import Motions
+from clpt.render.analysis import cameras, filters
 from clpt.render.contract import custom_materials
-from clpt.render.lowering.camera import cameras, filters
-from clpt.render.lowering.motion import Motions
 from clpt.scene import Scene
 from clpt.scene import materials as mt
 from clpt.scene.cameras import Lens
@@ -50,7 +50,7 @@ class SceneIndex:
 
     @classmethod
     def of(cls, scene: Scene) -> SceneIndex:
-        """Look through a scene that clpt.render.lowering.checks accepts.
+        """Look through a scene that clpt.render.analysis.checks accepts.
 
         Raises SceneError for an instance that cannot be placed, and for what is not a material.
         """

@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from clpt.render.lowering.camera.surroundings import box, every
-from clpt.render.lowering.index import SceneIndex, leaves_of
+from clpt.geometry.winding import box
+from clpt.render.analysis.index import SceneIndex, leaves_of
+from clpt.render.analysis.surroundings import every
 from clpt.scene.media import Medium
 from clpt.scene.shapes import Shape
 

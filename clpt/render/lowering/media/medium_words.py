@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.render.analysis.index import SceneIndex
 from clpt.render.contract.parameter_words import SPECTRUM_WORDS
 from clpt.render.lowering import grids
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.lights.brick_lights import BrickLights
 from clpt.render.lowering.lights.lights import LightRows
 from clpt.render.lowering.materials.material_words import MaterialWords
@@ -25,7 +25,7 @@ FLIES = 0x40000000  # in a medium's word: the stage `flight` takes rays through 
 BYTES = 0x10000000  # which has 8 bits for each number
 GRID = 0x20000000  # a density on a grid multiplies its coefficients
 DYED = 0x04000000  # with a dye that gives out light
-SEALED = 0x08000000  # no shadow ray leaves it, see sealed.py
+SEALED = 0x08000000  # no shadow ray leaves it, see clpt.render.analysis.sealed
 
 
 def medium_aims(lights: LightRows) -> NDArray[np.float32]:

@@ -7,10 +7,10 @@ from typing import Any, NoReturn
 from clpt.errors import SceneError
 from clpt.geometry import shapes
 from clpt.geometry.instancing import distinct
-from clpt.render.lowering.bodies import check_bodies
-from clpt.render.lowering.camera.cameras import CONNECTED, dispersive_glasses
-from clpt.render.lowering.motion import Motions
-from clpt.render.lowering.motion import check as check_motion
+from clpt.geometry.motion import Motions
+from clpt.geometry.motion import check as check_motion
+from clpt.render.analysis.bodies import check_bodies
+from clpt.render.analysis.cameras import CONNECTED, dispersive_glasses
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
 from clpt.scene.integrators import (

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt import spectra, spectral_exr
-from clpt.render.lowering.camera.colour import sensor
-from clpt.render.lowering.index import SceneIndex
+from clpt.render.analysis.colour import sensor
+from clpt.render.analysis.index import SceneIndex
 from clpt.scene.integrators import Film
 from clpt.scene.materials import Material
 from clpt.scene.params import params

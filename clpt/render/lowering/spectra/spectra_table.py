@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from clpt import spectra
 from clpt.errors import SceneError
 from clpt.measured import Measurement, MerlTable
+from clpt.render.analysis.wavelengths import Density
 from clpt.render.contract.parameter_words import (
     MEASUREMENT_WORDS,
     MERL_WORDS,
     SPECTRUM_WORDS,
 )
-from clpt.render.lowering.camera.wavelengths import Density
-from clpt.render.lowering.materials import measurements, reradiation
+from clpt.render.lowering.spectra import measurements, reradiation
 from clpt.render.lowering.tables import TableStore, Words, as_words
 from clpt.spectra import (
     RGB,

@@ -1,4 +1,4 @@
-"""clpt.render.lowering.camera.colour: the matrix from a film's sums to its picture."""
+"""clpt.render.analysis.colour: the matrix from a film's sums to its picture."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 from clpt import spectra
 from clpt.errors import SceneError
-from clpt.render.lowering.camera.colour import BRIGHTEST, DIMMEST, film_scale, output_matrix
+from clpt.render.analysis.colour import BRIGHTEST, DIMMEST, film_scale, output_matrix
 from clpt.scene import Film
 from clpt.spectra import Sensor, cie, spaces
 

@@ -1,4 +1,4 @@
-"""clpt.render.lowering.camera.wavelengths: which density a scene gets, and where it lies."""
+"""clpt.render.analysis.wavelengths: which density a scene gets, and where it lies."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from clpt import spectra
-from clpt.render.lowering.camera import wavelengths
-from clpt.render.lowering.camera.wavelengths import Density
-from clpt.render.lowering.index import SceneIndex
+from clpt.render.analysis import wavelengths
+from clpt.render.analysis.index import SceneIndex
+from clpt.render.analysis.wavelengths import Density
 from clpt.render.lowering.scene import lower
 from clpt.scene import Film, Scene, lights
 from clpt.scene.cameras import Perspective

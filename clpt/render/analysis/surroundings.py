@@ -20,20 +20,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
-from clpt.geometry import analytic, shapes, spheres
-from clpt.geometry.tessellate import keeps_its_kind, tessellate
-from clpt.geometry.triangles import at_time, counted, triangulate
-from clpt.render.lowering.camera.cameras import origin_of
-from clpt.render.lowering.motion import AT_ONCE, corners
+from clpt.geometry import shapes, winding
+from clpt.geometry.motion import AT_ONCE, corners
+from clpt.geometry.triangles import at_time
+from clpt.geometry.winding import box
+from clpt.render.analysis.cameras import origin_of
 from clpt.scene import Scene
 from clpt.scene.media import Medium
-from clpt.scene.shapes import Cylinder, Disk, Instance, Mesh, Shape, Sphere, Spheres
+from clpt.scene.shapes import Instance, Shape
 
-Triangles = tuple[NDArray[np.float32], NDArray[np.uint32]]
-AROUND = 96  # corners of what stands for a disk
 MOST_COMPARED = 500  # bodies whose boxes are compared
 OPEN = 1e-2  # of its area: what a closed boundary may lack
-CHUNK = 1 << 18  # triangles that are summed at a time
 
 
 def media_around(
@@ -74,7 +71,7 @@ def media_at(
         low = np.min([box[0] for box in bounds[medium]], axis=0)
         high = np.max([box[1] for box in bounds[medium]], axis=0)
         outside = any(sign < 0.0 for sign, _ in own)
-        endless = outside and sum(sign * _volume(shape, cached) for sign, shape in own) < 0.0
+        endless = outside and sum(sign * winding.volume(shape, cached) for sign, shape in own) < 0.0
         turns[medium] = 1.0 if endless else 0.0
         extents[medium] = np.inf if endless else float(np.linalg.norm(high - low))
         if ((p >= low) & (p <= high)).all():
@@ -93,7 +90,9 @@ def open_medium(
     time = _moment(scene, time)
     sums: dict[Medium, NDArray[np.float64]] = {}
     for shape in every(scene):
-        area = _areas(shape, cached, time)
+        then = _then(shape, time)
+        to_world = None if shape.motion is None else shape.motion.at(time)
+        area = winding.areas(then, cached if then is shape else None, to_world)
         for medium, sign in ((shape.interior, 1.0), (shape.exterior, -1.0)):
             if medium is not None:
                 signed = area * np.array([sign, sign, sign, 1.0])
@@ -248,19 +247,6 @@ def _swept_box(
     return hull.min(axis=0), hull.max(axis=0)
 
 
-def box(shape: Shape, cached: Callable[..., Any] | None) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return the lowest and the highest corner of a shape's box."""
-    if isinstance(shape, Sphere) and keeps_its_kind(shape):
-        return analytic.bounds(shape)
-    if isinstance(shape, Spheres):
-        centers, radii = _balls(shape)
-        return (centers - radii[:, None]).min(axis=0), (centers + radii[:, None]).max(axis=0)
-    vertices, faces = triangles_of(shape, cached)
-    if not len(faces):
-        return np.full(3, np.inf), np.full(3, -np.inf)
-    return vertices.min(axis=0), vertices.max(axis=0)
-
-
 def _winding(
     shape: Shape, p: NDArray[np.float64], cached: Callable[..., Any] | None, time: float
 ) -> float:
@@ -269,93 +255,6 @@ def _winding(
     if shape.motion is not None:
         p = transforms.transform_points(transforms.inverse(shape.motion.at(time)), p)
     if cached is None or then is not shape:
-        return _winding_still(then, p, None)
+        return winding.winding(then, p, None)
     by = (*shapes.geometry(shape), p.tobytes())
-    return float(cached(_winding_still, shape, p, cached, by=by))
-
-
-def _winding_still(
-    shape: Shape, p: NDArray[np.float64], cached: Callable[..., Any] | None
-) -> float:
-    """The same of a shape where it was lowered."""
-    side = -1.0 if shape.flip_normals else 1.0
-    if isinstance(shape, Sphere) and keeps_its_kind(shape):
-        members = analytic.members_of(shape)
-        return side * float(np.linalg.norm(p - members["center"]) < members["radius"])
-    if isinstance(shape, Spheres):
-        centers, radii = _balls(shape)
-        return side * float((np.linalg.norm(p - centers, axis=1) < radii).sum())
-    return winding_number(*triangles_of(shape, cached), p)
-
-
-def _areas(shape: Shape, cached: Callable[..., Any] | None, time: float) -> NDArray[np.float64]:
-    """The sum of a shape's areas along their normals, and of the areas alone (4,) [m^2]."""
-    then = _then(shape, time)
-    if isinstance(then, Spheres):
-        return np.array([0.0, 0.0, 0.0, 4.0 * np.pi * float((_balls(then)[1] ** 2).sum())])
-    vertices, faces = triangles_of(then, cached if then is shape else None)
-    points = np.asarray(vertices, np.float64)
-    if shape.motion is not None:
-        points = transforms.transform_points(shape.motion.at(time), points)
-    a, b, c = np.moveaxis(points[faces], 1, 0)
-    n = np.cross(b - a, c - a) / 2.0
-    return np.array([*n.sum(axis=0), np.linalg.norm(n, axis=1).sum()])
-
-
-def _volume(shape: Shape, cached: Callable[..., Any] | None) -> float:
-    """What a shape encloses [m^3], below 0 of one that faces inward."""
-    if isinstance(shape, Spheres):
-        return (-1.0 if shape.flip_normals else 1.0) * 4.2 * float((_balls(shape)[1] ** 3).sum())
-    vertices, faces = triangles_of(shape, cached)
-    a, b, c = np.moveaxis(np.asarray(vertices, np.float64)[faces], 1, 0)
-    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
-
-
-def winding_number(vertices: NDArray[Any], faces: NDArray[Any], p: NDArray[np.float64]) -> float:
-    """Return how often triangles wind around a point; those that face away count as 1 in all.
-
-    vertices (n, 3), faces (m, 3), p (3,). Van Oosterom and Strackee 1983, equation 8.
-    """
-    total = 0.0
-    corners = np.asarray(vertices, np.float64) - p
-    for first in range(0, len(faces), CHUNK):
-        a, b, c = np.moveaxis(corners[faces[first : first + CHUNK]], 1, 0)
-        la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
-        volume = np.einsum("ij,ij->i", a, np.cross(b, c))
-        dots = (np.einsum("ij,ij->i", *pair) for pair in ((a, b), (b, c), (c, a)))
-        ab, bc, ca = dots
-        total += 2.0 * float(np.arctan2(volume, la * lb * lc + ab * lc + bc * la + ca * lb).sum())
-    return total / (4.0 * np.pi)
-
-
-def _balls(shape: Spheres) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Centres and radii of many spheres, in the world."""
-    rows = np.asarray(spheres.balls(shape), np.float64)
-    return rows[:, :3], np.abs(rows[:, 3])
-
-
-def triangles_of(shape: Shape, cached: Callable[..., Any] | None = None) -> Triangles:
-    """Return the triangles of a shape in the world, or those that stand for it."""
-    if isinstance(shape, Disk):
-        shape = _fan(shape)
-    elif isinstance(shape, Cylinder | Sphere):
-        shape = tessellate(shape)
-    elif cached is not None:
-        vertices, faces, *_ = cached(counted, shape, by=shapes.geometry(shape))
-        return vertices, faces
-    vertices, faces, *_ = triangulate(shape)
-    return vertices, faces
-
-
-def _fan(disk: Disk) -> Mesh:
-    """A disk as triangles about its middle."""
-    angle = 2.0 * np.pi * np.arange(AROUND) / AROUND
-    rim = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(AROUND)])
-    i = np.arange(AROUND)
-    faces = np.column_stack([np.zeros(AROUND, int), 1 + i, 1 + (i + 1) % AROUND])
-    return Mesh(
-        vertices=np.concatenate([np.zeros((1, 3)), rim]).astype(np.float32),
-        faces=faces.astype(np.uint32),
-        to_world=disk.to_world,
-        flip_normals=disk.flip_normals,
-    )
+    return float(cached(winding.winding, shape, p, cached, by=by))

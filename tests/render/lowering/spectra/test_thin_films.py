@@ -8,8 +8,8 @@ import pytest
 from clpt.errors import SceneError
 from clpt.render.codegen import programs
 from clpt.render.contract.parameter_words import FILM_COSINES
-from clpt.render.lowering.materials.thin_films import film_colours
 from clpt.render.lowering.scene import lower
+from clpt.render.lowering.spectra.thin_films import film_colours
 from clpt.scene import Film, Scene, cameras, shapes, textures
 from clpt.scene import materials as m
 from clpt.spectra import cie

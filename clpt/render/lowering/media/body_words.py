@@ -12,59 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.errors import SceneError
-from clpt.geometry import shapes
+from clpt.render.analysis.bodies import BENDS, Matter, matter_of
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.materials.material_words import CLEAR, MaterialWords
-from clpt.render.lowering.media import MediumWords
-from clpt.scene.materials import Dielectric, Material, Null, RoughDielectric
-from clpt.scene.media import Medium
-from clpt.scene.shapes import Curves, Cylinder, Disk, Instance, Rectangle, Shape
+from clpt.render.lowering.materials.material_words import MaterialWords
+from clpt.render.lowering.media.medium_words import MediumWords
+from clpt.scene.materials import CLEAR
+from clpt.scene.shapes import Shape
 
 MOST = 255  # numbers: a byte of a path's word
 DEPTH = 4  # bodies at a point: bytes of that word
-OPEN = (Rectangle, Disk, Cylinder, Curves)
-BENDS = (Dielectric, RoughDielectric)
-
-Matter = tuple[int, Material, "Medium | None"]
-
-
-def matter_of(shape: Shape) -> Matter | None:
-    """Return the matter of a shape's body in a scene with priorities, None of what is no body."""
-    if not isinstance(shape.material, BENDS) and shape.interior is None:
-        return None
-    return shape.priority, shape.material, shape.interior
-
-
-def check_bodies(things: Iterable[Shape]) -> None:
-    """Raise SceneError for priorities that make no sense; nothing in a scene without any."""
-    found = list(things)
-    for shape in found:
-        where, given = shapes.where(shape), shape.priority
-        if isinstance(given, bool) or not isinstance(given, int) or given < 0:
-            raise SceneError(f"priority must be an integer from 0, not {given!r}", where=where)
-        if given and isinstance(shape, Instance):
-            raise SceneError("priority is for the shapes of its group", where=where)
-        if given and not isinstance(shape.material, (*BENDS, Null)):
-            raise SceneError(
-                "priority is for bodies of dielectric, rough_dielectric or null, not of "
-                f"{shape.material.kind}",
-                where=where,
-            )
-    if not any(shape.priority for shape in found):
-        return
-    for shape in found:
-        if isinstance(shape, OPEN) and matter_of(shape) is not None:
-            raise SceneError(
-                f"a {shape.kind} is not closed: where bodies have a priority, each is one closed "
-                "shape, such as a mesh, a cube or a sphere",
-                where=shapes.where(shape),
-            )
-    for shape in found:
-        if shape.exterior is not None:
-            raise SceneError(
-                "leave exterior out where bodies have a priority: it tells what is outside",
-                where=shapes.where(shape),
-            )
 
 
 class BodyWords:

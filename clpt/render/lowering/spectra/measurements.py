@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from clpt import measured
 from clpt.measured import Measurement, MerlTable, merl
 from clpt.measured.fit import hemispherical
-from clpt.render.lowering.materials.warp_tables import halves, scaled, warp_words
+from clpt.render.lowering.spectra.warp_tables import halves, scaled, warp_words
 from clpt.spectra import cie
 from clpt.spectra.spectrum import d65, primaries
 

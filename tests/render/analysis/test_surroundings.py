@@ -10,7 +10,8 @@ import pytest
 from clpt import transforms as tf
 from clpt.geometry.tessellate import tessellate
 from clpt.geometry.triangles import triangulate
-from clpt.render.lowering.camera.surroundings import media_around, warnings_of, winding_number
+from clpt.geometry.winding import winding_number
+from clpt.render.analysis.surroundings import media_around, warnings_of
 from clpt.scene import Scene, cameras, media
 from clpt.scene.materials import Diffuse, Null
 from clpt.scene.shapes import Cube, Cylinder, Disk, Group, Instance, Shape, Sphere, Spheres

@@ -10,7 +10,8 @@ import pytest
 import trimesh
 
 import clpt.transforms as tf
-from clpt.render.lowering.open_boundaries import HOLE, largest_hole
+from clpt.geometry.holes import largest_hole
+from clpt.render.analysis.open_boundaries import HOLE
 from clpt.render.lowering.scene import lower
 from clpt.scene import Film, Scene, materials, media
 from clpt.scene.cameras import Perspective

@@ -14,16 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
-from clpt.geometry import analytic, shapes
-from clpt.render.lowering.bodies import BodyWords, matter_of
-from clpt.render.lowering.camera import surroundings
-from clpt.render.lowering.geometry import Geometry
-from clpt.render.lowering.index import SceneIndex
+from clpt.geometry import analytic, shapes, winding
+from clpt.geometry.motion import Motions
+from clpt.render.analysis import surroundings
+from clpt.render.analysis.bodies import matter_of
+from clpt.render.analysis.index import SceneIndex
+from clpt.render.lowering.geometry import Emitter, Geometry
 from clpt.render.lowering.lights import light_bounds
-from clpt.render.lowering.lights.lights import Emitter, LightRows, row_order
+from clpt.render.lowering.lights.lights import LightRows, row_order
 from clpt.render.lowering.lowering_cache import LoweringCache
-from clpt.render.lowering.media import MediumWords
-from clpt.render.lowering.motion import Motions
+from clpt.render.lowering.media.body_words import BodyWords
+from clpt.render.lowering.media.medium_words import MediumWords
 from clpt.scene import Scene
 from clpt.scene.media import Lattice, Medium
 from clpt.scene.motion import Deformation, Keys
@@ -231,7 +232,7 @@ def _before(emitter: Emitter, before: float) -> NDArray[np.float64]:
         balls = np.asarray(vertices, np.float64)[:: max(1, len(vertices) // POINTS)]
         return (balls[:, None, :3] + (1.0 + before) * balls[:, None, 3:] * six).reshape(-1, 3)
     if vertices is None or faces is None:
-        vertices, faces = surroundings.triangles_of(shape)
+        vertices, faces = winding.triangles_of(shape)
     chosen = np.asarray(faces)[:: max(1, len(faces) // POINTS)]
     a, b, c = np.moveaxis(np.asarray(vertices, np.float64)[chosen], 1, 0)
     n = np.cross(b - a, c - a)
