@@ -20,7 +20,8 @@ BASE = {
     "input_files", "layout", "measured", "numpy_files", "output_files", "records", "spectra",
     "spectral_exr", "tev", "text", "transforms", "version",
 }  # fmt: skip
-# What a part may import of the others; itself always.
+RENDERS = BASE | {"scene", "device", "denoise", "render", "formats"}
+# What a part may import of the others; itself always. Every part has a row.
 MAY_IMPORT = {
     **dict.fromkeys(BASE, BASE),
     "lenses": BASE,
@@ -35,12 +36,16 @@ MAY_IMPORT = {
     "render": BASE | {"lenses", "scene", "geometry", "sky", "device", "bvh", "denoise"},
     "formats": BASE | {"lenses", "geometry", "scene"},
     "mie": BASE | {"scene"},
-    "view": BASE | {"scene", "device", "denoise", "render", "formats"},
+    "testing": BASE | {"scene", "device", "render"},
+    "view": RENDERS,
+    "cluster": RENDERS,
     "benchmark": BASE | {"scene", "device", "bvh", "rays", "render", "formats"},
+    "cli": RENDERS | {"lenses", "geometry", "mie", "bvh", "view", "cluster", "benchmark"},
+    "__main__": {"cli"},
 }
 OPENCL = {"device", "bvh", "denoise", "rays", "render"}  # only these import pyopencl
 # clpt/render/<room>: arrows point down; rooms of one floor do not know each other.
-FLOORS = ({"contract"}, {"lowering", "codegen"}, {"wavefront"}, {"editing", "film"})
+FLOORS = ({"contract"}, {"analysis"}, {"lowering", "codegen"}, {"wavefront"}, {"editing", "film"})
 # What kinds share, by what a reader looks for.
 SHARED = {
     "colour", "core", "denoising", "film", "guiding", "interface", "lighting", "merging", "optics",
@@ -65,14 +70,31 @@ def modules() -> list[Path]:
 
 def statements(path: Path) -> Iterator[tuple[str, list[str]]]:
     """The imports of a file, anywhere in it: a module's full name, and the names taken from it."""
-    inside = path.relative_to(ROOT).with_suffix("").parts
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    text = path.read_text(encoding="utf-8")
+    return imports_of(text, path.relative_to(ROOT).with_suffix("").parts)
+
+
+def imports_of(text: str, inside: tuple[str, ...]) -> Iterator[tuple[str, list[str]]]:
+    """The same of the text of a module; inside: the parts of its full name."""
+    for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import):
             yield from ((alias.name, []) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             package = ".".join(inside[: len(inside) - node.level]) if node.level else ""
             base = ".".join(part for part in (package, node.module or "") if part)
             yield base, [alias.name for alias in node.names]
+        elif isinstance(node, ast.Call) and node.args:
+            called = getattr(node.func, "id", getattr(node.func, "attr", ""))
+            name = beginning(node.args[0]) if called in ("import_module", "__import__") else ""
+            if name:
+                yield name, []
+
+
+def beginning(name: ast.expr) -> str:
+    """What is known of a module's name: all of "a.b", "a.b" of f"a.b.{c}", nothing of f"{c}.d"."""
+    if isinstance(name, ast.JoinedStr) and name.values:
+        return beginning(name.values[0]).rpartition(".")[0]
+    return name.value if isinstance(name, ast.Constant) and isinstance(name.value, str) else ""
 
 
 def imports(path: Path) -> set[str]:
@@ -115,10 +137,15 @@ def part_of(name: str) -> str | None:
     return parts[1] if parts[0] == "clpt" and len(parts) > 1 else None
 
 
+def test_every_part_has_a_row() -> None:
+    parts = {p.name.removesuffix(".py") for p in PACKAGE.iterdir() if not p.name.startswith(".")}
+    assert parts - {"__init__", "__pycache__", "py.typed"} == MAY_IMPORT.keys()
+
+
 @pytest.mark.parametrize("path", modules(), ids=lambda p: str(p.relative_to(ROOT)))
 def test_imports_follow_the_direction(path: Path) -> None:
     own = part_of(".".join(path.relative_to(ROOT).with_suffix("").parts))
-    if own not in MAY_IMPORT:
+    if own == "__init__":
         return
     parts = {p.name.removesuffix(".py") for p in PACKAGE.iterdir()}
     found = {part_of(name) for name in imports(path)} & parts
@@ -143,15 +170,62 @@ def test_a_circle_is_found() -> None:
     assert circle({"a": {"b"}, "b": {"c", "d"}, "c": set(), "d": {"b"}}) == ["b", "d", "b"]
 
 
-def test_no_modules_import_each_other() -> None:
-    """No circle of imports, those inside functions and for type checking included."""
+def test_imports_by_name_are_found() -> None:
+    text = """
+def late():
+    import_module("clpt.view.widget")
+    importlib.import_module(f"clpt.formats.{kind}").load
+    __import__("clpt.tev")
+    import_module(f"{here}.read")
+    open("clpt.scene")
+"""
+    found = [name for name, _ in imports_of(text, ("clpt", "one"))]
+    assert sorted(found) == ["clpt.formats", "clpt.tev", "clpt.view.widget"]
+
+
+def import_graph() -> dict[str, set[str]]:
+    """The modules of the package that each of them imports, anywhere in it and by name too."""
     paths = module_names()
     graph: dict[str, set[str]] = {}
     for name in sorted(paths):
         taken = [(base, part) for base, parts in statements(paths[name]) for part in parts or [""]]
         targets = {f"{b}.{part}" if f"{b}.{part}" in paths else b for b, part in taken}
-        graph[name] = targets & paths.keys()
-    assert not circle(graph), "a circle of imports: " + " -> ".join(circle(graph))
+        graph[name] = (targets & paths.keys()) - {name}
+    return graph
+
+
+def test_no_modules_import_each_other() -> None:
+    """No circle of imports, those inside functions and for type checking included."""
+    found = circle(import_graph())
+    assert not found, "a circle of imports: " + " -> ".join(found)
+
+
+def rooms_of(graph: dict[str, set[str]], package: str) -> dict[str, set[str]]:
+    """The graph of the folders and modules that are directly in a package."""
+    depth = package.count(".") + 2
+    rooms: dict[str, set[str]] = {}
+    for name in graph:
+        if name.startswith(f"{package}."):
+            own = ".".join(name.split(".")[:depth])
+            inside = [other for other in graph[name] if other.startswith(f"{package}.")]
+            rooms.setdefault(own, set()).update(".".join(o.split(".")[:depth]) for o in inside)
+    return {room: others - {room} for room, others in rooms.items()}
+
+
+def test_a_circle_of_folders_is_found() -> None:
+    graph = {"p.a.x": {"p.b.x"}, "p.a.y": set(), "p.b.x": set(), "p.b.y": {"p.c"}, "p.c": set()}
+    assert not circle(rooms_of(graph, "p"))
+    graph["p.c"] = {"p.a.y"}
+    assert not circle(graph)
+    assert circle(rooms_of(graph, "p")) == ["p.a", "p.b", "p.c", "p.a"]
+
+
+def test_no_folders_import_each_other() -> None:
+    """In each package what its folders and modules import is a graph without circles."""
+    graph = import_graph()
+    packages = {name.rpartition(".")[0] for name in graph} - {""}
+    found = [circle(rooms_of(graph, package)) for package in sorted(packages)]
+    assert not any(found), "\n".join(" -> ".join(one) for one in found if one)
 
 
 @pytest.mark.parametrize("path", modules(), ids=lambda p: str(p.relative_to(ROOT)))
@@ -167,6 +241,7 @@ def test_who_imports_pyopencl(path: Path) -> None:
         "scene",
         "lenses",
         "geometry",
+        "sky",
         "formats",
         "spectra",
         "layout",
@@ -211,6 +286,7 @@ def test_public_names() -> None:
         for node in tree.body
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("clpt")
         for alias in node.names
+        if not (alias.asname or alias.name).startswith("_")
     }
     assert set(clpt.__all__) == imported | {"__version__"}
     for name in clpt.__all__:
