@@ -22,7 +22,7 @@ from ..denoise.needs import METHODS, prepared
 from ..errors import nearest
 from ..formats import load
 from ..formats.missing import Missing
-from ..render.lowering.checks import check
+from ..render.analysis.checks import check
 from ..render.renderer import Renderer
 from ..scene import Scene, kinds
 from ..scene.integrators import AUTO, MOST_LIGHT_PATHS, NO_AOV, Auto

@@ -60,11 +60,11 @@ float3 PURE cross(float3, float3);
 float4 PURE cross(float4, float4);
 
 #define FROM(form, T, n, ending, S) T##n PURE convert_##form##n##ending(S##n);
-#define FROM_EACH(form, T, n, ending) \
+#define FROM_EACH(form, T, n, ending)                                                              \
     FROM(form, T, n, ending, char) FROM(form, T, n, ending, uchar) FROM(form, T, n, ending, short) \
-    FROM(form, T, n, ending, ushort) FROM(form, T, n, ending, int) FROM(form, T, n, ending, uint) \
+    FROM(form, T, n, ending, ushort) FROM(form, T, n, ending, int) FROM(form, T, n, ending, uint)  \
     FROM(form, T, n, ending, long) FROM(form, T, n, ending, ulong) FROM(form, T, n, ending, float)
-#define CONVERT(T, ending) \
+#define CONVERT(T, ending)                                                                                     \
     FROM_EACH(T, T, , ending) FROM_EACH(T, T, 2, ending) FROM_EACH(T, T, 3, ending) FROM_EACH(T, T, 4, ending) \
     FROM_EACH(T, T, 8, ending) FROM_EACH(T, T, 16, ending)
 CONVERT(char, ) CONVERT(uchar, ) CONVERT(ushort, ) CONVERT(int, ) CONVERT(uint, ) CONVERT(long, ) CONVERT(ulong, )
@@ -73,17 +73,17 @@ CONVERT(int, _rte) CONVERT(int, _rtn) CONVERT(long, _sat)
 
 #define LOADED(T, n, space) T##n __attribute__((overloadable, pure)) vload##n(size_t, const space T *);
 #define STORED(T, n, space) void CALLED vstore##n(T##n, size_t, space T *);
-#define MOVED(T, n) \
+#define MOVED(T, n)                                                                       \
     LOADED(T, n, constant) LOADED(T, n, global) LOADED(T, n, local) LOADED(T, n, private) \
     STORED(T, n, global) STORED(T, n, local) STORED(T, n, private)
 #define MOVES(T) MOVED(T, 2) MOVED(T, 3) MOVED(T, 4) MOVED(T, 8) MOVED(T, 16)
 MOVES(float) MOVES(int) MOVES(uint) MOVES(uchar) MOVES(ushort) MOVES(ulong)
 
-#define COUNTED(T, space) \
-    T CALLED atomic_add(volatile space T *, T); T CALLED atomic_sub(volatile space T *, T); \
-    T CALLED atomic_xchg(volatile space T *, T); T CALLED atomic_inc(volatile space T *); \
+#define COUNTED(T, space)                                                                       \
+    T CALLED atomic_add(volatile space T *, T); T CALLED atomic_sub(volatile space T *, T);     \
+    T CALLED atomic_xchg(volatile space T *, T); T CALLED atomic_inc(volatile space T *);       \
     T CALLED atomic_dec(volatile space T *); T CALLED atomic_cmpxchg(volatile space T *, T, T); \
-    T CALLED atomic_min(volatile space T *, T); T CALLED atomic_max(volatile space T *, T); \
+    T CALLED atomic_min(volatile space T *, T); T CALLED atomic_max(volatile space T *, T);     \
     T CALLED atomic_and(volatile space T *, T); T CALLED atomic_or(volatile space T *, T);
 COUNTED(int, global) COUNTED(uint, global) COUNTED(int, local) COUNTED(uint, local)
 void __attribute__((overloadable, convergent)) barrier(cl_mem_fence_flags);
