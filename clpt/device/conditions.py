@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import operator
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
 
 from .text_rows import Row, renamed
@@ -18,6 +18,7 @@ _TOKEN = re.compile(
     r"\s*(?:(?P<number>(?:0[xX][0-9a-fA-F]+|\d+)(?![\w.]))|(?P<name>[A-Za-z_]\w*)"
     r"|(?P<sign>&&|\|\||<<|>>|[<>=!]=|[-+*/%<>!~&|^?:(),]))"
 )
+_NAME = re.compile(r"[A-Za-z_]")
 _DEEPEST = 64  # macros whose values name macros
 
 Tokens = tuple[str, ...]
@@ -65,34 +66,41 @@ class Macros:
         else:
             self._open.add(name)
 
-    def value(self, condition: str) -> Known:
-        """Return what a condition without comments comes to, None where it is open."""
-        tokens = _tokens(condition)
-        return None if tokens is None else _value(tuple(self._expand(tokens, 0)))
+    def value(self, directive: str, condition: str) -> Known:
+        """Return what the condition of a directive comes to, None where it is open."""
+        tokens = _condition(directive, condition)
+        if tokens is None:
+            return None
+        found: list[str] = []
+        self._expand(tokens, found, 0)
+        return _value(tuple(found))
 
-    def _expand(self, tokens: Tokens, depth: int) -> Iterable[str]:
-        """Put values in the place of names, but for those that are open."""
-        if depth > _DEEPEST:  # a macro that names itself
-            yield "open"
-            return
+    def _expand(self, tokens: Tokens, found: list[str], depth: int) -> None:
+        """Append tokens with values in the place of names, but for those that are open."""
         rest = iter(tokens)
         for token in rest:
-            if token == "defined":
+            if not _NAME.match(token):
+                found.append(token)
+            elif token == "defined":
                 name = next(rest, "")
                 if name == "(":
                     name = next(rest, "")
                     next(rest, "")
-                yield self._defined(name)
-            elif not (token[0].isalpha() or token[0] == "_"):
-                yield token
-            elif token in self._open or (token not in self._values and OUTSIDE.match(token)):
-                yield token
-            elif (value := self._values.get(token, "0")) is None:
-                yield token
-            elif (inner := _tokens(value)) is None:
-                yield "open"
+                found.append(self._defined(name))
+            elif (value := self._known_value(token)) is None:
+                found.append(token)
+            elif (inner := _tokens(value)) is None or depth == _DEEPEST:
+                found.append("open")
             else:
-                yield from self._expand(inner, depth + 1)
+                self._expand(inner, found, depth + 1)
+
+    def _known_value(self, name: str) -> str | None:
+        """The value of a macro, "0" of what is none; None if it is open, or has arguments."""
+        if name in self._open:
+            return None
+        if name in self._values:
+            return self._values[name]
+        return None if OUTSIDE.match(name) else "0"
 
     def _defined(self, name: str) -> str:
         if name in self._open:
@@ -116,7 +124,7 @@ class _Chain:
         """Return whether the rows behind this one may be taken, and what stays in its place."""
         if self._ended:
             return False, None
-        known = macros.value(_CONDITIONS[row.directive].format(row.argument))
+        known = macros.value(row.directive, row.argument)
         if known == 0:
             return False, None
         if known is None:
@@ -125,7 +133,7 @@ class _Chain:
             return True, row
         self._ended = True
         if row.directive == "elif":
-            row = Row(row.number, "#else", "#else", "else")
+            row = Row(row.number, "#else", "#else", row.lines, "else")
         return True, row if self.stays else None
 
 
@@ -136,9 +144,10 @@ OPENING = ("if", "ifdef", "ifndef")
 BRANCHING = (*_CONDITIONS, "endif")
 
 
-def taken(rows: Iterable[Row], macros: Macros) -> tuple[Row, ...]:
+def taken(rows: Iterable[Row | Sequence[Row]], macros: Macros) -> tuple[Row, ...]:
     """Return the rows that conditions leave, and note the macros that these define.
 
+    rows: those that are no directives in groups.
     What is open stays, without the branches that are not taken in any case; where nothing is left
     in its branches it goes too. Every `#if` has its end among the rows.
     """
@@ -146,14 +155,15 @@ def taken(rows: Iterable[Row], macros: Macros) -> tuple[Row, ...]:
     chains: list[_Chain] = []
     lives = sure = True
     for row in rows:
-        directive = row.directive
-        if not directive:
+        if not isinstance(row, Row):
             if lives:
-                kept.append(row)
-        elif directive == "endif" and chains:
+                kept += row
+            continue
+        directive = row.directive
+        if directive == "endif" and chains:
             chain = chains.pop()
             lives, sure = chain.outer
-            if all(one.directive in BRANCHING or not one.text.strip() for one in kept[chain.start :]):
+            if all(map(_says_nothing, kept[chain.start :])):
                 del kept[chain.start :]
             elif chain.stays:
                 kept.append(row)
@@ -166,10 +176,19 @@ def taken(rows: Iterable[Row], macros: Macros) -> tuple[Row, ...]:
         elif lives:
             kept.append(row)
             if directive == "define":
-                macros.define(*row.defined(), sure)
+                macros.define(*row.macro, sure)
             elif directive == "undef":
                 macros.undefine(row.argument, sure)
     return tuple(kept)
+
+
+def _says_nothing(row: Row) -> bool:
+    return row.directive in BRANCHING or not row.text.strip()
+
+
+@lru_cache(maxsize=4096)
+def _condition(directive: str, argument: str) -> Tokens | None:
+    return _tokens(_CONDITIONS[directive].format(argument))
 
 
 @lru_cache(maxsize=4096)

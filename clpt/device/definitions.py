@@ -10,13 +10,13 @@ import re
 from collections import defaultdict
 from collections.abc import Iterable, Sequence, Set
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 from .conditions import BRANCHING, OPENING
-from .text_rows import Row, rows_of
+from .text_rows import Row, joined, rows_of
 
 _WORD = re.compile(r"[A-Za-z_]\w*")
-_PASTED = re.compile(r"(\w*)\s*##\s*(\w*)")
+_PASTED = re.compile(r"(?<![.\w])(?<!->)(\w*)\s*##\s*(\w*)")  # but for members
 _FUNCTION = re.compile(  # types, a name, arguments without brackets, and a body or nothing
     r"\s*(?:[A-Za-z_]\w*[\s*]+)+?(?P<name>[A-Za-z_]\w*)\s*\([^()]*\)\s*(?:\{.*\}|;)\s*\Z", re.DOTALL
 )
@@ -30,23 +30,37 @@ _CONSTANT = re.compile(
 _KERNEL = re.compile(r"\b(?:__)?kernel\b")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Definition:
     """Rows of a text that stay or go together.
 
-    names: what they define, none for what always stays; words: what they name; beginnings, endings:
-    those of names that their macros paste together.
+    names: what they define, none for what always stays.
     """
 
-    rows: tuple[Row, ...]
+    rows: Sequence[Row]
     names: frozenset[str]
-    words: frozenset[str]
-    beginnings: tuple[str, ...] = ()
-    endings: tuple[str, ...] = ()
 
-    def pastes(self, name: str) -> bool:
-        """Return whether its macros may paste the name together."""
-        return name.startswith(self.beginnings) or name.endswith(self.endings)
+    @cached_property
+    def words(self) -> frozenset[str]:
+        """What the rows name."""
+        return frozenset(_WORD.findall("\n".join([row.code for row in self.rows])))
+
+    @cached_property
+    def pasted(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Beginnings and endings of names that macros of the rows paste together."""
+        beginnings, endings = set[str](), set[str]()
+        for row in self.rows:
+            if "##" in row.code:
+                arguments = {"", *_WORD.findall(row.macro[0])}
+                for begin, end in _PASTED.findall(row.code):
+                    beginnings |= {begin} - arguments
+                    endings |= {end} - arguments
+        return tuple(beginnings), tuple(endings)
+
+    @cached_property
+    def printed(self) -> tuple[Row, ...]:
+        """The rows, those that follow one another as one."""
+        return joined(self.rows)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +76,7 @@ class Paragraph:
 
     def left(self, stay: Set[Definition]) -> tuple[list[Row], bool]:
         """Return its rows without definitions that do not stay, and whether it is apart."""
-        own = [row for one in self.definitions if one in stay for row in one.rows]
+        own = [row for one in self.definitions if one in stay for row in one.printed]
         return [*self.comments, *own] if own else [], self.apart
 
 
@@ -94,7 +108,7 @@ def paragraphs(rows: tuple[Row, ...]) -> tuple[Paragraph, ...]:
 @lru_cache(maxsize=2048)
 def whole(rows: tuple[Row, ...]) -> tuple[Paragraph, ...]:
     """Return rows as one paragraph of which nothing may go."""
-    return (Paragraph((), (_made(rows, frozenset()),), False),) if rows else ()
+    return (Paragraph((), (Definition(rows, frozenset()),), False),) if rows else ()
 
 
 def macro(head: str, value: str) -> Definition:
@@ -111,10 +125,10 @@ def _definition(rows: Sequence[Row], at: int) -> tuple[Definition, int]:
         names = frozenset()
         if first.directive in ("define", "undef"):
             names = frozenset(_WORD.findall(first.argument)[:1])
-        return _made((first,), names), at + 1
+        return Definition((first,), names), at + 1
     end = _end(rows, at)
-    own = tuple(rows[at:end])
-    return _made(own, _name("\n".join(row.code for row in own))), end
+    own = rows[at:end]
+    return Definition(own, _name("\n".join(row.code for row in own))), end
 
 
 def _end(rows: Sequence[Row], at: int) -> int:
@@ -155,7 +169,7 @@ def _open_conditional(rows: Sequence[Row], at: int) -> tuple[Definition, int]:
         definition, inner = _definition(rows[:end], inner)
         stays = stays or not definition.names
         names |= definition.names
-    return _made(tuple(rows[at:end]), frozenset() if stays else frozenset(names)), end
+    return Definition(rows[at:end], frozenset() if stays else frozenset(names)), end
 
 
 def _name(code: str) -> frozenset[str]:
@@ -178,18 +192,6 @@ def _is_one(code: str) -> bool:
     return False
 
 
-def _made(rows: tuple[Row, ...], names: frozenset[str]) -> Definition:
-    beginnings, endings = [], []
-    for row in rows:
-        if "##" in row.code:
-            pasted = _PASTED.findall(row.code)
-            arguments = {*_WORD.findall(row.defined()[0])} if row.directive == "define" else set()
-            beginnings += [begin for begin, _ in pasted if begin and begin not in arguments]
-            endings += [end for _, end in pasted if end and end not in arguments]
-    words = frozenset(_WORD.findall("\n".join(row.code for row in rows)))
-    return Definition(rows, names, words, tuple(beginnings), tuple(endings))
-
-
 def named(definitions: Iterable[Definition]) -> set[Definition]:
     """Return those that stay: what has no name of its own, and what these name in turn."""
     by_name: dict[str, list[Definition]] = defaultdict(list)
@@ -206,8 +208,9 @@ def named(definitions: Iterable[Definition]) -> set[Definition]:
             continue
         found.add(definition)
         new = definition.words & unseen
-        if definition.beginnings or definition.endings:
-            new |= {name for name in unseen if definition.pastes(name)}
+        beginnings, endings = definition.pasted
+        if beginnings or endings:
+            new |= {n for n in unseen if n.startswith(beginnings) or n.endswith(endings)}
         unseen -= new
         for name in new:
             pending += by_name[name]

@@ -17,15 +17,13 @@ from .text_rows import Row, rows_of
 _GENERATED = "generated/"  # begins the names of files that are made for a scene
 _QUOTED = re.compile(r'"([^"]+)"$')
 _LINE = re.compile(r'\s*#\s*line (\d+)(?: "([^"]+)")?')
-_FUNCTION = re.compile(  # at the beginning of a line: type, name, and a first argument or "void"
-    r"^(?:static )?(?P<rest>(?!static\b|kernel\b|typedef\b|return\b|else\b|void loop_)"
-    r"[A-Za-z_]\w*(?: \w+)* \*?(?P<name>\w+)\((?=[A-Za-z_]))",
+_PRIVATE = re.compile(  # at the beginning of a line: a constant, or a function with an argument
+    r"^(?:static )?(?=[A-Za-z_])(?P<rest>"
+    r"constant\b[^;=\[]*?(?P<constant>\w+)\s*(?=[=\[])"
+    r"|(?!static\b|kernel\b|typedef\b|return\b|else\b|void loop_)"
+    r"[A-Za-z_]\w*(?: \w+)* \*?(?P<function>\w+)\((?=[A-Za-z_]))",
     re.MULTILINE,
 )
-_CONSTANT = re.compile(
-    r"^(?:static )?(?P<rest>constant\b[^;=\[]*?(?P<name>\w+)\s*(?=[=\[]))", re.MULTILINE
-)
-_PRIVATE = (_FUNCTION, _CONSTANT)
 
 
 @dataclass(frozen=True)
@@ -60,10 +58,7 @@ class Source:
         functions that a macro names, stay as they are. A compiler leaves out what is not used, and
         does not optimise by itself what it puts into its callers: a third less time.
         """
-        text = self.text
-        for pattern in _PRIVATE:
-            text = pattern.sub(r"static \g<rest>", text)
-        return Source(self.name, text, self.files)
+        return Source(self.name, _PRIVATE.sub(r"static \g<rest>", self.text), self.files)
 
     def with_private(self, prefix: str) -> Source:
         """Return a source whose functions and constants other programs do not see, to be linked.
@@ -71,11 +66,15 @@ class Source:
         They are static, see `with_static`, and get the prefix, since some linkers look at nothing
         but names.
         """
-        matches = (match for pattern in _PRIVATE for match in pattern.finditer(self.text))
-        names = dict.fromkeys(match["name"] for match in matches)
+        names: dict[str, None] = {}
+
+        def note(match: re.Match[str]) -> str:
+            names[match["function"] or match["constant"]] = None
+            return f"static {match['rest']}"
+
+        text = _PRIVATE.sub(note, self.text)
         head = [f"#define {name} {prefix}_{name}" for name in names]
-        static = self.with_static()
-        return Source(self.name, "\n".join([*head, static.text]), self.files)
+        return Source(self.name, "\n".join([*head, text]), self.files)
 
 
 @dataclass(frozen=True)
@@ -147,16 +146,26 @@ class _BadRow(Exception):
         self.line = line
 
 
-@lru_cache(maxsize=1024)
-def _pieces(text: str, first: int) -> tuple[tuple[tuple[Row, ...], Row | None], ...]:
-    """What a file has up to each of its includes, and the include; None at its end.
+@dataclass
+class _Piece:
+    """What a file has up to an include or its end: directives, and groups of other rows."""
 
-    first: the number of its first line. Raises _BadRow.
-    """
-    found: list[tuple[tuple[Row, ...], Row | None]] = []
-    rows: list[Row] = []
+    rows: list[Row | list[Row]]
+    include: Row | None = None
+
+
+@lru_cache(maxsize=1024)
+def _pieces(text: str, first: int) -> tuple[_Piece, ...]:
+    """The pieces of a file; first: the number of its first line. Raises _BadRow."""
+    found = [_Piece([])]
     openings: list[int] = []
     for row in rows_of(text, first):
+        rows = found[-1].rows
+        if not row.directive:
+            if not (rows and isinstance(rows[-1], list)):
+                rows.append([])
+            rows[-1].append(row)
+            continue
         if row.directive in OPENING:
             openings.append(row.number)
         elif row.directive == "endif" and openings:
@@ -170,11 +179,11 @@ def _pieces(text: str, first: int) -> tuple[tuple[tuple[Row, ...], Row | None], 
                 "needs no include guard",
             )
         else:
-            found.append((tuple(rows), row))
-            rows = []
+            found[-1].include = row
+            found.append(_Piece([]))
     if openings:
         raise _BadRow(openings[-1], "there is no #endif of this #if")
-    return (*found, (tuple(rows), None))
+    return tuple(found)
 
 
 @dataclass(eq=False)
@@ -186,8 +195,8 @@ class _File:
     """
 
     label: str
-    header: tuple[Row, ...]
     generated: bool
+    header: tuple[Row, ...] = ()
     lines: int = 0
 
 
@@ -211,15 +220,15 @@ class _Assembly:
             self._fail(part.file, error.line, str(error))
         keeps_all = self.library or isinstance(self.virtual.get(name), Part)
         generated = name.startswith(_GENERATED)
-        header = () if keeps_all or generated else tuple(r for r in pieces[0][0][:1] if r.is_comment)
-        file = _File(part.file, header, generated)
-        for rows, include in pieces:
-            kept = taken(rows, self.macros)
-            kept = kept[len(header) :] if rows is pieces[0][0] else kept
+        file = _File(part.file, generated)
+        for number, piece in enumerate(pieces):
+            kept = taken(piece.rows, self.macros)
+            if number == 0 and kept and kept[0].is_comment and not (keeps_all or generated):
+                file.header, kept = kept[:1], kept[1:]
             self.pieces.append((file, whole(kept) if keeps_all else paragraphs(kept)))
-            included = _QUOTED.match(include.argument) if include else None
-            if include and included and included[1] not in self.names:
-                self.add(included[1], part.file, include.number)
+            include = piece.include and _QUOTED.match(piece.include.argument)
+            if piece.include and include and include[1] not in self.names:
+                self.add(include[1], part.file, piece.include.number)
 
     def source(self) -> Source:
         """Return the text, without definitions that nothing in it names."""
@@ -262,8 +271,9 @@ class _Text:
     def add(self, file: _File, rows: Sequence[Row], apart: bool = False) -> None:
         """Append rows of a file; apart: with a blank row before them."""
         self.files.setdefault(file.label)
-        for number, row in enumerate(rows):
-            self._place(file, row, apart and number == 0)
+        for row in rows:
+            self._place(file, row, apart)
+            apart = False
             self.rows.append(row.text)
             self._line += row.lines
             file.lines += row.lines

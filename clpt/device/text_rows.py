@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -18,28 +19,22 @@ _WITHIN = "\0"  # ends a row whose comment goes on
 class Row:
     """A row, and those that a comment or a backslash at its end joins to it.
 
-    number: of its first line; text: its lines as they stand; code: the same without comments.
-    directive, argument: what stands behind `#`, "" where there is none.
+    number: of its first line; text: its lines as they stand; lines: how many; code: the text without
+    comments; directive, argument: what stands behind `#`, "" where there is none; macro: the name of
+    a `#define` with its arguments, and the value.
     """
 
     number: int
     text: str
     code: str
+    lines: int = 1
     directive: str = ""
     argument: str = ""
-
-    @property
-    def lines(self) -> int:
-        return self.text.count("\n") + 1
+    macro: tuple[str, str] = ("", "")
 
     @property
     def is_comment(self) -> bool:
         return not self.code.strip() and bool(self.text.strip())
-
-    def defined(self) -> tuple[str, str]:
-        """Return the name of a `#define`, with its arguments, and the value."""
-        match = _DEFINE.match(self.argument)
-        return (match[1], match[2].strip()) if match else ("", "")
 
 
 def _spaces(match: re.Match[str]) -> str:
@@ -58,24 +53,35 @@ def rows_of(text: str, first: int = 1) -> tuple[Row, ...]:
     rows: list[Row] = []
     at = 0
     while at < len(plain):
-        end = at
-        while end + 1 < len(plain) and codes[end].endswith((_WITHIN, "\\")):
+        end, code = at + 1, codes[at]
+        while end < len(plain) and codes[end - 1].endswith((_WITHIN, "\\")):
             end += 1
-        if end == at:
-            raw, code = plain[at], codes[at]
+        if end == at + 1:
+            row = Row(first + at, plain[at], code)
         else:
-            raw = "\n".join(plain[at : end + 1])
-            code = "\n".join(codes[at : end + 1]).replace(_WITHIN, "")
-        rows.append(_row(first + at, raw, code))
-        at = end + 1
+            code = "\n".join(codes[at:end]).replace(_WITHIN, "")
+            row = Row(first + at, "\n".join(plain[at:end]), code, end - at)
+        if "#" in code and (match := _DIRECTIVE.match(code)):
+            row.directive = match[1] or "#"
+            row.argument = match[2].replace("\\\n", " ").strip()
+            if row.directive == "define" and (told := _DEFINE.match(row.argument)):
+                row.macro = told[1], told[2]
+        rows.append(row)
+        at = end
     return tuple(rows)
 
 
-def _row(number: int, text: str, code: str) -> Row:
-    match = _DIRECTIVE.match(code) if "#" in code else None
-    if match is None:
-        return Row(number, text, code)
-    return Row(number, text, code, match[1] or "#", match[2].replace("\\\n", " ").strip())
+def joined(rows: Sequence[Row]) -> tuple[Row, ...]:
+    """Return rows that follow one another as one."""
+    found: list[Row] = []
+    start = 0
+    for at in range(1, len(rows) + 1):
+        if at == len(rows) or rows[at].number != rows[at - 1].number + rows[at - 1].lines:
+            text = "\n".join([row.text for row in rows[start:at]])
+            lines = rows[at - 1].number + rows[at - 1].lines - rows[start].number
+            found.append(Row(rows[start].number, text, text, lines))
+            start = at
+    return tuple(found)
 
 
 @lru_cache(maxsize=512)
