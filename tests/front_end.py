@@ -13,9 +13,12 @@ CLANG = shutil.which("clang")
 TARGETS = ("nvptx64-nvidia-nvcl", "amdgcn-amd-amdhsa", "spir64-unknown-unknown")
 LINE = re.compile(r'^#line \d+ "', re.MULTILINE)
 OWNER = re.compile(r"(\d+)\.cl[/:]")
-FLAGS = (
-    *("-x", "cl", "-cl-std=CL1.2", "-fsyntax-only", "-Wall", "-Werror"),
+LANGUAGE = (
+    *("-x", "cl", "-cl-std=CL1.2"),
     *("-finclude-default-header", "-fdeclare-opencl-builtins"),  # as the driver has them
+)
+FLAGS = (
+    *LANGUAGE, "-fsyntax-only", "-Wall", "-Werror",
     *("-Wno-unused-function", "-Wno-unused-variable", "-Wno-unknown-warning-option"),
     *("-ferror-limit", "0"),  # an error does not end the texts behind it
     "-Wno-bitwise-instead-of-logical",  # masks are integers, in one lane as in eight
@@ -50,3 +53,14 @@ def errors(texts: Iterable[str], target: str = TARGETS[-1]) -> list[str]:
         number = int(owner[1]) if owner else number
         found[number].append(row[owner.end() :] if owner else row)
     return ["\n".join(own) for own in found]
+
+
+def compiled(text: str, *flags: str) -> str:
+    """A program in LLVM's language, before it is optimised: without functions that nobody calls."""
+    given = [word for flag in (*LANGUAGE[2:], "-disable-llvm-passes") for word in ("-Xclang", flag)]
+    command = [str(CLANG), *LANGUAGE[:2], *given, "-emit-llvm", "-S", "-w", *flags, "-o", "-", "-"]
+    done = subprocess.run(
+        command, input=text, capture_output=True, text=True, timeout=300, check=False
+    )
+    assert done.returncode == 0, done.stderr[:3000]
+    return done.stdout

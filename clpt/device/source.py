@@ -270,8 +270,8 @@ class _Text:
 
     def add(self, file: _File, rows: Sequence[Row], apart: bool = False) -> None:
         """Append rows of a file; apart: with a blank row before them."""
-        self.files.setdefault(file.label)
         for row in rows:
+            self.files.setdefault(file.label)
             self._place(file, row, apart)
             apart = False
             self.rows.append(row.text)
