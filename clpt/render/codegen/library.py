@@ -72,7 +72,8 @@ def kernel_source(
     for part in parts:
         files += PARTS[part] if part in PARTS else _bsdf(part, mode, virtual)
     virtual["library"] = tuple(files)
-    text = _own_inline(device.assemble("library", virtual, {"LANES": lanes}).text)
+    made = device.assemble("library", virtual, {"LANES": lanes}, library=True)
+    text = _own_inline(made.text)
     if lines:
         return text + '#line 1 "program"\n'
     return re.sub(r"^#line .*\n", "", text, flags=re.MULTILINE)
