@@ -2,7 +2,7 @@
  * ends, and the medium's phase function is its material. Both are chosen by the extinction at the hero wavelength, and
  * weighed over all of the path's wavelengths (Miller, Georgiev and Jarosz 2019, with one sample): `ratio` does it as
  * for directions, see path/hero.cl. Light that is absorbed is a weight, never an end. Some flights end near lamps, see
- * optics/equiangular.cl; both ways to choose are weighed by their sum. */
+ * media/equiangular.cl; both ways to choose are weighed by their sum. */
 #include "core/base.cl"
 #include "interface/stage.cl"
 #include "generated/sampler.cl"
@@ -13,7 +13,7 @@
 #include "generated/grid_flight.cl"
 #include "generated/flight_args.cl"
 #include "generated/flight_layers.cl"
-#include "optics/equiangular.cl"
+#include "media/equiangular.cl"
 
 #define FLIES_NEAR_LAMPS (MEDIUM_AIMS && !LIGHT_PATHS) /* paths from lamps have no reason to stay there */
 

@@ -52,15 +52,15 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         else ()
     ),
     "generated/medium.cl": lambda f, _: (
-        ("generated/medium_coefficients.cl", "optics/medium.cl") * (f.absorption or f.media)
-        + ("optics/dye_flight.cl",) * f.dyed_media
-        + ("optics/medium_grid.cl",) * f.grids
-        + ("optics/medium_grid_light.cl",) * f.emissive_grids
-        + ("generated/body_index.cl", "optics/bodies.cl") * f.bodies
+        ("generated/medium_coefficients.cl", "media/medium.cl") * (f.absorption or f.media)
+        + ("media/dye_flight.cl",) * f.dyed_media
+        + ("media/medium_grid.cl",) * f.grids
+        + ("media/medium_grid_light.cl",) * f.emissive_grids
+        + ("generated/body_index.cl", "media/bodies.cl") * f.bodies
     ),
     "generated/grid_flight.cl": lambda f, _: (
         ("generated/lights.cl", "path/met_light.cl") * f.emissive_grids
-        + ("optics/grid_flight.cl",) * f.grids
+        + ("media/grid_flight.cl",) * f.grids
     ),
     "generated/light_medium.cl": lambda f, _: (
         ("generated/textures.cl", "generated/medium.cl") * f.light_media

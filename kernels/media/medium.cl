@@ -70,7 +70,7 @@ inline Spectrum medium_emission(Scene scene, integer name, Medium m, real t, Wav
 }
 #endif
 
-/* In `media` stand first what optics/equiangular.cl reads, then, where paths start at lights, two words for each row of
+/* In `media` stand first what media/equiangular.cl reads, then, where paths start at lights, two words for each row of
  * `lights`: the bodies around the light and the name of its medium. Then come two words for each shape. */
 #if LIGHT_MEDIA
 #define MEDIA_OF_SHAPES (4 * MEDIUM_AIMS + 2 * scene.settings->light_count)
