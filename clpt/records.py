@@ -31,7 +31,11 @@ PATH = Record(
         "distance from the point where d was chosen to o, through null surfaces [m]",
     ),
     nulls=("integer", "null surfaces that the path has crossed"),
-    ratio=("spectrum", "density of the path at each wavelength, over the mean of the four"),
+    ratio=(
+        "spectrum",
+        "density of the path at each wavelength, over the mean of the four",
+        "spectrum_of(1.0f)",
+    ),
     eta=("real", "product of the relative indices so far, for Russian roulette"),
     weight=("real", "sample's weight by the pixel filter; from a light, 1 over its first beta"),
     medium=("integer", "medium of the ray, see kernels/media/medium.cl; 0: none"),
