@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import device
+from clpt.render.codegen import rough_coat_table
 from clpt.render.codegen.library import BSDF
 from clpt.render.codegen.parameters import array_size, lane_type, struct_text
 from clpt.render.contract import custom_materials
@@ -45,7 +46,8 @@ def run(
     given: (k, n) float32, streams of `in`; table: what follows them there; virtual: the program's
     files. Returns (rows, n) float32. n is padded to whole lane blocks.
     """
-    source = device.assemble("probe.cl", virtual, {"LANES": lanes})
+    files = {**rough_coat_table.virtual_files(), **virtual}
+    source = device.assemble("probe.cl", files, {"LANES": lanes})
     program = device.build(on, source)
     n = given.shape[1]
     padded = -(-n // 16) * 16

@@ -17,6 +17,7 @@ from clpt.render.codegen import (
     flags,
     lights,
     parameters,
+    rough_coat_table,
     shapes,
     signatures,
     stages,
@@ -179,6 +180,7 @@ def _shared(features: Features, layout: str) -> Files:
     textured = "texture" in stages.emission_sources(features)
     return {
         **shapes.virtual_files(),
+        **rough_coat_table.virtual_files(),
         **lights.virtual_files(),
         **signatures.virtual_files(features, layout),
         **parameters.virtual_files(features),

@@ -1,7 +1,7 @@
 /* A medium whose coefficients a density multiplies, which is given at the points of a lattice and trilinear between.
  * Bricks of 8^3 cells hold the density of their 9^3 points over the brick's highest, in 16 bits each. A ray goes from
  * brick to brick by integer steps (Amanatides and Woo 1987), and the highest density of each bounds the extinction
- * there. Flights are in optics/grid_flight.cl; rays to lights are dimmed by ratio tracking (Novak et al. 2014).
+ * there. Flights are in media/grid_flight.cl; rays to lights are dimmed by ratio tracking (Novak et al. 2014).
  *
  * All that follows is linear in the density: one of the eight points around stands for it, each with its trilinear
  * weight as its chance. In `materials` there stand behind a medium's coefficients: the first word in `images`, the
@@ -150,7 +150,7 @@ inline real grid_length(natural bits) { return -log_r(1.0f - unit_interval(bits)
 
 #if GRIDS_TINTED || GRIDS_COLOURED
 #if GRIDS_EMIT
-#define GRID_ALBEDO (2 * MEDIUM_SCATTERING + 25) /* words from a medium's row: behind optics/medium_grid_light.cl's */
+#define GRID_ALBEDO (2 * MEDIUM_SCATTERING + 25) /* words from a medium's row: behind media/medium_grid_light.cl's */
 #else
 #define GRID_ALBEDO (2 * MEDIUM_SCATTERING + 19)
 #endif

@@ -34,6 +34,17 @@ inline Spectrum medium_transmittance(Scene scene, integer medium, real t, Wavele
     return r;
 }
 
+/* `value` of light after t metres of a medium. Where a ray may go through several, it is dimmed as it is traced, see
+ * tracing/transmittance_media.cl. */
+inline Spectrum medium_dims(Scene scene, integer medium, real t, Wavelengths lambdas, Spectrum value)
+{
+#if SHADOW_MEDIA
+    return value;
+#else
+    return spectrum_mul(value, medium_transmittance(scene, medium, t, lambdas));
+#endif
+}
+
 #if USES_MEDIA
 typedef struct {
     Spectrum sigma_t, sigma_s; /* [1/m] */
@@ -70,7 +81,7 @@ inline Spectrum medium_emission(Scene scene, integer name, Medium m, real t, Wav
 }
 #endif
 
-/* In `media` stand first what optics/equiangular.cl reads, then, where paths start at lights, two words for each row of
+/* In `media` stand first what media/equiangular.cl reads, then, where paths start at lights, two words for each row of
  * `lights`: the bodies around the light and the name of its medium. Then come two words for each shape. */
 #if LIGHT_MEDIA
 #define MEDIA_OF_SHAPES (4 * MEDIUM_AIMS + 2 * scene.settings->light_count)

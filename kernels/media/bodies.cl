@@ -3,7 +3,10 @@
  * higher their priority. Those around a point are the four bytes of a word, in any order, 0 for none; a fifth is not
  * kept. `media` holds two words for each shape, the number of its body first; behind them two for each number: the name
  * of its medium, and where its index stands in `materials`, 0 where it has none. Number 0 has the material word of a
- * null surface in their place. What stands before: optics/medium.cl. */
+ * null surface in their place. What stands before: media/medium.cl. */
+#define camera_through(settings) ((integer)((settings)->camera_bodies)) /* what a ray to a light begins in */
+#define light_through(scene, row) light_bodies(scene, row)
+
 inline integer bodies_top(integer bodies)
 {
     integer low = max_i(bodies & 0xff, (bodies >> 8) & 0xff);
