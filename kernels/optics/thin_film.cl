@@ -5,8 +5,8 @@
  * medium of index `from`; where `outward`, it comes from the base's side and meets the last layer first.
  * eta + i k is the medium that it would enter. layer_at(layers, i) reads a layer, 0 outermost.
  *
- * Where nothing absorbs, what comes back is what does not go through. For between films that guide light the wave
- * grows, and the error of the amplitude that comes back grows by its square, of the share that goes through by itself. */
+ * Where nothing absorbs, what comes back is what does not go through: where films guide light the wave between them
+ * is large, and the error of the share that comes back is by its square larger, of the other share by itself. */
 inline Boundary thin_film(Layers layers, mask outward, real cos_i, Spectrum from, Spectrum eta, Spectrum k)
 {
     real c_i = clamp_r(fabs(cos_i), (real)(1e-4f), (real)(1.0f));
