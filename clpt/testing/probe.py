@@ -40,15 +40,16 @@ def run(
     given: NDArray,
     rows: int,
     table: NDArray = NOTHING,
+    options: Sequence[str] = (),
 ) -> NDArray[np.float32]:
     """Run `kernel void probe(global const float *in, global float *out, uint n)` of "probe.cl".
 
     given: (k, n) float32, streams of `in`; table: what follows them there; virtual: the program's
-    files. Returns (rows, n) float32. n is padded to whole lane blocks.
+    files; options: more of the compiler's. Returns (rows, n) float32. n is padded to whole blocks.
     """
     files = {**rough_coat_table.virtual_files(), **virtual}
     source = device.assemble("probe.cl", files, {"LANES": lanes})
-    program = device.build(on, source)
+    program = device.build(on, source, options)
     n = given.shape[1]
     padded = -(-n // 16) * 16
     data = np.empty((given.shape[0], padded), np.float32)

@@ -8,7 +8,7 @@ real emissive_brick_pdf(EmissiveBrick l, real t) { return l.inverse * l.chord * 
 
 LightSample emissive_brick_sample(EmissiveBrick l, Scene scene, vec3 p, vec2 u, Wavelengths lambdas)
 {
-    natural bits = hash_natural(as_natural(u.x) ^ hash_natural(as_natural(u.y)));
+    natural bits = hash_natural(as_natural(u.y) ^ 0x68bc21ebu); /* u.x may be what a choice left, and rounded */
     real third = unit_interval(bits);
     vec3 q = madd3(l.x, u.x, madd3(l.y, u.y, madd3(l.z, third, l.corner)));
     vec3 to = sub3(q, p);
