@@ -85,6 +85,7 @@ _HOMES = {  # the module of each name, and what it is called there
     "write_spectral": ("spectral_exr", "write"),
     "__version__": ("version", "VERSION"),
 }
+_SHOWN = ("MultiRenderer", "Renderer")  # renderers, whose pictures a notebook shows
 
 
 class _Front(ModuleType):
@@ -94,6 +95,8 @@ class _Front(ModuleType):
         if name in _HOMES:
             module, inside = _HOMES[name]
             value = getattr(importlib.import_module(f"clpt.{module}"), inside)
+            if name in _SHOWN:
+                _give_widgets()
         else:
             value = _submodule(name)
         self.__dict__[name] = value
@@ -106,6 +109,14 @@ class _Front(ModuleType):
 
     def __dir__(self) -> list[str]:
         return sorted({*self.__dict__, *__all__})
+
+
+def _give_widgets() -> None:
+    """Let renderers have widgets: they know nothing of who shows their pictures."""
+    from clpt.render.pictures import Pictures as _Pictures
+    from clpt.view.notebook import widget as _widget
+
+    _Pictures.make_widget = _widget
 
 
 def _submodule(name: str) -> ModuleType:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from contextlib import ExitStack
-from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -31,7 +30,6 @@ def warm(scenes: tuple[Path, ...], options: SceneOptions, verbose: int, quiet: b
     from .opening.scenes import open_scene
     from .printing.display import display
 
-    options = replace(options, machine=replace(options.machine, keep=True))
     for scene in scenes:
         shown, began = display(quiet, None), time.perf_counter()
         with ExitStack() as resources:

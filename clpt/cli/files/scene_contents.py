@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from typing import Any
 
 from ...formats.meshes import framing
-from ...render.lowering.geometry.triangles import triangulate
+from ...geometry.triangles import triangulate
 from ...scene import Scene, materials, shapes, textures
 from ...scene.params import Kind
 

@@ -25,7 +25,7 @@ def share_compilers(devices: list[dev.Device], machine: Machine, resources: Exit
     cores = [(machine.threads or on.info.compute_units) - 1 for on in slow]
     spare = min([dev.spare_cores(), *cores])
     if slow and spare > 0:
-        compilers = resources.enter_context(dev.Compilers(spare, wait_for_kept=machine.keep))
+        compilers = resources.enter_context(dev.Compilers(spare))
         for on in slow:
             on.compilers = compilers
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ... import device as dev
-from ...render.lowering.checks import check
+from ...render.analysis.checks import check
 from ...scene import Scene
 from ..options.changes import changed
 from ..options.scene_options import SceneOptions

@@ -41,13 +41,12 @@ class Loading:
 class Machine:
     """Devices of this machine, by what --device says, and the cores that one may use.
 
-    profiling: whether stages are timed; keep: wait for what compilers keep for the next time.
+    profiling: whether stages are timed.
     """
 
     device: str | None = None
     threads: int | None = None
     profiling: bool = False
-    keep: bool = False
 
 
 @dataclass(frozen=True)

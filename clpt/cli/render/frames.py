@@ -19,7 +19,7 @@ import click
 
 from ... import __version__, images
 from ...errors import ClusterError, SceneError
-from ...render.lowering.checks import check
+from ...render.analysis.checks import check
 from ...scene import Scene
 from ...scene.fingerprint import fingerprint
 from ..files import outputs, targets
