@@ -6,11 +6,11 @@ from pathlib import Path
 
 import click
 
-from .. import __version__
 from ..errors import SceneError
 from ..render.film import film_file
 from ..render.film.host_picture import HostPicture
 from ..render.film.saved_film import SavedFilm, other_devices
+from ..version import VERSION
 from .files import checkpoints, outputs
 from .files.targets import checked
 from .options.grading import GradingOptions, grading_options, names_option
@@ -55,7 +55,7 @@ def merge(
     made = HostPicture(total, denoise)
     origin = total.origin.scene.values
     stats: dict[str, str | int | float] = {
-        "software": f"clpt {__version__}",
+        "software": f"clpt {VERSION}",
         "integrator": str(origin["integrator.type"]),
         "sampler": str(origin["sampler.type"]),
         "seed": int(origin["seed"] or 0),

@@ -9,13 +9,14 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from ... import __version__, images
+from ... import images
 from ...cluster.cluster_renderer import ClusterRenderer
 from ...device import disk_cache
 from ...errors import ClptError, SceneError
 from ...render.film import film_file, layer_channels
 from ...render.film.denoised_picture import DenoisedPicture
 from ...render.film.host_picture import HostPicture
+from ...version import VERSION
 from ..opening.makers import AnyRenderer, OfDevices
 from ..options.grading import Grading
 from .standard_output import is_standard
@@ -38,7 +39,7 @@ def metadata(renderer: AnyRenderer, scene: Path, seconds: float) -> dict[str, st
         pictured = renderer
     samples = max(counts.samples for counts in pictured.counts)
     return {
-        "software": f"clpt {__version__}",
+        "software": f"clpt {VERSION}",
         "scene": os.fsencode(scene).decode("utf-8", "replace"),
         "mode": plan.film.mode,
         "integrator": plan.integrator.kind,
