@@ -21,6 +21,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, KERNELS = ROOT / "clpt", ROOT / "kernels"
 
 BASE = {
+    "array_types",
     "budget", "child_processes", "colour", "errors", "host_memory", "images", "input_files",
     "layout", "measured", "numpy_files", "output_files", "records", "spectra", "text", "transforms",
     "spectral_exr", "tev", "version",

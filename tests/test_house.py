@@ -23,7 +23,7 @@ BOUNDS = {
     "fields of a record of features, most": 75,
     "getattr(": 246,
     ": Any": 630,
-    "aliases of array types outside clpt/array_types.py": 100,
+    "aliases of array types outside clpt/array_types.py": 45,
     "rooms in circles of imports": 14,
     "lines of Python": 72_884,
     "lines of OpenCL": 19_701,
