@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import images
-from clpt.array_types import Floats32
+from clpt.arrays import Floats32
 from clpt.errors import SceneError
 from clpt.images import exr, exr_files
 from clpt.images.failures import check_there, reading

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from clpt.array_types import Matrix as Matrix
+from clpt.arrays import Matrix as Matrix
 from clpt.errors import SceneError
 
 IDENTITY: Matrix = np.eye(4)

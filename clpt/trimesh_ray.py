@@ -16,7 +16,7 @@ from trimesh.ray.ray_util import contains_points
 from trimesh.util import unitize
 
 from clpt import device
-from clpt.array_types import Floats, Integers
+from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
 from clpt.rays import Accel
 

@@ -23,7 +23,7 @@ BOUNDS = {
     "fields of a record of features, most": 75,
     "getattr(": 246,
     ": Any": 630,
-    "aliases of array types outside clpt/array_types.py": 45,
+    "aliases of array types outside clpt/arrays.py": 45,
     "rooms in circles of imports": 14,
     "lines of Python": 72_884,
     "lines of OpenCL": 19_701,
@@ -128,7 +128,7 @@ def test_features_types_and_sizes_are_measured(tmp_path: Path) -> None:
             "clpt/render/flags.py": fields("Other") + "    d: int\n    e: int\n",
             "clpt/a.py": "Floats = NDArray[np.float64]\nWords: TypeAlias = NDArray[int]\n"
             "def f(a: Anything):\n    x = NDArray[int]\n    return getattr(a, 'x')\n",
-            "clpt/array_types.py": "Floats = NDArray[np.float64]\n",
+            "clpt/arrays.py": "Floats = NDArray[np.float64]\n",
             "kernels/a.cl": "int a;\nint b;\n",
             "README.md": "Three small words.\n",
         },
@@ -136,7 +136,7 @@ def test_features_types_and_sizes_are_measured(tmp_path: Path) -> None:
     figures = {f.name: f for measure in (house.types, house.sizes) for f in measure(root)}
     assert figures[": Any"].value == 3
     assert figures["getattr("].where == ("clpt/a.py",)
-    aliases = figures["aliases of array types outside clpt/array_types.py"]
+    aliases = figures["aliases of array types outside clpt/arrays.py"]
     assert aliases.where == ("clpt/a.py:1 Floats", "clpt/a.py:2 Words")
     assert figures["lines of Python"].value == 5 + 1 + 9 + 6
     assert figures["lines of OpenCL"].value == 2

@@ -21,7 +21,7 @@ from .. import __version__, images
 from ..cluster.cluster_renderer import ClusterRenderer
 from ..errors import ClusterError, SceneError
 from ..formats import load
-from ..render.lowering.checks import check
+from ..render.analysis.checks import check
 from ..scene import Scene
 from ..scene.fingerprint import fingerprint
 from . import outputs, video

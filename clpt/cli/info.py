@@ -14,7 +14,7 @@ from rich.table import Table
 
 from clpt.formats import load
 from clpt.formats.meshes import framing
-from clpt.render.lowering.geometry.triangles import triangulate
+from clpt.geometry.triangles import triangulate
 
 from ..images import READERS
 from ..scene import Scene, materials, shapes, textures

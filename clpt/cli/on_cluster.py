@@ -20,8 +20,8 @@ from ..cluster.blocks import WorkerRecord
 from ..cluster.cluster_renderer import ClusterRenderer
 from ..errors import ClusterError
 from ..formats import load
+from ..render.analysis.checks import check
 from ..render.film.saved_film import SavedFilm
-from ..render.lowering.checks import check
 from ..render.progress import Progress
 from . import checkpoints, outputs
 from .display import Display

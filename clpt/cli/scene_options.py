@@ -22,7 +22,7 @@ from ..denoise.needs import METHODS, prepared
 from ..errors import nearest
 from ..formats import load
 from ..formats.missing import Missing
-from ..render.lowering.checks import check
+from ..render.analysis.checks import check
 from ..render.renderer import Renderer
 from ..scene import Scene, kinds
 from ..scene.integrators import AUTO, MOST_LIGHT_PATHS, NO_AOV, Auto
@@ -227,7 +227,6 @@ def open_scene(
     accept: Callable[[Scene], None] | None = None,
     *,
     profiling: bool = False,
-    keep: bool = False,
     device: str | None,
     threads: int | None,
     variables: dict[str, Any],
@@ -236,8 +235,8 @@ def open_scene(
 ) -> tuple[Scene, list[dev.Device], float]:
     """Return the scene of a file, the devices, and the seconds that the file took.
 
-    resources: get the processes that compile beside this one; accept: called with the scene; keep:
-    wait for what they keep for the next time; changes: see `changed`.
+    resources: get the processes that compile beside this one; accept: called with the scene;
+    changes: see `changed`.
     """
     began = time.perf_counter()
     with ThreadPoolExecutor(max_workers=1) as beside:
@@ -250,7 +249,7 @@ def open_scene(
             accept(plan)
         check(plan)
         devices = chosen.result()
-    share_compilers(devices, threads, resources, keep=keep)
+    share_compilers(devices, threads, resources)
     for warning in plan.warnings:
         shown.note(f"clpt: warning: {warning}")
     if plan.film.filtering != loaded.film.filtering:
@@ -273,13 +272,13 @@ def choose_devices(which: str | None, *, profiling: bool, threads: int | None) -
 
 
 def share_compilers(
-    devices: list[dev.Device], threads: int | None, resources: ExitStack, *, keep: bool = False
+    devices: list[dev.Device], threads: int | None, resources: ExitStack
 ) -> None:
     """Let other processes compile for devices whose driver compiles one text at a time."""
     slow = [on for on in devices if on.info.compiles_singly]
     spare = min([dev.spare_cores(), *((threads or on.info.compute_units) - 1 for on in slow)])
     if slow and spare > 0:
-        compilers = resources.enter_context(dev.Compilers(spare, wait_for_kept=keep))
+        compilers = resources.enter_context(dev.Compilers(spare))
         for on in slow:
             on.compilers = compilers
 

@@ -29,7 +29,7 @@ def warm(scenes: tuple[Path, ...], verbose: int, quiet: bool, **options: Any) ->
     for scene in scenes:
         shown, began = display(quiet, None), time.perf_counter()
         with ExitStack() as resources:
-            renderer, loading = open_renderer(scene, shown, resources, keep=True, **options)
+            renderer, loading = open_renderer(scene, shown, resources, **options)
             with shown.phase("compiling for the first samples"):
                 renderer.prepare()
         builds, seconds = [on.builds for on in renderer.devices], time.perf_counter() - began

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from clpt.array_types import Floats32
+from clpt.arrays import Floats32
 from clpt.errors import UnknownKindError
 
 LARGEST = np.float32(1e18)  # its square is finite

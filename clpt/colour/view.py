@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from clpt.array_types import Floats32
+from clpt.arrays import Floats32
 from clpt.errors import SceneError, UnknownKindError
 
 DEFAULT_CONFIG = "ocio://default"  # the config for computer graphics that comes with OpenColorIO

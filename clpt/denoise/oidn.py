@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from clpt.array_types import Image
+from clpt.arrays import Image
 from clpt.errors import DeviceError, SceneError
 
 GREY = 0.18  # what the mean of logarithms of luminance becomes, as Open Image Denoise has it

@@ -15,7 +15,7 @@ import mapbox_earcut
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.array_types import Floats, Integers
+from clpt.arrays import Floats, Integers
 
 CHUNK = 1 << 18  # corners that are tested at a time: in float64 they take 200 bytes each
 CANCELLED = 1e-9  # of a polygon's triangles: a sum of their areas that has no direction

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt.array_types import Floats32, Matrix
+from clpt.arrays import Floats32, Matrix
 from clpt.errors import SceneError
 from clpt.images import exr_files
 from clpt.images.exr_channels import Choice, choose

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from clpt import budget, output_files
-from clpt.array_types import Bytes, Floats32, Matrix
+from clpt.arrays import Bytes, Floats32, Matrix
 from clpt.errors import SceneError
 from clpt.images import sizes
 from clpt.images.stored import Stored

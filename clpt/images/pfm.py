@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from clpt import budget, output_files
-from clpt.array_types import Floats32
+from clpt.arrays import Floats32
 from clpt.errors import SceneError
 from clpt.images import sizes
 from clpt.images.stored import Stored

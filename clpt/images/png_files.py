@@ -15,7 +15,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.array_types import Matrix
+from clpt.arrays import Matrix
 from clpt.errors import SceneError
 from clpt.spectra import spaces
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from clpt import budget
-from clpt.array_types import Floats32
+from clpt.arrays import Floats32
 from clpt.errors import SceneError
 from clpt.images import exr, hdr, npy, pfm, pillow
 from clpt.images.failures import check_there, reading

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.array_types import Floats32, Matrix
+from clpt.arrays import Floats32, Matrix
 from clpt.errors import SceneError
 from clpt.images.transfer import srgb_to_linear
 

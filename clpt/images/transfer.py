@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.array_types import Floats32
+from clpt.arrays import Floats32
 from clpt.colour import tones
 from clpt.colour.view import View
 from clpt.spectra.spaces import between

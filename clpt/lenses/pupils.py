@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.array_types import Floats
+from clpt.arrays import Floats
 from clpt.lenses.glasses import LINE_D
 from clpt.lenses.paraxial import cardinal
 from clpt.lenses.prescription import Prescription

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clpt.array_types import Floats
+from clpt.arrays import Floats
 from clpt.lenses.glasses import LINE_D
 from clpt.lenses.paraxial import cardinal
 from clpt.lenses.prescription import Prescription

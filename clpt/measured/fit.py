@@ -14,7 +14,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt.array_types import Floats
+from clpt.arrays import Floats
 from clpt.errors import SceneError
 from clpt.measured.measurement import Measurement
 from clpt.measured.warp import bilinear, sample, warp

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import input_files, output_files
-from clpt.array_types import Floats
+from clpt.arrays import Floats
 from clpt.errors import SceneError
 from clpt.measured.fit import Reflection, area, direction, grid, spherical
 from clpt.measured.warp import sample, warp

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt.array_types import Floats
+from clpt.arrays import Floats
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt.array_types import Floats
+from clpt.arrays import Floats
 from clpt.errors import SceneError
 
 LARGEST = 2e4  # size parameter: 1 mm of radius at 315 nm

@@ -35,9 +35,10 @@ from clpt.scene.params import (
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.textures import Bitmap
 from clpt.scene.values import IndexLike, SpectrumLike, Textured, TexturedNumber
-from clpt.spectra import Reradiation, Spectrum
+from clpt.spectra import Constant, Reradiation, Spectrum
 
 DISTRIBUTIONS = ("ggx", "beckmann")
+CLEAR = Constant(0.0)  # absorption of what absorbs nothing
 FILMS = "thin films on the surface, from the outside in"
 
 

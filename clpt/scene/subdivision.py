@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import budget
-from clpt.array_types import Floats, Integers
+from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
 
 PER_TRIANGLE = 512  # bytes of memory for each of the finest, while they are made

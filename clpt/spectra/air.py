@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from clpt.array_types import Floats
+from clpt.arrays import Floats
 from clpt.spectra.data import table
 
 EARTH = 6371.0  # radius [km]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from clpt import text as text_files
-from clpt.array_types import Floats
+from clpt.arrays import Floats
 from clpt.errors import SceneError
 from clpt.spectra.files import fields_of
 from clpt.spectra.reradiation import Donaldson

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from clpt.array_types import Floats
+from clpt.arrays import Floats
 from clpt.errors import SceneError
 from clpt.spectra.spectrum import Cauchy, Sellmeier, Spectrum, Tabulated
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from clpt.array_types import Floats
+from clpt.arrays import Floats
 from clpt.errors import SceneError, UnknownKindError
 from clpt.spectra import cie, data
 from clpt.spectra.spectrum import Constant, Spectrum, with_luminance_one

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from clpt.array_types import Floats
+from clpt.arrays import Floats
 from clpt.spectra import cie
 from clpt.spectra.data import ROOT
 from clpt.spectra.spectrum import d65

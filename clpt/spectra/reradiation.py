@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt.array_types import Matrix
+from clpt.arrays import Matrix
 from clpt.errors import SceneError
 from clpt.spectra import cie
 from clpt.spectra.spectrum import Spectrum, Tabulated, d65, extremes, gridded

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from clpt.array_types import Matrix
+from clpt.arrays import Matrix
 from clpt.errors import SceneError, UnknownKindError
 from clpt.spectra import cie, data, files, upsampling
 from clpt.spectra.spectrum import Spectrum, Tabulated, d65

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from clpt.array_types import Matrix
+from clpt.arrays import Matrix
 from clpt.errors import SceneError, UnknownKindError
 from clpt.spectra import cie
 from clpt.spectra.emission import Blackbody

@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt.array_types import Floats
+from clpt.arrays import Floats
 from clpt.errors import SceneError
 from clpt.spectra import cie, data, upsampling
 

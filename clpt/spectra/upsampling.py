@@ -17,7 +17,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt.array_types import Floats
+from clpt.arrays import Floats
 from clpt.spectra.data import ROOT
 
 NODES = 40

@@ -13,9 +13,9 @@ from clpt.render.codegen.library import BSDF
 from clpt.render.codegen.parameters import array_size, lane_type, struct_text
 from clpt.render.contract import custom_materials
 from clpt.render.contract.parameter_words import FILM_COSINES
-from clpt.render.lowering.materials import measurements
-from clpt.render.lowering.materials.thin_films import film_colours
-from clpt.render.lowering.spectra_table import angular_values
+from clpt.render.lowering.spectra import measurements
+from clpt.render.lowering.spectra.spectra_table import angular_values
+from clpt.render.lowering.spectra.thin_films import film_colours
 from clpt.scene.materials import Layer, Material
 from clpt.scene.params import Param, device_params
 from clpt.spectra.spectrum import primaries

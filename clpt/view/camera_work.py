@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from clpt.array_types import Floats
+from clpt.arrays import Floats
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera, Perspective, ThinLens
 from clpt.scene.params import params

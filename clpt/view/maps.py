@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import images
-from clpt.array_types import Bytes, Image
+from clpt.arrays import Bytes, Image
 from clpt.render.film.layer_preview import viewable
 from clpt.scene.layers import LAYERS
 

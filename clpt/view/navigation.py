@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
-from clpt.array_types import Floats
+from clpt.arrays import Floats
 from clpt.scene.cameras import Camera, Matrix, Orthographic, Perspective
 
 FARTHEST = 1e12  # [m] from the origin, as of vertices

@@ -17,7 +17,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.array_types import Image
+from clpt.arrays import Image
 from clpt.device import Device
 from clpt.render.progress import Progress
 from clpt.render.renderer import Renderer

@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 
 import clpt
 from clpt import device as dev
+from clpt.geometry import shapes as placing
 from clpt.render.film import film_file
-from clpt.render.lowering.geometry import shapes as placing
 from clpt.render.wavefront.film_state import FilmState, Ranges
 from tests.pictures.support import with_film
 

@@ -9,7 +9,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from clpt.array_types import Floats
+from clpt.arrays import Floats
 from clpt.errors import SceneError
 from clpt.formats.gltf import pointers
 from clpt.formats.gltf.accessors import floats

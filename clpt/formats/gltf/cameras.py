@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from clpt import transforms
-from clpt.array_types import Matrix
+from clpt.arrays import Matrix
 from clpt.formats.gltf.document import Element
 from clpt.formats.gltf.nodes import Graph
 from clpt.scene.cameras import Camera, Orthographic, Perspective

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from clpt.array_types import Matrix
+from clpt.arrays import Matrix
 from clpt.formats.gltf.cameras import FROM_GLTF, rigid
 from clpt.formats.gltf.document import Element
 from clpt.formats.gltf.nodes import Graph

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import budget, transforms
-from clpt.array_types import Matrix
+from clpt.arrays import Matrix
 from clpt.formats.gltf import materials, skins, variants, volume
 from clpt.formats.gltf.accessors import floats
 from clpt.formats.gltf.document import Element

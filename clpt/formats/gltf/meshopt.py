@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import budget
-from clpt.array_types import Bytes
+from clpt.arrays import Bytes
 from clpt.formats.gltf import meshopt_filters, meshopt_indices
 from clpt.formats.gltf.document import Element
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.array_types import Bytes
+from clpt.arrays import Bytes
 
 TABLE = 16  # bytes at a triangle stream's end
 

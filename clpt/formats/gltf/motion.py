@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.array_types import Matrix
+from clpt.arrays import Matrix
 from clpt.errors import SceneError
 from clpt.scene import Scene
 from clpt.scene.motion import Deformation, Shutter, placement, through

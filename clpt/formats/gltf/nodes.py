@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.array_types import Matrix
+from clpt.arrays import Matrix
 from clpt.formats.gltf.document import Document, Element
 
 # The defaults of a node, ten numbers in all.

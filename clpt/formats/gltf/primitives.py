@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.array_types import Floats32
+from clpt.arrays import Floats32
 from clpt.formats.gltf import draco
 from clpt.formats.gltf.accessors import COMPONENTS, floats, integers, stored
 from clpt.formats.gltf.document import Element

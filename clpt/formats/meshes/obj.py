@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import budget, input_files, text
-from clpt.array_types import Bytes, Floats32, Integers
+from clpt.arrays import Bytes, Floats32, Integers
 from clpt.errors import SceneError
 
 PER_BYTE = 8  # bytes of memory for each of the file, while it is read

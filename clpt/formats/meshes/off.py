@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import budget, text
-from clpt.array_types import Floats, Integers
+from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
 from clpt.formats.gzip_file import read_bytes
 from clpt.formats.meshes.triangles import Triangles, indices, see_through

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt.array_types import Floats32
+from clpt.arrays import Floats32
 
 TALLEST = 4096  # [rows] of an image in latitude and longitude that is made
 DENSE = 1024  # [rows] up to which a pixel takes two lookups in each direction, beyond it one

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from clpt.geometry import shape_records
 from clpt.layout import Record
-from clpt.render.contract import shape_records
 from clpt.scene.lights import KINDS as LIGHTS
 from clpt.scene.lights import Light
 from clpt.scene.params import Param, params

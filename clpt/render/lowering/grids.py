@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import on_host
 from clpt.render.lowering import device_grids
-from clpt.render.lowering.device_arrays import on_host
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.tables import Words, as_words
 from clpt.scene.media import Cloud, Grid, Lattice, Medium, Mixture

@@ -14,7 +14,7 @@ from clpt import transforms as tf
 from clpt.errors import SceneError
 from clpt.formats import load, native
 from clpt.lenses import Coat, Prescription, Surface
-from clpt.render.lowering.index import SceneIndex
+from clpt.render.analysis.index import SceneIndex
 from clpt.render.lowering.scene import lower
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Lens, Perspective

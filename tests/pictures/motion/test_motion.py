@@ -13,8 +13,8 @@ import pytest
 import clpt
 from clpt import transforms
 from clpt.errors import SceneError
-from clpt.render.lowering import motion
-from clpt.render.lowering.geometry.tubes import as_tubes
+from clpt.geometry import motion
+from clpt.geometry.tubes import as_tubes
 from clpt.render.lowering.scene import lower
 from clpt.scene import Scene, cameras, integrators, lights, materials, media, shapes, textures
 from clpt.scene.motion import Deformation, Keys, Shutter, decomposed, rotation

@@ -9,8 +9,8 @@ import pytest
 
 import clpt
 from clpt import transforms as T
-from clpt.render.lowering.geometry.instancing import FEW
-from clpt.render.lowering.geometry.tubes import as_tubes
+from clpt.geometry.instancing import FEW
+from clpt.geometry.tubes import as_tubes
 from clpt.render.lowering.scene import lower
 from clpt.scene import cameras, integrators, lights, materials
 from clpt.scene.shapes import Curves, Group, Instance, Spheres

@@ -12,8 +12,8 @@ import clpt
 from clpt import spectra
 from clpt import transforms as tf
 from clpt.formats.native.write import save
-from clpt.render.lowering.camera.wavelengths import Density, density
-from clpt.render.lowering.index import SceneIndex
+from clpt.render.analysis.index import SceneIndex
+from clpt.render.analysis.wavelengths import Density, density
 from clpt.render.lowering.scene import lower
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Orthographic
