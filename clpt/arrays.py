@@ -13,6 +13,8 @@ Floats32 = NDArray[np.float32]
 Integers = NDArray[np.int64]
 Words = NDArray[np.uint32]
 Bytes = NDArray[np.uint8]
+Points = NDArray[np.float32]  # (n, 3)
+Faces = NDArray[np.uint32]  # (n, 3)
 Image = NDArray[np.float32]  # (height, width, channels)
 Matrix = NDArray[np.float64]  # (rows, columns)
 
