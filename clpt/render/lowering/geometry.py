@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
+from clpt.arrays import Faces, Points
 from clpt.bvh.build import MOST
 from clpt.errors import SceneError
 from clpt.geometry import (
@@ -51,9 +52,9 @@ class Emitter:
 
     shape: Shape
     shape_row: int
-    vertices: shapes.Points | None = None
-    faces: shapes.Faces | None = None
-    uvs: shapes.Points | None = None
+    vertices: Points | None = None
+    faces: Faces | None = None
+    uvs: Points | None = None
     keys: int = 1
 
 
