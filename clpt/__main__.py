@@ -8,7 +8,8 @@ from collections.abc import Sequence
 
 import click
 
-from .cli import allocator, cli, failures, stopping, streams
+from .cli import cli
+from .cli.process import allocator, failures, stopping, streams
 
 
 def main() -> None:

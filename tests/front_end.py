@@ -15,8 +15,9 @@ LINE = re.compile(r'^#line \d+ "', re.MULTILINE)
 OWNER = re.compile(r"(\d+)\.cl[/:]")
 DRIVERS = ("-finclude-default-header", "-fdeclare-opencl-builtins")  # what a driver declares
 OURS = ("-include", "opencl-c-base.h")  # types alone: for `clpt.device.declarations`
+LANGUAGE = ("-x", "cl", "-cl-std=CL1.2")
 FLAGS = (
-    *("-x", "cl", "-cl-std=CL1.2", "-fsyntax-only", "-Wall", "-Werror"),
+    *(*LANGUAGE, "-fsyntax-only", "-Wall", "-Werror"),
     *("-Wno-unused-function", "-Wno-unused-variable", "-Wno-unknown-warning-option"),
     *("-ferror-limit", "0"),  # an error does not end the texts behind it
     "-Wno-bitwise-instead-of-logical",  # masks are integers, in one lane as in eight
@@ -54,3 +55,14 @@ def errors(
         number = int(owner[1]) if owner else number
         found[number].append(row[owner.end() :] if owner else row)
     return ["\n".join(own) for own in found]
+
+
+def compiled(text: str, *flags: str) -> str:
+    """A program in LLVM's language, before it is optimised: without functions that nobody calls."""
+    given = [word for flag in (*LANGUAGE[2:], *DRIVERS, "-disable-llvm-passes") for word in ("-Xclang", flag)]
+    command = [str(CLANG), *LANGUAGE[:2], *given, "-emit-llvm", "-S", "-w", *flags, "-o", "-", "-"]
+    done = subprocess.run(
+        command, input=text, capture_output=True, text=True, timeout=300, check=False
+    )
+    assert done.returncode == 0, done.stderr[:3000]
+    return done.stdout

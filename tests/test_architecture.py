@@ -53,8 +53,8 @@ OPENCL = {"device", "bvh", "denoise", "rays", "render"}  # only these import pyo
 FLOORS = ({"contract"}, {"analysis"}, {"lowering", "codegen"}, {"wavefront"}, {"editing", "film"})
 # What kinds share, by what a reader looks for.
 SHARED = {
-    "colour", "core", "denoising", "film", "guiding", "interface", "lighting", "merging", "optics",
-    "path", "spectrum", "texturing", "tracing",
+    "colour", "core", "denoising", "film", "guiding", "interface", "lighting", "media", "merging",
+    "optics", "path", "spectrum", "texturing", "tracing",
 }  # fmt: skip
 KINDS = {"bsdf", "phase", "camera", "emission", "light", "medium", "sampler", "shape", "texture"}
 # kernels/<folder>: the folders that its files may include; generated text stands between them.

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import device
+from clpt.render.codegen import rough_coat_table
 from clpt.render.codegen.library import BSDF
 from clpt.render.codegen.parameters import array_size, lane_type, struct_text
 from clpt.render.contract import custom_materials
@@ -39,14 +40,16 @@ def run(
     given: NDArray,
     rows: int,
     table: NDArray = NOTHING,
+    options: Sequence[str] = (),
 ) -> NDArray[np.float32]:
     """Run `kernel void probe(global const float *in, global float *out, uint n)` of "probe.cl".
 
     given: (k, n) float32, streams of `in`; table: what follows them there; virtual: the program's
-    files. Returns (rows, n) float32. n is padded to whole lane blocks.
+    files; options: more of the compiler's. Returns (rows, n) float32. n is padded to whole blocks.
     """
-    source = device.assemble("probe.cl", virtual, {"LANES": lanes})
-    program = device.build(on, source)
+    files = {**rough_coat_table.virtual_files(), **virtual}
+    source = device.assemble("probe.cl", files, {"LANES": lanes})
+    program = device.build(on, source, options)
     n = given.shape[1]
     padded = -(-n // 16) * 16
     data = np.empty((given.shape[0], padded), np.float32)

@@ -10,8 +10,8 @@ import pytest
 import clpt
 from clpt import images
 from clpt import transforms as tf
-from clpt.cli import outputs
-from clpt.cli.grading import Grading
+from clpt.cli.files import outputs
+from clpt.cli.options.grading import Grading
 from clpt.errors import SceneError
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Perspective
