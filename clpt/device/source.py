@@ -139,7 +139,7 @@ def _text(folder: Path, name: str) -> str:
 
 
 class _BadRow(Exception):
-    """What is wrong with a row of a file, and its number."""
+    """A fault in a row of a file, with the row's number."""
 
     def __init__(self, line: int, message: str):
         super().__init__(message)
@@ -148,7 +148,7 @@ class _BadRow(Exception):
 
 @dataclass
 class _Piece:
-    """What a file has up to an include or its end: directives, and groups of other rows."""
+    """A part of a file, up to an include or its end: directives, and groups of other rows."""
 
     rows: list[Row | list[Row]]
     include: Row | None = None

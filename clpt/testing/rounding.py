@@ -1,4 +1,4 @@
-"""How far two programs agree that compute one expression."""
+"""Rounding of one expression in two programs, and the tolerance that it asks for."""
 
 from __future__ import annotations
 
