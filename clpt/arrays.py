@@ -5,6 +5,9 @@ from __future__ import annotations
 import sys
 from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 
 def on_host(values: Any) -> Any:
     """Return values in host memory; of an array on a device a copy, for which it waits."""
@@ -17,3 +20,14 @@ def on_device(values: Any) -> bool:
     opencl, module = sys.modules.get("pyopencl"), sys.modules.get("pyopencl.array")
     array = module is not None and isinstance(values, module.Array)
     return array or (opencl is not None and isinstance(values, opencl.Buffer))
+
+
+def single(values: ArrayLike) -> NDArray[np.float32]:
+    """Return values as float32, infinite where they are beyond it: whoever asks looks for that."""
+    with np.errstate(over="ignore"):
+        return np.asarray(values, np.float32)
+
+
+def fits_single(values: ArrayLike) -> bool:
+    """Return whether values are finite as float32 too."""
+    return bool(np.isfinite(single(values)).all())

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
+from clpt.arrays import fits_single
 from clpt.bvh.build import MOST
 from clpt.errors import SceneError
 from clpt.geometry import (
@@ -89,7 +90,10 @@ class Geometry:
     keys: Mapping[int, int] = field(default_factory=dict)
 
     def bounding_sphere(self) -> tuple[NDArray[np.float64], float]:
-        """Return centre and radius of a sphere around the scene; a unit one if it is empty."""
+        """Return centre and radius of a sphere around the scene; a unit one if it is empty.
+
+        Raises SceneError for a scene whose size is beyond float32.
+        """
         vertices = self.vertices[: self.world_vertices]
         boxes = [box for box in (self.boxes, self.instances.boxes) if len(box)]
         lows = [vertices.min(axis=0)] if len(vertices) else []
@@ -99,6 +103,10 @@ class Geometry:
         if not lows:
             return np.zeros(3), 1.0
         low, high = np.min(lows, axis=0), np.max(highs, axis=0)
+        if max(np.abs(low).max(), np.abs(high).max()) > triangles.FAR:
+            low, high = low.astype(np.float64), high.astype(np.float64)
+        if not fits_single(2.0 * (high - low)):
+            raise SceneError("the scene is too large: its size must be below 1.7e38 m")
         return (low + high) / 2, max(float(np.linalg.norm(high - low)) / 2, LEAST_RADIUS)
 
 
