@@ -18,9 +18,9 @@ from numpy.typing import ArrayLike, NDArray
 from clpt import images, spectral_exr, transforms
 from clpt.arrays import fits_single, on_host
 from clpt.errors import SceneError
+from clpt.render.analysis.lowering_cache import version
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.lights import block_grids
-from clpt.render.lowering.lowering_cache import version
 from clpt.render.lowering.textures.texels import bands, texels
 from clpt.scene.lights import CubeMap, Envmap, Sky
 from clpt.spectra import Tabulated, luminance
