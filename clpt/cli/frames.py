@@ -256,14 +256,14 @@ class _FrameLoop:
         )  # fmt: skip
         if self.stopped:
             return renderer  # what it has so far is no frame
-        if not any(counts.samples for counts in renderer.counts):
+        if not renderer.counts.samples:
             message = "in so short a time there was no sample"
             raise click.BadParameter(message, param_hint="--time")
         seconds = time.perf_counter() - began
         stats = outputs.metadata(renderer, plan.file(frame), seconds)
         stats |= {"frame": frame, "fingerprint": digest}
         outputs.write_all(plan.targets(frame), renderer, stats, plan.grading, lambda text: None)
-        rejected = sum(counts.rejected for counts in renderer.counts)
+        rejected = renderer.counts.rejected
         bad = f", {rejected} samples were not finite, or too bright" if rejected else ""
         done = f"{plan.targets(frame)[0]}  {stats['spp']:.4g} spp, {seconds:.1f} s{bad}"
         self._tell(frame, done, time.perf_counter() - began)

@@ -117,7 +117,7 @@ def render_on_cluster(
 
             def after_pass() -> None:
                 writer.after_pass()
-                if any(counts.samples for counts in renderer.counts):
+                if renderer.counts.samples:
                     so_far.after_pass()
 
             def tell_progress(progress: Progress) -> None:
@@ -139,7 +139,7 @@ def render_on_cluster(
             if not adaptive:
                 renderer.hold()
             writer.save(bool(stopped), failed=error is not None)
-            if any(counts.samples for counts in renderer.counts):
+            if renderer.counts.samples:
                 outputs.write_all(targets, renderer, stats_so_far(), graded, shown.note)
                 _warn_of_refused(renderer, shown.note)
             elif error is None:
@@ -236,10 +236,10 @@ class Watch:
 
 def _warn_of_refused(renderer: ClusterRenderer, tell: Callable[[str], None]) -> None:
     """Warn of samples that the films refused."""
-    rejected = sum(counts.rejected for counts in renderer.counts)
+    rejected = renderer.counts.rejected
     if rejected:
         tell(
             f"clpt: warning: {rejected} samples were not finite, or too bright, and count as black"
         )
-    if any(counts.full for counts in renderer.counts):
+    if renderer.counts.full:
         tell("clpt: warning: pixels are too bright for the film: lower film.exposure")

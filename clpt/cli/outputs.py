@@ -58,7 +58,6 @@ def metadata(
         devices = "; ".join(sorted({record.kind for record in renderer.workers.values()}))
     else:
         pictured = renderer
-    samples = max(counts.samples for counts in pictured.counts)
     return {
         "software": f"clpt {__version__}",
         "scene": os.fsencode(scene).decode("utf-8", "replace"),
@@ -66,7 +65,7 @@ def metadata(
         "integrator": plan.integrator.kind,
         "sampler": plan.sampler.kind,
         "seed": plan.seed,
-        "spp": samples / pictured.wavefronts[0].paths.pixels,
+        "spp": pictured.counts.samples / pictured.wavefront.paths.pixels,
         "device": devices or " and ".join(on.info.label for on in pictured.devices),
         "seconds": round(seconds + renderer.former_seconds, 3),
     }

@@ -260,12 +260,12 @@ def render(
     share = float(stats["spp"])
     if share < 1.0:
         shown.note(f"clpt: warning: only {share:.1%} of the pixels have a sample; others are black")
-    rejected = sum(counts.rejected for counts in renderer.counts)
+    rejected = renderer.counts.rejected
     if rejected:
         shown.note(
             f"clpt: warning: {rejected} samples were not finite, or too bright, and count as black"
         )
-    if any(counts.full for counts in renderer.counts):
+    if renderer.counts.full:
         shown.note("clpt: warning: pixels are too bright for the film: lower film.exposure")
     if verbose:
         report.after(renderer)
@@ -290,7 +290,7 @@ def _rescuing(
         writer.save(False, failed=True)
 
     def write_picture() -> None:
-        if any(counts.samples for counts in renderer.counts):
+        if renderer.counts.samples:
             outputs.write_all(targets, renderer, stats(), graded, shown.note)
 
     try:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from ..cluster.cluster_renderer import ClusterRenderer
 from ..render.progress import Progress
 from ..render.renderer import MOST_SAMPLES
+from ..render.wavefront.wavefront import Counts
 from .scene_options import AnyRenderer
 
 PASS_SECONDS = 3.0  # at the end of a pass few paths are left; only at its end is there a checkpoint
@@ -38,12 +39,11 @@ def render_samples(
     began = time.perf_counter()
     first, last = renderer.first_sample, end or MOST_SAMPLES
     total = 0 if end is None else end - first
-    others = renderer.counts if renderer.samples > first else ()  # who rendered before
-    former = sum(counts.samples for counts in others), sum(counts.rays for counts in others)
+    others = renderer.counts if renderer.samples > first else Counts()  # who rendered before
 
     def tell(progress: Progress) -> bool:
         seconds = time.perf_counter() - began
-        paths, rays = progress.paths - former[0], progress.rays - former[1]
+        paths, rays = progress.paths - others.samples, progress.rays - others.rays
         show(dataclasses.replace(progress, total=total, seconds=seconds, paths=paths, rays=rays))
         over = limit is not None and seconds >= limit
         return not (stopped or over)

@@ -62,9 +62,10 @@ class FilmSum:
     def taken(self) -> Ranges:
         return () if self.film is None else self.film.taken
 
-    def counts(self, films: int) -> Counts:
-        """The share of one of so many films."""
-        samples, rays, rejected, full = (value // films for value in self.totals.values())
+    @property
+    def counts(self) -> Counts:
+        """What happened; rays of both kinds as one."""
+        samples, rays, rejected, full = self.totals.values()
         return Counts(samples=samples, closest=rays, rejected=rejected, full=full)
 
 
@@ -125,10 +126,9 @@ class ClusterFilm(FilmKeeping):
         return self._first_sample
 
     @property
-    def counts(self) -> tuple[Counts, ...]:
-        """What has happened for all blocks that were added, of each film; see `Renderer.counts`."""
-        films = 1 if self._sum.film is None else len(self._sum.film.words)
-        return (self._sum.counts(films),) * films
+    def counts(self) -> Counts:
+        """What has happened for all blocks that were added; see `Renderer.counts`."""
+        return self._sum.counts
 
     # ---- the film
 
@@ -178,8 +178,7 @@ class ClusterFilm(FilmKeeping):
             if film is not None:
                 local.merge(film)
             self._developed = film
-        for one in local.wavefronts:
-            one.counts = self._sum.counts(len(local.wavefronts))
+        local.wavefront.counts = self._sum.counts
         return local
 
     # ---- saved films
@@ -206,8 +205,7 @@ class ClusterFilm(FilmKeeping):
         adaptive = {} if self._noise is None or held else self._noise.arrays()
         films, arrays = self._held if held and self._held else (self._sum, adaptive)
         state = self._empty() if films.film is None else films.film
-        number = len(state.words)
-        counts = tuple(dict(vars(films.counts(number))) for _ in range(number))
+        counts = dict(vars(films.counts))
         seconds = [self._seconds_rendered] + [0.0] * len(self._classes)  # each second once
         sessions = [
             Session(self._began, took, VERSION, device)
@@ -231,10 +229,8 @@ class ClusterFilm(FilmKeeping):
         own, film, former = self._empty().arrays, saved.film, (self._sum, self._whole)
         if any(own[name].shape != array.shape for name, array in film.arrays.items()):
             raise SceneError("the film has another form than this scene's")
-        totals = dict.fromkeys(self._sum.totals, 0)
-        for one in (Counts(**counts) for counts in saved.counts):
-            for name in totals:
-                totals[name] += getattr(one, name)
+        counts = Counts(**saved.counts)
+        totals = {name: getattr(counts, name) for name in self._sum.totals}
         self._begin_with(FilmSum(film if film.taken else None, totals))
         if saved.adaptive:
             try:

@@ -133,7 +133,7 @@ class ClusterRenderer(ClusterFilm):
         if samples < 1 or self.samples + samples > MOST_SAMPLES:
             raise SceneError(f"cannot add {samples} samples", where="samples")
         if noise is not None:
-            noise = adaptive.checked(noise, self._here.wavefronts[0].features)
+            noise = adaptive.checked(noise, self._here.wavefront.features)
         if self._stop.is_set():
             self._stop.clear()
             return False
@@ -180,7 +180,7 @@ class ClusterRenderer(ClusterFilm):
         try:
             if noise is not None:
                 return self._noise.run(end, noise, lambda _: tick())
-            every = Selection("all", self._here.wavefronts[0].paths.pixels)
+            every = Selection("all", self._here.wavefront.paths.pixels)
             finished = self._tracer.add(every, first, end, lambda _: tick())
             if finished:
                 self._noise.skip(end)
@@ -200,7 +200,7 @@ class ClusterRenderer(ClusterFilm):
             self._sum = self._sum.counting(film.counts)
             add(film.state)
 
-        pixels = self._here.wavefronts[0].paths.pixels
+        pixels = self._here.wavefront.paths.pixels
         return self._take(selection, pixels, (first, end), (), note, lambda: on_batch(None))
 
     def _take(

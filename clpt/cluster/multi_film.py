@@ -74,8 +74,8 @@ class MultiFilm(FilmKeeping, Pictures):
 
     @property
     @abstractmethod
-    def counts(self) -> tuple[Counts, ...]:
-        """What has happened so far, of each film."""
+    def counts(self) -> Counts:
+        """What has happened so far."""
 
     @synchronized
     def film_state(self) -> FilmState:
@@ -110,9 +110,9 @@ class MultiFilm(FilmKeeping, Pictures):
 
     @property
     @synchronized
-    def wavefronts(self) -> list[Wavefront]:  # type: ignore[override]
-        """Those of the first device, whose films then hold the picture of all."""
-        return self._on_first(lambda first: first.renderer.wavefronts)
+    def wavefront(self) -> Wavefront:
+        """That of the first device, whose film then holds the picture of all."""
+        return self._on_first(lambda first: first.renderer.wavefront)
 
     def image(self) -> Image:
         """The picture so far of all devices; see `Renderer.image`."""
@@ -194,8 +194,7 @@ class MultiFilm(FilmKeeping, Pictures):
             renderer.contents, taken=now.taken, adaptive=self._adaptive, sessions=now.sessions
         )
         renderer._seconds_rendered = self._seconds_rendered
-        counts = tuple(dict(vars(one)) for one in self.counts)
-        return {**renderer.progress_so_far(), "counts": counts}
+        return {**renderer.progress_so_far(), "counts": dict(vars(self.counts))}
 
     def _film_with(self, state: FilmState, so_far: Mapping[str, Any]) -> SavedFilm:
         others = {name: value for name, value in so_far.items() if name != "taken"}

@@ -154,8 +154,8 @@ class MultiRenderer(MultiFilm):
         return [*of_scene, *self._lost_at_first, *failed]
 
     @property
-    def counts(self) -> tuple[Counts, ...]:
-        """What has happened so far, of each film; see `Renderer.counts`."""
+    def counts(self) -> Counts:
+        """What has happened so far; see `Renderer.counts`."""
         return self._crew.counts
 
     @property
@@ -201,7 +201,7 @@ class MultiRenderer(MultiFilm):
             return False
         base: FilmState | None = None  # that adaptive sampling begins over
         if noise is not None:
-            noise = adaptive.checked(noise, self._crew.first.renderer.wavefronts[0].features)
+            noise = adaptive.checked(noise, self._crew.first.renderer.wavefront.features)
             if self._noise is None:
                 base = self.film_state()
         raised: list[BaseException] = []
@@ -239,7 +239,7 @@ class MultiRenderer(MultiFilm):
 
     def tracer(self) -> Tracer:
         """Return what adds selections of samples to the films of all devices."""
-        return CrewTracer(self._crew.first.renderer.wavefronts[0], self._crew)
+        return CrewTracer(self._crew.first.renderer.wavefront, self._crew)
 
     def cancel(self) -> None:
         """Let the `run` of another thread, or else the next one, stop soon and return False."""
@@ -321,7 +321,7 @@ class MultiRenderer(MultiFilm):
 
         def tick() -> bool:
             counts = self._crew.counts
-            paths, rays = sum(c.samples for c in counts), sum(c.rays for c in counts)
+            paths, rays = counts.samples, counts.rays
             now = time.perf_counter()
             if paths:
                 self._seconds.setdefault("first_sample", now - self._start)

@@ -27,15 +27,16 @@ Image = NDArray[np.float32]
 
 
 class Pictures(FilmOwner):
-    """Base of renderers: their picture as an array, on the device or the host.
-
-    wavefronts: its one.
-    """
+    """Base of renderers: their picture as an array, on the device or the host."""
 
     scene: Scene
     device: dev.Device
-    wavefronts: list[Wavefront]
     _resolve: Resolve | None = None  # built when a picture is first resolved
+
+    @property
+    def wavefront(self) -> Wavefront:
+        """The wavefront whose film holds the picture."""
+        raise NotImplementedError
 
     @property
     def form(self) -> PictureForm:
@@ -51,7 +52,7 @@ class Pictures(FilmOwner):
         has. Always the same memory, on the renderer's queue; steps wait for those of its `events`
         that readers add, as its `get_async` does.
         """
-        return self.wavefronts[0].film.picture
+        return self.wavefront.film.picture
 
     @synchronized
     def resolve(
@@ -79,7 +80,7 @@ class Pictures(FilmOwner):
         Raises DeviceError if the picture does not fit, UnknownKindError for names.
         """
         if self._resolve is None:
-            self._resolve = Resolve(self.device, self.wavefronts[0].stream)
+            self._resolve = Resolve(self.device, self.wavefront.stream)
         return self._resolve(
             self.film, into, dtype=dtype, exposure=exposure,
             tone=tone, srgb=srgb, flip=flip, view=view, wait_for=wait_for,
@@ -120,15 +121,15 @@ class Pictures(FilmOwner):
         """
         film = self.scene.film
         if film.bands:
-            return self.wavefronts[0].bands() * np.float32(film.exposure)
+            return self.wavefront.bands() * np.float32(film.exposure)
         if film.alpha:
-            return np.dstack([self.colours(), self.wavefronts[0].alpha()])
+            return np.dstack([self.colours(), self.wavefront.alpha()])
         return self.colours()
 
     @synchronized
     def colours(self) -> Image:
         """The picture so far in three colours, (h, w, 3) float32, also of a film with bands."""
-        return self.wavefronts[0].image()
+        return self.wavefront.image()
 
     def spectral_image(self) -> SpectralImage:
         """The picture so far of a film with bands, at their centres. Raises SceneError without."""
@@ -139,12 +140,12 @@ class Pictures(FilmOwner):
     @synchronized
     def samples_per_pixel(self) -> Image:
         """How many samples each pixel has, (h, w) float32."""
-        return np.ascontiguousarray(self.wavefronts[0].film.picture.get()[..., 3])
+        return np.ascontiguousarray(self.wavefront.film.picture.get()[..., 3])
 
     @synchronized
     def light_paths_per_pixel(self) -> float:
         """How many paths have begun at lights for each pixel."""
-        return self.wavefronts[0].light_paths_per_pixel
+        return self.wavefront.light_paths_per_pixel
 
     @synchronized
     def halves(self) -> tuple[Image, Image]:
@@ -153,7 +154,7 @@ class Pictures(FilmOwner):
         (h, w, 3) float32 each, in the film's output space, of a Renderer with `halves=True`. Their
         mean, weighted as samples are, is the whole picture. Raises SceneError without.
         """
-        first = self.wavefronts[0]
+        first = self.wavefront
         if first.film.halves != 2:
             raise SceneError("even and odd samples are not kept apart; give Renderer halves=True")
         return first.half(0), first.half(1)
@@ -167,4 +168,4 @@ class Pictures(FilmOwner):
         group, `light_rest` of lights that name none; of mattes (h, w, 12), pairs of a name's hash
         and its coverage; see docs/layers.md.
         """
-        return layers_of(self.form, self.wavefronts[0].film.layer_words(), self)
+        return layers_of(self.form, self.wavefront.film.layer_words(), self)

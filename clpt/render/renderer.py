@@ -103,7 +103,8 @@ class Renderer(Resumable):
         self._texture_budget, self._successors = texture_budget, Successors()
         lowered = self._lower(scene)
         self._seconds = {"lower": time.perf_counter() - self._start}
-        first = Wavefront.create(
+        self._wavefront: Wavefront | None = None
+        self._wavefront = first = Wavefront.create(
             device,
             lowered,
             layout=options.get("layout"),
@@ -114,11 +115,9 @@ class Renderer(Resumable):
             halves=options.get("halves", False) or needs.halves(scene, self.denoise),
             cancel_seconds=options.get("cancel_seconds"),
         )
-        self.wavefronts = [first]
-        for one in self.wavefronts:
-            one.prepare()
+        first.prepare()
         self._built = device.builds.programs - before[0], device.builds.cached - before[1]
-        self._seconds["programs"] = sum(one.program_seconds for one in self.wavefronts)
+        self._seconds["programs"] = first.program_seconds
         self._seconds["trees"] = first.scene.trees.seconds
         self._seconds["ready"] = time.perf_counter() - self._start
         self.warnings = list(lowered.warnings)
@@ -141,9 +140,16 @@ class Renderer(Resumable):
         """
         now = self.contents
         with self._adding("prepare", now):
-            for wavefront in self.wavefronts:
-                wavefront.render_samples(self.samples, self.samples)
+            self.wavefront.render_samples(self.samples, self.samples)
             self._contents = now
+
+    @property
+    def wavefront(self) -> Wavefront:
+        """What renders on the device. Raises DeviceError after `close`."""
+        wavefront = self._wavefront
+        if wavefront is None:
+            raise self._closed_error()
+        return wavefront
 
     @synchronized
     def step(self, samples: int = 1, wait_for: dev.Events = None) -> cl.Event:
@@ -156,12 +162,11 @@ class Renderer(Resumable):
         Raises SceneError for a number that is none, DeviceError if the driver refuses.
         """
         first, end = next_range(self.samples, samples)
-        stream = self.wavefronts[0].stream
+        stream = self.wavefront.stream
         stream.after(wait_for)
         more = self._with(first, end)
         with self._adding("step", more, plain=True):
-            for wavefront in self.wavefronts:
-                wavefront.enqueue(first, end)
+            self.wavefront.enqueue(first, end)
             stream.flush()
             if more.adaptive is not None:
                 more.adaptive.skip(end)
@@ -177,7 +182,7 @@ class Renderer(Resumable):
         What the caller then raises is logged: in a thread of the driver nobody could catch it.
         """
         samples, start = self.samples, self._start
-        pixels = self.wavefronts[0].paths.pixels * len(self.wavefronts)
+        pixels = self.wavefront.paths.pixels
 
         def report(_: int) -> None:
             seconds = time.perf_counter() - start
@@ -214,13 +219,11 @@ class Renderer(Resumable):
         raised: list[BaseException] = []
 
         def on_batch(_: Any) -> bool:
-            counts = self.counts
-            paths = sum(c.samples for c in counts)
+            paths, rays = self.counts.samples, self.counts.rays
             if paths:
                 self._seconds.setdefault("first_sample", time.perf_counter() - self._start)
-            pixels = self.wavefronts[0].paths.pixels * len(counts)
+            pixels = self.wavefront.paths.pixels
             seconds = time.perf_counter() - start
-            rays = sum(c.rays for c in counts)
             if self._stop.is_set() and self._discards:
                 raise _Discarded
             if self._stop.is_set() or progress is None:
@@ -239,14 +242,13 @@ class Renderer(Resumable):
             self._stop.clear()
             return False
         if noise is not None:
-            noise = adaptive.checked(noise, self.wavefronts[0].features)
+            noise = adaptive.checked(noise, self.wavefront.features)
             if self.contents.adaptive is None:
                 begun = self.adaptively(None, self.denoise)
                 begun.skip(first)
                 self._contents = dataclasses.replace(self.contents, adaptive=begun)
         more = self._with(first, end)
-        for wavefront in self.wavefronts:
-            wavefront.leave.lower()  # that a `cancel` raised which came too late for another run
+        self.wavefront.leave.lower()  # that a `cancel` raised which came too late for another run
         try:
             with self._adding("run", more, plain=noise is None):
                 try:
@@ -274,7 +276,7 @@ class Renderer(Resumable):
         """Add samples to all pixels, or to those with noise; return whether all were added."""
         if noise is not None and chosen is not None:
             return chosen.run(end, noise, on_batch)
-        finished = all(one.render_samples(first, end, on_batch) for one in self.wavefronts)
+        finished = self.wavefront.render_samples(first, end, on_batch)
         if chosen is not None:
             chosen.skip(end)  # after a stop too: numbers are not used again
         return finished
@@ -291,31 +293,28 @@ class Renderer(Resumable):
         it holds that too, though some pixels may lack some of these samples; or what it held, if
         none has begun. An error of the device makes nothing whole.
         """
-        now = self.contents
-        for wavefront in self.wavefronts:
-            wavefront.begun = False
+        now, wavefront = self.contents, self.wavefront
+        wavefront.begun = False
 
         def finish(error: BaseException) -> Contents:
-            begun = any(wavefront.begun for wavefront in self.wavefronts)
+            begun = wavefront.begun
             if isinstance(error, DeviceError) and not isinstance(error, MemoryBudgetError):
                 if begun:
                     raise error
                 return now
-            for wavefront in self.wavefronts:
-                wavefront.finish()
+            wavefront.finish()
             if more.adaptive is not None:
                 more.adaptive.finish()
                 if plain and begun:
                     more.adaptive.skip(more.taken[-1][1])
-            for wavefront in self.wavefronts:
-                wavefront.refresh()
+            wavefront.refresh()
             return more if begun else now
 
         return self.change(what, finish)
 
     def tracer(self) -> Tracer:
         """Return what adds selections of samples to the film."""
-        return Tracer(self.wavefronts[0])
+        return Tracer(self.wavefront)
 
     @property
     def devices(self) -> tuple[dev.Device, ...]:
@@ -323,9 +322,9 @@ class Renderer(Resumable):
         return (self.device,)
 
     @property
-    def counts(self) -> tuple[Counts, ...]:
-        """What has happened so far, of each film: of its one film."""
-        return tuple(wavefront.counts for wavefront in self.wavefronts)
+    def counts(self) -> Counts:
+        """What has happened so far."""
+        return self.wavefront.counts
 
     @property
     def active(self) -> float:
@@ -340,9 +339,8 @@ class Renderer(Resumable):
         sooner, and a run that has begun leaves the film as after `reset`. A step is not stopped.
         It may be called from anywhere, also from a signal's handler, and waits for nothing.
         """
-        if discard:  # in this order: who sees the flag finds the reason soon
-            for wavefront in self.wavefronts:
-                wavefront.leave.raise_()
+        if discard and self._wavefront is not None:  # who sees the flag finds the reason soon
+            self._wavefront.leave.raise_()
             self._discards = True
         self._stop.set()
 
@@ -367,7 +365,7 @@ class Renderer(Resumable):
         if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int)):
             raise SceneError(f"must be a whole number, not {seed!r}", where="seed")
         broken = isinstance(self._contents, Change)
-        self.wavefronts[0].stream.after(wait_for)
+        self.wavefront.stream.after(wait_for)
         with self.healing("reset", lambda _: self._emptied(recover=True)):
             if seed is not None:
                 self.scene = dataclasses.replace(self.scene, seed=seed)
@@ -378,21 +376,21 @@ class Renderer(Resumable):
 
     @property
     def _last(self) -> cl.Event:
-        event = self.wavefronts[0].stream.last
+        event = self.wavefront.stream.last
         assert event is not None, "something was enqueued"
         return event
 
     def _emptied(self, *, recover: bool = False) -> Contents:
         """Enqueue that the film is empty; return what it then holds; recover: from an error at any
         line."""
-        for wavefront in self.wavefronts:
-            if recover:
-                wavefront.stream.rejoin()
-                use_all_pixels(wavefront)
-            wavefront.paths.set_seed(self.scene.seed)
-            wavefront.clear()
+        wavefront = self.wavefront
+        if recover:
+            wavefront.stream.rejoin()
+            use_all_pixels(wavefront)
+        wavefront.paths.set_seed(self.scene.seed)
+        wavefront.clear()
         self._held, self._seconds_rendered = None, 0.0
-        self.wavefronts[0].stream.flush()
+        wavefront.stream.flush()
         return Contents()
 
     @property
@@ -437,7 +435,7 @@ class Renderer(Resumable):
         """
         with self._lock:
             self._closed = True
-            self.wavefronts = []
+            self._wavefront = None
             self._contents = Contents()
             self._moving = self._resolve = None
 
@@ -491,7 +489,7 @@ class Renderer(Resumable):
             scene = needs.prepared(scene, self.denoise)
         check_changes(camera, materials=materials, transforms=transforms, vertices=vertices)
         events = list(wait_for or ())
-        self.wavefronts[0].stream.after(events)
+        self.wavefront.stream.after(events)
         quick = scene is None and not (motion or self._blurred)
         moves = quick and bool(transforms or vertices)
         if moves and self._move(transforms or {}, vertices or {}):
@@ -553,7 +551,7 @@ class Renderer(Resumable):
     def _move(self, transforms: Mapping[ShapeKey, Any], vertices: Mapping[ShapeKey, Any]) -> bool:
         """Move shapes on the device, and begin at sample 0; return whether they could."""
         if self._moving is None:
-            self._moving = Moving(self.wavefronts[0].scene, self.scene)
+            self._moving = Moving(self.wavefront.scene, self.scene)
         moved, replaced = self._edit(self.scene, None, transforms, vertices)
         if self._enters_a_medium(moved):
             return False
@@ -571,7 +569,7 @@ class Renderer(Resumable):
         """Return what writes the words of parameters that differ, None if more does."""
         if self._enters_a_medium(scene):
             return None
-        found = parameter_patch.patch(self.wavefronts[0].scene, self.scene, scene)
+        found = parameter_patch.patch(self.wavefront.scene, self.scene, scene)
         if isinstance(found, str):
             log.debug("words alone do not change the scene: %s", found)
             return None
@@ -579,7 +577,7 @@ class Renderer(Resumable):
 
     def _enters_a_medium(self, scene: Scene) -> bool:
         """Whether the camera or a light of a changed scene may be in other media than before."""
-        lowered = self.wavefronts[0].scene.lowered
+        lowered = self.wavefront.scene.lowered
         if not lowered.features.media:
             return False
         if lowered.features.light_media and _lights_moved(self.scene, scene):
@@ -598,9 +596,9 @@ class Renderer(Resumable):
         """
         for event in events:
             dev.wait(event)
-        first = self.wavefronts[0]
+        first = self.wavefront
         lowered = self._lower(scene, first.scene.lowered)
-        take = rebuild.prepare(self.wavefronts, lowered, refit)
+        take = rebuild.prepare(first, lowered, refit)
 
         def write() -> None:
             take()
@@ -612,7 +610,7 @@ class Renderer(Resumable):
     @synchronized
     def stats(self) -> RenderStats:
         """What the render took so far: numbers of things, bytes by table and tree, seconds."""
-        return collect(self.wavefronts, *self._built, dict(self._seconds))
+        return collect(self.wavefront, *self._built, dict(self._seconds))
 
 
 def _lights_moved(former: Scene, scene: Scene) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import logging
 from functools import cache
@@ -31,6 +30,7 @@ from clpt.render.pictures import Pictures
 from clpt.render.wavefront.adaptive import Adaptive
 from clpt.render.wavefront.film_state import FilmState, Ranges
 from clpt.render.wavefront.tracer import Tracer
+from clpt.render.wavefront.wavefront import Counts
 from clpt.scene import Scene
 from clpt.scene.fingerprint import Fingerprint, Plain, fingerprint
 from clpt.scene.integrators import PIXELWISE
@@ -74,11 +74,9 @@ class Resumable(FilmKeeping, Pictures):
 
     def words(self, taken: Ranges, *, held: bool) -> FilmState:
         """Return what the film holds, or held, as `film_state` does, of samples that are taken."""
-        films = [one.film.words(held=held) for one in self.wavefronts]
-        scale = float(self.wavefronts[0].paths.settings["film_scale"])
-        words = [film.pop("words") for film in films]
-        stacked = np.stack(words) if len(words) > 1 else words[0][None]
-        return FilmState(stacked, taken=taken, scale=scale, **films[0])
+        first = self.wavefront
+        scale = float(first.paths.settings["film_scale"])
+        return FilmState(taken=taken, scale=scale, **first.film.words(held=held))
 
     @synchronized
     def hold(self) -> None:
@@ -88,8 +86,7 @@ class Resumable(FilmKeeping, Pictures):
         samples that some pixels have and others have not. Raises MemoryBudgetError.
         """
         so_far, self._held = self.progress_so_far(), None
-        for one in self.wavefronts:
-            one.film.hold()
+        self.wavefront.film.hold()
         self._held = so_far
 
     @synchronized
@@ -109,9 +106,9 @@ class Resumable(FilmKeeping, Pictures):
     def origin(self) -> Origin:
         """Return what the samples are of. Raises SceneError for a scene that cannot be read."""
         if self._scene_read is None or self._scene_read[0] is not self.scene:
-            readable = resolve_device_arrays(self.scene, self.wavefronts[0].stream.queue)
+            readable = resolve_device_arrays(self.scene, self.wavefront.stream.queue)
             self._scene_read = self.scene, fingerprint(readable)
-        first = self.wavefronts[0]
+        first = self.wavefront
         lowered, features = first.scene.lowered, first.features
         settings: dict[str, Plain] = {
             "chosen.integrator": lowered.integrator.kind,
@@ -130,7 +127,7 @@ class Resumable(FilmKeeping, Pictures):
     @synchronized
     def device_class(self) -> dict[str, Plain]:
         """Return what decides the last bits of samples: equal classes give equal films."""
-        first, info = self.wavefronts[0], self.device.info
+        first, info = self.wavefront, self.device.info
         return {
             "device": info.label,
             "driver": f"{info.version} {info.driver}",
@@ -145,7 +142,7 @@ class Resumable(FilmKeeping, Pictures):
         tracer: adds the samples; denoise: a denoiser: noise is then what it leaves. Light paths
         have their noise before. Raises SceneError where halves are wanted and not kept.
         """
-        first = self.wavefronts[0]
+        first = self.wavefront
         if denoise is None or first.features.weighed:
             return Adaptive(first, tracer)
         if first.film.halves != 2:
@@ -172,8 +169,7 @@ class Resumable(FilmKeeping, Pictures):
 
         def put(_: BaseException | None = None) -> Contents:
             self._held, self._seconds_rendered = None, 0.0
-            for one, counts in zip(self.wavefronts, saved.counts, strict=True):
-                one.counts = dataclasses.replace(one.counts, **counts)
+            self.wavefront.counts = Counts(**saved.counts)
             self._put(saved.film)
             return restored
 
@@ -186,8 +182,7 @@ class Resumable(FilmKeeping, Pictures):
 
     def _put(self, state: FilmState) -> None:
         """Enqueue that the film holds the words of another one of its form."""
-        for one, words in zip(self.wavefronts, state.films, strict=True):
-            one.set_words(words)
+        self.wavefront.set_words(state.arrays)
 
     def progress_so_far(self) -> dict[str, Any]:
         """Return what changes while samples are taken, but for the film's words."""
@@ -195,7 +190,7 @@ class Resumable(FilmKeeping, Pictures):
         session = Session(now.began, self._seconds_rendered, VERSION, self.device_class())
         return {
             "taken": now.taken,
-            "counts": tuple(dict(vars(one.counts)) for one in self.wavefronts),
+            "counts": dict(vars(self.wavefront.counts)),
             "sessions": (*now.sessions, session),
             "adaptive": {} if now.adaptive is None else now.adaptive.arrays(),
         }
@@ -204,7 +199,7 @@ class Resumable(FilmKeeping, Pictures):
     @synchronized
     def form(self) -> PictureForm:
         """How the film's words become a picture."""
-        first, film = self.wavefronts[0], self.scene.film
+        first, film = self.wavefront, self.scene.film
         settings, features = first.paths.settings, first.features
         return PictureForm(
             tuple(tuple(float(v) for v in np.ravel(settings[name])[:3]) for name in TO_OUTPUT),

@@ -56,7 +56,7 @@ def test_two_workers_are_one(two, expected):
         assert renderer.run(SAMPLES, lambda progress: told.append(progress.samples))
         assert renderer.samples == SAMPLES
         assert sum(record.samples for record in renderer.workers.values()) == SAMPLES
-        assert renderer.counts[0].samples == SAMPLES * 32 * 24
+        assert renderer.counts.samples == SAMPLES * 32 * 24
         assert told == sorted(told) and told[-1] == SAMPLES
         assert renderer.image().shape == (24, 32, 3)
 
@@ -101,12 +101,12 @@ def test_a_saved_film_is_gone_on_with(two, expected, tmp_path):
     with ClusterRenderer(scene(), two.client) as renderer:
         renderer.load_state(path)
         assert renderer.samples == SAMPLES // 2
-        assert renderer.counts[0].samples == SAMPLES // 2 * 32 * 24
+        assert renderer.counts.samples == SAMPLES // 2 * 32 * 24
         assert renderer.run(SAMPLES - SAMPLES // 2)
         assert digest(renderer) == expected
     with clpt.Renderer(scene(), threads=1) as renderer:
         renderer.load_state(path)
-        assert renderer.counts[0].samples == SAMPLES // 2 * 32 * 24
+        assert renderer.counts.samples == SAMPLES // 2 * 32 * 24
         renderer.run(SAMPLES - SAMPLES // 2)
         assert digest(renderer) == expected
 
@@ -143,7 +143,7 @@ WRONG = {
     "a wrong film": (
         "whole = tasks.state_to_arrays\n"
         "def wrong(state):\n"
-        "    state.words[0, 0, 0, 5, 5] ^= 1\n"
+        "    state.words[0, 0, 5, 5] ^= 1\n"
         "    return whole(state)\n"
         "tasks.state_to_arrays = wrong", "is wrong",
     ),

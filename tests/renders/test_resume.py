@@ -82,9 +82,7 @@ def check_equal(renderer: clpt.Renderer, whole: clpt.Renderer) -> None:
     np.testing.assert_array_equal(one.bands, other.bands)
     assert one.taken == other.taken
     np.testing.assert_array_equal(renderer.image(), whole.image())
-    assert [vars(w.counts) for w in renderer.wavefronts] == [
-        vars(w.counts) for w in whole.wavefronts
-    ]
+    assert renderer.counts == whole.counts
 
 
 def test_going_on_is_as_one_run(mode, tmp_path: Path):
@@ -231,7 +229,7 @@ def test_saved_films_add(tmp_path: Path):
         total = films[0].merged(films[1]).merged(films[2])
         np.testing.assert_array_equal(total.film.words, whole.film_state().words)
         assert total.film.taken == ((0, 9),) and len(total.sessions) == 3
-        assert total.counts[0]["samples"] == whole.wavefronts[0].counts.samples
+        assert total.counts["samples"] == whole.wavefront.counts.samples
         with pytest.raises(SceneError, match="samples 4 to 5 would be taken twice"):
             total.merged(films[2])
     with clpt.Renderer(sky(seed=1)) as other, pytest.raises(SceneError, match="seed: 0 -> 1"):

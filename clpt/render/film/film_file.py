@@ -35,7 +35,7 @@ from clpt.spectra.spaces import chromaticities
 _Parts = Mapping[str, Mapping[str, NDArray[np.uint32]]]  # channels by name, of parts by name
 _T = TypeVar("_T")
 
-FORMAT = 1
+FORMAT = 2  # format 1 had a row of films, always one, and its counts in a list
 ATTRIBUTE = "clpt"
 SUFFIXES = (".film", ".exr")
 SEAL = b"clpt film"
@@ -143,6 +143,9 @@ def _header(path: Path, text: Any) -> dict[str, Any]:
             f"its format is {header['format']}, of clpt {header['clpt']}; this clpt reads "
             f"{FORMAT} and older: use a newer clpt",
         )
+    if header["format"] == 1:
+        del header["shapes"]["words"][0]
+        (header["counts"],) = header["counts"]
     return dict(header)
 
 
@@ -173,7 +176,7 @@ def _header_of(saved: SavedFilm) -> dict[str, Any]:
         "settings": dict(saved.origin.settings),
         "kernels": saved.origin.kernels,
         "form": dataclasses.asdict(saved.form),
-        "counts": [dict(one) for one in saved.counts],
+        "counts": dict(saved.counts),
         "sessions": [dataclasses.asdict(one) for one in saved.sessions],
         "adaptive": {n: [a.dtype.str, a.shape] for n, a in saved.adaptive.items()},
     }
@@ -238,7 +241,7 @@ def _restored(header: dict[str, Any], parts: _Parts) -> SavedFilm:
             Fingerprint(header["scene"]), header["settings"], header["kernels"], header["clpt"]
         ),
         form=PictureForm(**{**form, **rows, **names}),
-        counts=tuple(header["counts"]),
+        counts=header["counts"],
         sessions=tuple(Session(**one) for one in header["sessions"]),
         adaptive={n: array(n, *about) for n, about in header["adaptive"].items()},
     )

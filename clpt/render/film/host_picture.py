@@ -38,11 +38,11 @@ class HostPicture:
         self.saved, self.form = saved, saved.form
         self.is_adaptive = bool(saved.adaptive)
         state = saved.film
-        films, bands = state.words[:, 0], state.bands[0]
-        for half in range(1, state.words.shape[1]):
-            films = add_films(films, state.words[:, half])
+        words, bands = state.words[0], state.bands[0]
+        for half in range(1, len(state.words)):
+            words = add_films(words, state.words[half])
             bands = add_sums(bands, state.bands[half])
-        self._films, self._bands = films, bands
+        self._words, self._bands = words, bands
 
     def saved_film(self, *, held: bool = False) -> SavedFilm:
         """The film; held: as of a renderer, here without a meaning."""
@@ -58,7 +58,7 @@ class HostPicture:
 
     def colours(self) -> Image:
         """The picture in three colours, (h, w, 3) float32, also of a film with bands."""
-        return self._colours(self._films[0])
+        return self._colours(self._words)
 
     def layers(self) -> dict[str, Image]:
         """The layers by name, (h, w, 1 to 12) float32, as `Renderer.layers` returns them."""
@@ -69,7 +69,7 @@ class HostPicture:
 
         Raises SceneError where the film does not keep them apart.
         """
-        words = self.saved.film.words[0]
+        words = self.saved.film.words
         if len(words) != 2:
             raise SceneError(
                 "the film does not keep even and odd samples apart; render it with --denoise "
@@ -85,11 +85,11 @@ class HostPicture:
 
     def samples_per_pixel(self) -> Image:
         """How many samples each pixel has, (h, w) float32."""
-        return self._samples(self._films[0])
+        return self._samples(self._words)
 
     def light_paths_per_pixel(self) -> float:
         """How many paths have begun at lights for each pixel."""
-        return self._light_paths(self._films[0])
+        return self._light_paths(self._words)
 
     def _colours(self, words: Words) -> Image:
         total = _means(words, 0) * self._mean(words)
@@ -99,11 +99,11 @@ class HostPicture:
         return np.ascontiguousarray(np.moveaxis(np.tensordot(matrix, total, 1), 0, 2))
 
     def _alpha(self) -> Image:
-        words, first = self._films[0], FILM_WORDS + SUM_WORDS * self.form.weights
+        words, first = self._words, FILM_WORDS + SUM_WORDS * self.form.weights
         return numbers(words[first : first + SUM_WORDS]) * self._mean(words)
 
     def _mean_bands(self) -> Image:
-        words, count = self._films[0], self.form.bands
+        words, count = self._words, self.form.bands
         scale = np.float32(self.saved.film.scale)
         sums = numbers(np.moveaxis(self._bands, 1, 0))
         total = sums[:count] * (self._mean(words) / scale)

@@ -88,16 +88,22 @@ class Origin:
 class SavedFilm:
     """A film, and all that it takes to go on with it, from `Renderer.saved_film`.
 
-    form: how its picture is made; counts: paths and rays of each film by name; sessions: what was
+    form: how its picture is made; counts: paths and rays by name; sessions: what was
     done; adaptive: the state of adaptive sampling, arrays by name, empty without.
     """
 
     film: FilmState
     origin: Origin
     form: PictureForm
-    counts: tuple[Mapping[str, int], ...]
+    counts: Mapping[str, int]
     sessions: tuple[Session, ...]
     adaptive: Mapping[str, NDArray[Any]]
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        """Take what a pickle holds; in older ones `counts` are a tuple of always one."""
+        self.__dict__.update(state)
+        if isinstance(state["counts"], tuple):
+            (self.__dict__["counts"],) = state["counts"]
 
     @property
     def seconds(self) -> float:
@@ -110,10 +116,7 @@ class SavedFilm:
         Raises SceneError where they are not of the same scene, or a sample is in both.
         """
         self.origin.check_same(other.origin)
-        counts = tuple(
-            {name: a[name] + b[name] for name in a}
-            for a, b in zip(self.counts, other.counts, strict=True)
-        )
+        counts = {name: value + other.counts[name] for name, value in self.counts.items()}
         return dataclasses.replace(
             self,
             film=self.film.merged(other.film),
