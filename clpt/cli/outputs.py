@@ -15,14 +15,14 @@ from ..device import disk_cache
 from ..errors import ClptError, SceneError
 from ..render.film import film_file, layer_channels
 from ..render.film.denoised_picture import DenoisedPicture
-from ..render.film.host_picture import HostPicture
+from ..render.film.pictures import Pictures
+from ..render.film.saved_film import SavedFilm
 from .grading import Grading
 from .scene_options import AnyRenderer
 from .standard_output import is_standard
 
 FILM = ".film"  # suffix of films, which hold all that a picture was made of
-Film = AnyRenderer | ClusterRenderer | HostPicture  # what pictures are taken of
-Source = Film | DenoisedPicture
+Film = AnyRenderer | ClusterRenderer | SavedFilm  # what can be saved
 
 
 def default(scene: Path) -> tuple[Path, ...]:
@@ -54,7 +54,7 @@ def metadata(
     """
     plan, devices = renderer.scene, ""
     if isinstance(renderer, ClusterRenderer):
-        pictured: AnyRenderer = renderer.developed()
+        pictured: AnyRenderer = renderer.shown()
         devices = "; ".join(sorted({record.kind for record in renderer.workers.values()}))
     else:
         pictured = renderer
@@ -77,27 +77,32 @@ def write_all(
     stats: dict[str, str | int | float],
     grading: Grading,
     tell: Callable[[str], None],
+    denoise: str | None = None,
 ) -> None:
     """Write the picture so far to every path, denoised where that was asked for; tell of each.
+
+    denoise: a denoiser, by default the one that the film was made for.
 
     A picture that cannot be written goes to another folder, and if that fails too the film does.
     Raises SceneError at the end, which says where it is.
     """
     failures = []
-    source: Source = film
-    if film.denoise is not None and any(path.suffix.lower() != FILM for path in paths):
+    denoised, denoise = None, denoise or film.denoise
+    if denoise is not None and any(path.suffix.lower() != FILM for path in paths):
         try:
-            source = DenoisedPicture(film)
-            stats = {**stats, "denoised": source.text}
+            denoised = DenoisedPicture(film, denoise)
+            stats = {**stats, "denoised": denoised.text}
         except ClptError as error:  # the picture is worth more
             tell(f"clpt: warning: not denoised: {error}")
     for path in paths:
         try:
-            write(path, source, stats, grading)
+            write(path, film, stats, grading, denoised)
             name = "standard output" if is_standard(path) else path
             tell(f"{name}  {stats['spp']:.4g} spp, {stats['seconds']:.1f} s")
         except FAILURES as error:
-            failures.append(f"{failure(path, error)}; {_rescue(path, source, stats, grading)}")
+            failures.append(
+                f"{failure(path, error)}; {_rescue(path, film, stats, grading, denoised)}"
+            )
     if failures:
         raise SceneError("; ".join(failures))
 
@@ -106,7 +111,11 @@ FAILURES = (ClptError, OSError, MemoryError)  # of writing a file
 
 
 def _rescue(
-    path: Path, source: Source, stats: dict[str, str | int | float], grading: Grading
+    path: Path,
+    film: Film,
+    stats: dict[str, str | int | float],
+    grading: Grading,
+    denoised: DenoisedPicture | None,
 ) -> str:
     """Write a picture, or else its film, where there is room for it; return what to say."""
     label = f"{path.stem}-{secrets.token_hex(4)}"
@@ -114,12 +123,12 @@ def _rescue(
     for folder in folders:
         other = folder / f"{label}{path.suffix}"
         with suppress(*FAILURES):
-            write(other, source, stats, grading)
+            write(other, film, stats, grading, denoised)
             return f"the picture is in {other}"
     for folder in folders:
         other = folder / f"{label}{FILM}"
         with suppress(*FAILURES):
-            film_file.write(other, source.saved_film())
+            film_file.write(other, film.saved_film())
             return f"the film is in {other}, of which clpt merge makes the picture"
     return f"nor can it in {' or '.join(map(str, folders))}"
 
@@ -133,12 +142,17 @@ def failure(path: Path, error: Exception) -> str:
 
 
 def write(
-    path: Path, source: Source, stats: dict[str, str | int | float], grading: Grading
+    path: Path,
+    film: Film,
+    stats: dict[str, str | int | float],
+    grading: Grading,
+    denoised: DenoisedPicture | None = None,
 ) -> None:
-    """Write the picture so far, or the film. Raises SceneError, OSError."""
+    """Write the picture so far, perhaps denoised, or the film. Raises SceneError, OSError."""
+    source: Pictures = denoised or film
     form = source.form
     if path.suffix.lower() == FILM:
-        saved = source.saved_film(held=True)
+        saved = film.saved_film(held=True)
         if not saved.film.taken:
             raise SceneError("no pass has come to its end: there is no film yet", file=path)
         film_file.write(path, saved)

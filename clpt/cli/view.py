@@ -103,7 +103,7 @@ def view(
         webbrowser.open(address)
 
     def write_exr(path: Path, renderer: Any, seconds: float) -> None:
-        renderer = renderer.developed() if cluster is not None else renderer
+        renderer = renderer.shown() if cluster is not None else renderer
         outputs.write(path, renderer, outputs.metadata(renderer, file, seconds), Grading())
 
     of_renderer = {name: options.pop(name) for name in OF_RENDERER}

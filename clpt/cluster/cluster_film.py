@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import datetime
 import logging
 from abc import abstractmethod
@@ -15,16 +16,16 @@ from numpy.typing import NDArray
 from clpt import device as dev
 from clpt.cluster.cluster_noise import FarmTracer
 from clpt.errors import ClusterError, SceneError
+from clpt.render.film.developed import Developed
 from clpt.render.film.film_keeping import FilmKeeping
+from clpt.render.film.picture_form import PictureForm
 from clpt.render.film.saved_film import (
     Origin,
-    PictureForm,
     SavedFilm,
     Session,
     classes_text,
     other_devices,
 )
-from clpt.render.pictures import Image
 from clpt.render.renderer import Renderer
 from clpt.render.wavefront.adaptive import Adaptive
 from clpt.render.wavefront.film_state import FilmState, Ranges
@@ -32,7 +33,6 @@ from clpt.render.wavefront.tracer import OnBatch, Selection
 from clpt.render.wavefront.wavefront import Counts
 from clpt.scene import Scene
 from clpt.scene.fingerprint import Plain
-from clpt.spectral_exr import SpectralImage
 from clpt.version import VERSION
 
 log = logging.getLogger(__name__)
@@ -93,7 +93,7 @@ class ClusterFilm(FilmKeeping):
         """Note that there is no film."""
         self._sum = self._whole = FilmSum()  # of all films, and of those of whole blocks
         self._held: tuple[FilmSum, Mapping[str, NDArray[Any]]] | None = None
-        self._developed: FilmState | None = None  # that the local renderer has
+        self._shown: FilmState | None = None  # that the local renderer has
         self._tracer: FarmTracer | None = None
         self._noise: Adaptive | None = None  # adds to the local renderer's film
         self._began = datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds")
@@ -154,7 +154,7 @@ class ClusterFilm(FilmKeeping):
         if len(taken) > 1:
             message = "samples are missing before the last one; add them first, without noise"
             raise SceneError(message, where="noise")
-        local = self.developed()
+        local = self.shown()
         tracer = FarmTracer(local, self._take_selection)
         begun = local.adaptively(tracer, self.denoise)
         if arrays:
@@ -170,14 +170,14 @@ class ClusterFilm(FilmKeeping):
             self._local = Renderer(self.scene, self._device, **self._options)
         return self._local
 
-    def developed(self) -> Renderer:
-        """Return a renderer on this machine that holds the film so far, for its pictures."""
+    def shown(self) -> Renderer:
+        """Return a renderer on this machine that holds the film so far."""
         local, film = self._here, self._sum.film
-        if self._developed is not film:
+        if self._shown is not film:
             local.reset()
             if film is not None:
                 local.merge(film)
-            self._developed = film
+            self._shown = film
         local.wavefront.counts = self._sum.counts
         return local
 
@@ -256,30 +256,11 @@ class ClusterFilm(FilmKeeping):
     # ---- pictures
 
     @property
-    def form(self) -> PictureForm:
+    def form(self) -> PictureForm:  # type: ignore[override]
         """What makes a picture of the film; see `Renderer.form`."""
-        return self._here.form
+        form = self._here.form
+        return dataclasses.replace(form, adaptive=form.adaptive or self._noise is not None)
 
-    def image(self) -> Image:
-        """The picture so far, see `Renderer.image`; made on this machine."""
-        return self.developed().image()
-
-    def colours(self) -> Image:
-        """The picture so far in three colours, see `Renderer.colours`."""
-        return self.developed().colours()
-
-    def layers(self) -> dict[str, Image]:
-        """The layers by name, see `Renderer.layers`."""
-        return self.developed().layers()
-
-    def halves(self) -> tuple[Image, Image]:
-        """The pictures of the even and of the odd samples, see `Renderer.halves`."""
-        return self.developed().halves()
-
-    def spectral_image(self) -> SpectralImage:
-        """The picture so far of a film with bands, see `Renderer.spectral_image`."""
-        return self.developed().spectral_image()
-
-    def samples_per_pixel(self) -> Image:
-        """How many samples each pixel has, (h, w) float32."""
-        return self.developed().samples_per_pixel()
+    def developed(self, *words: str) -> Developed:
+        """Return the pictures of the film as it is now, which then stay; see `Pictures`."""
+        return Developed(self._sum.film or self._empty(), self.form)

@@ -190,7 +190,7 @@ class ClusterRenderer(ClusterFilm):
             taken = join_ranges(self._sum.taken, ((first, end),))
             film = dataclasses.replace(self._here.film_state(), taken=taken)
             self._sum = self._whole = FilmSum(film, self._sum.totals)
-            self._developed = film
+            self._shown = film
 
     def _take_selection(
         self, selection: Selection, first: int, end: int, add: Callable[[FilmState], None],

@@ -16,10 +16,12 @@ from clpt.cluster.device_worker import DeviceWorker
 from clpt.cluster.multi_noise import AdaptiveCrew
 from clpt.errors import ClusterError, DeviceError, MemoryBudgetError, SceneError
 from clpt.render.contents import Change, Contents
+from clpt.render.film.developed import Developed
 from clpt.render.film.film_keeping import FilmKeeping
-from clpt.render.film.saved_film import Origin, PictureForm, SavedFilm, Session
+from clpt.render.film.picture_form import PictureForm
+from clpt.render.film.saved_film import Origin, SavedFilm, Session
 from clpt.render.locking import synchronized
-from clpt.render.pictures import Image, Pictures
+from clpt.render.pictures import DevicePictures
 from clpt.render.wavefront.adaptive import Adaptive
 from clpt.render.wavefront.film_state import FilmState
 from clpt.render.wavefront.wavefront import Counts, Wavefront
@@ -51,7 +53,7 @@ class _Held:
         return dataclasses.replace(total, taken=self.so_far["taken"])
 
 
-class MultiFilm(FilmKeeping, Pictures):
+class MultiFilm(FilmKeeping, DevicePictures):
     """Base of renderers on several devices.
 
     The first device stands for all: its film then holds the whole picture, and its renderer knows
@@ -114,28 +116,17 @@ class MultiFilm(FilmKeeping, Pictures):
         """That of the first device, whose film then holds the picture of all."""
         return self._on_first(lambda first: first.renderer.wavefront)
 
-    def image(self) -> Image:
-        """The picture so far of all devices; see `Renderer.image`."""
-        return self._on_first(lambda first: first.renderer.image())
-
-    def colours(self) -> Image:
-        """The picture so far in three colours, (h, w, 3) float32, also of a film with bands."""
-        return self._on_first(lambda first: first.renderer.colours())
-
-    def layers(self) -> dict[str, Image]:
-        """The layers by name; see `Renderer.layers`."""
-        return self._on_first(lambda first: first.renderer.layers())
-
-    def halves(self) -> tuple[Image, Image]:
-        """Return the pictures of the even and of the odd samples; see `Renderer.halves`."""
-        return self._on_first(lambda first: first.renderer.halves())
+    def developed(self, *words: str) -> Developed:
+        """Return the pictures of the film as it is now, which then stay; see `Pictures`."""
+        return Developed(self.film_state(), self.form)
 
     # ---- saved films
 
     @property
-    def form(self) -> PictureForm:
+    def form(self) -> PictureForm:  # type: ignore[override]
         """What makes a picture of the film; see `Renderer.form`."""
-        return self._crew.first.renderer.form
+        form = self._crew.first.renderer.form
+        return dataclasses.replace(form, adaptive=form.adaptive or self._noise is not None)
 
     @property
     def first_sample(self) -> int:

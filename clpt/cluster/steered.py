@@ -66,9 +66,9 @@ class SteeredCluster:
         """Give back what this machine holds."""
         self._renderer.close()
 
-    def developed(self) -> Renderer:
+    def shown(self) -> Renderer:
         """Return a renderer on this machine that holds the picture so far."""
-        return self._renderer.developed()
+        return self._renderer.shown()
 
     @property
     def scene(self) -> Scene:
@@ -93,17 +93,17 @@ class SteeredCluster:
     @property
     def film(self) -> Any:
         """The picture so far on the device of this machine, as `Renderer.film`."""
-        return self.developed().film
+        return self.shown().film
 
     @property
     def stats(self) -> Any:
         """Figures of this machine's part, as `Renderer.stats`."""
-        return self.developed().stats
+        return self.shown().stats
 
     def resolve(self, **how: Any) -> Any:
         """A picture for a screen, as `Renderer.resolve`."""
-        return self.developed().resolve(**how)
+        return self.shown().resolve(**how)
 
     def layers(self) -> Any:
         """The layers by name, as `Renderer.layers`."""
-        return self.developed().layers()
+        return self._renderer.layers()

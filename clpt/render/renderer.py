@@ -27,12 +27,12 @@ from clpt.render.editing.scene_edit import (
     match_replacements,
     resolve_device_arrays,
 )
+from clpt.render.film.pictures import Image
 from clpt.render.locking import Stop, healing, synchronized
 from clpt.render.lowering.bodies import matter_of
 from clpt.render.lowering.camera.surroundings import bodies_around, media_around
 from clpt.render.lowering.scene import Lowered, lower
 from clpt.render.options import RenderOptions, check_changes, check_options, check_scene
-from clpt.render.pictures import Image
 from clpt.render.progress import Progress
 from clpt.render.resumable import Resumable
 from clpt.render.stats import RenderStats, collect

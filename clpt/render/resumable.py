@@ -15,20 +15,21 @@ from clpt.render.contents import Contents
 from clpt.render.contract import custom_materials
 from clpt.render.editing.scene_edit import resolve_device_arrays
 from clpt.render.film.denoised_noise import DenoisedNoise
+from clpt.render.film.developed import Developed
 from clpt.render.film.film_keeping import FilmKeeping
 from clpt.render.film.layers import white_paper
+from clpt.render.film.picture_form import PictureForm
 from clpt.render.film.saved_film import (
     Origin,
-    PictureForm,
     SavedFilm,
     Session,
     classes_text,
     other_devices,
 )
 from clpt.render.locking import synchronized
-from clpt.render.pictures import Pictures
+from clpt.render.pictures import DevicePictures
 from clpt.render.wavefront.adaptive import Adaptive
-from clpt.render.wavefront.film_state import FilmState, Ranges
+from clpt.render.wavefront.film_state import DIMENSIONS, FilmState, Ranges
 from clpt.render.wavefront.tracer import Tracer
 from clpt.render.wavefront.wavefront import Counts
 from clpt.scene import Scene
@@ -42,7 +43,7 @@ log = logging.getLogger(__name__)
 TO_OUTPUT = ("to_first", "to_second", "to_third")
 
 
-class Resumable(FilmKeeping, Pictures):
+class Resumable(FilmKeeping, DevicePictures):
     """Base of renderers whose film can be saved.
 
     warnings: for people; the others are the renderer's own.
@@ -72,11 +73,20 @@ class Resumable(FilmKeeping, Pictures):
         """Return what the film holds, as whole numbers on the host; wait for it."""
         return self.words(self.contents.taken, held=False)
 
-    def words(self, taken: Ranges, *, held: bool) -> FilmState:
-        """Return what the film holds, or held, as `film_state` does, of samples that are taken."""
+    @synchronized
+    def developed(self, *words: str) -> Developed:
+        """Return the pictures of the film as it is now, which then stay; see `Pictures`."""
+        return Developed(self.words((), held=False, names=words), self.form)
+
+    def words(self, taken: Ranges, *, held: bool, names: tuple[str, ...] = ()) -> FilmState:
+        """Return what the film holds, or held, as `film_state` does, of samples that are taken.
+
+        names: of the arrays that are wanted, all by default.
+        """
         first = self.wavefront
         scale = float(first.paths.settings["film_scale"])
-        return FilmState(taken=taken, scale=scale, **first.film.words(held=held))
+        arrays = first.film.words(*(names or DIMENSIONS), held=held)
+        return FilmState(taken=taken, scale=scale, **arrays)
 
     @synchronized
     def hold(self) -> None:
@@ -148,7 +158,7 @@ class Resumable(FilmKeeping, Pictures):
         if first.film.halves != 2:
             message = "what is left after denoising is told by even and odd samples apart"
             raise SceneError(f"{message}; give the scene `noise`, or halves=True", where="noise")
-        return Adaptive(first, tracer, DenoisedNoise(self, denoise).measure)
+        return Adaptive(first, tracer, DenoisedNoise(self, self.device, denoise).measure)
 
     @synchronized
     def restore(self, saved: SavedFilm) -> None:
@@ -197,7 +207,7 @@ class Resumable(FilmKeeping, Pictures):
 
     @property
     @synchronized
-    def form(self) -> PictureForm:
+    def form(self) -> PictureForm:  # type: ignore[override]
         """How the film's words become a picture."""
         first, film = self.wavefront, self.scene.film
         settings, features = first.paths.settings, first.features
@@ -215,6 +225,7 @@ class Resumable(FilmKeeping, Pictures):
             layers=features.layers,
             paper=tuple(map(tuple, white_paper(film, features.mode).tolist())),
             names=first.scene.lowered.layer_names,
+            adaptive=self.scene.noise is not None or self._known.adaptive is not None,
         )
 
 

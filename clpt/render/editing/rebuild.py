@@ -63,9 +63,7 @@ class _Staged:
     queue: dict[str, Any]
 
 
-def prepare(
-    wavefront: Wavefront, lowered: Lowered, refit: bool = False
-) -> Callable[[], None]:
+def prepare(wavefront: Wavefront, lowered: Lowered, refit: bool = False) -> Callable[[], None]:
     """Return what lets a wavefront render another lowering from now on.
 
     It may be called again where an error has ended it. refit: refit the tree over triangles that

@@ -26,8 +26,8 @@ from clpt import output_files
 from clpt.errors import SceneError
 from clpt.images import exr_files
 from clpt.render.contract.layer_names import LayerNames
-from clpt.render.film.host_picture import HostPicture
-from clpt.render.film.saved_film import Origin, PictureForm, SavedFilm, Session
+from clpt.render.film.picture_form import PictureForm
+from clpt.render.film.saved_film import Origin, SavedFilm, Session
 from clpt.render.wavefront.film_state import FilmState
 from clpt.scene.fingerprint import Fingerprint
 from clpt.spectra.spaces import chromaticities
@@ -151,7 +151,7 @@ def _header(path: Path, text: Any) -> dict[str, Any]:
 
 def _picture(saved: SavedFilm) -> Any:
     """The picture so far, with the header: what viewers show."""
-    form, made = saved.form, HostPicture(saved)
+    form, made = saved.form, saved.developed()
     pixels = made.colours() if form.bands else made.image()
     letters = "RGBA"[: pixels.shape[2]]
     stored = np.clip(np.nan_to_num(pixels), -HALF_MAX, HALF_MAX).astype(np.float16)
@@ -228,7 +228,7 @@ def _restored(header: dict[str, Any], parts: _Parts) -> SavedFilm:
         size = math.prod(shape) * dtype.itemsize // 4
         return stored[:size].copy().view(dtype).reshape(shape)
 
-    form = header["form"]
+    form = {"adaptive": bool(header["adaptive"]), **header["form"]}
     rows = {name: tuple(map(tuple, form[name])) for name in ("to_output", "paper")}
     names: dict[str, Any] = {"layers": tuple(form["layers"])}
     names["names"] = LayerNames(**{n: tuple(v) for n, v in form.get("names", {}).items()})

@@ -6,25 +6,17 @@ from pathlib import Path
 
 from clpt.errors import SceneError
 from clpt.render.film import film_file
-from clpt.render.film.denoised_picture import DenoisedPicture, Image, Source
+from clpt.render.film.denoised_picture import DenoisedPicture
+from clpt.render.film.pictures import Image, Pictures
 from clpt.render.film.saved_film import SavedFilm, Session
 from clpt.scene import Scene
 
 
-class FilmKeeping:
-    """Base of renderers whose film is saved to a file, and gone on with from one.
-
-    denoise: the denoiser that it was made for.
-    """
+class FilmKeeping(Pictures):
+    """Base of renderers whose film is saved to a file, and gone on with from one."""
 
     scene: Scene
-    denoise: str | None = None
     _sessions: tuple[Session, ...]  # that the film has from before
-
-    @property
-    def is_adaptive(self) -> bool:
-        """Whether pixels may differ in their numbers of samples."""
-        return self.scene.noise is not None
 
     @property
     def former_seconds(self) -> float:
@@ -39,7 +31,7 @@ class FilmKeeping:
         """Go on from a saved film. Raises SceneError."""
         raise NotImplementedError
 
-    def denoised(self: Source, method: str | None = None) -> Image:
+    def denoised(self, method: str | None = None) -> Image:
         """The picture so far without most of its noise, as `image` returns it.
 
         method: oidn or statistical, by default what the renderer was made for, else oidn. Make the

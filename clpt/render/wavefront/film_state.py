@@ -29,6 +29,7 @@ def _none(*shape: int) -> Words:
     return none
 
 
+NO_BANDS = _none(SUM_WORDS, 1, 1)[None]
 NO_LAYERS, NO_LIGHT_LAYERS, NO_MATTES = _none(1, 1), _none(SUM_WORDS, 1, 1), _none(1, 1, 1)
 DIMENSIONS = {"words": 4, "bands": 5, "layers": 3, "light_layers": 4, "mattes": 4}
 
@@ -55,8 +56,8 @@ class FilmState:
     """
 
     words: Words
-    bands: Words
-    taken: Ranges
+    bands: Words = field(default_factory=lambda: NO_BANDS)
+    taken: Ranges = ()
     scale: float = 1.0
     layers: Words = field(default_factory=lambda: NO_LAYERS)
     light_layers: Words = field(default_factory=lambda: NO_LIGHT_LAYERS)

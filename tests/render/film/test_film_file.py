@@ -17,7 +17,8 @@ import pytest
 import clpt
 from clpt.errors import SceneError
 from clpt.render.film import film_file
-from clpt.render.film.saved_film import Origin, PictureForm, SavedFilm, Session
+from clpt.render.film.picture_form import PictureForm
+from clpt.render.film.saved_film import Origin, SavedFilm, Session
 from clpt.render.wavefront.film_state import FilmState
 from clpt.scene.fingerprint import Fingerprint
 

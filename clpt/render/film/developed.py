@@ -1,7 +1,8 @@
-"""The picture of a film on the host, without a device: what kernels/stage/accumulate.cl makes."""
+"""The pictures of a film, made of its words on the host."""
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -10,46 +11,33 @@ from numpy.typing import NDArray
 from clpt.errors import SceneError
 from clpt.render.contract.features import SUM_WORDS
 from clpt.render.film.layers import layers_of
-from clpt.render.film.saved_film import SavedFilm
+from clpt.render.film.picture_form import PictureForm
+from clpt.render.film.pictures import Image, Still
 from clpt.render.wavefront.film_state import (
     FILM_WORDS,
     SAMPLES_WORD,
+    FilmState,
     Words,
     add_films,
     add_sums,
     light_group,
     numbers,
 )
-from clpt.scene import Film
-from clpt.spectral_exr import SpectralImage
-
-Image = NDArray[np.float32]
 
 
-class HostPicture:
-    """The picture of a film, with the methods of `Renderer` that make it; equal but for an ulp.
+class Developed(Still):
+    """The pictures of a film: what every picture of clpt is made by.
 
-    saved: the film. form: as of a renderer; is_adaptive: whether pixels differ in their
-    numbers of samples. denoise: the denoiser of its files, None for none.
+    Equal words give equal pictures on every machine: each step is one of IEEE 754 in float32, and
+    their order stands here. `Renderer.film`, which kernels/stage/accumulate.cl makes on the device
+    for those who look on, takes the same steps; a device may divide and contract otherwise.
     """
 
-    def __init__(self, saved: SavedFilm, denoise: str | None = None):
-        self.denoise = denoise
-        self.saved, self.form = saved, saved.form
-        self.is_adaptive = bool(saved.adaptive)
-        state = saved.film
-        words, bands = state.words[0], state.bands[0]
-        for half in range(1, len(state.words)):
-            words = add_films(words, state.words[half])
-            bands = add_sums(bands, state.bands[half])
-        self._words, self._bands = words, bands
-
-    def saved_film(self, *, held: bool = False) -> SavedFilm:
-        """The film; held: as of a renderer, here without a meaning."""
-        return self.saved
+    def __init__(self, film: FilmState, form: PictureForm):
+        self._film, self.form = film, form
 
     def image(self) -> Image:
-        """The picture, as `Renderer.image` returns it."""
+        """The picture: colours, with alpha where the film has it, or the film's bands."""
         if self.form.bands:
             return self._mean_bands() * np.float32(self.form.exposure)
         if self.form.alpha:
@@ -61,27 +49,18 @@ class HostPicture:
         return self._colours(self._words)
 
     def layers(self) -> dict[str, Image]:
-        """The layers by name, (h, w, 1 to 12) float32, as `Renderer.layers` returns them."""
-        return layers_of(self.form, self.saved.film.arrays, self)
+        """The layers by name, (h, w, 1 to 12) float32."""
+        return layers_of(self._film.arrays, self)
 
     def halves(self) -> tuple[Image, Image]:
-        """The pictures of the even and of the odd samples, as `Renderer.halves` returns them.
-
-        Raises SceneError where the film does not keep them apart.
-        """
-        words = self.saved.film.words
+        """The pictures of the even and of the odd samples. Raises SceneError without."""
+        words = self._film.words
         if len(words) != 2:
             raise SceneError(
-                "the film does not keep even and odd samples apart; render it with --denoise "
-                "statistical, or give Renderer halves=True"
+                "even and odd samples are not kept apart; give Renderer halves=True, or render "
+                "with --denoise statistical"
             )
         return self._colours(words[0]), self._colours(words[1])
-
-    def spectral_image(self) -> SpectralImage:
-        """The picture of a film with bands, at their centres."""
-        form = self.form
-        film = Film(bands=form.bands, lambda_min=form.lambda_min, lambda_max=form.lambda_max)
-        return SpectralImage(self.image(), film.band_centres, emissive=True)
 
     def samples_per_pixel(self) -> Image:
         """How many samples each pixel has, (h, w) float32."""
@@ -91,24 +70,35 @@ class HostPicture:
         """How many paths have begun at lights for each pixel."""
         return self._light_paths(self._words)
 
+    @cached_property
+    def _words(self) -> Words:
+        """The words of all samples, (10 to 26, h, w)."""
+        total, *others = self._film.words
+        for half in others:
+            total = add_films(total, half)
+        return np.asarray(total)
+
     def _colours(self, words: Words) -> Image:
-        total = _means(words, 0) * self._mean(words)
+        first, second, third = _sums(words, 0) * self._mean(words)
         if self.form.weighed:
-            total += _means(words, light_group(len(words))) * self._light_mean(words)
-        matrix = np.array(self.form.to_output, np.float32)
-        return np.ascontiguousarray(np.moveaxis(np.tensordot(matrix, total, 1), 0, 2))
+            brought = _sums(words, light_group(len(words))) * self._light_mean(words)
+            first, second, third = first + brought[0], second + brought[1], third + brought[2]
+        rows = np.array(self.form.to_output, np.float32)
+        return np.stack([a * first + b * second + c * third for a, b, c in rows], axis=2)
 
     def _alpha(self) -> Image:
         words, first = self._words, FILM_WORDS + SUM_WORDS * self.form.weights
         return numbers(words[first : first + SUM_WORDS]) * self._mean(words)
 
     def _mean_bands(self) -> Image:
-        words, count = self._words, self.form.bands
-        scale = np.float32(self.saved.film.scale)
-        sums = numbers(np.moveaxis(self._bands, 1, 0))
-        total = sums[:count] * (self._mean(words) / scale)
+        sums, *others = self._film.bands
+        for half in others:
+            sums = add_sums(sums, half)
+        values, count = numbers(np.moveaxis(sums, 1, 0)), self.form.bands
+        words, scale = self._words, np.float32(self._film.scale)
+        total = values[:count] * (self._mean(words) / scale)
         if self.form.weighed:
-            total += sums[count:] * (self._light_mean(words) / scale)
+            total += values[count:] * (self._light_mean(words) / scale)
         return np.ascontiguousarray(np.moveaxis(total, 0, 2))
 
     def _samples(self, words: Words) -> Image:
@@ -134,11 +124,11 @@ class HostPicture:
         return float(count.sum(dtype=np.uint64)) / count.size
 
 
-def _means(words: Words, first: int) -> Image:
-    """The three sums of pixels (n, h, w) from a word on, (3, h, w) float32."""
+def _sums(words: Words, first: int) -> Image:
+    """Three sums of pixels (n, h, w) from a word on, (3, h, w) float32."""
     sums = words[first : first + 3 * SUM_WORDS].reshape(3, SUM_WORDS, *words.shape[1:])
     return numbers(np.moveaxis(sums, 1, 0))
 
 
-def _inverse(by: Any) -> Image:
+def _inverse(by: NDArray[Any]) -> Image:
     return np.divide(np.float32(1.0), by, out=np.zeros_like(by), where=by > 0)
