@@ -52,12 +52,10 @@ def metadata(
 
     seconds: of this session; those of former ones are added.
     """
-    plan, devices = renderer.scene, ""
+    plan, devices = renderer.scene, " and ".join(on.info.label for on in renderer.devices)
     if isinstance(renderer, ClusterRenderer):
-        pictured: AnyRenderer = renderer.shown()
-        devices = "; ".join(sorted({record.kind for record in renderer.workers.values()}))
-    else:
-        pictured = renderer
+        kinds = {record.kind for record in renderer.workers.values()}
+        devices = "; ".join(sorted(kinds)) or devices
     return {
         "software": f"clpt {__version__}",
         "scene": os.fsencode(scene).decode("utf-8", "replace"),
@@ -65,8 +63,8 @@ def metadata(
         "integrator": plan.integrator.kind,
         "sampler": plan.sampler.kind,
         "seed": plan.seed,
-        "spp": pictured.counts.samples / pictured.wavefront.paths.pixels,
-        "device": devices or " and ".join(on.info.label for on in pictured.devices),
+        "spp": renderer.counts.samples / renderer.wavefront.paths.pixels,
+        "device": devices,
         "seconds": round(seconds + renderer.former_seconds, 3),
     }
 

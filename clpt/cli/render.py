@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from ..render.renderer import MOST_SAMPLES
+from ..render.film_renderer import MOST_SAMPLES
 from ..scene import Scene
 from . import checkpoints, outputs, report
 from .display import Display

@@ -8,8 +8,8 @@ import time
 from collections.abc import Callable, Sequence
 
 from ..cluster.cluster_renderer import ClusterRenderer
+from ..render.film_renderer import MOST_SAMPLES
 from ..render.progress import Progress
-from ..render.renderer import MOST_SAMPLES
 from ..render.wavefront.wavefront import Counts
 from .scene_options import AnyRenderer
 

@@ -103,7 +103,6 @@ def view(
         webbrowser.open(address)
 
     def write_exr(path: Path, renderer: Any, seconds: float) -> None:
-        renderer = renderer.shown() if cluster is not None else renderer
         outputs.write(path, renderer, outputs.metadata(renderer, file, seconds), Grading())
 
     of_renderer = {name: options.pop(name) for name in OF_RENDERER}
@@ -115,9 +114,13 @@ def view(
     if cluster is not None:
         on, threads = options["device"], options["threads"]
         with extra("cluster", "clpt view --cluster"):
-            from ..cluster.steered import SteeredCluster
+            from ..cluster.cluster_renderer import ClusterRenderer
         client = resources.enter_context(connected(cluster, keys, on, threads, shown))
-        make, where = partial(SteeredCluster, client=client, device=device), cluster
+
+        def of_cluster(scene: Scene, cancel_seconds: float, **made: Any) -> ClusterRenderer:
+            return ClusterRenderer(scene, client, device=device, mixed=True, **made)
+
+        make, where = of_cluster, cluster
     elif len(devices) > 1:
         make = partial(MultiRenderer, devices=devices)
     session = Session(

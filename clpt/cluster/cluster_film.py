@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from clpt import device as dev
 from clpt.cluster.cluster_noise import FarmTracer
 from clpt.errors import ClusterError, SceneError
+from clpt.render.contents import Contents
 from clpt.render.film.developed import Developed
-from clpt.render.film.film_keeping import FilmKeeping
 from clpt.render.film.picture_form import PictureForm
 from clpt.render.film.saved_film import (
     Origin,
@@ -26,11 +26,12 @@ from clpt.render.film.saved_film import (
     classes_text,
     other_devices,
 )
+from clpt.render.pictures import DevicePictures
 from clpt.render.renderer import Renderer
 from clpt.render.wavefront.adaptive import Adaptive
 from clpt.render.wavefront.film_state import FilmState, Ranges
 from clpt.render.wavefront.tracer import OnBatch, Selection
-from clpt.render.wavefront.wavefront import Counts
+from clpt.render.wavefront.wavefront import Counts, Wavefront
 from clpt.scene import Scene
 from clpt.scene.fingerprint import Plain
 from clpt.version import VERSION
@@ -69,7 +70,7 @@ class FilmSum:
         return Counts(samples=samples, closest=rays, rejected=rejected, full=full)
 
 
-class ClusterFilm(FilmKeeping):
+class ClusterFilm(DevicePictures):
     """Base of a renderer whose samples come from elsewhere.
 
     device: where pictures are made, and noise is measured; options: of the renderer that does so.
@@ -82,6 +83,7 @@ class ClusterFilm(FilmKeeping):
         first_sample: int,
         options: Mapping[str, Any],
     ):
+        super().__init__()
         self.scene = scene
         self.warnings: list[str] = []
         self._device, self._options = device, options
@@ -116,11 +118,6 @@ class ClusterFilm(FilmKeeping):
         return self._first_sample + sum(end - first for first, end in self._sum.taken)
 
     @property
-    def active(self) -> float:
-        """The share of the pixels that would get more samples; see `Renderer.active`."""
-        return 1.0 if self._noise is None else self._noise.active
-
-    @property
     def first_sample(self) -> int:
         """The number of the first sample."""
         return self._first_sample
@@ -129,6 +126,10 @@ class ClusterFilm(FilmKeeping):
     def counts(self) -> Counts:
         """What has happened for all blocks that were added; see `Renderer.counts`."""
         return self._sum.counts
+
+    @property
+    def _known(self) -> Contents:
+        return Contents(self._sum.taken, self._noise, self._sessions, self._began)
 
     # ---- the film
 
@@ -178,8 +179,22 @@ class ClusterFilm(FilmKeeping):
             if film is not None:
                 local.merge(film)
             self._shown = film
-        local.wavefront.counts = self._sum.counts
         return local
+
+    @property
+    def device(self) -> dev.Device:  # type: ignore[override]
+        """The device of this machine where pictures are made for screens, and noise is measured."""
+        return self._here.device
+
+    @property
+    def devices(self) -> tuple[dev.Device, ...]:
+        """That device, once it is in use."""
+        return () if self._local is None else self._local.devices
+
+    @property
+    def wavefront(self) -> Wavefront:
+        """What has the picture so far, for screens."""
+        return self.shown().wavefront
 
     # ---- saved films
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import logging
-from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -17,14 +16,13 @@ from clpt.cluster.multi_noise import AdaptiveCrew
 from clpt.errors import ClusterError, DeviceError, MemoryBudgetError, SceneError
 from clpt.render.contents import Change, Contents
 from clpt.render.film.developed import Developed
-from clpt.render.film.film_keeping import FilmKeeping
 from clpt.render.film.picture_form import PictureForm
-from clpt.render.film.saved_film import Origin, SavedFilm, Session
+from clpt.render.film.saved_film import Origin, SavedFilm
 from clpt.render.locking import synchronized
 from clpt.render.pictures import DevicePictures
 from clpt.render.wavefront.adaptive import Adaptive
 from clpt.render.wavefront.film_state import FilmState
-from clpt.render.wavefront.wavefront import Counts, Wavefront
+from clpt.render.wavefront.wavefront import Wavefront
 
 log = logging.getLogger(__name__)
 
@@ -36,7 +34,7 @@ class _Held:
     """A film that is held where it is: copies on devices, and what is on the host.
 
     workers: that have a copy of what only they have; saved: the rest, None without; so_far: of the
-    film, see `Renderer.progress_so_far`.
+    film, see `FilmRenderer._progress_so_far`.
     """
 
     workers: list[DeviceWorker]
@@ -53,31 +51,19 @@ class _Held:
         return dataclasses.replace(total, taken=self.so_far["taken"])
 
 
-class MultiFilm(FilmKeeping, DevicePictures):
+class MultiFilm(DevicePictures):
     """Base of renderers on several devices.
 
     The first device stands for all: its film then holds the whole picture, and its renderer knows
     what was taken.
     """
 
-    _first_sample: int
     _crew: Crew
 
     def __init__(self) -> None:
         super().__init__()
         self._noise: AdaptiveCrew | None = None
-        self._telling = False  # whether devices are at work
         self._held: SavedFilm | _Held | None = None
-        self._seconds_rendered = 0.0  # since the film was empty, or gone on with
-
-    @property
-    def _sessions(self) -> tuple[Session, ...]:  # type: ignore[override]
-        return self._known.sessions
-
-    @property
-    @abstractmethod
-    def counts(self) -> Counts:
-        """What has happened so far."""
 
     @synchronized
     def film_state(self) -> FilmState:
@@ -128,12 +114,6 @@ class MultiFilm(FilmKeeping, DevicePictures):
         form = self._crew.first.renderer.form
         return dataclasses.replace(form, adaptive=form.adaptive or self._noise is not None)
 
-    @property
-    def first_sample(self) -> int:
-        """The number of the first sample of the film, or of the first one to come."""
-        taken = self._known.taken
-        return taken[0][0] if taken else self._first_sample
-
     def origin(self) -> Origin:
         """Return what the samples are of. Raises SceneError for a scene that cannot be read."""
         return self._crew.first.renderer.origin()
@@ -154,7 +134,7 @@ class MultiFilm(FilmKeeping, DevicePictures):
                 raise ClusterError("a device has failed: others do its part first")
             for worker in workers:
                 worker.hold()
-            self._held = _Held(workers, saved, self._so_far(crew.first))
+            self._held = _Held(workers, saved, self._so_far_on(crew.first))
         except MemoryBudgetError:
             raise
         except Exception as error:
@@ -174,18 +154,13 @@ class MultiFilm(FilmKeeping, DevicePictures):
                 self._held = self._read(self._held)
             return self._held
         state, so_far = self._on_first(
-            lambda first: (first.renderer.film_state(), self._so_far(first))
+            lambda first: (first.renderer.film_state(), self._so_far_on(first))
         )
         return self._film_with(dataclasses.replace(state, taken=self.contents.taken), so_far)
 
-    def _so_far(self, first: DeviceWorker) -> dict[str, Any]:
-        """What changes while samples are taken, but for the film's words."""
-        renderer, now = first.renderer, self.contents
-        renderer._contents = dataclasses.replace(
-            renderer.contents, taken=now.taken, adaptive=self._adaptive, sessions=now.sessions
-        )
-        renderer._seconds_rendered = self._seconds_rendered
-        return {**renderer.progress_so_far(), "counts": dict(vars(self.counts))}
+    def _so_far_on(self, first: DeviceWorker) -> dict[str, Any]:
+        """What a saved film has beside its words and origin; first: the device that it is of."""
+        return self._progress_so_far(first.renderer.device_class())
 
     def _film_with(self, state: FilmState, so_far: Mapping[str, Any]) -> SavedFilm:
         others = {name: value for name, value in so_far.items() if name != "taken"}

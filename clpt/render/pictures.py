@@ -13,18 +13,15 @@ from clpt import device as dev
 from clpt import images
 from clpt.colour.view import View
 from clpt.errors import ClptError
-from clpt.render.contents import FilmOwner
-from clpt.render.film.pictures import Pictures
 from clpt.render.film.resolve import Resolve
+from clpt.render.film_renderer import FilmRenderer
 from clpt.render.locking import synchronized
 from clpt.render.wavefront.wavefront import Wavefront
-from clpt.scene import Scene
 
 
-class DevicePictures(FilmOwner, Pictures):
+class DevicePictures(FilmRenderer):
     """Base of renderers: their picture as an array on the device, beside those of the host."""
 
-    scene: Scene
     device: dev.Device
     _resolve: Resolve | None = None  # built when a picture is first resolved
 

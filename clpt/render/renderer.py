@@ -8,13 +8,13 @@ import time
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import pyopencl as cl
 
 from clpt import device as dev
 from clpt.denoise import needs
 from clpt.errors import DeviceError, MemoryBudgetError, SceneError
 from clpt.render.contents import Change, Contents
+from clpt.render.contract.features import Features
 from clpt.render.editing import parameter_patch, rebuild
 from clpt.render.editing.blurring import between
 from clpt.render.editing.moving import Moving
@@ -28,7 +28,8 @@ from clpt.render.editing.scene_edit import (
     resolve_device_arrays,
 )
 from clpt.render.film.pictures import Image
-from clpt.render.locking import Stop, healing, synchronized
+from clpt.render.film_renderer import Watch, checked_number, checked_samples, next_range
+from clpt.render.locking import healing, synchronized
 from clpt.render.lowering.bodies import matter_of
 from clpt.render.lowering.camera.surroundings import bodies_around, media_around
 from clpt.render.lowering.scene import Lowered, lower
@@ -49,7 +50,6 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-MOST_SAMPLES = 2**31 - 1
 TEXTURE_SHARE = 0.5  # of a device's free memory, for bitmaps
 
 
@@ -81,7 +81,7 @@ class Renderer(Resumable):
         super().__init__()
         check_scene(scene)
         check_options(scene, options)
-        self._stop, self._discards = Stop(), False
+        self._discards = False
         self.denoise = options.get("denoise")
         self.scene = scene = needs.prepared(scene, self.denoise)
         queue, threads = options.get("queue"), options.get("threads")
@@ -102,7 +102,7 @@ class Renderer(Resumable):
             texture_budget = texture_budget_of(device)
         self._texture_budget, self._successors = texture_budget, Successors()
         lowered = self._lower(scene)
-        self._seconds = {"lower": time.perf_counter() - self._start}
+        self._seconds["lower"] = time.perf_counter() - self._start
         self._wavefront: Wavefront | None = None
         self._wavefront = first = Wavefront.create(
             device,
@@ -121,7 +121,7 @@ class Renderer(Resumable):
         self._seconds["trees"] = first.scene.trees.seconds
         self._seconds["ready"] = time.perf_counter() - self._start
         self.warnings = list(lowered.warnings)
-        self._first_sample = _sample_number(options.get("first_sample", 0))
+        self._first_sample = checked_number(options.get("first_sample", 0))
         self._progress = progress
         if self.denoise is not None:
             splats = first.features.filter_reach > 0
@@ -193,76 +193,35 @@ class Renderer(Resumable):
 
         event.set_callback(cl.command_execution_status.COMPLETE, report)
 
-    @synchronized
-    def run(
-        self,
-        samples: int,
-        progress: Callable[[Progress], bool | None] | None = None,
-        *,
-        noise: float | None = None,
-    ) -> bool:
-        """Add samples to every pixel and wait; `self.samples` is then the next one's number.
+    @property
+    def _features(self) -> Features:
+        return self.wavefront.features
 
-        noise: leave pixels as soon as the noise around them is as low, relative to the picture,
-        such as 0.02; `samples` is then the most that a pixel gets, see
-        clpt.render.wavefront.adaptive. A renderer with `denoise` counts what is left after that.
-        progress: called every few milliseconds to seconds; if it returns False the run stops soon,
-        as after `cancel`. Returns whether it came to its end. What progress raises, or Ctrl+C at
-        any line, is raised when the paths in flight have ended. The film is whole after a stop too:
-        its pixels have fewer samples, and the numbers of those left out are not used again.
+    @property
+    def _pixels(self) -> int:
+        return self.wavefront.paths.pixels
 
-        Raises SceneError for noise that makes no sense with the scene, and for more than 2^31 - 1
-        samples.
-        """
-        start = time.perf_counter()
-        first, end = next_range(self.samples, samples)
-        raised: list[BaseException] = []
+    def _add_samples(self, first: int, end: int, noise: float | None, watch: Watch) -> bool:
+        """Add samples to all pixels, or to those with noise; return whether all were added."""
 
         def on_batch(_: Any) -> bool:
-            paths, rays = self.counts.samples, self.counts.rays
-            if paths:
-                self._seconds.setdefault("first_sample", time.perf_counter() - self._start)
-            pixels = self.wavefront.paths.pixels
-            seconds = time.perf_counter() - start
             if self._stop.is_set() and self._discards:
                 raise _Discarded
-            if self._stop.is_set() or progress is None:
-                return not self._stop.is_set()
-            try:
-                so_far = Progress(paths / pixels, end, paths, rays, seconds, self.active)
-                if progress(so_far) is False:
-                    self._stop.set()
-            except BaseException as error:
-                raised.append(error)
-                self._stop.set()
-            return not self._stop.is_set()
+            return watch()
 
-        if self._stop.is_set():  # before it began: nothing is taken
-            self._discards = False
-            self._stop.clear()
-            return False
-        if noise is not None:
-            noise = adaptive.checked(noise, self.wavefront.features)
-            if self.contents.adaptive is None:
-                begun = self.adaptively(None, self.denoise)
-                begun.skip(first)
-                self._contents = dataclasses.replace(self.contents, adaptive=begun)
+        if noise is not None and self.contents.adaptive is None:
+            begun = self.adaptively(None, self.denoise)
+            begun.skip(first)
+            self._contents = dataclasses.replace(self.contents, adaptive=begun)
         more = self._with(first, end)
         self.wavefront.leave.lower()  # that a `cancel` raised which came too late for another run
-        try:
-            with self._adding("run", more, plain=noise is None):
-                try:
-                    finished = self._render_samples(more.adaptive, first, end, noise, on_batch)
-                except _Discarded:
-                    self._contents = self._emptied()
-                    return False
-                self._contents = more
-        finally:
-            self._seconds_rendered += time.perf_counter() - start
-            self._discards = False
-            self._stop.clear()
-        if raised:
-            raise raised.pop()
+        with self._adding("run", more, plain=noise is None):
+            try:
+                finished = self._render_samples(more.adaptive, first, end, noise, on_batch)
+            except _Discarded:
+                self._contents = self._emptied()
+                return False
+            self._contents = more
         return finished
 
     def _render_samples(
@@ -326,23 +285,19 @@ class Renderer(Resumable):
         """What has happened so far."""
         return self.wavefront.counts
 
-    @property
-    def active(self) -> float:
-        """The share of the pixels that would get more samples, 1 but for `run` with `noise`."""
-        chosen = self._known.adaptive
-        return 1.0 if chosen is None else chosen.active
-
     def cancel(self, *, discard: bool = False) -> None:
         """Let the `run` of another thread, or else the next one, stop soon and return False.
 
-        discard: the film is of no use any more: paths in flight are left as they are, which is
-        sooner, and a run that has begun leaves the film as after `reset`. A step is not stopped.
-        It may be called from anywhere, also from a signal's handler, and waits for nothing.
+        discard: see `FilmRenderer.cancel`.
         """
         if discard and self._wavefront is not None:  # who sees the flag finds the reason soon
             self._wavefront.leave.raise_()
             self._discards = True
-        self._stop.set()
+        super().cancel()
+
+    def _rest(self) -> None:
+        self._discards = False
+        super()._rest()
 
     @healing
     def reset(
@@ -361,7 +316,7 @@ class Renderer(Resumable):
         A renderer that says it is broken is whole again then, unless it says otherwise.
         """
         if first_sample is not None:
-            first_sample = _sample_number(first_sample)
+            first_sample = checked_number(first_sample)
         if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int)):
             raise SceneError(f"must be a whole number, not {seed!r}", where="seed")
         broken = isinstance(self._contents, Change)
@@ -392,12 +347,6 @@ class Renderer(Resumable):
         self._held, self._seconds_rendered = None, 0.0
         wavefront.stream.flush()
         return Contents()
-
-    @property
-    def samples(self) -> int:
-        """The number of the next sample: of all so far, where they began at number 0."""
-        taken = self._known.taken
-        return taken[-1][1] if taken else self._first_sample
 
     @synchronized
     def merge(self, state: FilmState) -> None:
@@ -438,12 +387,6 @@ class Renderer(Resumable):
             self._wavefront = None
             self._contents = Contents()
             self._moving = self._resolve = None
-
-    def __enter__(self) -> Renderer:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
 
     @synchronized
     def update(
@@ -632,25 +575,6 @@ def _lights_moved(former: Scene, scene: Scene) -> bool:
     )
 
 
-def next_range(first: int, samples: int) -> tuple[int, int]:
-    """Return the numbers, first and end, of so many samples from the first. Raises SceneError."""
-    return first, _sample_number(first + _whole(samples))
-
-
-def _sample_number(number: int) -> int:
-    """A sample's number. Raises SceneError for one that is too large."""
-    if number > MOST_SAMPLES:
-        raise SceneError(f"a pixel cannot have more than {MOST_SAMPLES} samples", where="samples")
-    return number
-
-
-def _whole(samples: int) -> int:
-    """A number of samples. Raises SceneError for one that is none."""
-    if isinstance(samples, bool) or not isinstance(samples, (int, np.integer)) or samples < 1:
-        raise SceneError(f"samples per pixel must be a whole number above zero, not {samples!r}")
-    return int(samples)
-
-
 def texture_budget_of(device: dev.Device) -> int:
     """Return what bitmaps may take on a device [bytes]: half of what is free, in one buffer."""
     return min(int(TEXTURE_SHARE * device.free_memory()), device.info.max_alloc)
@@ -672,7 +596,7 @@ def render(
     is denoised. Raises as `Renderer` does.
     """
     check_scene(scene)
-    spp = _whole(scene.spp if spp is None else spp)
+    spp = checked_samples(scene.spp if spp is None else spp)
     noise = scene.noise if noise is None else noise
     renderer = Renderer(dataclasses.replace(scene, spp=spp, noise=noise), device, **options)
     renderer.run(spp, progress, noise=noise)

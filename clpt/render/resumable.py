@@ -16,13 +16,11 @@ from clpt.render.contract import custom_materials
 from clpt.render.editing.scene_edit import resolve_device_arrays
 from clpt.render.film.denoised_noise import DenoisedNoise
 from clpt.render.film.developed import Developed
-from clpt.render.film.film_keeping import FilmKeeping
 from clpt.render.film.layers import white_paper
 from clpt.render.film.picture_form import PictureForm
 from clpt.render.film.saved_film import (
     Origin,
     SavedFilm,
-    Session,
     classes_text,
     other_devices,
 )
@@ -43,30 +41,13 @@ log = logging.getLogger(__name__)
 TO_OUTPUT = ("to_first", "to_second", "to_third")
 
 
-class Resumable(FilmKeeping, DevicePictures):
-    """Base of renderers whose film can be saved.
-
-    warnings: for people; the others are the renderer's own.
-    """
-
-    warnings: list[str]
-    _first_sample: int
+class Resumable(DevicePictures):
+    """Base of renderers on a device: their film is saved, and gone on with."""
 
     def __init__(self) -> None:
         super().__init__()
         self._scene_read: tuple[Scene, Fingerprint] | None = None
         self._held: dict[str, Any] | None = None
-        self._seconds_rendered = 0.0
-
-    @property
-    def _sessions(self) -> tuple[Session, ...]:  # type: ignore[override]
-        return self._known.sessions
-
-    @property
-    def first_sample(self) -> int:
-        """The number of the first sample of the film, or of the first one to come."""
-        taken = self._known.taken
-        return taken[0][0] if taken else self._first_sample
 
     @synchronized
     def film_state(self) -> FilmState:
@@ -95,7 +76,7 @@ class Resumable(FilmKeeping, DevicePictures):
         So a render that is stopped in the middle of a `run` can be saved as it was before: without
         samples that some pixels have and others have not. Raises MemoryBudgetError.
         """
-        so_far, self._held = self.progress_so_far(), None
+        so_far, self._held = self._progress_so_far(self.device_class()), None
         self.wavefront.film.hold()
         self._held = so_far
 
@@ -108,7 +89,10 @@ class Resumable(FilmKeeping, DevicePictures):
         """
         if held and self._held is None:
             raise SceneError("no film is held; call hold() first")
-        so_far = dict(self.progress_so_far() if self._held is None or not held else self._held)
+        if held and self._held is not None:
+            so_far = dict(self._held)
+        else:
+            so_far = self._progress_so_far(self.device_class())
         state = self.words(so_far.pop("taken"), held=held)
         return SavedFilm(state, self.origin(), self.form, **so_far)
 
@@ -193,17 +177,6 @@ class Resumable(FilmKeeping, DevicePictures):
     def _put(self, state: FilmState) -> None:
         """Enqueue that the film holds the words of another one of its form."""
         self.wavefront.set_words(state.arrays)
-
-    def progress_so_far(self) -> dict[str, Any]:
-        """Return what changes while samples are taken, but for the film's words."""
-        now = self.contents
-        session = Session(now.began, self._seconds_rendered, VERSION, self.device_class())
-        return {
-            "taken": now.taken,
-            "counts": dict(vars(self.wavefront.counts)),
-            "sessions": (*now.sessions, session),
-            "adaptive": {} if now.adaptive is None else now.adaptive.arrays(),
-        }
 
     @property
     @synchronized

@@ -24,6 +24,7 @@ from clpt.render.wavefront.film_state import (
 from clpt.scene.layers import MATTE_SLOTS
 
 NONE = {"layers": NO_LAYERS, "light_layers": NO_LIGHT_LAYERS, "mattes": NO_MATTES}
+READ = 1 << 24  # bytes that are read at once: memory is dear
 SIDE_BY_SIDE = ("layers", "mattes")  # whose pixels have their words together
 
 
@@ -167,10 +168,13 @@ class Film:
         width, height = self.size
         sums = self._held if held else self.sums
         pixels = np.empty((count, height, width), np.uint32)
-        stored = np.empty(self._padded_pixels, np.uint32)  # of one word: memory is dear
-        for i, plane in enumerate(pixels):
-            self.stream.read(sums[name], stored, i * stored.nbytes)
-            plane[:] = work_list.picture(self._settings, stored)
+        size = 4 * self._padded_pixels
+        at_once = max(READ // size, 1)
+        for i in range(0, count, at_once):
+            stored = np.empty((min(at_once, count - i), self._padded_pixels), np.uint32)
+            self.stream.read(sums[name], stored, i * size)
+            for plane, words in zip(pixels[i:], stored, strict=False):
+                plane[:] = work_list.picture(self._settings, words)
         return pixels
 
     def set_words(self, arrays: Mapping[str, Words]) -> None:
