@@ -10,19 +10,19 @@ from contextlib import suppress
 from pathlib import Path
 
 from .. import __version__, images, output_files
-from ..cluster.cluster_renderer import ClusterRenderer
 from ..device import disk_cache
 from ..errors import ClptError, SceneError
 from ..render.film import film_file, layer_channels
 from ..render.film.denoised_picture import DenoisedPicture
-from ..render.film.pictures import Pictures
 from ..render.film.saved_film import SavedFilm
+from ..render.film_renderer import FilmRenderer
+from ..render.pictures import DevicePictures
 from .grading import Grading
-from .scene_options import AnyRenderer
 from .standard_output import is_standard
 
 FILM = ".film"  # suffix of films, which hold all that a picture was made of
-Film = AnyRenderer | ClusterRenderer | SavedFilm  # what can be saved
+Film = FilmRenderer | SavedFilm  # what can be saved
+Source = Film | DenoisedPicture  # what pictures are taken of
 
 
 def default(scene: Path) -> tuple[Path, ...]:
@@ -45,17 +45,12 @@ def checked(paths: tuple[Path, ...]) -> tuple[Path, ...]:
     return paths
 
 
-def metadata(
-    renderer: AnyRenderer | ClusterRenderer, scene: Path, seconds: float
-) -> dict[str, str | int | float]:
+def metadata(renderer: DevicePictures, scene: Path, seconds: float) -> dict[str, str | int | float]:
     """Return the metadata of an .exr: how it was made. spp is the mean over all pixels.
 
     seconds: of this session; those of former ones are added.
     """
-    plan, devices = renderer.scene, " and ".join(on.info.label for on in renderer.devices)
-    if isinstance(renderer, ClusterRenderer):
-        kinds = {record.kind for record in renderer.workers.values()}
-        devices = "; ".join(sorted(kinds)) or devices
+    plan = renderer.scene
     return {
         "software": f"clpt {__version__}",
         "scene": os.fsencode(scene).decode("utf-8", "replace"),
@@ -64,7 +59,7 @@ def metadata(
         "sampler": plan.sampler.kind,
         "seed": plan.seed,
         "spp": renderer.counts.samples / renderer.wavefront.paths.pixels,
-        "device": devices,
+        "device": renderer.device_text,
         "seconds": round(seconds + renderer.former_seconds, 3),
     }
 
@@ -85,22 +80,23 @@ def write_all(
     Raises SceneError at the end, which says where it is.
     """
     failures = []
-    denoised, denoise = None, denoise or film.denoise
+    picture: Source = film
+    denoise = denoise or film.denoise
     if denoise is not None and any(path.suffix.lower() != FILM for path in paths):
         try:
-            denoised = DenoisedPicture(film, denoise)
-            stats = {**stats, "denoised": denoised.text}
+            picture = DenoisedPicture(film, denoise)
+            stats = {**stats, "denoised": picture.text}
         except ClptError as error:  # the picture is worth more
             tell(f"clpt: warning: not denoised: {error}")
     for path in paths:
+        source = film if path.suffix.lower() == FILM else picture
         try:
-            write(path, film, stats, grading, denoised)
+            write(path, source, stats, grading)
             name = "standard output" if is_standard(path) else path
             tell(f"{name}  {stats['spp']:.4g} spp, {stats['seconds']:.1f} s")
         except FAILURES as error:
-            failures.append(
-                f"{failure(path, error)}; {_rescue(path, film, stats, grading, denoised)}"
-            )
+            rescued = _rescue(path, film, source, stats, grading)
+            failures.append(f"{failure(path, error)}; {rescued}")
     if failures:
         raise SceneError("; ".join(failures))
 
@@ -109,11 +105,7 @@ FAILURES = (ClptError, OSError, MemoryError)  # of writing a file
 
 
 def _rescue(
-    path: Path,
-    film: Film,
-    stats: dict[str, str | int | float],
-    grading: Grading,
-    denoised: DenoisedPicture | None,
+    path: Path, film: Film, source: Source, stats: dict[str, str | int | float], grading: Grading
 ) -> str:
     """Write a picture, or else its film, where there is room for it; return what to say."""
     label = f"{path.stem}-{secrets.token_hex(4)}"
@@ -121,7 +113,7 @@ def _rescue(
     for folder in folders:
         other = folder / f"{label}{path.suffix}"
         with suppress(*FAILURES):
-            write(other, film, stats, grading, denoised)
+            write(other, source, stats, grading)
             return f"the picture is in {other}"
     for folder in folders:
         other = folder / f"{label}{FILM}"
@@ -140,17 +132,12 @@ def failure(path: Path, error: Exception) -> str:
 
 
 def write(
-    path: Path,
-    film: Film,
-    stats: dict[str, str | int | float],
-    grading: Grading,
-    denoised: DenoisedPicture | None = None,
+    path: Path, source: Source, stats: dict[str, str | int | float], grading: Grading
 ) -> None:
-    """Write the picture so far, perhaps denoised, or the film. Raises SceneError, OSError."""
-    source: Pictures = denoised or film
+    """Write the picture so far, or the film. Raises SceneError, OSError."""
     form = source.form
-    if path.suffix.lower() == FILM:
-        saved = film.saved_film(held=True)
+    if path.suffix.lower() == FILM and not isinstance(source, DenoisedPicture):
+        saved = source.saved_film(held=True)
         if not saved.film.taken:
             raise SceneError("no pass has come to its end: there is no film yet", file=path)
         film_file.write(path, saved)

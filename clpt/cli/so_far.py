@@ -25,12 +25,12 @@ class PictureSoFar:
         self,
         period: float | None,
         targets: tuple[Path, ...],
-        film: outputs.Film,
+        source: outputs.Source,
         stats: Callable[[], dict[str, str | int | float]],
         grading: Grading,
         note: Callable[[str], None],
     ):
-        self._period, self._targets, self._film = period or math.inf, targets, film
+        self._period, self._targets, self._source = period or math.inf, targets, source
         self._stats, self._grading, self._note = stats, grading, note
         self._due = time.monotonic() + self._period
         self._failed: set[Path] = set()
@@ -46,7 +46,7 @@ class PictureSoFar:
 
     def _write(self, path: Path, stats: dict[str, str | int | float]) -> None:
         try:
-            outputs.write(path, self._film, stats, self._grading)
+            outputs.write(path, self._source, stats, self._grading)
         except outputs.FAILURES as error:
             if path not in self._failed:
                 self._note(f"clpt: warning: {outputs.failure(path, error)}; the render goes on")

@@ -102,6 +102,12 @@ class ClusterRenderer(ClusterFilm):
         return dict(self.farm.known.records)
 
     @property
+    def device_text(self) -> str:
+        """The classes of the workers' devices, for people."""
+        kinds = {record.kind for record in self.workers.values()}
+        return "; ".join(sorted(kinds)) or super().device_text
+
+    @property
     def refused(self) -> dict[str, str]:
         """Why workers take no part, by their addresses."""
         return dict(self.farm.known.refused)

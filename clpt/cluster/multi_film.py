@@ -15,7 +15,6 @@ from clpt.cluster.device_worker import DeviceWorker
 from clpt.cluster.multi_noise import AdaptiveCrew
 from clpt.errors import ClusterError, DeviceError, MemoryBudgetError, SceneError
 from clpt.render.contents import Change, Contents
-from clpt.render.film.developed import Developed
 from clpt.render.film.picture_form import PictureForm
 from clpt.render.film.saved_film import Origin, SavedFilm
 from clpt.render.locking import synchronized
@@ -101,10 +100,6 @@ class MultiFilm(DevicePictures):
     def wavefront(self) -> Wavefront:
         """That of the first device, whose film then holds the picture of all."""
         return self._on_first(lambda first: first.renderer.wavefront)
-
-    def developed(self, *words: str) -> Developed:
-        """Return the pictures of the film as it is now, which then stay; see `Pictures`."""
-        return Developed(self.film_state(), self.form)
 
     # ---- saved films
 

@@ -19,6 +19,7 @@ from clpt.render.contents import FilmOwner
 from clpt.render.contract.features import Features
 from clpt.render.film import film_file
 from clpt.render.film.denoised_picture import DenoisedPicture
+from clpt.render.film.developed import Developed
 from clpt.render.film.pictures import Image, Pictures
 from clpt.render.film.saved_film import SavedFilm, Session
 from clpt.render.locking import Stop, synchronized
@@ -42,11 +43,13 @@ OnProgress = Callable[[Progress], bool | None]
 class FilmRenderer(FilmOwner, Pictures):
     """Base of renderers: what adds samples of a scene to a film.
 
-    scene: that is rendered; warnings: for people.
+    scene: that is rendered; warnings: for people; shows_meanwhile: whether there is a picture to
+    show while samples are taken.
     """
 
     scene: Scene
     warnings: list[str]
+    shows_meanwhile = False
 
     def __init__(self) -> None:
         super().__init__()
@@ -58,6 +61,11 @@ class FilmRenderer(FilmOwner, Pictures):
         self._telling = False  # of progress, while samples are taken
 
     # ---- what there is
+
+    @property
+    def device_text(self) -> str:
+        """Where the samples are taken, for people."""
+        return " and ".join(on.info.label for on in self.devices)
 
     @property
     @abstractmethod
@@ -175,7 +183,12 @@ class FilmRenderer(FilmOwner, Pictures):
         """Note that no run is to be stopped any more."""
         self._stop.clear()
 
-    # ---- the film in files
+    # ---- the film, its pictures, and its files
+
+    @synchronized
+    def developed(self, *words: str) -> Developed:
+        """Return the pictures of the film as it is now, which then stay; see `Pictures`."""
+        return Developed(self.film_state(), self.form)
 
     @abstractmethod
     def film_state(self) -> FilmState:

@@ -70,6 +70,8 @@ class Renderer(Resumable):
     makes no sense; DeviceError, MemoryBudgetError, KernelBuildError.
     """
 
+    shows_meanwhile = True
+
     def __init__(
         self,
         scene: Scene,
