@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import Any
+from collections.abc import Callable
+from typing import Any, ClassVar
 
 import pyopencl as cl
 from numpy.typing import DTypeLike, NDArray
@@ -12,7 +12,6 @@ from pyopencl.array import Array
 from clpt import device as dev
 from clpt import images
 from clpt.colour.view import View
-from clpt.errors import ClptError
 from clpt.render.film.resolve import Resolve
 from clpt.render.film_renderer import FilmRenderer
 from clpt.render.locking import synchronized
@@ -20,7 +19,12 @@ from clpt.render.wavefront.wavefront import Wavefront
 
 
 class DevicePictures(FilmRenderer):
-    """Base of renderers: their picture as an array on the device, beside those of the host."""
+    """Base of renderers: their picture as an array on the device, beside those of the host.
+
+    make_widget: given by who shows pictures in notebooks, see `clpt/__init__`.
+    """
+
+    make_widget: ClassVar[Callable[..., Any]]
 
     device: dev.Device
     _resolve: Resolve | None = None  # built when a picture is first resolved
@@ -81,12 +85,7 @@ class DevicePictures(FilmRenderer):
         It is rendered by another renderer, with these options, in a thread of its own; see
         clpt.view.widget.Widget. Raises ClptError where clpt[notebook] is not installed.
         """
-        try:  # by its name: a renderer knows nothing of those who show its pictures
-            room = import_module("clpt.view.widget")
-        except ImportError as error:
-            message = f"a widget needs {error.name}: pip install 'clpt[notebook]'"
-            raise ClptError(message) from error
-        return room.Widget(self.scene, self.device, **options)
+        return type(self).make_widget(self.scene, self.device, **options)
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         """`image()`, for numpy.asarray(renderer): a copy, which waits."""

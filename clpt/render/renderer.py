@@ -13,6 +13,8 @@ import pyopencl as cl
 from clpt import device as dev
 from clpt.denoise import needs
 from clpt.errors import DeviceError, MemoryBudgetError, SceneError
+from clpt.render.analysis.bodies import matter_of
+from clpt.render.analysis.surroundings import bodies_around, media_around
 from clpt.render.contents import Change, Contents
 from clpt.render.contract.features import Features
 from clpt.render.editing import parameter_patch, rebuild
@@ -30,8 +32,6 @@ from clpt.render.editing.scene_edit import (
 from clpt.render.film.pictures import Image
 from clpt.render.film_renderer import Watch, checked_number, checked_samples, next_range
 from clpt.render.locking import healing, synchronized
-from clpt.render.lowering.bodies import matter_of
-from clpt.render.lowering.camera.surroundings import bodies_around, media_around
 from clpt.render.lowering.scene import Lowered, lower
 from clpt.render.options import RenderOptions, check_changes, check_options, check_scene
 from clpt.render.progress import Progress

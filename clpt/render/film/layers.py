@@ -7,11 +7,11 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.render.analysis.colour import output_matrix, sensor
 from clpt.render.contract.features import layer_places
 from clpt.render.film.cryptomatte import pairs_of
 from clpt.render.film.picture_form import PictureForm
 from clpt.render.film.pictures import Pictures
-from clpt.render.lowering.camera.colour import output_matrix, sensor
 from clpt.render.wavefront.film_state import numbers
 from clpt.scene.integrators import Film
 from clpt.scene.layers import LAYERS
