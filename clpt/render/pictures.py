@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable
 from typing import Any, ClassVar
 
@@ -30,9 +31,9 @@ class DevicePictures(FilmRenderer):
     _resolve: Resolve | None = None  # built when a picture is first resolved
 
     @property
+    @abstractmethod
     def wavefront(self) -> Wavefront:
         """The wavefront whose film holds the picture."""
-        raise NotImplementedError
 
     @property
     @synchronized
