@@ -1,4 +1,4 @@
-"""What all renderers have in common, on a device, on several, or on a cluster.
+"""The base of all renderers, be it on a device, on several, or on a cluster.
 
 Samples are asked for here, and the film that they make is denoised, saved and gone on with. Heirs
 say who takes the samples.
@@ -64,13 +64,13 @@ class FilmRenderer(FilmOwner, Pictures):
 
     @property
     def device_text(self) -> str:
-        """Where the samples are taken, for people."""
+        """Names of the devices that take the samples, for people."""
         return " and ".join(on.info.label for on in self.devices)
 
     @property
     @abstractmethod
     def counts(self) -> Counts:
-        """What has happened so far."""
+        """Counts of what has happened so far."""
 
     @property
     def samples(self) -> int:
@@ -92,7 +92,7 @@ class FilmRenderer(FilmOwner, Pictures):
 
     @property
     def former_seconds(self) -> float:
-        """How long others rendered the film, before this renderer went on with it."""
+        """Seconds for which others rendered the film, before this renderer went on with it."""
         return sum(session.seconds for session in self._known.sessions)
 
     @property
@@ -101,7 +101,7 @@ class FilmRenderer(FilmOwner, Pictures):
         return self._known.adaptive
 
     def _progress_so_far(self, device: Mapping[str, Plain]) -> dict[str, Any]:
-        """What a saved film has beside its words and origin; device: the class that it is of."""
+        """Return what a saved film has beside its words and origin; device: the class it is of."""
         now, chosen = self.contents, self._adaptive
         session = Session(now.began, self._seconds_rendered, VERSION, device)
         return {
@@ -161,10 +161,10 @@ class FilmRenderer(FilmOwner, Pictures):
     @property
     @abstractmethod
     def _pixels(self) -> int:
-        """How many pixels are sampled."""
+        """The number of pixels that are sampled."""
 
     def _so_far(self, end: int, seconds: float) -> Progress:
-        """How far a run is after some seconds; end: the number after its last sample."""
+        """Return how far a run is after some seconds; end: the number after its last sample."""
         counts = self.counts
         mean = counts.samples / self._pixels
         return Progress(mean, end, counts.samples, counts.rays, seconds, self.active)
@@ -271,7 +271,7 @@ class Watch:
 
     @property
     def seconds(self) -> float:
-        """How long the run has taken."""
+        """Seconds that the run has taken."""
         return time.perf_counter() - self._began
 
     def __call__(self, _: object = None) -> bool:

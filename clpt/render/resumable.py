@@ -181,7 +181,7 @@ class Resumable(DevicePictures):
     @property
     @synchronized
     def form(self) -> PictureForm:  # type: ignore[override]
-        """How the film's words become a picture."""
+        """The way from the film's words to a picture."""
         first, film = self.wavefront, self.scene.film
         settings, features = first.paths.settings, first.features
         return PictureForm(

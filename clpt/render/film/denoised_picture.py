@@ -61,11 +61,11 @@ class DenoisedPicture(Still):
         return self._layers
 
     def samples_per_pixel(self) -> Image:
-        """How many samples each pixel has, (h, w) float32."""
+        """Return how many samples each pixel has, (h, w) float32."""
         return self._source.samples_per_pixel()
 
     def light_paths_per_pixel(self) -> float:
-        """How many paths have begun at lights for each pixel."""
+        """Return how many paths have begun at lights for each pixel."""
         return self._source.light_paths_per_pixel()
 
     def halves(self) -> tuple[Image, Image]:

@@ -63,11 +63,11 @@ class Developed(Still):
         return self._colours(words[0]), self._colours(words[1])
 
     def samples_per_pixel(self) -> Image:
-        """How many samples each pixel has, (h, w) float32."""
+        """Return how many samples each pixel has, (h, w) float32."""
         return self._samples(self._words)
 
     def light_paths_per_pixel(self) -> float:
-        """How many paths have begun at lights for each pixel."""
+        """Return how many paths have begun at lights for each pixel."""
         return self._light_paths(self._words)
 
     @cached_property
@@ -113,12 +113,12 @@ class Developed(Still):
         return _inverse(by)
 
     def _light_mean(self, words: Words) -> Image:
-        """The same of light paths; 0 where a pixel has no samples of the camera."""
+        """One over the number of light paths; 0 where a pixel has no samples of the camera."""
         inverse = _inverse(np.full((), self._light_paths(words), np.float32))
         return np.where(words[SAMPLES_WORD] > 0, inverse, np.float32(0.0))
 
     def _light_paths(self, words: Words) -> float:
-        """How many light paths there were for each pixel."""
+        """Return how many light paths there were for each pixel."""
         first = light_group(len(words)) if self.form.weighed else 0
         count = words[first + SAMPLES_WORD]
         return float(count.sum(dtype=np.uint64)) / count.size

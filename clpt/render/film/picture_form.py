@@ -1,4 +1,4 @@
-"""How a film's words become a picture."""
+"""The form of a picture: how a film's words become it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from clpt.scene import Film
 
 @dataclass(frozen=True)
 class PictureForm:
-    """How a film's words become a picture.
+    """The way from a film's words to a picture.
 
     to_output: (3, 3), rows of the matrix from the sums to the output space; light_paths: all paths
     start at lights; weighed: some do, beside the camera's; weights: samples serve several pixels;

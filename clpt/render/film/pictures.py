@@ -1,4 +1,4 @@
-"""What pictures can be taken of, such as a renderer or a film in a file."""
+"""Pictures, and the base of all that they are taken of: renderers, and films in files."""
 
 from __future__ import annotations
 
@@ -60,11 +60,11 @@ class Pictures(ABC):
         return SpectralImage(self.image(), self.form.band_centres, emissive=True)
 
     def samples_per_pixel(self) -> Image:
-        """How many samples each pixel has, (h, w) float32."""
+        """Return how many samples each pixel has, (h, w) float32."""
         return self.developed("words").samples_per_pixel()
 
     def light_paths_per_pixel(self) -> float:
-        """How many paths have begun at lights for each pixel."""
+        """Return how many paths have begun at lights for each pixel."""
         return self.developed("words").light_paths_per_pixel()
 
     def halves(self) -> tuple[Image, Image]:
