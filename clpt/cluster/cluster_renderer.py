@@ -47,8 +47,9 @@ class ClusterRenderer(ClusterFilm):
     options: halves, layout, queued, looped, slots, texture_budget, tree_quality, denoise, as of
     `Renderer`.
 
-    The film is added up here, and is kept whatever happens to the cluster. It may be used by one
-    thread; `cancel` from any. warnings: for people.
+    The film is added up here, and is kept whatever happens to the cluster. At a stop workers send
+    what they have; the next run renders what is missing, but with noise no number is used again. It
+    may be used by one thread; `cancel` from any. warnings: for people.
 
     Raises TypeError for what is no scene or option, SceneError for a scene that cannot be written,
     or has materials that are not clpt's own.

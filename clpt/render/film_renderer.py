@@ -180,7 +180,8 @@ class FilmRenderer(FilmOwner, Pictures):
         self._stop.set()
 
     def _rest(self) -> None:
-        """Note that no run is to be stopped any more."""
+        """Note that no run is under way, nor to be stopped any more."""
+        self._telling = False
         self._stop.clear()
 
     # ---- the film, its pictures, and its files
