@@ -36,7 +36,7 @@ from clpt.render.codegen.library import kernel_source
 from clpt.render.film.denoised_picture import DenoisedPicture
 from clpt.render.film.layer_channels import write_layers
 from clpt.render.options import RenderOptions
-from clpt.render.pictures import Pictures as _Pictures
+from clpt.render.pictures import DevicePictures as _Pictures
 from clpt.render.progress import Progress
 from clpt.render.renderer import Renderer, render
 from clpt.render.wavefront.film_state import FilmState

@@ -112,9 +112,8 @@ def _shading(
 
 
 def film_sources(features: Features, layout: str) -> dict[str, device.Source]:
-    """Return the texts of what makes pictures of a film, by program name."""
-    names = ("accumulate", *(("bands",) if features.bands else ()))
-    return _static(_alone(features, layout, *names))
+    """Return the text of what makes the picture of a film, by program name."""
+    return _static(_alone(features, layout, "accumulate"))
 
 
 def noise_sources(features: Features, layout: str) -> dict[str, device.Source]:
