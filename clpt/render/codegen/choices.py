@@ -107,6 +107,28 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/shape_traversal.cl": lambda f, layout: (
         (f"bvh/{bvh.shapes_layout(layout)}.cl", "bvh/shapes.cl") * bool(f.analytic)
     ),
+    "generated/hit_space.cl": lambda f, _: either(f.instances, "surface/hit_space.cl"),
+    "generated/surface_steps.cl": lambda f, _: (
+        "generated/motion.cl",
+        *either(f.attributes, "surface/attributes.cl"),
+        *either(f.screen_motion and "vertices" in f.moving, "surface/deforms.cl"),
+        *either(f.normals or f.uvs or f.tangents, "surface/triangle.cl"),
+        *either(f.analytic, "surface/analytic.cl"),
+    ),
+    "generated/corner_rows.cl": lambda f, _: (
+        f"surface/corner_rows{'_keyed' * _corners_move(f)}.cl",
+    ),
+    "generated/triangle_steps.cl": lambda f, _: (
+        *either(f.normals, "surface/triangle_normal.cl"),
+        *either(f.uvs, "surface/triangle_uv.cl"),
+        *either(f.uvs and f.tangents and f.vertex_tangents, "surface/triangle_tangents.cl"),
+    ),
+    "generated/uv_tangents.cl": lambda f, _: either(f.tangents, "surface/uv_tangents.cl"),
+    "generated/analytic_steps.cl": lambda f, _: (
+        *either("shapes" in f.moving, "surface/shape_motion.cl"),
+        *either(f.screen_motion and "spheres" in f.moving, "surface/spheres_move.cl"),
+        *either(f.tangents, "surface/analytic_tangents.cl"),
+    ),
     "generated/instances.cl": lambda f, _: ("tracing/instances.cl",) * f.instances,
     "generated/motion.cl": lambda f, _: (
         *either(bool(f.moving), "tracing/motion.cl"),
@@ -130,6 +152,11 @@ def _screen_motion(features: Features) -> tuple[str, ...]:
     files = ("interface/camera.cl", "generated/camera.cl", "generated/screen.cl")
     needed = when(features.screen_motion, *files)
     return (*needed, *either(features.screen_motion, "path/screen_motion.cl"))
+
+
+def _corners_move(features: Features) -> bool:
+    """Whether shading asks for rows of vertices, of meshes that deform."""
+    return "vertices" in features.moving and (features.normals or features.tangents)
 
 
 def _passing(features: Features) -> str:
