@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from clpt import bvh
+from clpt.render.codegen import flags
 from clpt.render.contract.camera_records import WEIGHTED
 from clpt.render.contract.features import Features
+from clpt.scene.scatterer import Scatterer
 
 
 def when(holds: object, *files: str) -> tuple[str, ...]:
@@ -34,6 +36,10 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/integrator.cl": lambda f, _: (f"integrator/{f.integrator}.cl",),
     "generated/merging.cl": lambda f, _: either(f.merged, "merging/area.cl"),
     "generated/cone.cl": lambda f, _: either(f.mips, "path/cone.cl"),
+    "generated/vertex_media.cl": lambda f, _: (
+        when(f.bodies, "path/vertex_bodies.cl")
+        or either(f.absorption or f.media, "path/vertex_media.cl")
+    ),
     "generated/ghosts.cl": lambda f, _: either(f.lit_ghosts, "path/ghosts.cl"),
     "generated/first_ray.cl": lambda f, _: (
         f"path/first_ray{'_weighted' * (f.camera in WEIGHTED)}.cl",
@@ -146,6 +152,20 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     ),
 }
 
+# likewise, for a scene's features and the kind of material that a program shades
+MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...]]] = {
+    "generated/vertex_steps.cl": lambda f, cls: (
+        *either(flags.names_surfaces(f), "path/vertex_names.cl"),
+        *(
+            when(f.bodies, "path/vertex_bodies_ways.cl")
+            or either(f.absorption or f.media, "path/vertex_media_ways.cl")
+        ),
+        *either(flags.between_bodies(f, cls), "path/between_bodies.cl"),
+        *either(flags.has_lobe(f, cls, "clearcoat_apart"), "path/coat_normal.cl"),
+    ),
+}
+
+
 
 def _screen_motion(features: Features) -> tuple[str, ...]:
     """How what is seen moves across the film, where a layer tells it."""
@@ -176,3 +196,8 @@ def _spectrum_read(features: Features) -> tuple[str, ...]:
 def virtual_files(features: Features, layout: str) -> dict[str, tuple[str, ...]]:
     """Return the files that stand for each name in CHOICES."""
     return {name: choose(features, layout) for name, choose in CHOICES.items()}
+
+
+def material_files(features: Features, cls: type[Scatterer]) -> dict[str, tuple[str, ...]]:
+    """Return the files that stand for each name in MATERIAL_CHOICES."""
+    return {name: choose(features, cls) for name, choose in MATERIAL_CHOICES.items()}
