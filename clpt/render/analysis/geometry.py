@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
-from clpt.arrays import fits_single
+from clpt.arrays import Faces, Points, fits_single
 from clpt.bvh.build import MOST
 from clpt.errors import SceneError
 from clpt.geometry import (
