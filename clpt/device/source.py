@@ -46,8 +46,8 @@ class Source:
         """
         file, line = None, None
         for text in self.text.splitlines()[: row - 1]:
-            if told := _LINE.match(text):
-                file, line = told[2].removeprefix("kernels/"), int(told[1])
+            if directive := _LINE.match(text):
+                file, line = directive[2].removeprefix("kernels/"), int(directive[1])
             elif line is not None:
                 line += 1
         return file, line
