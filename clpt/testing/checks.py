@@ -1,4 +1,4 @@
-"""What the functions of every material keep. Each check raises AssertionError, and tells where."""
+"""Checks that the functions of every material pass; a check that fails raises AssertionError."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def samples_follow_the_pdf(probe: Probe, params: Params, rng: Random, significan
 
 
 def weight_is_eval_over_pdf(probe: Probe, params: Params, rng: Random) -> None:
-    """What `sample` says of its direction is what `pdf` and `eval` say."""
+    """Assert that `sample` agrees with `pdf` and `eval` in the direction that it returns."""
     wo, _ = pairs(rng, 2000)
     r = probe(params, wo, wo, rng.random((len(wo), 3)))
     spread = (r["sampled_pdf"] > 1e-3) & (r["lobe"] & DELTA == 0)

@@ -2,7 +2,7 @@
  * point emits into a metre counts as if it came from all of the brick's mean chord c, four times its volume over its
  * surface. So its radiance is c times that, and its density [1/sr] that of the point, t^2 times 1 / V, times c: on
  * average one over the solid angle of the brick. Rays that go through the medium weigh what they gather against that,
- * see optics/grid_flight.cl (Villemin and Hery 2013 sample flames as lights; the weights are ours). */
+ * see media/grid_flight.cl (Villemin and Hery 2013 sample flames as lights; the weights are ours). */
 
 real emissive_brick_pdf(EmissiveBrick l, real t) { return l.inverse * l.chord * t * t; }
 

@@ -226,7 +226,7 @@ def test_a_render_with_damaged_programs(user: Path, caplog) -> None:
     made = []
     for _ in range(2):
         on = device.Device.open(info)  # its own context, without programs
-        with device.Compilers(1, wait_for_kept=True) as on.compilers:
+        with device.Compilers(1) as on.compilers:
             made.append(clpt.render(scene, 1, device=on))
         kept = [path for path in (user / "programs").iterdir() if path.is_file()]
         assert kept

@@ -9,8 +9,8 @@ import pytest
 from scipy.interpolate import BSpline
 
 from clpt import transforms as T
+from clpt.geometry import analytic, strands
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.geometry import analytic, strands
 from clpt.render.lowering.lights import lights
 from clpt.scene.shapes import Curves
 from tests.kernels.harness import assert_lanes_agree
