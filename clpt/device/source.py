@@ -45,8 +45,9 @@ class Source:
         """
         file, line = None, None
         for text in self.text.splitlines()[: row - 1]:
-            if told := _LINE.match(text):
-                file, line = told[2].removeprefix("kernels/") if told[2] else file, int(told[1])
+            if directive := _LINE.match(text):
+                file = directive[2].removeprefix("kernels/") if directive[2] else file
+                line = int(directive[1])
             elif line is not None:
                 line += 1
         return file, line
