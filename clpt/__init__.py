@@ -113,10 +113,10 @@ class _Front(ModuleType):
 
 def _give_widgets() -> None:
     """Let renderers have widgets: they know nothing of who shows their pictures."""
-    from clpt.render.pictures import Pictures as _Pictures
-    from clpt.view.notebook import widget as _widget
+    from clpt.render.pictures import DevicePictures
+    from clpt.view.notebook import widget
 
-    _Pictures.make_widget = _widget
+    DevicePictures.make_widget = widget
 
 
 def _submodule(name: str) -> ModuleType:

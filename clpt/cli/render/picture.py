@@ -183,7 +183,7 @@ class _Picture:
 
     @property
     def _has_samples(self) -> bool:
-        return any(counts.samples for counts in self._renderer.counts)
+        return self._renderer.counts.samples > 0
 
     def _stats(self) -> dict[str, str | int | float]:
         seconds = time.perf_counter() - self.ready

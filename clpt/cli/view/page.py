@@ -93,10 +93,14 @@ def _renderers(
     device = opened.devices[0]
     if settings.workers.cluster is not None:
         with extra("cluster", "clpt view --cluster"):
-            from ...cluster.steered import SteeredCluster
+            from ...cluster.cluster_renderer import ClusterRenderer
         workers = connected(settings.workers, settings.options.machine, shown)
         client = resources.enter_context(workers)
-        return settings.workers.cluster, partial(SteeredCluster, client=client, device=device)
+
+        def of_cluster(scene: Scene, cancel_seconds: float, **made: Any) -> ClusterRenderer:
+            return ClusterRenderer(scene, client, device=device, mixed=True, **made)
+
+        return settings.workers.cluster, of_cluster
     several = partial(MultiRenderer, devices=opened.devices) if len(opened.devices) > 1 else None
     return " and ".join(one.info.label for one in opened.devices), several
 
@@ -105,8 +109,6 @@ def _folder(file: Path, settings: Settings) -> Folder:
     """Return what writes files of the page."""
 
     def write_exr(path: Path, renderer: Any, seconds: float) -> None:
-        if settings.workers.cluster is not None:
-            renderer = renderer.developed()
         outputs.write(path, renderer, outputs.metadata(renderer, file, seconds), Grading())
 
     return Folder(settings.folder, targets.name_of(file), write_exr)
