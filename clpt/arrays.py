@@ -6,7 +6,7 @@ import sys
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
@@ -30,3 +30,14 @@ def on_device(values: Any) -> bool:
     opencl, module = sys.modules.get("pyopencl"), sys.modules.get("pyopencl.array")
     array = module is not None and isinstance(values, module.Array)
     return array or (opencl is not None and isinstance(values, opencl.Buffer))
+
+
+def single(values: ArrayLike) -> NDArray[np.float32]:
+    """Return values as float32, infinite where they are beyond it: whoever asks looks for that."""
+    with np.errstate(over="ignore"):
+        return np.asarray(values, np.float32)
+
+
+def fits_single(values: ArrayLike) -> bool:
+    """Return whether values are finite as float32 too."""
+    return bool(np.isfinite(single(values)).all())

@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
-from clpt.arrays import Points, on_host
+from clpt.arrays import Points, on_host, single
 from clpt.errors import SceneError
 from clpt.geometry import analytic, shape_records, shapes
 from clpt.geometry.tessellate import keeps_its_kind, tessellate
 from clpt.geometry.tubes import Tubes, as_tubes
 from clpt.records import INSTANCE
-from clpt.scene.shapes import Curves, Group, Instance, Shape
+from clpt.scene.shapes import Curves, Cylinder, Group, Instance, Shape, Sphere
 
 Matrices = NDArray[np.floating]
 CELLS = 16  # columns along a side, see `outline`
@@ -217,7 +217,7 @@ def _analytic(
     if not stretched.any():
         return copies
     count = int(stretched.sum())
-    if shape.kind in shape_records.ONE_OF:
+    if not isinstance(shape, (Sphere, Cylinder)):  # nor can it become triangles: tell why
         analytic.row(next(copy.shape for copy, bad in zip(copies, stretched, strict=True) if bad))
     warnings.append(
         f"{shapes.where(shape)}: {count} of {len(copies)} instances stretch it; "
@@ -250,7 +250,7 @@ def place(
     linear = to_world[:, :3, :3]
     rows = np.zeros(len(linear), INSTANCE.dtype)
     rows["number"] = numbers
-    rows["origin"] = linear @ centre + to_world[:, :3, 3]
+    rows["origin"] = single(linear @ centre + to_world[:, :3, 3])
     with np.errstate(all="ignore"):  # looked at below
         to_local = np.linalg.inv(linear).astype(np.float32)
         for i, name in enumerate("xyz"):

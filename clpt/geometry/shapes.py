@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
-from clpt.arrays import on_host
+from clpt.arrays import fits_single, on_host
 from clpt.errors import SceneError
 from clpt.scene.params import fields_of
 from clpt.scene.shapes import Shape
@@ -38,6 +38,8 @@ def placement(shape: Shape) -> NDArray[np.float64]:
         raise SceneError(
             "its transform is singular: it flattens space or is not finite", where=where(shape)
         )
+    if not fits_single(matrix):
+        raise SceneError("its transform is beyond float32, 3.4e38", where=where(shape))
     if not transforms.is_affine(matrix):
         raise SceneError("its transform is a projection, not affine", where=where(shape))
     return matrix

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.arrays import Floats, Integers
+from clpt.arrays import Floats, Integers, single
 from clpt.errors import SceneError
 from clpt.scene.shapes import Curves
 
@@ -104,7 +104,7 @@ def _checked(shape: Curves, name: str) -> tuple[Floats, Integers]:
         raise SceneError(f"points are not numbers: {error}", where=name) from error
     if points.ndim != 2 or points.shape[1] != 4 or not len(points):
         raise SceneError(f"points must be (n, 4), found {points.shape}", where=name)
-    wrong = ~np.isfinite(points.astype(np.float32)).all(axis=1) | (points[:, 3] < 0.0)
+    wrong = ~np.isfinite(single(points)).all(axis=1) | (points[:, 3] < 0.0)
     if wrong.any():
         i = int(np.argmax(wrong))
         message = f"points[{i}] is not finite, or its radius negative: {points[i].tolist()}"

@@ -241,7 +241,7 @@ class _FrameLoop:
         render_samples(renderer, end, maker.look, pass_seconds=seconds)
         if self.stopped:
             return renderer  # what it has so far is no frame
-        if not any(counts.samples for counts in renderer.counts):
+        if not renderer.counts.samples:
             message = "in so short a time there was no sample"
             raise click.BadParameter(message, param_hint="--time")
         seconds = time.perf_counter() - began

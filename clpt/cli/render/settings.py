@@ -27,7 +27,7 @@ class SampleRange(click.ParamType):
     name = "FIRST:END"
 
     def convert(self, value: Any, param: Any, ctx: Any) -> tuple[int, int]:
-        from ...render.renderer import MOST_SAMPLES  # here: help needs no OpenCL
+        from ...render.film_renderer import MOST_SAMPLES  # here: help needs no OpenCL
 
         found = re.fullmatch(r"(\d{1,10}):(\d{1,10})", str(value).strip())
         if not found or not int(found[1]) < int(found[2]) <= MOST_SAMPLES:

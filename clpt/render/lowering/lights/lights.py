@@ -17,14 +17,14 @@ from clpt.arrays import Faces, Points
 from clpt.errors import SceneError
 from clpt.geometry import analytic, shape_records, shapes, spheres, triangles
 from clpt.records import LIGHT
+from clpt.render.analysis.geometry import Emitter
+from clpt.render.analysis.lowering_cache import content
 from clpt.render.contract.light_records import ALONG, BOTH, FRONT, INFINITE, KINDS, VOLUME
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.geometry import Emitter
 from clpt.render.lowering.lights import light_bounds, light_tree
 from clpt.render.lowering.lights.brick_lights import BrickLights
 from clpt.render.lowering.lights.non_shape_lights import blank_row, brightness, lower_lamp
 from clpt.render.lowering.lights.triangle_means import triangle_means
-from clpt.render.lowering.lowering_cache import content
 from clpt.render.lowering.textures.textures import per_face
 from clpt.scene.lights import DirectionalArea, Light
 from clpt.scene.shapes import Shape
