@@ -5,8 +5,7 @@
     python -m bench.house --json
     python -m bench.house --bounds     the table of tests/test_house.py, where figures may only fall
 
-No device is needed; of clpt only
-the command `clpt kernels` runs, and the table of flags is counted.
+No device is needed. Of clpt only `clpt kernels` runs, and the table of flags is counted.
 """
 
 from __future__ import annotations
