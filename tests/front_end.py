@@ -18,7 +18,10 @@ LANGUAGE = (
     *("-finclude-default-header", "-fdeclare-opencl-builtins"),  # as the driver has them
 )
 FLAGS = (
-    *LANGUAGE, "-fsyntax-only", "-Wall", "-Werror",
+    *LANGUAGE,
+    "-fsyntax-only",
+    "-Wall",
+    "-Werror",
     *("-Wno-unused-function", "-Wno-unused-variable", "-Wno-unknown-warning-option"),
     *("-ferror-limit", "0"),  # an error does not end the texts behind it
     "-Wno-bitwise-instead-of-logical",  # masks are integers, in one lane as in eight
