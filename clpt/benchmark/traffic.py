@@ -1,17 +1,18 @@
 """Memory traffic: what each stage of a bounce reads and writes of the state of a path.
 
 Counted in the text that the compiler gets: the loads and stores of the slabs of clpt/records.py.
-What a stage fetches from the scene's tables and trees depends on
-the rays and is not counted: a figure is the least that must move.
+What a stage fetches from the scene's tables and trees depends on the rays and is not counted: a
+figure is the least that must move.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from clpt.records import SLABS
-from clpt.render.codegen import programs
+from clpt.render.codegen import blocks, programs
 from clpt.render.contract.features import Features
 
 _WORD = 4  # bytes
@@ -39,24 +40,27 @@ def traffic(features: Features, layout: str, *, queued: bool = False) -> dict[st
     in `intersect` and `shade_...` a ray and its hit, in `shadow` a shadow ray, in `append` a slot.
     """
     texts = programs.sources(features, layout, 1, queued=queued)
-    moved = {name: _moved(source.text, features.mode) for name, source in texts.items()}
-    for name, (read, written) in _QUEUED.items() if queued else ():
-        for program in (one for one in moved if one.split("_")[0] == name):
-            own = moved[program]
-            moved[program] = Moved(own.read + _WORD * read, own.written + _WORD * written)
+    unused = blocks.unused(features)
+    sizes = {
+        f"{record.name.lower()}_{member.name}": member.words
+        - (member.type == "spectrum" and features.mode == "rgb")
+        for record in SLABS
+        for member in record.members
+        if member.name not in unused
+    }
+    moved = {}
+    for name, source in texts.items():
+        own = _QUEUED.get(name.split("_")[0]) if queued else None
+        moved[name] = _moved(source.text, sizes, *(own or (0, 0)))
     return moved
 
 
-def _moved(text: str, mode: str) -> Moved:
-    sizes = {
-        f"{record.name.lower()}_{member.name}": member.words
-        - (member.type == "spectrum" and mode == "rgb")
-        for record in SLABS
-        for member in record.members
-    }
+def _moved(text: str, sizes: Mapping[str, int], read: int, written: int) -> Moved:
+    """What an item moves; sizes: of the members of slabs; read, written: beside these; in words."""
     words: dict[str, set[str]] = {"load": set(), "store": set()}
     for call in _CALL.finditer(_COMMENT.sub("", text)):
         if call["member"] in sizes:
             words[call["verb"]].add(call["member"])
-    read, written = (sum(sizes[member] for member in words[verb]) for verb in ("load", "store"))
+    read += sum(sizes[member] for member in words["load"])
+    written += sum(sizes[member] for member in words["store"])
     return Moved(_WORD * read, _WORD * written)

@@ -45,8 +45,9 @@ class Source:
         """
         file, line = None, None
         for text in self.text.splitlines()[: row - 1]:
-            if told := _LINE.match(text):
-                file, line = told[2].removeprefix("kernels/") if told[2] else file, int(told[1])
+            if directive := _LINE.match(text):
+                file = directive[2].removeprefix("kernels/") if directive[2] else file
+                line = int(directive[1])
             elif line is not None:
                 line += 1
         return file, line
@@ -139,7 +140,7 @@ def _text(folder: Path, name: str) -> str:
 
 
 class _BadRow(Exception):
-    """What is wrong with a row of a file, and its number."""
+    """A fault in a row of a file, with the row's number."""
 
     def __init__(self, line: int, message: str):
         super().__init__(message)
@@ -148,7 +149,7 @@ class _BadRow(Exception):
 
 @dataclass
 class _Piece:
-    """What a file has up to an include or its end: directives, and groups of other rows."""
+    """A part of a file, up to an include or its end: directives, and groups of other rows."""
 
     rows: list[Row | list[Row]]
     include: Row | None = None

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from clpt.geometry import shape_records
 from clpt.render.codegen.dispatch import Case, Function, choose, function
 from clpt.render.codegen.lights import NOWHERE, kind_test, pmf_text, point_text, row_text
-from clpt.render.contract import shape_records
 from clpt.render.contract.light_records import (
     ALONG,
     BASES,

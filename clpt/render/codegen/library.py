@@ -6,6 +6,7 @@ import re
 
 from clpt import bvh, device
 from clpt.errors import SceneError, UnknownKindError
+from clpt.render.codegen import rough_coat_table
 from clpt.render.codegen.stages import functions_text
 from clpt.render.contract import custom_materials
 from clpt.scene.integrators import PIXELWISE
@@ -67,6 +68,7 @@ def kernel_source(
         "generated/spectrum.cl": (f"spectrum/{mode}.cl",),
         "generated/sampler.cl": (f"sampler/{sampler}.cl",),
         "generated/layout.cl": bvh.traversal_text(layout),
+        **rough_coat_table.virtual_files(),
     }
     files: list[str] = []
     for part in parts:

@@ -17,6 +17,7 @@ from clpt.render.codegen import (
     flags,
     lights,
     parameters,
+    rough_coat_table,
     shapes,
     signatures,
     stages,
@@ -96,7 +97,11 @@ def _shading(
     files, defines = _shared(features, layout), flags.defines(flags.SCENE, features)
     texts = {}
     for cls in features.leaves:
-        own = {**files, "generated/bsdf.cl": stages.bsdf_text(features, cls)}
+        own = {
+            **files,
+            **choices.material_files(features, cls),
+            "generated/bsdf.cl": stages.bsdf_text(features, cls),
+        }
         if cls.is_phase:
             own["generated/shading_frame.cl"] = ("path/phase_frame.cl",)
         if cls.source is not None:
@@ -111,9 +116,8 @@ def _shading(
 
 
 def film_sources(features: Features, layout: str) -> dict[str, device.Source]:
-    """Return the texts of what makes pictures of a film, by program name."""
-    names = ("accumulate", *(("bands",) if features.bands else ()))
-    return _static(_alone(features, layout, *names))
+    """Return the text of what makes the picture of a film, by program name."""
+    return _static(_alone(features, layout, "accumulate"))
 
 
 def noise_sources(features: Features, layout: str) -> dict[str, device.Source]:
@@ -179,6 +183,7 @@ def _shared(features: Features, layout: str) -> Files:
     textured = "texture" in stages.emission_sources(features)
     return {
         **shapes.virtual_files(),
+        **rough_coat_table.virtual_files(),
         **lights.virtual_files(),
         **signatures.virtual_files(features, layout),
         **parameters.virtual_files(features),

@@ -1,0 +1,73 @@
+"""What is costly in a lowering, kept for the next: after an edit most of a scene is the same."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from clpt.arrays import on_device
+
+Made = TypeVar("Made")
+_BY_VALUE = (str, bytes, int, float, bool, type(None), type)
+
+
+class LoweringCache:
+    """What pure functions made, by what they were given.
+
+    Numbers and texts count by value, whatever else by identity: an array that is the same object is
+    taken to hold the same. former: of the lowering before, whose pieces are taken on when they are
+    asked for again; `settle` lets go of the others.
+    """
+
+    def __init__(self, former: LoweringCache | None = None):
+        self._former = {} if former is None else former._made
+        self._made: dict[Any, tuple[Any, Any]] = {}
+
+    def __call__(
+        self, make: Callable[..., Made], *given: Any, by: tuple[Any, ...] | None = None
+    ) -> Made:
+        """Return make(*given); the same object as before for what was given before.
+
+        by: what it follows from, where that is not all of what is given.
+        """
+        by = given if by is None else by
+        key = make, *map(_mark, by)
+        if key not in self._made:
+            # what is known by identity stays alive, so that no other object gets its id
+            self._made[key] = self._former.get(key) or (make(*given), by)
+        return self._made[key][0]
+
+    def settle(self) -> None:
+        """Forget what was not asked for."""
+        self._former = {}
+
+
+def _mark(given: Any) -> Any:
+    """What a thing is known by; device memory by nothing: kernels may have written there."""
+    if isinstance(given, _BY_VALUE):
+        return given
+    return object() if on_device(given) else (id(given),)
+
+
+def version(image: Any) -> Any:
+    """Return what an image is known by: of a file its name, its time and its size."""
+    if not isinstance(image, (str, Path)):
+        return image
+    try:
+        found = os.stat(image)
+    except OSError:  # whoever reads it tells what is wrong
+        return str(image)
+    return f"{image}\0{found.st_mtime_ns}\0{found.st_size}"
+
+
+def content(*arrays: np.ndarray) -> bytes:
+    """Return what stands for the values of arrays, where these are made anew each time."""
+    digest = hashlib.blake2b()
+    for array in arrays:
+        digest.update(np.ascontiguousarray(array).data.cast("B") if array.size else b"")
+    return digest.digest()
