@@ -1,7 +1,8 @@
 """Flags: the macros by which kernels ask what a scene has, each with its condition.
 
-A flag that holds is 1. One that does not hold is not defined: `#if` takes it for 0, and a text has
-no line for what its scene has not. Numbers and names are defined as they are.
+A flag that holds is 1. One that does not hold is not defined: `#if` takes it for 0. `assemble`
+decides each `#if`, so that a text has no line for what its scene has not. Numbers and names are
+defined as they are.
 """
 
 from __future__ import annotations
