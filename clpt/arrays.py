@@ -1,4 +1,4 @@
-"""Arrays that may lie on a device, read by who does not need OpenCL."""
+"""Types of arrays, for type checkers; and arrays that may lie on a device, without OpenCL."""
 
 from __future__ import annotations
 
@@ -7,6 +7,16 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+Floats32 = NDArray[np.float32]
+Integers = NDArray[np.int64]
+Words = NDArray[np.uint32]
+Bytes = NDArray[np.uint8]
+Points = NDArray[np.float32]  # (n, 3), or (n, 2) for uv
+Faces = NDArray[np.uint32]  # (n, 3)
+Image = NDArray[np.float32]  # (height, width, channels)
+Matrix = NDArray[np.float64]  # (rows, columns)
 
 
 def on_host(values: Any) -> Any:

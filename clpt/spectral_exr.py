@@ -19,13 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import images
+from clpt.arrays import Floats32
 from clpt.errors import SceneError
 from clpt.images import exr, exr_files
 from clpt.images.failures import check_there, reading
 from clpt.spectra import Tabulated, cie
 from clpt.spectra.spectrum import d65
-
-Array = NDArray[np.float32]
 
 RADIANCE = "W.m^-2.sr^-1.nm^-1"
 VERSION = "1.0"
@@ -54,7 +53,7 @@ class SpectralImage:
     beside that. Raises SceneError where these do not fit together.
     """
 
-    values: Array
+    values: Floats32
     lambdas: NDArray[np.float64]
     emissive: bool = False
     units: str = RADIANCE
@@ -78,13 +77,13 @@ class SpectralImage:
         object.__setattr__(self, "values", values)
         object.__setattr__(self, "lambdas", lambdas)
 
-    def to_rgb(self) -> Array:
+    def to_rgb(self) -> Floats32:
         """Linear Rec. 709 (h, w, 3) float32: reflectances under D65, light as it is; unclipped."""
         return self.values @ self._rgb_of_bands.astype(np.float32)
 
     @cached_property
     def _rgb_of_bands(self) -> NDArray[np.float64]:
-        """What a band of 1 adds to a pixel's colour, (n, 3): colour is linear in the values."""
+        """The colour that each band adds at a value of 1, (n, 3): colour is linear in them."""
         bands = np.eye(len(self.lambdas))
         curves = np.array([self.spectrum(band).sample(cie.GRID) for band in bands])
         light = 1.0 if self.emissive else d65().sample(cie.GRID)
@@ -157,9 +156,9 @@ def write(
     image: SpectralImage,
     *,
     half: bool = False,
-    preview: Array | None = None,
+    preview: Floats32 | None = None,
     metadata: Mapping[str, Any] | None = None,
-    layers: Mapping[str, Array] | None = None,
+    layers: Mapping[str, Floats32] | None = None,
 ) -> None:
     """Write a spectral EXR file; what `read` gives back is the same to the bit unless `half`.
 
@@ -240,7 +239,7 @@ def _other_kind(emissive: bool) -> str:
 
 
 def _left_out(parts: Mapping[str, Any], light: bool) -> tuple[str, ...]:
-    """What is told of a file's parts that are not read."""
+    """Return notes on parts of a file that are not read."""
     polarised = any(part in parts for part in ("S1", "S2", "S3"))
     made = ["its polarisation (S1 to S3) is left out"] if light and polarised else []
     if {"S0", "T"} <= parts.keys():

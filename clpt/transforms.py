@@ -7,11 +7,10 @@ w = 0, normals go through the inverse transpose.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from clpt.arrays import Matrix as Matrix
 from clpt.errors import SceneError
-
-Matrix = NDArray[np.float64]
 
 IDENTITY: Matrix = np.eye(4)
 IDENTITY.setflags(write=False)

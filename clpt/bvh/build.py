@@ -61,9 +61,11 @@ def choose_layout(device: Device, n_triangles: int) -> str:
 def choose_tree(device: Device) -> str:
     """Return the layout that traces fastest on the device among those that have a tree.
 
-    Measured on CPUs; for other devices the literature's choice, see bench/NOTES.md.
+    Measured on CPUs and a GPU of NVIDIA's. Elsewhere it is the literature's choice, as compilers
+    for AMD's and Intel's GPUs have too few registers for the other: see bench/NOTES.md.
     """
-    return "wide8" if device.info.is_cpu else "compact"
+    measured = device.info.is_cpu or "nvidia" in device.info.vendor.casefold()
+    return "wide8" if measured else "compact"
 
 
 def outgrows_caches(device: Device, layout: str, n_triangles: int) -> bool:
@@ -88,7 +90,8 @@ def build(
     space-filling curve, and builds the nodes above them as "high" does; brute has no tree.
 
     The build takes up to 250 bytes a triangle and .25 MiB on the device, beside its input, of which
-    about 60 bytes stay (binary: 130); no buffer has more than 64 bytes a triangle.
+    about 60 bytes stay (binary: 130); no buffer has more than 64 bytes a triangle. What is no CPU
+    takes 45 kB a compute unit more, for counters.
     Trees are never deeper than BVH_DEPTH of kernels/bvh/node.cl: traversals cannot overflow.
 
     Raises SceneError for vertices that are not finite or beyond 1e12, for indices out of range and

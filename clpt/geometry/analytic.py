@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt import transforms
-from clpt.arrays import fits_single, single
+from clpt.arrays import Points, Words, fits_single, single
 from clpt.errors import SceneError
 from clpt.geometry.shape_records import ANALYTIC, ONE_OF, RECORDS, ROWS
-from clpt.geometry.shapes import Points, Words, placement, where
+from clpt.geometry.shapes import placement, where
 from clpt.geometry.triangles import triangle_areas, triangulate
 from clpt.scene import shapes
 from clpt.scene.shapes import Shape

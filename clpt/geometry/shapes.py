@@ -1,4 +1,4 @@
-"""What every shape has: a name for messages, what its geometry follows from, and its transform."""
+"""Properties of every shape: its name in messages, the source of its geometry, its transform."""
 
 from __future__ import annotations
 
@@ -12,10 +12,6 @@ from clpt.arrays import fits_single, on_host
 from clpt.errors import SceneError
 from clpt.scene.params import fields_of
 from clpt.scene.shapes import Shape
-
-Points = NDArray[np.float32]
-Faces = NDArray[np.uint32]
-Words = NDArray[np.uint32]
 
 
 def where(shape: Shape) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
-from clpt.arrays import on_host, single
+from clpt.arrays import Words, on_host, single
 from clpt.errors import SceneError
 from clpt.geometry import analytic, shapes, triangles
 from clpt.scene.shapes import Shape, Spheres
@@ -64,12 +64,12 @@ def keyed(shape: Spheres, times: Sequence[float]) -> Balls:
     return np.stack(at_all, axis=1)
 
 
-def common(shape: Shape) -> shapes.Words:
+def common(shape: Shape) -> Words:
     """Return the row of `geometry` of all: a sphere of radius 1 before `to_world`."""
     return analytic.row(shape)
 
 
-def rows(shape: Shape, placed: Balls) -> shapes.Words:
+def rows(shape: Shape, placed: Balls) -> Words:
     """Return a row of `geometry` for each of the balls of a shape, (n, words) uint32."""
     made = np.tile(common(shape), (len(placed), 1))
     center, radius = (analytic.member("sphere", name) for name in ("center", "radius"))

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
-from clpt.arrays import on_host, single
+from clpt.arrays import Faces, Points, Words, on_host, single
 from clpt.errors import SceneError
 from clpt.geometry import distance_grids, refining
 from clpt.geometry.shape_records import ONE_OF
-from clpt.geometry.shapes import Faces, Points, Words, placement, where
+from clpt.geometry.shapes import placement, where
 from clpt.geometry.tubes import tubes
 from clpt.scene import shapes
 from clpt.scene.motion import Deformation
@@ -47,7 +47,7 @@ _CORNER_FACES = ((0, 1, 2), (3, 0, 2))
 
 @dataclass(frozen=True)
 class Flat:
-    """How many of a shape's triangles have no area."""
+    """A count of a shape's triangles that have no area."""
 
     where: str
     count: int

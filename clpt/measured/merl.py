@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import input_files, output_files
+from clpt.arrays import Floats
 from clpt.errors import SceneError
 from clpt.measured.fit import Reflection, area, direction, grid, spherical
-from clpt.measured.warp import Values, sample, warp
+from clpt.measured.warp import sample, warp
 
 STEPS = (90, 90, 180)  # of the published files
 SCALES = np.array([1.0, 1.15, 1.66]) / 1500.0  # of the numbers in a file [1/sr]
@@ -105,9 +106,11 @@ def filled(table: MerlTable) -> NDArray[Any]:
     return np.maximum(values, 0.0)
 
 
-def densities(values: NDArray[Any]) -> tuple[Values, Values, Values]:
-    """How light is sampled: angles of viewers (n,) [rad], densities over the square of halfway
-    directions (n, rows, columns), and the share of light (3,) that a viewer along the normal sees.
+def densities(values: NDArray[Any]) -> tuple[Floats, Floats, Floats]:
+    """Return tables by which light is sampled.
+
+    They are angles of viewers (n,) [rad], densities over the square of halfway directions
+    (n, rows, columns), and the share of light (3,) that a viewer along the normal sees.
 
     values: of `filled`. Of the brightest of neighbours each, so that nothing bright is missed.
     """
@@ -129,8 +132,8 @@ def densities(values: NDArray[Any]) -> tuple[Values, Values, Values]:
 
 
 def _seen(
-    values: NDArray[Any], theta: float, x: Values, y: Values
-) -> tuple[Values, Values, Values]:
+    values: NDArray[Any], theta: float, x: Floats, y: Floats
+) -> tuple[Floats, Floats, Floats]:
     """At halfway directions: cosine of wi, f cos (n, 3), solid angle over area of the square."""
     wo = spherical(theta, 0.0)
     m = direction(x, y)
@@ -142,7 +145,7 @@ def _seen(
     return wi[:, 2], light * lit[:, None], solid
 
 
-def _nearest(values: NDArray[Any], m: Values, wo: Values, wi: Values) -> Values:
+def _nearest(values: NDArray[Any], m: Floats, wo: Floats, wi: Floats) -> Floats:
     """The table's nearest values (n, 3) at halfway directions m."""
     halfway = np.arctan2(np.hypot(m[:, 0], m[:, 1]), m[:, 2])
     difference = np.arctan2(np.linalg.norm(wi - wo, axis=1), np.linalg.norm(wi + wo, axis=1))
@@ -156,7 +159,7 @@ def _nearest(values: NDArray[Any], m: Values, wo: Values, wi: Values) -> Values:
     return np.asarray(values[tuple(cells)], np.float64)
 
 
-def _widest(values: Values) -> Values:
+def _widest(values: Floats) -> Floats:
     """The largest of each value and its eight neighbours; rows go around."""
     rows = np.maximum(values, np.maximum(np.roll(values, 1, 0), np.roll(values, -1, 0)))
     padded = np.pad(rows, ((0, 0), (1, 1)), "edge")

@@ -566,7 +566,7 @@ class Hair(Material):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Measured(Material):
-    """What was measured of a real surface (Dupuy and Jakob 2018), from a file `.bsdf`; front side.
+    """A surface by measurement (Dupuy and Jakob 2018), from a file `.bsdf`; front side only.
 
     By default a matt grey. It is as reciprocal as what was measured, and its numbers are linear in
     between.

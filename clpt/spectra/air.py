@@ -11,11 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from clpt.arrays import Floats
 from clpt.spectra.data import table
-
-Floats = NDArray[np.float64]
 
 EARTH = 6371.0  # radius [km]
 AEROSOL_HEIGHT = 1.2  # in which its density falls to 1/e [km]
@@ -56,7 +55,7 @@ def share(height: ArrayLike) -> Floats:
 
 @dataclass(frozen=True)
 class Atmosphere:
-    """What is in the air.
+    """Contents of the air: aerosol and ozone.
 
     aerosol: optical depth at 550 nm; exponent: of its fall with wavelength; aerosol_albedo: share
     that is scattered; asymmetry: g of its phase function; ozone [Dobson units].

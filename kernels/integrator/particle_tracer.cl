@@ -17,7 +17,7 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
 {
     global const Settings *settings = scene.settings;
     Surface s = v.s;
-    Spectrum beta = v.beta, ratio = hero_ratio(path, at);
+    Spectrum beta = v.beta, ratio = load_path_ratio(path, at);
     integer state = v.state, depth = v.depth;
 
     Sampler sampler = light_path_sampler(settings, load_path_pixel_index(path, at), load_path_sample(path, at));
@@ -52,11 +52,7 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
     value = vertex_beyond(scene, v, neg3(c.d), c.t, v.lambdas, value);
     connect_camera(shadow, at, active, shine, s, c, value);
 #if SHADOW_MEDIA
-#if USES_BODIES
-    store_shadow_through(shadow, at, shine, bodies_beyond(v.bodies, dot3(s.n, c.d) > 0.0f));
-#else
-    store_shadow_through(shadow, at, shine, vertex_medium(v, neg3(c.d)));
-#endif
+    store_shadow_through(shadow, at, shine, vertex_through(v, neg3(c.d)));
 #endif
     state += sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
 #endif
@@ -104,7 +100,7 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
     path_scattered(path, at, next & !null);
 #endif
     vertex_leave(path, at, next, null, v, onward, beta);
-    hero_keep(path, at, next, ratio);
+    store_path_ratio(path, at, next, ratio);
     vertex_end(path, at, active, next, null, state);
 }
 

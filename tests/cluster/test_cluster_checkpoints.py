@@ -20,7 +20,7 @@ from machines import ENVIRONMENT, LONGEST, ROOT, machines, wait_until  # noqa: E
 from machines import scene as box  # noqa: E402
 
 from clpt.__main__ import run  # noqa: E402
-from clpt.cli import outputs  # noqa: E402
+from clpt.cli.files import outputs  # noqa: E402
 from clpt.cluster import processes  # noqa: E402
 from clpt.cluster.cluster_renderer import ClusterRenderer  # noqa: E402
 from clpt.cluster.tasks import film_digest  # noqa: E402
@@ -77,7 +77,7 @@ def test_a_cluster_goes_on_where_it_was_saved(hub, folder, capsys):
     assert render("--spp", "20", *on, "--checkpoint", "1h") == 0
     saved = film_file.read(SAVED)
     assert saved.film.taken == ((0, 20),)
-    assert saved.counts[0]["samples"] == 20 * 32 * 24
+    assert saved.counts["samples"] == 20 * 32 * 24
     with Renderer(box(), threads=1) as one:
         assert [session.device for session in saved.sessions] == [one.device_class()]
     assert render("--spp", "50", *on, "--resume") == 0

@@ -12,7 +12,7 @@ import pytest
 import clpt
 from clpt import bvh, device
 from clpt import transforms as T
-from clpt.cli.info import summary
+from clpt.cli.files.scene_contents import summary
 from clpt.errors import SceneError
 from clpt.formats.native import load, save
 from clpt.geometry import spheres
@@ -21,7 +21,7 @@ from clpt.render.lowering.scene import lower
 from clpt.scene import Scene, cameras, integrators, lights, materials, shapes
 from clpt.scene.textures import MeshAttribute
 from tests.kernels.harness import opened
-from tests.renders.support import layers_of
+from tests.pictures.support import layers_of
 
 RNG = np.random.default_rng(11)
 PLACE = T.translate([0.1, -0.2, 0.3]) @ T.rotate([1, 2, 3], 40.0) @ T.scale(1.2)

@@ -13,6 +13,7 @@ from clpt.scene import KINDS
 
 ALTERNATIVES = (  # files, of each row of which a program has one at most
     ("bvh/*_keyed.cl",),
+    ("media/medium.cl", "media/light_medium_none.cl"),
     ("bvh/query*.cl",),
     ("bvh/shapes_*.cl",),
     ("film/exposure.cl", "film/splatting.cl"),
@@ -20,11 +21,13 @@ ALTERNATIVES = (  # files, of each row of which a program has one at most
     ("optics/boundary_*.cl",),
     ("optics/boundary_bare.cl", "optics/layers_*.cl"),
     ("path/*_frame*.cl",),
+    ("path/first_ray*.cl",),
     ("path/pixel_sampler*.cl",),
     ("path/shadow_ray*.cl",),
     ("sampler/independent.cl", "core/sobol.cl"),
     ("spectrum/density.cl", "spectrum/visible.cl", "spectrum/rgb_read.cl"),
     ("spectrum/rgb*.cl", "spectrum/spectral*.cl"),
+    ("surface/corner_rows*.cl",),
     ("tracing/curve_others*.cl",),
     ("tracing/instances_*.cl",),
     ("tracing/shape_rows_m*.cl", "tracing/shape_rows_single.cl"),
@@ -62,6 +65,8 @@ def files() -> dict[str, str]:
 
 def meet(first: str, second: str, texts: dict[str, str]) -> bool:
     """Whether one program may have both files."""
+    if second == f"{first.removesuffix('.cl')}_none.cl":  # the twin that does nothing
+        return False
     if second in INCLUDE.findall(texts[first]) or first in INCLUDE.findall(texts[second]):
         return True
     return not any(

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import budget
+from clpt.arrays import Bytes
 from clpt.formats.gltf import meshopt_filters, meshopt_indices
 from clpt.formats.gltf.document import Element
 
@@ -23,7 +24,6 @@ TAIL = {0: 32, 1: 24}  # bytes at least, by version
 # By control mode (version 1), or for version 0: the bits of a delta by the group's header bits.
 BITS_V0, BITS_V1 = (0, 2, 4, 8), ((0, 1, 2, 4), (1, 2, 4, 8))
 ZERO, LITERAL = 2, 3  # control modes without header bits
-Bytes = NDArray[np.uint8]
 
 
 def extension(view: Element) -> Element | None:
@@ -122,7 +122,7 @@ def _groups(
 
 
 def _sentinels(stream: Bytes, bits: int) -> list[int]:
-    """How many deltas of all ones, `bits` wide, stand before each byte."""
+    """Count the deltas before each byte, `bits` wide, whose bits are all one."""
     values = np.arange(256)
     per_byte = sum(
         (values >> shift & (1 << bits) - 1) == (1 << bits) - 1 for shift in range(0, 8, bits)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Bytes = NDArray[np.uint8]
+from clpt.arrays import Bytes
+
 TABLE = 16  # bytes at a triangle stream's end
 
 
@@ -43,7 +44,7 @@ def sequence(stream: Bytes, count: int) -> NDArray[np.uint32]:
 
 
 class _Triangles:
-    """What the decoder of triangles carries from one to the next."""
+    """A decoder of triangles, with the edges and vertices that the next triangle may refer to."""
 
     def __init__(self, data: list[int]):
         self.data, self.table = data, data[-TABLE:]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
-from clpt.arrays import fits_single
+from clpt.arrays import Faces, Points, fits_single
 from clpt.bvh.build import MOST
 from clpt.errors import SceneError
 from clpt.geometry import (
@@ -51,9 +51,9 @@ class Emitter:
 
     shape: Shape
     shape_row: int
-    vertices: shapes.Points | None = None
-    faces: shapes.Faces | None = None
-    uvs: shapes.Points | None = None
+    vertices: Points | None = None
+    faces: Faces | None = None
+    uvs: Points | None = None
     keys: int = 1
 
 
@@ -66,8 +66,8 @@ class Stored:
     """
 
     vertices: int = 0
-    normals: shapes.Points | None = None
-    uvs: shapes.Points | None = None
+    normals: Points | None = None
+    uvs: Points | None = None
     many: NDArray[np.float32] | None = None
 
 
@@ -78,9 +78,8 @@ class Geometry:
     rows: of `shapes`, those of analytic shapes last, with what is known before lowering: number,
     kind, first primitive and flags; owners: of each row, with its first vertex and face; stored:
     for each row, what goes to other tables; vertices (n, 3) float32, faces (m, 3) uint32 and tags
-    (m,) uint32, the shape of each triangle: the world's before those of groups;
-    boxes (k, 2, 3) float32: of analytic shapes;
-    world_vertices: how many vertices are not a group's; first_analytic: a row; single_count:
+    (m,) uint32, the shape of each triangle: the world's before those of groups; boxes (k, 2, 3)
+    float32: of analytic shapes; world_vertices: how many vertices are not a group's; first_analytic: a row; single_count:
     analytic shapes that are one each; analytic: their kinds; normals, uvs: whether a shape needs
     them; tangents: of shapes that say their own, each with its first vertex; keys: by the first
     vertex of a shape how many rows each of its vertices has, where that is not one.

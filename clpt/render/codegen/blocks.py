@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from clpt.records import HIT, SHADOW
+from clpt.records import HIT, SHADOW, SLABS
 from clpt.render.codegen import flags
 from clpt.render.contract.features import Features
 
@@ -38,6 +38,24 @@ NEEDED = {
     "instance": "USES_INSTANCES",
 }
 
+# members that stages other than shading use too, whatever the flags above
+ELSEWHERE = frozenset({"weight", "light", "pixel_index", "film"})
+
+
+def unused(features: Features) -> frozenset[str]:
+    """Return the members of slabs that no kind of paths of a scene uses."""
+    used = set(ELSEWHERE)
+    for own in features.passes:
+        used |= {name for name in NEEDED if _has(own, name)}
+    return frozenset(NEEDED.keys() - used)
+
+
+def _has(features: Features, name: str) -> bool:
+    """Whether paths of one kind have a member."""
+    defined = flags.defines(flags.SCENE, features)
+    has = {"SPECTRAL": features.mode == "spectral", **defined}
+    return name not in NEEDED or any(has.get(flag) for flag in NEEDED[name].split())
+
 
 def members(features: Features) -> dict[str, list[str]]:
     """Return the members of each slab that a block takes, and as "changed" those of a path that
@@ -45,9 +63,7 @@ def members(features: Features) -> dict[str, list[str]]:
     defined = flags.defines(flags.SCENE, features)
 
     def there(names: Iterable[str]) -> list[str]:
-        has = {"SPECTRAL": features.mode == "spectral", "": True, **defined}
-        wanted = {name: NEEDED[name].split() if name in NEEDED else [""] for name in names}
-        return [name for name, of in wanted.items() if any(has.get(flag) for flag in of)]
+        return [name for name in names if _has(features, name)]
 
     chosen = ("light",) if "LIGHT_LAYER_GROUPS" in defined else ()  # by next-event estimation
     changed = [*there(CHANGED), *chosen]
@@ -63,15 +79,14 @@ def blocks_text(kinds: Sequence[Features]) -> str:
     """Return `blocks_0` and further, for each kind of paths: the words of a slot's state that a
     block takes, of a path first those that shading may change."""
     numbers = "".join(f"    uint {name};\n" for name in ("path", "changed", "hit", "shadow"))
-    slabs = kinds[0].slabs
-    arrays = "".join(f"    uchar {r.name.lower()}_words[{r.words}];\n" for r in slabs)
+    arrays = "".join(f"    uchar {r.name.lower()}_words[{r.words}];\n" for r in SLABS)
     t = next(m.word for m in SHADOW.members if m.name == "t")
     rows = [f"typedef struct {{\n{numbers}{arrays}}} BlockWords;", f"#define SHADOW_T {t}"]
     for which, features in enumerate(kinds):
         kept = members(features)
         own = {name: _words(features, name, names) for name, names in kept.items()}
         counts = [str(len(own[name])) for name in ("path", "changed", "hit", "shadow")]
-        lists = (", ".join(map(str, own[record.name.lower()])) for record in slabs)
+        lists = (", ".join(map(str, own[record.name.lower()])) for record in SLABS)
         values = ", ".join([*counts, *(f"{{{words}}}" for words in lists)])
         rows.append(f"constant BlockWords blocks_{which} = {{{values}}};")
     return "\n".join([*rows, ""])
@@ -79,9 +94,7 @@ def blocks_text(kinds: Sequence[Features]) -> str:
 
 def _words(features: Features, slab: str, names: Iterable[str]) -> list[int]:
     """The words of a slab's members; "changed" is a part of a path's."""
-    record = next(
-        r for r in features.slabs if r.name.lower() == ("path" if slab == "changed" else slab)
-    )
+    record = next(r for r in SLABS if r.name.lower() == ("path" if slab == "changed" else slab))
     found = []
     for member in (next(m for m in record.members if m.name == name) for name in names):
         count = member.words - (member.type == "spectrum" and features.mode == "rgb")

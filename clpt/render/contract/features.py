@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from clpt.layout import Record
-from clpt.records import HIT, PATH, SHADOW
 from clpt.render.contract.texture_records import MIPS
 from clpt.scene.layers import LAYERS, WORDS, Form
 from clpt.scene.params import device_params
@@ -133,14 +131,6 @@ class Features:
     def mips(self) -> bool:
         """Whether some image has smaller copies, which the cones around rays choose."""
         return not MIPS.keys().isdisjoint(self.textures)
-
-    @property
-    def slabs(self) -> tuple[Record, ...]:
-        """The records of the state of paths, see clpt.records, as the scene's kernels have them.
-
-        Their memory is that of `SLABS`, so that it serves whatever a scene changes to.
-        """
-        return (PATH if self.mips else PATH.without("cone"), HIT, SHADOW)
 
     @property
     def film_weights(self) -> bool:

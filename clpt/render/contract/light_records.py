@@ -148,8 +148,8 @@ RECORDS: dict[str, Record] = {
     VOLUME: Record(
         "EmissiveBrick",
         "A brick of a grid that emits.",
-        medium=("integer", "the medium, see kernels/optics/medium.cl"),
-        number=("integer", "of the brick, see kernels/optics/medium_grid.cl"),
+        medium=("integer", "the medium, see kernels/media/medium.cl"),
+        number=("integer", "of the brick, see kernels/media/medium_grid.cl"),
         corner=("vec3", "[m]"),
         x=("vec3", "edges from there [m]"),
         y=("vec3", ""),

@@ -1,4 +1,4 @@
-"""Densities on grids as bricks of words, see kernels/optics/medium_grid.cl."""
+"""Densities on grids as bricks of words, see kernels/media/medium_grid.cl."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from clpt.spectra import Spectrum, uplift
 from clpt.spectra.spectrum import gridded
 
 ROUNDED = 1e-4  # by how much a mixture's density bounds more than its parts
-GLOW_WORDS = 6  # behind the row of a grid, see kernels/optics/medium_grid_light.cl
+GLOW_WORDS = 6  # behind the row of a grid, see kernels/media/medium_grid_light.cl
 
 
 def row(medium: Lattice, encoder: Encoder) -> Words:

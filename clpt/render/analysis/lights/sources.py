@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Faces, Points
 from clpt.errors import SceneError
 from clpt.geometry import analytic, shape_records, shapes, triangles
 from clpt.geometry.motion import corners, swept
@@ -216,15 +217,13 @@ def _face_attributes(shape: Shape, value: Any) -> dict[str, NDArray[np.float32]]
     return {name: triangles.attribute(shape, name) for name in names if triangles.per_face(name)}
 
 
-def _triangle_areas(vertices: shapes.Points, faces: shapes.Faces, keys: int) -> NDArray[np.float64]:
+def _triangle_areas(vertices: Points, faces: Faces, keys: int) -> NDArray[np.float64]:
     """The mean area over all keys (m,) [m^2]: by it triangles are chosen, at any time alike."""
     areas = (triangles.triangle_areas(vertices, faces + np.uint32(i)) for i in range(keys))
     return np.asarray(sum(areas) / keys)
 
 
-def _triangle_bounds(
-    vertices: shapes.Points, faces: shapes.Faces, keys: int, two_sided: bool
-) -> Bounds:
+def _triangle_bounds(vertices: Points, faces: Faces, keys: int, two_sided: bool) -> Bounds:
     """Bounds (m) that hold at all times: between two keys a triangle is in the box around both."""
     first, *others = (
         light_bounds.of_triangles(vertices, faces + np.uint32(i), two_sided) for i in range(keys)

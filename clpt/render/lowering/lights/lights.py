@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from clpt.arrays import Faces, Points
 from clpt.errors import SceneError
 from clpt.geometry import analytic, shape_records, shapes, spheres, triangles
 from clpt.records import LIGHT
@@ -156,7 +157,7 @@ def _emitter_rows(emitter: Emitter, encoder: Encoder) -> np.ndarray:
     return rows
 
 
-def _triangle_rows(vertices: shapes.Points, faces: shapes.Faces, keys: int) -> NDArray[np.uint32]:
+def _triangle_rows(vertices: Points, faces: Faces, keys: int) -> NDArray[np.uint32]:
     """Rows of `Triangle` (m, 10 k) uint32 of faces: one for each of k keys, side by side."""
     rows = [triangles.triangle_rows(vertices, faces + np.uint32(i)) for i in range(keys)]
     return np.ascontiguousarray(np.hstack(rows))

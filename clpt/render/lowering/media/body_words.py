@@ -1,4 +1,4 @@
-"""Bodies that overlap: their numbers and rows in `media`, see kernels/optics/bodies.cl.
+"""Bodies that overlap: their numbers and rows in `media`, see kernels/media/bodies.cl.
 
 What counts of a body is its matter: material, medium inside and priority. Bodies of the same matter
 have one number, and join where they overlap.

@@ -1,4 +1,4 @@
-"""Media as words: what a path knows its medium by, see kernels/optics/medium.cl."""
+"""Media as words: what a path knows its medium by, see kernels/media/medium.cl."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from clpt.scene.media import Dyed, Grid, Lattice, Medium, Mixture, Phase
 from clpt.scene.shapes import Shape
 from clpt.spectra import Constant, Spectrum
 
-MOST_AIMS = 8  # lamps near which flights end, see kernels/optics/equiangular.cl
+MOST_AIMS = 8  # lamps near which flights end, see kernels/media/equiangular.cl
 FLIES = 0x40000000  # in a medium's word: the stage `flight` takes rays through it
 BYTES = 0x10000000  # which has 8 bits for each number
 GRID = 0x20000000  # a density on a grid multiplies its coefficients
