@@ -79,7 +79,8 @@ class Geometry:
     kind, first primitive and flags; owners: of each row, with its first vertex and face; stored:
     for each row, what goes to other tables; vertices (n, 3) float32, faces (m, 3) uint32 and tags
     (m,) uint32, the shape of each triangle: the world's before those of groups; boxes (k, 2, 3)
-    float32: of analytic shapes; world_vertices: how many vertices are not a group's; first_analytic: a row; single_count:
+    float32: of analytic shapes;
+    world_vertices: how many vertices are not a group's; first_analytic: a row; single_count:
     analytic shapes that are one each; analytic: their kinds; normals, uvs: whether a shape needs
     them; tangents: of shapes that say their own, each with its first vertex; keys: by the first
     vertex of a shape how many rows each of its vertices has, where that is not one.
