@@ -121,8 +121,15 @@ def lower(
     """
     cache = LoweringCache(former.cache if former else None)
     before = Before(former.integrator, former.features.lit_ghosts) if former else None
-    found = analyse(scene, cache, before)
-    index, film = found.index, scene.film
+    return encode(analyse(scene, cache, before), cache, texture_budget)
+
+
+def encode(found: Analysis, cache: LoweringCache, texture_budget: int | None = None) -> Lowered:
+    """Return a scene's tables, features and settings; cache: what the analysis was made with.
+
+    texture_budget: as of `lower`. Raises SceneError for parameters that cannot be encoded.
+    """
+    index, film = found.index, found.index.scene.film
     ends = film.lambda_min, film.lambda_max
     wavelengths = density(index) if index.spectral else Density(*ends)
     encoder = Encoder(index.mode, *ends, sensor(film), wavelengths, texture_budget, cache)
