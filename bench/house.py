@@ -96,9 +96,9 @@ def types(root: Path) -> Iterator[Figure]:
         (1, f"{place}:{file.line_of(found.start())} {found[1]}")
         for place, file in files
         for found in python_files.ARRAY.finditer(file.text)
-        if place != "clpt/array_types.py"
+        if place != "clpt/arrays.py"
     ]
-    yield _sum("aliases of array types outside clpt/array_types.py", aliases)
+    yield _sum("aliases of array types outside clpt/arrays.py", aliases)
 
 
 def sizes(root: Path) -> Iterator[Figure]:

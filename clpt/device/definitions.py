@@ -42,7 +42,7 @@ class Definition:
 
     @cached_property
     def words(self) -> frozenset[str]:
-        """What the rows name."""
+        """All names in the rows."""
         return frozenset(_WORD.findall("\n".join([row.code for row in self.rows])))
 
     @cached_property

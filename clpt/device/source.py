@@ -45,8 +45,9 @@ class Source:
         """
         file, line = None, None
         for text in self.text.splitlines()[: row - 1]:
-            if told := _LINE.match(text):
-                file, line = told[2].removeprefix("kernels/") if told[2] else file, int(told[1])
+            if directive := _LINE.match(text):
+                file = directive[2].removeprefix("kernels/") if directive[2] else file
+                line = int(directive[1])
             elif line is not None:
                 line += 1
         return file, line
@@ -113,8 +114,8 @@ def assemble(
 
     What an `#if` leaves out is not in the text, nor is the `#if`, but for those that ask for what
     compilers define (`conditions.OUTSIDE`). Functions, types, constants and macros that nothing in
-    the text names are left out too, unless it is a library or they are of a Part. So programs that
-    differ by nothing else are built once.
+    the text names are left out too, unless it is a library, or they are of a Part that pastes names
+    together. So programs that differ by nothing else are built once.
 
     A `#line` before every part, and where rows are left out of a file, lets a compiler name our file
     and line; generated files are numbered as they stand in the text. Includes are resolved before
@@ -139,7 +140,7 @@ def _text(folder: Path, name: str) -> str:
 
 
 class _BadRow(Exception):
-    """What is wrong with a row of a file, and its number."""
+    """A fault in a row of a file, with the row's number."""
 
     def __init__(self, line: int, message: str):
         super().__init__(message)
@@ -148,7 +149,7 @@ class _BadRow(Exception):
 
 @dataclass
 class _Piece:
-    """What a file has up to an include or its end: directives, and groups of other rows."""
+    """A part of a file, up to an include or its end: directives, and groups of other rows."""
 
     rows: list[Row | list[Row]]
     include: Row | None = None
@@ -218,7 +219,8 @@ class _Assembly:
             pieces = _pieces(part.text, part.line)
         except _BadRow as error:
             self._fail(part.file, error.line, str(error))
-        keeps_all = self.library or isinstance(self.virtual.get(name), Part)
+        is_pasted = isinstance(self.virtual.get(name), Part) and "##" in part.text
+        keeps_all = self.library or is_pasted
         generated = name.startswith(_GENERATED)
         file = _File(part.file, generated)
         for number, piece in enumerate(pieces):

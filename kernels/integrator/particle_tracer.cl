@@ -52,11 +52,7 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
     value = vertex_beyond(scene, v, neg3(c.d), c.t, v.lambdas, value);
     connect_camera(shadow, at, active, shine, s, c, value);
 #if SHADOW_MEDIA
-#if USES_BODIES
-    store_shadow_through(shadow, at, shine, bodies_beyond(v.bodies, dot3(s.n, c.d) > 0.0f));
-#else
-    store_shadow_through(shadow, at, shine, vertex_medium(v, neg3(c.d)));
-#endif
+    store_shadow_through(shadow, at, shine, vertex_through(v, neg3(c.d)));
 #endif
     state += sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
 #endif

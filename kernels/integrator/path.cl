@@ -91,7 +91,7 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     vec2 point = sampler_pair(sampler, scatter.dimension + DIMENSION_LIGHT);
     LightSample ls = light_sample_nothing();
 #if BSDF_IS_PHASE && SEALED_MEDIA
-    mask sealed = (v.medium & MEDIUM_SEALED) != 0;
+    mask sealed = (v.media.medium & MEDIUM_SEALED) != 0;
     if (any(next & !sealed))
 #elif BSDF_ABSORBS
     if (any(next))
@@ -136,11 +136,7 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     store_shadow_into(shadow, at, shine, brick_medium(scene, sel_i(shine, ls.row, (integer)(0))));
 #endif
 #if SHADOW_MEDIA
-#if USES_BODIES
-    store_shadow_through(shadow, at, shine, bodies_beyond(v.bodies, dot3(s.n, ls.wi) < 0.0f));
-#else
-    store_shadow_through(shadow, at, shine, vertex_medium(v, ls.wi));
-#endif
+    store_shadow_through(shadow, at, shine, vertex_through(v, ls.wi));
 #endif
 #endif
     mask null = vertex_is_null(bs.lobe);

@@ -8,7 +8,7 @@
 #include "generated/textures.cl"
 #include "generated/mixture.cl"
 #include "generated/shapes.cl"
-#include "path/surface.cl"
+#include "surface/surface.cl"
 
 #define MIXTURE 0xff /* the kind in a mixture's material word */
 

@@ -10,7 +10,7 @@
 #include "generated/textures.cl"
 #include "generated/shapes.cl"
 #include "generated/lights.cl"
-#include "path/surface.cl"
+#include "surface/surface.cl"
 #include "generated/shading_frame.cl"
 #include "lighting/next_event.cl"
 #include "optics/fresnel.cl"

@@ -27,6 +27,7 @@ ALTERNATIVES = (  # files, of each row of which a program has one at most
     ("sampler/independent.cl", "core/sobol.cl"),
     ("spectrum/density.cl", "spectrum/visible.cl", "spectrum/rgb_read.cl"),
     ("spectrum/rgb*.cl", "spectrum/spectral*.cl"),
+    ("surface/corner_rows*.cl",),
     ("tracing/curve_others*.cl",),
     ("tracing/instances_*.cl",),
     ("tracing/shape_rows_m*.cl", "tracing/shape_rows_single.cl"),

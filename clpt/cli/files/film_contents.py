@@ -10,14 +10,7 @@ import numpy as np
 from ...render.film import film_file
 from ...render.film.layer_channels import channels_of
 from ..printing.console import shown
-from . import checkpoints
 from .image_contents import ImageContents, size_text
-from .targets import FILM
-
-
-def is_film(path: Path) -> bool:
-    """Whether a file has the name of a film."""
-    return path.suffix.lower() == FILM or path.name.endswith(checkpoints.SUFFIX)
 
 
 def film_summary(path: Path) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from ...errors import ClusterError
 from ...render.film.saved_film import SavedFilm
 from ...render.progress import Progress
 from ...scene import Scene
-from ..files import checkpoints, outputs, targets
+from ..files import checkpoints, outputs
 from ..opening.makers import AnyRenderer, DeviceMaker, Maker, cluster_makers, device_makers
 from ..opening.scenes import open_scene, read_scene
 from ..printing.display import Display
@@ -32,7 +32,6 @@ def render_picture(job: Job, shown: Display) -> int:
     Raises what the render raises, after the picture so far and the film are written.
     """
     began = time.perf_counter()
-    targets.checked(job.targets)
     former = _Former.find(job, shown.note)
     with ExitStack() as resources:
         opened = _open(job, former, shown, resources)

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from clpt import bvh
+from clpt.render.codegen import flags
 from clpt.render.contract.camera_records import WEIGHTED
 from clpt.render.contract.features import Features
+from clpt.scene.scatterer import Scatterer
 
 
 def when(holds: object, *files: str) -> tuple[str, ...]:
@@ -34,6 +36,10 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/integrator.cl": lambda f, _: (f"integrator/{f.integrator}.cl",),
     "generated/merging.cl": lambda f, _: either(f.merged, "merging/area.cl"),
     "generated/cone.cl": lambda f, _: either(f.mips, "path/cone.cl"),
+    "generated/vertex_media.cl": lambda f, _: (
+        when(f.bodies, "path/vertex_bodies.cl")
+        or either(f.absorption or f.media, "path/vertex_media.cl")
+    ),
     "generated/ghosts.cl": lambda f, _: either(f.lit_ghosts, "path/ghosts.cl"),
     "generated/first_ray.cl": lambda f, _: (
         f"path/first_ray{'_weighted' * (f.camera in WEIGHTED)}.cl",
@@ -107,6 +113,28 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/shape_traversal.cl": lambda f, layout: (
         (f"bvh/{bvh.shapes_layout(layout)}.cl", "bvh/shapes.cl") * bool(f.analytic)
     ),
+    "generated/hit_space.cl": lambda f, _: either(f.instances, "surface/hit_space.cl"),
+    "generated/surface_steps.cl": lambda f, _: (
+        "generated/motion.cl",
+        *either(f.attributes, "surface/attributes.cl"),
+        *either(f.screen_motion and "vertices" in f.moving, "surface/deforms.cl"),
+        *either(f.normals or f.uvs or f.tangents, "surface/triangle.cl"),
+        *either(f.analytic, "surface/analytic.cl"),
+    ),
+    "generated/corner_rows.cl": lambda f, _: (
+        f"surface/corner_rows{'_keyed' * _corners_move(f)}.cl",
+    ),
+    "generated/triangle_steps.cl": lambda f, _: (
+        *either(f.normals, "surface/triangle_normal.cl"),
+        *either(f.uvs, "surface/triangle_uv.cl"),
+        *either(f.uvs and f.tangents and f.vertex_tangents, "surface/triangle_tangents.cl"),
+    ),
+    "generated/uv_tangents.cl": lambda f, _: either(f.tangents, "surface/uv_tangents.cl"),
+    "generated/analytic_steps.cl": lambda f, _: (
+        *either("shapes" in f.moving, "surface/shape_motion.cl"),
+        *either(f.screen_motion and "spheres" in f.moving, "surface/spheres_move.cl"),
+        *either(f.tangents, "surface/analytic_tangents.cl"),
+    ),
     "generated/instances.cl": lambda f, _: ("tracing/instances.cl",) * f.instances,
     "generated/motion.cl": lambda f, _: (
         *either(bool(f.moving), "tracing/motion.cl"),
@@ -124,12 +152,31 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     ),
 }
 
+# likewise, for a scene's features and the kind of material that a program shades
+MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...]]] = {
+    "generated/vertex_steps.cl": lambda f, cls: (
+        *either(flags.names_surfaces(f), "path/vertex_names.cl"),
+        *(
+            when(f.bodies, "path/vertex_bodies_ways.cl")
+            or either(f.absorption or f.media, "path/vertex_media_ways.cl")
+        ),
+        *either(flags.between_bodies(f, cls), "path/between_bodies.cl"),
+        *either(flags.has_lobe(f, cls, "clearcoat_apart"), "path/coat_normal.cl"),
+    ),
+}
+
+
 
 def _screen_motion(features: Features) -> tuple[str, ...]:
     """How what is seen moves across the film, where a layer tells it."""
     files = ("interface/camera.cl", "generated/camera.cl", "generated/screen.cl")
     needed = when(features.screen_motion, *files)
     return (*needed, *either(features.screen_motion, "path/screen_motion.cl"))
+
+
+def _corners_move(features: Features) -> bool:
+    """Whether shading asks for rows of vertices, of meshes that deform."""
+    return "vertices" in features.moving and (features.normals or features.tangents)
 
 
 def _passing(features: Features) -> str:
@@ -149,3 +196,8 @@ def _spectrum_read(features: Features) -> tuple[str, ...]:
 def virtual_files(features: Features, layout: str) -> dict[str, tuple[str, ...]]:
     """Return the files that stand for each name in CHOICES."""
     return {name: choose(features, layout) for name, choose in CHOICES.items()}
+
+
+def material_files(features: Features, cls: type[Scatterer]) -> dict[str, tuple[str, ...]]:
+    """Return the files that stand for each name in MATERIAL_CHOICES."""
+    return {name: choose(features, cls) for name, choose in MATERIAL_CHOICES.items()}

@@ -52,7 +52,7 @@ def filters_at_random(features: Features, cls: type[Scatterer]) -> bool:
     return any(p.linear and "texture" in sources.get(n, ()) for n, p in declared.items())
 
 
-def _has_lobe(features: Features, cls: type[Scatterer], name: str) -> bool:
+def has_lobe(features: Features, cls: type[Scatterer], name: str) -> bool:
     """Whether a material of the scene has a lobe that a parameter of 0 leaves out."""
     declared, none = device_params(cls), frozenset({"none"})
     return name in declared and features.sources_of(cls.kind).get(name, none) != none
@@ -72,6 +72,17 @@ def _first_for_denoisers(features: Features) -> int | bool:
     """The first word of the layers for denoisers, which come last; False where there is none."""
     places = features.layer_places
     return min((places[name] for name in places if LAYERS[name].denoising), default=False)
+
+
+def names_surfaces(features: Features) -> bool:
+    """Whether some layer tells which surface is seen."""
+    named = any(LAYERS[name].form in ("id", "matte") for name in features.layers)
+    return features.screen_motion or named
+
+
+def between_bodies(features: Features, cls: type[Scatterer]) -> bool:
+    """Whether the index outside of a material is that of a body there."""
+    return features.bodies and cls.kind in BETWEEN_BODIES
 
 
 BETWEEN_BODIES = ("dielectric", "rough_dielectric")  # their index outside is that of a body there
@@ -150,9 +161,6 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "FILM_WEIGHTS": lambda f: f.film_weights,
     "USES_LAYERS": lambda f: f.layer_words > 0,
     "LAYER_IDS": lambda f: any(LAYERS[name].form == "id" for name in f.layers),
-    "NAMES_SURFACES": lambda f: (
-        f.screen_motion or any(LAYERS[name].form in ("id", "matte") for name in f.layers)
-    ),
     "SCREEN_MOTION": lambda f: f.screen_motion,
     "MATTES": lambda f: len(f.mattes) or False,
     "MATTE_SLOTS": lambda f: bool(f.mattes) and MATTE_SLOTS,
@@ -185,8 +193,6 @@ MATERIAL: dict[str, Callable[[Features, type[Scatterer]], str | int]] = {
     "BSDF_MERGES": lambda f, cls: f.merged and gathers_photons(f, cls),
     "BSDF_GUIDED": lambda f, cls: f.guided and cls.guided,
     "BSDF_IS_PHASE": lambda f, cls: cls.is_phase,
-    "BSDF_BETWEEN_BODIES": lambda f, cls: f.bodies and cls.kind in BETWEEN_BODIES,
-    "BSDF_COAT_APART": lambda f, cls: _has_lobe(f, cls, "clearcoat_apart"),
     "BSDF_IS_NULL": lambda f, cls: cls.is_null and f.null_surfaces,
     "BSDF_IS_PANE": lambda f, cls: cls.is_pane and f.free_panes,
     "STOCHASTIC_FILTERING": filters_at_random,
@@ -195,10 +201,13 @@ MATERIAL: dict[str, Callable[[Features, type[Scatterer]], str | int]] = {
 
 
 def defines(table: Mapping[str, Callable[..., str | int]], *given: Any) -> Defines:
-    """Return the macros of SCENE for its features, or of MATERIAL for features and a class."""
+    """Return the macros of SCENE for its features, or of MATERIAL for features and a class.
+
+    Those of a material are 0 where they do not hold: kernels also ask for them by `if`.
+    """
     values = {name: value(*given) for name, value in table.items()}
     return {
         name: int(value) if isinstance(value, bool) else value
         for name, value in values.items()
-        if value is not False
+        if value is not False or table is MATERIAL
     }

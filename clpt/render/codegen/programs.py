@@ -97,7 +97,11 @@ def _shading(
     files, defines = _shared(features, layout), flags.defines(flags.SCENE, features)
     texts = {}
     for cls in features.leaves:
-        own = {**files, "generated/bsdf.cl": stages.bsdf_text(features, cls)}
+        own = {
+            **files,
+            **choices.material_files(features, cls),
+            "generated/bsdf.cl": stages.bsdf_text(features, cls),
+        }
         if cls.is_phase:
             own["generated/shading_frame.cl"] = ("path/phase_frame.cl",)
         if cls.source is not None:

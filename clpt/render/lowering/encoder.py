@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import SceneError
+from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.render.analysis.wavelengths import Density
 from clpt.render.contract.features import Sources
 from clpt.render.contract.parameter_words import (
@@ -16,7 +17,6 @@ from clpt.render.contract.parameter_words import (
     REAL_WORDS,
     SPECTRUM_WORDS,
 )
-from clpt.render.lowering.lowering_cache import LoweringCache
 from clpt.render.lowering.spectra import thin_films
 from clpt.render.lowering.spectra.spectra_table import SpectraTable
 from clpt.render.lowering.tables import TableStore, Words, as_words

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from clpt.records import PHOTON
 from clpt.render.analysis import cameras
-from clpt.render.lowering.geometry import Geometry
+from clpt.render.analysis.geometry import Geometry
 from clpt.scene.cameras import Camera
 from clpt.scene.integrators import Vcm
 

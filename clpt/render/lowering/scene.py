@@ -18,7 +18,16 @@ from clpt.render.analysis import cameras, open_boundaries
 from clpt.render.analysis.bodies import matter_of
 from clpt.render.analysis.checks import check
 from clpt.render.analysis.colour import sensor
+from clpt.render.analysis.geometry import (
+    SHAPE_ONE_LIGHT,
+    Emitter,
+    Geometry,
+    Owner,
+    assembled,
+    spheres_move,
+)
 from clpt.render.analysis.index import SceneIndex
+from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.render.analysis.sealed import sealed_media
 from clpt.render.analysis.surroundings import (
     bodies_around,
@@ -39,27 +48,20 @@ from clpt.render.lowering.device_arrays import is_table
 from clpt.render.lowering.device_grids import DeviceGrid
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.features import features_of
-from clpt.render.lowering.geometry import (
-    SHAPE_ONE_LIGHT,
-    Emitter,
-    Geometry,
-    lower_geometry,
-    shape_words,
-)
+from clpt.render.lowering.geometry import lower_geometry, shape_words
 from clpt.render.lowering.layer_names import lower_names
 from clpt.render.lowering.lights.aims import aims
 from clpt.render.lowering.lights.hard_light import Lit, decided
 from clpt.render.lowering.lights.light_bounds import Bounds
 from clpt.render.lowering.lights.light_level import light_level
 from clpt.render.lowering.lights.lights import Around, LightRows, light_rows, row_order
-from clpt.render.lowering.lowering_cache import LoweringCache
 from clpt.render.lowering.materials.material_words import MaterialWords
 from clpt.render.lowering.media.body_words import BodyWords
 from clpt.render.lowering.media.light_media import NOWHERE, LightMedia, light_media
 from clpt.render.lowering.media.medium_words import MediumWords, medium_aims
 from clpt.render.lowering.motion import lower_motion
 from clpt.render.lowering.settings import DEEPEST, settings_of
-from clpt.render.lowering.textures.attributes import Owner, lower_attributes
+from clpt.render.lowering.textures.attributes import lower_attributes
 from clpt.scene import Scene
 from clpt.scene import materials as mt
 from clpt.scene.integrators import Film, Integrator
@@ -145,7 +147,9 @@ def lower(
     encoder = Encoder(index.mode, *ends, sensor(film), wavelengths, texture_budget, cache)
     filters.lower_filter(film.filter, encoder.store, index.splatting)
     materials = _begin_materials(index, encoder)
-    geometry = lower_geometry(index, encoder, materials)
+    geometry = assembled(index, cache)
+    moves = spheres_move(index)
+    geometry = lower_geometry(geometry, encoder, materials, spheres_move=moves)
     sealed = sealed_media(index, cache) if index.media else frozenset()
     media = MediumWords(index, encoder, materials, sealed)
     sphere = geometry.bounding_sphere()

@@ -124,7 +124,6 @@ def test_only_what_absorbs_is_asked_for_a_medium(mode: str) -> None:
         for name in ("generate", "shade_dielectric", "shade_rough_dielectric", "shade_diffuse"):
             text = texts[name].text
             assert ("inline Spectrum medium_transmittance(" in text) == there
-            assert ("#define USES_ABSORPTION 1" in text) == there
         assert ("inline integer medium_beyond(" in texts["shade_diffuse"].text) == there
         device.build(device.choose(), texts["shade_rough_dielectric"], QUICK_TO_COMPILE)
 
@@ -138,11 +137,9 @@ def test_only_what_fluoresces_shifts_wavelengths() -> None:
     ):
         texts = programs.sources(lowered(materials, mode).features, "wide8", 8, queued=False)
         there = len(materials) > 1 and mode == "spectral"
-        assert ("#define USES_FLUORESCENCE 1" in texts["generate"].text) == there
         for name, source in texts.items():
             shifts = there and name == "shade_fluorescent"
             assert ("inline Wavelengths reradiation_shift(" in source.text) == shifts
-            assert ("#define BSDF_FLUORESCES 1" in source.text) == shifts
 
 
 def test_a_material_more_does_not_change_the_others() -> None:

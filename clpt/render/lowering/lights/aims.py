@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.geometry import shape_records
+from clpt.render.analysis.geometry import Geometry
 from clpt.render.analysis.index import SceneIndex
-from clpt.render.lowering.geometry import Geometry
 from clpt.scene import materials as mt
 
 AIMED = 0.7  # share of the light paths that aim

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from clpt.geometry import analytic, shape_records, shapes, triangles
 from clpt.render.analysis import cameras, surroundings
+from clpt.render.analysis.geometry import Emitter, Geometry
 from clpt.render.analysis.index import SceneIndex
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.geometry import Emitter, Geometry
 from clpt.render.lowering.lights import image_lights, light_bounds, sky
 from clpt.render.lowering.lights.aims import is_sharp, sharp_pieces
 from clpt.render.lowering.lights.lights import LightRows, row_order

@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt import images, spectral_exr, transforms
-from clpt.arrays import on_host
+from clpt.arrays import fits_single, on_host
 from clpt.errors import SceneError
+from clpt.render.analysis.lowering_cache import version
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.lights import block_grids
-from clpt.render.lowering.lowering_cache import version
 from clpt.render.lowering.textures.texels import bands, texels
 from clpt.scene.lights import CubeMap, Envmap, Sky
 from clpt.spectra import Tabulated, luminance
@@ -160,7 +160,7 @@ def axes_of(lamp: Envmap | CubeMap | Sky) -> NDArray[np.float64]:
     """Where the light's own axes point, the columns of (3, 3)."""
     matrix = np.asarray(lamp.to_world, np.float64)
     where = f"{lamp.kind}.to_world"
-    if matrix.shape != (4, 4) or transforms.is_singular(matrix):
+    if matrix.shape != (4, 4) or transforms.is_singular(matrix) or not fits_single(matrix):
         raise SceneError("must be an invertible (4, 4) matrix", where=where)
     axes = matrix[:3, :3] / np.linalg.norm(matrix[:3, :3], axis=0)
     if np.abs(axes.T @ axes - np.eye(3)).max() > 1e-5:

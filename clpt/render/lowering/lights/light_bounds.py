@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt.geometry import analytic, shapes
+from clpt.arrays import Faces, Points
+from clpt.geometry import analytic
 from clpt.scene import lights
 from clpt.scene.lights import Light
 from clpt.scene.shapes import Shape
@@ -78,7 +79,7 @@ def of_shape(shape: Shape, two_sided: bool) -> Bounds:
     return _one(low, axis, 0.0, np.pi / 2.0, high=high, both=two_sided)
 
 
-def of_triangles(vertices: shapes.Points, faces: shapes.Faces, two_sided: bool) -> Bounds:
+def of_triangles(vertices: Points, faces: Faces, two_sided: bool) -> Bounds:
     """Return the bounds (m) of triangles (m, 3); the front is on the winding's side."""
     corners = np.asarray(vertices, np.float64)[faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

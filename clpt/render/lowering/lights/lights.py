@@ -13,17 +13,18 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from clpt.arrays import Faces, Points
 from clpt.errors import SceneError
 from clpt.geometry import analytic, shape_records, shapes, spheres, triangles
 from clpt.records import LIGHT
+from clpt.render.analysis.geometry import Emitter
+from clpt.render.analysis.lowering_cache import content
 from clpt.render.contract.light_records import ALONG, BOTH, FRONT, INFINITE, KINDS, VOLUME
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.geometry import Emitter
 from clpt.render.lowering.lights import light_bounds, light_tree
 from clpt.render.lowering.lights.brick_lights import BrickLights
 from clpt.render.lowering.lights.non_shape_lights import blank_row, brightness, lower_lamp
 from clpt.render.lowering.lights.triangle_means import triangle_means
-from clpt.render.lowering.lowering_cache import content
 from clpt.render.lowering.textures.textures import per_face
 from clpt.scene.lights import DirectionalArea, Light
 from clpt.scene.shapes import Shape
@@ -225,20 +226,20 @@ def _face_attributes(shape: Shape, value: Any) -> dict[str, NDArray[np.float32]]
     return {name: triangles.attribute(shape, name) for name in names if per_face(name)}
 
 
-def _triangle_rows(vertices: shapes.Points, faces: shapes.Faces, keys: int) -> NDArray[np.uint32]:
+def _triangle_rows(vertices: Points, faces: Faces, keys: int) -> NDArray[np.uint32]:
     """Rows of `Triangle` (m, 10 k) uint32 of faces: one for each of k keys, side by side."""
     rows = [triangles.triangle_rows(vertices, faces + np.uint32(i)) for i in range(keys)]
     return np.ascontiguousarray(np.hstack(rows))
 
 
-def _triangle_areas(vertices: shapes.Points, faces: shapes.Faces, keys: int) -> NDArray[np.float64]:
+def _triangle_areas(vertices: Points, faces: Faces, keys: int) -> NDArray[np.float64]:
     """The mean area over all keys (m,) [m^2]: by it triangles are chosen, at any time alike."""
     areas = (triangles.triangle_areas(vertices, faces + np.uint32(i)) for i in range(keys))
     return np.asarray(sum(areas) / keys)
 
 
 def _triangle_bounds(
-    vertices: shapes.Points, faces: shapes.Faces, keys: int, two_sided: bool
+    vertices: Points, faces: Faces, keys: int, two_sided: bool
 ) -> light_bounds.Bounds:
     """Bounds (m) that hold at all times: between two keys a triangle is in the box around both."""
     first, *others = (

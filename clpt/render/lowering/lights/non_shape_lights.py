@@ -7,6 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from clpt import transforms
+from clpt.arrays import fits_single
 from clpt.errors import SceneError
 from clpt.render.contract import light_records
 from clpt.render.contract.light_records import RECORDS
@@ -72,6 +74,8 @@ def lower_lamp(lamp: Light, encoder: Encoder, scene_radius: float) -> Lowered:
         strength = float(np.mean([brightness(value) for value in emissions.values()]))
     words = np.zeros(1, RECORDS[kind].dtype)
     for name, value in members.items():
+        if not fits_single(value):
+            raise SceneError("is beyond float32, 3.4e38", where=f"{lamp.kind}.{name}")
         words[name] = value
     at = encoder.store.append("light_params", words.view(np.uint32))
     sent = power(lamp, strength, scene_radius)
@@ -133,7 +137,7 @@ def _three(value: ArrayLike, where: str) -> NDArray[np.float64]:
 
 def _unit(value: ArrayLike, where: str) -> NDArray[np.float64]:
     vector = _three(value, where)
-    length = float(np.linalg.norm(vector))
+    length = transforms.length(vector)
     if not length > 0.0:
         raise SceneError("has no length", where=where)
     return vector / length

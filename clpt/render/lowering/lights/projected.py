@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt import transforms
+from clpt.arrays import fits_single
 from clpt.errors import SceneError
 from clpt.render.lowering.encoder import Encoder
 from clpt.scene.lights import SPOT_EDGES, Goniometric, Light, Projector, Spot
@@ -47,7 +48,7 @@ def members(lamp: Light, encoder: Encoder) -> dict[str, ArrayLike]:
 def invertible(to_world: ArrayLike, where: str) -> NDArray[np.float64]:
     """Return a light's transform. Raises SceneError for a matrix without an inverse."""
     matrix = np.asarray(to_world, np.float64)
-    if matrix.shape != (4, 4) or transforms.is_singular(matrix):
+    if matrix.shape != (4, 4) or transforms.is_singular(matrix) or not fits_single(matrix):
         raise SceneError("must be an invertible (4, 4) matrix", where=where)
     return matrix
 

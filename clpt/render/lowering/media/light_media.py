@@ -18,11 +18,11 @@ from clpt.geometry import analytic, shapes, winding
 from clpt.geometry.motion import Motions
 from clpt.render.analysis import surroundings
 from clpt.render.analysis.bodies import matter_of
+from clpt.render.analysis.geometry import Emitter, Geometry
 from clpt.render.analysis.index import SceneIndex
-from clpt.render.lowering.geometry import Emitter, Geometry
+from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.render.lowering.lights import light_bounds
 from clpt.render.lowering.lights.lights import LightRows, row_order
-from clpt.render.lowering.lowering_cache import LoweringCache
 from clpt.render.lowering.media.body_words import BodyWords
 from clpt.render.lowering.media.medium_words import MediumWords
 from clpt.scene import Scene
