@@ -1,4 +1,4 @@
-"""What `clpt render --verbose` prints on stderr."""
+"""The figures that `clpt render --verbose` prints on stderr."""
 
 from __future__ import annotations
 
