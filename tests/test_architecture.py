@@ -60,7 +60,7 @@ FLOORS_OF_COMMANDS = (
 # What kinds share, by what a reader looks for.
 SHARED = {
     "colour", "core", "denoising", "film", "guiding", "interface", "lighting", "media", "merging",
-    "optics", "path", "spectrum", "surface", "texturing", "tracing",
+    "optics", "path", "spectrum", "steps", "surface", "texturing", "tracing",
 }  # fmt: skip
 KINDS = {"bsdf", "phase", "camera", "emission", "light", "medium", "sampler", "shape", "texture"}
 # kernels/<folder>: the folders that its files may include; generated text stands between them.
