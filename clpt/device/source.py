@@ -104,7 +104,7 @@ def assemble(
     *,
     library: bool = False,
 ) -> Source:
-    """Return the text of `root` with its includes in place, each file once, and what it needs alone.
+    """Return the text of `root` with its includes in place, each file once, and nothing unused.
 
     root: a path under the kernels folder ("stage/shade.cl") or the name of a virtual file.
     virtual: name -> generated text, a Part, or the names of files that stand for it, includable by
@@ -117,9 +117,9 @@ def assemble(
     the text names are left out too, unless it is a library, or they are of a Part that pastes names
     together. So programs that differ by nothing else are built once.
 
-    A `#line` before every part, and where rows are left out of a file, lets a compiler name our file
-    and line; generated files are numbered as they stand in the text. Includes are resolved before
-    the preprocessor runs, so they have to stand outside of `#if`.
+    A `#line` before every part, and where rows are left out of a file, lets a compiler name our
+    file and line; generated files are numbered as they stand in the text. Includes are resolved
+    before the preprocessor runs, so they have to stand outside of `#if`.
 
     Raises KernelBuildError for an include that names nothing, or that stands inside an `#if`, and
     for an `#if` without its end.
@@ -163,9 +163,11 @@ def _pieces(text: str, first: int) -> tuple[_Piece, ...]:
     for row in rows_of(text, first):
         rows = found[-1].rows
         if not row.directive:
-            if not (rows and isinstance(rows[-1], list)):
-                rows.append([])
-            rows[-1].append(row)
+            last = rows[-1] if rows else None
+            if isinstance(last, list):
+                last.append(row)
+            else:
+                rows.append([row])
             continue
         if row.directive in OPENING:
             openings.append(row.number)

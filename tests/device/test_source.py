@@ -108,7 +108,9 @@ def test_what_is_not_a_definition_stays(kept: str):
     assert "unused" not in assemble("a", {"a": text}).text
 
 
-@pytest.mark.parametrize("macro", ["LAYOUT(verb) wide_##verb", "END(x) x##_closest", "A(x) f(wide_##x)"])
+@pytest.mark.parametrize(
+    "macro", ["LAYOUT(verb) wide_##verb", "END(x) x##_closest", "A(x) f(wide_##x)"]
+)
 def test_names_that_are_pasted_together_are_named(macro: str):
     name = macro.split("(")[0]
     text = f"#define {macro}\nreal wide_closest(void);\nkernel void k(void) {{ {name}(closest); }}"

@@ -7,7 +7,7 @@ import re
 from clpt.device import kernels_folder
 from clpt.render.codegen import flags, programs
 from clpt.render.lowering.scene import lower
-from clpt.scene import Film, Scene, materials, shapes
+from clpt.scene import Film, Scene, lights, materials, shapes
 from clpt.scene.cameras import Perspective
 from clpt.spectra import Tabulated
 
@@ -38,7 +38,8 @@ def test_every_flag_is_asked_for() -> None:
 
 
 def test_only_flags_that_kernels_calculate_with_are_in_the_text() -> None:
-    scene = Scene(camera=Perspective(), shapes=[shapes.Sphere()], film=Film(width=4, height=4))
+    film, sky = Film(width=4, height=4), lights.Constant()
+    scene = Scene(camera=Perspective(), shapes=[shapes.Sphere()], lights=[sky], film=film)
     texts = programs.sources(lower(scene).features, "wide8", 1, queued=False)
     head = texts["shade_diffuse"].text.split("#line", 1)[0]
     assert "USES_ANALYTIC" not in head and "USES_INSTANCES" not in head
