@@ -94,7 +94,7 @@ class _Front(ModuleType):
     def __getattr__(self, name: str) -> Any:
         if name in _HOMES:
             module, inside = _HOMES[name]
-            value = getattr(importlib.import_module(f"clpt.{module}"), inside)
+            value = vars(importlib.import_module(f"clpt.{module}"))[inside]
             if name in _SHOWN:
                 _give_widgets()
         else:

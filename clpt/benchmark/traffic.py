@@ -56,7 +56,7 @@ def traffic(features: Features, layout: str, *, queued: bool = False) -> dict[st
 
 
 def _moved(text: str, sizes: Mapping[str, int], read: int, written: int) -> Moved:
-    """What an item moves; sizes: of the members of slabs; read, written: beside these; in words."""
+    """Count what an item moves, in words; sizes: of slabs' members; read, written: beside these."""
     words: dict[str, set[str]] = {"load": set(), "store": set()}
     for call in _CALL.finditer(_COMMENT.sub("", text)):
         if call["member"] in sizes:

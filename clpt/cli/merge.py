@@ -6,10 +6,10 @@ from pathlib import Path
 
 import click
 
-from .. import __version__
 from ..errors import SceneError
 from ..render.film import film_file
 from ..render.film.saved_film import SavedFilm, other_devices
+from ..version import VERSION
 from .files import checkpoints, outputs
 from .files.targets import checked
 from .options.grading import GradingOptions, grading_options, names_option
@@ -53,7 +53,7 @@ def merge(
         note(f"clpt: warning: the films are of several classes of devices: {change}")
     origin = total.origin.scene.values
     stats: dict[str, str | int | float] = {
-        "software": f"clpt {__version__}",
+        "software": f"clpt {VERSION}",
         "integrator": str(origin["integrator.type"]),
         "sampler": str(origin["sampler.type"]),
         "seed": int(origin["seed"] or 0),

@@ -181,20 +181,25 @@ def tangents(shape: shapes.Mesh) -> Points:
     return made
 
 
+def per_face(name: str) -> bool:
+    """Return whether an attribute has a value for each face, by its name."""
+    return name.startswith("face_")
+
+
 def attribute(shape: Shape, name: str) -> Points:
     """Return an attribute of a mesh, (n, 1 or 3) float32 per vertex, or per face of `triangulate`.
 
     Raises SceneError for one that has another shape, or values that are not finite.
     """
-    per_face = name.startswith("face_")
+    by_face = per_face(name)
     if shape.kind in ONE_OF:
         count = len(shape.centers)  # type: ignore[attr-defined]
-        if per_face:
+        if by_face:
             message = f"attribute {name!r}: spheres have no faces, its name must begin with vertex_"
             raise SceneError(message, where=where(shape))
     else:
         vertices, faces, _, _ = _in_world(shape)
-        count = len(faces) if per_face else len(vertices)
+        count = len(faces) if by_face else len(vertices)
     given: Any = shape.attributes[name]  # type: ignore[attr-defined]
     values = np.asarray(on_host(given), np.float32)
     values = values[:, None] if values.ndim == 1 else values
@@ -203,7 +208,7 @@ def attribute(shape: Shape, name: str) -> Points:
         raise SceneError(message, where=where(shape))
     if not np.isfinite(values).all():
         raise SceneError(f"attribute {name!r} is not finite", where=where(shape))
-    return values[_solid(vertices, faces)] if per_face else values
+    return values[_solid(vertices, faces)] if by_face else values
 
 
 def _in_world(

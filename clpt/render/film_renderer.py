@@ -21,7 +21,7 @@ from clpt.render.film import film_file
 from clpt.render.film.denoised_picture import DenoisedPicture
 from clpt.render.film.developed import Developed
 from clpt.render.film.pictures import Image, Pictures
-from clpt.render.film.saved_film import SavedFilm, Session
+from clpt.render.film.saved_film import Origin, SavedFilm, Session
 from clpt.render.locking import Stop, synchronized
 from clpt.render.progress import Progress
 from clpt.render.wavefront import adaptive
@@ -29,6 +29,7 @@ from clpt.render.wavefront.adaptive import Adaptive
 from clpt.render.wavefront.film_state import FilmState
 from clpt.render.wavefront.wavefront import Counts
 from clpt.scene import Scene
+from clpt.scene.cameras import Camera
 from clpt.scene.fingerprint import Plain
 from clpt.version import VERSION
 
@@ -111,7 +112,18 @@ class FilmRenderer(FilmOwner, Pictures):
             "adaptive": {} if chosen is None else chosen.arrays(),
         }
 
+    @abstractmethod
+    def origin(self) -> Origin:
+        """Return what the samples are of. Raises SceneError for a scene that cannot be read."""
+
     # ---- samples
+
+    def prepare(self) -> None:
+        """Get ready, so that the first samples come at once; others may do so by themselves."""
+
+    @abstractmethod
+    def update(self, *, camera: Camera | None = None, scene: Scene | None = None) -> Any:
+        """Render another scene from now on, or another camera, and begin again at sample 0."""
 
     @synchronized
     def run(

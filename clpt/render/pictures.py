@@ -16,6 +16,7 @@ from clpt.colour.view import View
 from clpt.render.film.resolve import Resolve
 from clpt.render.film_renderer import FilmRenderer
 from clpt.render.locking import synchronized
+from clpt.render.stats import RenderStats
 from clpt.render.wavefront.wavefront import Wavefront
 
 
@@ -34,6 +35,11 @@ class DevicePictures(FilmRenderer):
     @abstractmethod
     def wavefront(self) -> Wavefront:
         """The wavefront whose film holds the picture."""
+
+    @property
+    @abstractmethod
+    def stats(self) -> RenderStats:
+        """Figures of what the render took so far: numbers of things, bytes, seconds."""
 
     @property
     @synchronized

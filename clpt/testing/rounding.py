@@ -26,7 +26,8 @@ def contracts(on: device.Device) -> bool:
     """Return whether the device's compiler makes an fma of a product and a sum that stand apart.
 
     Which of them it joins depends on the rest of the program. So one expression is rounded in two
-    ways in two programs, and lanes of two widths agree to CONTRACTED, where others agree to the bit.
+    ways in two programs, and lanes of two widths agree to CONTRACTED; elsewhere they agree to the
+    bit.
     """
     given = np.array([[1 + 2.0**-12], [1 + 2.0**-11]])  # a number, and its square as rounded
     return bool(run(on, {"probe.cl": _TEXT}, 1, given, 1)[0, 0] != 0.0)

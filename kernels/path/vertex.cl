@@ -90,6 +90,15 @@ inline Scattering vertex_scattering(Scene scene, Slab path, uint at, mask active
     return scatter;
 }
 
+/* Whether a collision is in a medium that no ray to a light leaves. */
+#if USES_LIGHTS && BSDF_IS_PHASE && SEALED_MEDIA
+#define BSDF_IS_SEALED 1
+#define vertex_sealed(v) (((v).media.medium & MEDIUM_SEALED) != 0)
+#else
+#define BSDF_IS_SEALED 0
+#define vertex_sealed(v) mask_of(0)
+#endif
+
 /* The normal of the hemisphere to which the material sends light, 0 if to the whole sphere: for interface/light.cl. */
 inline vec3 vertex_hemisphere(Frame frame, vec3 wo)
 {

@@ -20,7 +20,6 @@
 #include "generated/medium.cl"
 #include "path/vertex.cl"
 #include "path/hero.cl"
-#include "path/roulette.cl"
 #include "generated/integrator.cl"
 
 #if QUEUED

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from ... import __version__, images
+from ... import images
 from ...device import disk_cache
 from ...errors import ClptError, SceneError
 from ...render.film import film_file, layer_channels
@@ -17,6 +17,7 @@ from ...render.film.denoised_picture import DenoisedPicture
 from ...render.film.saved_film import SavedFilm
 from ...render.film_renderer import FilmRenderer
 from ...render.pictures import DevicePictures
+from ...version import VERSION
 from ..options.grading import Grading
 from .standard_output import is_standard
 from .targets import FILM
@@ -32,7 +33,7 @@ def metadata(renderer: DevicePictures, scene: Path, seconds: float) -> dict[str,
     """
     plan = renderer.scene
     return {
-        "software": f"clpt {__version__}",
+        "software": f"clpt {VERSION}",
         "scene": os.fsencode(scene).decode("utf-8", "replace"),
         "mode": plan.film.mode,
         "integrator": plan.integrator.kind,

@@ -1,4 +1,4 @@
-"""What a scene holds, as `clpt info` shows it."""
+"""The contents of a scene, as `clpt info` shows them."""
 
 from __future__ import annotations
 

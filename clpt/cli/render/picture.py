@@ -122,7 +122,7 @@ def _open(job: Job, former: _Former, shown: Display, resources: ExitStack) -> _O
 
 
 class _Picture:
-    """What is written of a render: pictures and films so far, and those of its end.
+    """Writes the pictures and films of a render, while it goes on and at its end.
 
     ready: when it began [s of time.perf_counter].
     """

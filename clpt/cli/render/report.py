@@ -1,14 +1,14 @@
-"""What `clpt render --verbose` prints on stderr."""
+"""The figures that `clpt render --verbose` prints on stderr."""
 
 from __future__ import annotations
 
 import click
 
 from ...cluster.multi_renderer import MultiRenderer
-from ..opening.makers import OfDevices
+from ..opening.makers import AnyRenderer
 
 
-def before(renderer: OfDevices, loading: float) -> None:
+def before(renderer: AnyRenderer, loading: float) -> None:
     """Print what was made of the scene, and the time; loading: seconds for its file."""
     first, stats = renderer.wavefront, renderer.stats
     for on in renderer.devices:
@@ -47,7 +47,7 @@ def before(renderer: OfDevices, loading: float) -> None:
         )
 
 
-def after(renderer: OfDevices) -> None:
+def after(renderer: AnyRenderer) -> None:
     """Print the time of the first sample, what each device did, and each stage of the first."""
     if isinstance(renderer, MultiRenderer):
         for one in renderer.shares:

@@ -49,36 +49,22 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         *either(f.infinite and bool(f.light_layers), "path/sky_layers.cl"),
     ),
     "generated/join_light.cl": lambda f, _: either(f.shows_lights, "lighting/join_light.cl"),
-    "generated/guide.cl": lambda f, _: ("guiding/guide.cl",) * f.guided,
-    "generated/gather.cl": lambda f, _: (
-        ("generated/photon.cl", "merging/gather.cl") * (f.merged and not f.light_paths)
-    ),
     "generated/layer_sums.cl": lambda f, _: (
         *either(f.layer_words > 0, "film/layers.cl"),
         *_screen_motion(f),
     ),
     "generated/layers.cl": lambda f, _: (
-        ("generated/layer_args.cl", *_screen_motion(f), "path/layers.cl") * (f.layer_words > 0)
+        when(f.layer_words > 0, "generated/layer_args.cl", *_screen_motion(f), "path/layers.cl")
+        or ("path/layers_none.cl",)
     ),
     "generated/light_layers.cl": lambda f, _: (
-        ("generated/light_layer_args.cl", "generated/sampler.cl", "film/light_layers.cl")
-        * bool(f.light_layers)
+        *when(f.light_layers, "generated/light_layer_args.cl", "generated/sampler.cl"),
+        *either(f.light_layers, "film/light_layers.cl"),
     ),
+    "generated/met_weight.cl": lambda f, _: either(f.balanced, "steps/met_weight.cl"),
     "generated/flight_layers.cl": lambda f, _: (
         ("film/light_layers.cl",)
         * (bool(f.light_layers) and f.emissive_media and not f.light_paths)
-    ),
-    "generated/rivals.cl": lambda f, _: (
-        (
-            "generated/merging.cl",
-            "interface/camera.cl",
-            "generated/camera.cl",
-            "film/connect.cl",
-            "generated/connect.cl",
-            "lighting/rivals.cl",
-        )
-        if f.balanced
-        else ()
     ),
     "generated/medium.cl": lambda f, _: (
         ("generated/medium_coefficients.cl", "media/medium.cl") * (f.absorption or f.media)
@@ -152,8 +138,44 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     ),
 }
 
+_RIVALS = (
+    "generated/merging.cl",
+    "interface/camera.cl",
+    "generated/camera.cl",
+    "film/connect.cl",
+    "generated/connect.cl",
+    "lighting/rivals.cl",
+)
+
+
+def _merges(features: Features, cls: type[Scatterer]) -> bool:
+    """Whether paths from the camera are merged with photons at a material."""
+    return features.merged and flags.gathers_photons(features, cls)
+
+
 # likewise, for a scene's features and the kind of material that a program shades
 MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...]]] = {
+    "generated/rivals.cl": lambda f, cls: (
+        when(f.balanced and not flags.is_null(f, cls), *_RIVALS) or ("lighting/rivals_none.cl",)
+    ),
+    "generated/guide.cl": lambda f, cls: (
+        ("guiding/guided_vertex.cl",)
+        if flags.is_guided(f, cls) and not f.light_paths
+        else ("guiding/guide_none.cl",)
+    ),
+    "generated/path_steps.cl": lambda f, cls: (
+        *either(cls.kind in f.shining, "steps/met_emission.cl"),
+        *when(_merges(f, cls), "generated/photon.cl", "merging/gather.cl"),
+        *either(_merges(f, cls), "steps/merge.cl"),
+        *either(f.lights and not cls.delta, "steps/next_event.cl"),
+        *either(not flags.is_null(f, cls), "steps/roulette.cl"),
+        *either(not flags.is_null(f, cls), "steps/scatters.cl"),
+    ),
+    "generated/light_path_steps.cl": lambda f, cls: (
+        *either(f.joined and not cls.delta, "steps/join_camera.cl"),
+        "steps/adjoint_weight.cl",
+        *either(not flags.is_null(f, cls), "steps/light_path_roulette.cl"),
+    ),
     "generated/vertex_steps.cl": lambda f, cls: (
         *either(flags.names_surfaces(f), "path/vertex_names.cl"),
         *(

@@ -75,6 +75,16 @@ def _first_for_denoisers(features: Features) -> int | bool:
     return min((places[name] for name in places if LAYERS[name].denoising), default=False)
 
 
+def is_null(features: Features, cls: type[Scatterer]) -> bool:
+    """Whether a material is none: paths cross it as if nothing were there."""
+    return cls.is_null and features.null_surfaces
+
+
+def is_guided(features: Features, cls: type[Scatterer]) -> bool:
+    """Whether a guide helps to choose directions at a material."""
+    return features.guided and cls.guided
+
+
 def names_surfaces(features: Features) -> bool:
     """Whether some layer tells which surface is seen."""
     named = any(LAYERS[name].form in ("id", "matte") for name in features.layers)
@@ -192,9 +202,9 @@ MATERIAL: dict[str, Callable[[Features, type[Scatterer]], str | int]] = {
     "BSDF_FLUORESCES": fluoresces,
     "BSDF_ENDS_LIGHT_PATHS": lambda f, cls: f.balanced and ends_light_paths(f, cls),
     "BSDF_MERGES": lambda f, cls: f.merged and gathers_photons(f, cls),
-    "BSDF_GUIDED": lambda f, cls: f.guided and cls.guided,
+    "BSDF_GUIDED": is_guided,
     "BSDF_IS_PHASE": lambda f, cls: cls.is_phase,
-    "BSDF_IS_NULL": lambda f, cls: cls.is_null and f.null_surfaces,
+    "BSDF_IS_NULL": is_null,
     "BSDF_IS_PANE": lambda f, cls: cls.is_pane and f.free_panes,
     "STOCHASTIC_FILTERING": filters_at_random,
     "USES_CHOICE": lambda f, cls: cls.uses_lobe_sample or cls.fluoresces or f.many_lights,

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.records import SETTINGS
+from clpt.render.analysis import photons
 from clpt.render.analysis.colour import film_scale, output_matrix
 from clpt.render.analysis.geometry import Geometry
 from clpt.render.analysis.index import SceneIndex
 from clpt.render.analysis.wavelengths import Density
-from clpt.render.lowering import guides, photons
+from clpt.render.lowering import guides
 from clpt.render.lowering.lights.lights import LightRows
 from clpt.spectra.cie import tanh_ends
 

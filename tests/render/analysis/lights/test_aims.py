@@ -10,7 +10,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from clpt import transforms as tf
-from clpt.render.lowering.lights.aims import AIMED, CELLS, MOST, is_sharp
+from clpt.render.analysis.lights.aims import AIMED, CELLS, MOST, is_sharp
 from clpt.render.lowering.scene import lower
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from clpt.render.analysis.lights import sources
+from clpt.render.analysis.lights.triangle_means import LEAST, triangle_means
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.lights import lights
-from clpt.render.lowering.lights.triangle_means import LEAST, triangle_means
 from clpt.scene.lights import Area
 from clpt.scene.shapes import Mesh
 from clpt.scene.textures import Bitmap, Checkerboard, Mix, Product
@@ -80,7 +81,9 @@ def test_dark_triangles_are_seldom_chosen():
         emission=Area(radiance=Bitmap(image=image)),
     )  # fmt: skip
     emitter = lights.Emitter(mesh, 0, mesh.vertices, faces, uvs)
-    pmf = lights.light_rows([], [emitter], Encoder("rgb"), 1.0).rows["pmf"].astype(float)
+    encoder = Encoder("rgb")
+    found = sources.measured([], [emitter], 1.0, encoder.look)
+    pmf = lights.light_rows([], [emitter], encoder, found).rows["pmf"].astype(float)
     middle = uvs[faces].mean(axis=1)
     bright = (middle[:, 0] < 0.25) & (middle[:, 1] > 0.75)
     assert bright.sum() == 8

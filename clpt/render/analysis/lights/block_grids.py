@@ -9,13 +9,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-
-from clpt.render.lowering.encoder import Encoder
 
 Floats = NDArray[np.float64]
 Directions = Callable[[ArrayLike, ArrayLike], Floats]  # unit (..., 3) of rows and columns 0 to 1
@@ -39,24 +36,6 @@ class BlockGrid(NamedTuple):
     block_rows: int
     block_columns: int
     total: float
-
-
-def members(corners: NDArray[Any], grid: BlockGrid, encoder: Encoder) -> dict[str, ArrayLike]:
-    """Put a grid, and the weights at its corners, into the tables; return a record's members.
-
-    A power of two brings the largest weight next to 1, so that squares of weights stay in float32.
-    """
-    append = partial(encoder.store.append_floats, "distributions")
-    unit = 2.0 ** math.frexp(float(corners.max()))[1]
-    return {
-        "corners": append(corners / unit),
-        "marginal": append(grid.marginal),
-        "conditional": append(grid.conditional),
-        "blocks": append(grid.blocks),
-        "block_rows": grid.block_rows,
-        "block_columns": grid.block_columns,
-        "norm": unit / grid.total if grid.total > 0.0 else 0.0,
-    }
 
 
 def of(

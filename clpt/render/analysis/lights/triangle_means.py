@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.render.lowering.lights.non_shape_lights import brightness
+from clpt.render.analysis.lights.light_power import brightness
 from clpt.scene.pixels import pixels
 from clpt.scene.textures import Bitmap, Checkerboard, MeshAttribute, Mix, Product
 

@@ -19,10 +19,11 @@ from clpt.geometry import analytic, shape_records, shapes, triangles
 from clpt.render.analysis import cameras, surroundings
 from clpt.render.analysis.geometry import Emitter, Geometry
 from clpt.render.analysis.index import SceneIndex
-from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.lights import image_lights, light_bounds, sky
-from clpt.render.lowering.lights.aims import is_sharp, sharp_pieces
-from clpt.render.lowering.lights.lights import LightRows, row_order
+from clpt.render.analysis.lights import image_lights, light_bounds, sky_light
+from clpt.render.analysis.lights.aims import is_sharp, sharp_pieces
+from clpt.render.analysis.lights.look import Look
+from clpt.render.analysis.lights.sources import Sources
+from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.scene import materials as mt
 from clpt.scene.integrators import AUTO, Auto, Integrator, Path, Vcm
 from clpt.scene.lights import CubeMap, Envmap, Sky
@@ -56,8 +57,8 @@ class Lit:
 
     index: SceneIndex
     geometry: Geometry
-    encoder: Encoder
-    lights: LightRows
+    look: Look
+    sources: Sources
     sphere: Ball
     extinction: NDArray[np.float64]
 
@@ -141,8 +142,8 @@ def _in_fog(lit: Lit) -> tuple[Integrator, str] | None:
     """
     if not lit.extinction.any():
         return None
-    share = lit.lights.power / max(lit.lights.power.sum(), 1e-300)
-    bounds = light_bounds.concatenated(lit.lights.bounds)
+    share = lit.sources.power / max(lit.sources.power.sum(), 1e-300)
+    bounds = light_bounds.concatenated([one.bounds for one in lit.sources.every])
     spots = bounds.theta_o + bounds.theta_e < ALL_AROUND
     shutter = lit.index.motions.shutter
     eye = surroundings.camera_origin(lit.index.scene, (shutter.open + shutter.close) / 2.0)
@@ -230,14 +231,14 @@ def _small_lights(lit: Lit) -> Iterator[tuple[str, NDArray[np.float64] | None, f
 def _small_rows(lit: Lit) -> Iterator[tuple[str, NDArray[np.float64] | None, float, slice]]:
     """The same, and their rows in `lights`."""
     motions, geometry = lit.index.motions, lit.geometry
-    encoder, lights, (middle, radius) = lit.encoder, lit.lights, lit.sphere
-    lamps, share = lit.index.scene.lights, lights.power / max(lights.power.sum(), 1e-300)
-    for row, i in enumerate(row_order(lamps)):
+    sources, (middle, radius) = lit.sources, lit.sphere
+    lamps, share = lit.index.scene.lights, sources.power / max(sources.power.sum(), 1e-300)
+    for row, i in enumerate(sources.order):
         lamp = lamps[i]
         if isinstance(lamp, (Envmap, CubeMap)):
-            small = image_lights.extent(lamp, encoder, SUN) < SMALL
+            small = image_lights.extent(lamp, lit.look, SUN) < SMALL
         elif isinstance(lamp, Sky):
-            small = sky.sun_share(lamp, encoder) >= SUN
+            small = sky_light.sun_share(lamp, lit.look) >= SUN
         else:
             small = lamp.reach in ("placed", "distant") and getattr(lamp, "falloff", True)
         if small:
@@ -246,9 +247,9 @@ def _small_rows(lit: Lit) -> Iterator[tuple[str, NDArray[np.float64] | None, flo
                 bounds = light_bounds.of_lamp(lamp)
                 place = motions.halfway(motions.lamps.get(i), (bounds.low + bounds.high)[0] / 2.0)
             yield f"lights[{i}]", place, float(share[row]), slice(row, row + 1)
-    ends = (*lights.first, len(share))[1:]
-    for emitter, first, end in zip(geometry.emitters, lights.first, ends, strict=True):
-        area, place = _area_and_place(emitter, encoder)
+    ends = (*sources.first, len(share))[1:]
+    for emitter, first, end in zip(geometry.emitters, sources.first, ends, strict=True):
+        area, place = _area_and_place(emitter, lit.look.cache)
         keys = motions.shapes.get(int(geometry.rows[emitter.shape_row]["number"]))
         place = motions.halfway(keys, place)
         far = max(float(np.linalg.norm(place - middle)), NEAR * radius)
@@ -257,7 +258,7 @@ def _small_rows(lit: Lit) -> Iterator[tuple[str, NDArray[np.float64] | None, flo
             yield shapes.where(emitter.shape), place, float(share[rows].sum()), rows
 
 
-def _area_and_place(emitter: Emitter, encoder: Encoder) -> tuple[float, NDArray[Any]]:
+def _area_and_place(emitter: Emitter, cache: LoweringCache) -> tuple[float, NDArray[Any]]:
     """The area of a shape that emits [m^2], and the middle of the box around it (3,) [m]."""
     vertices, faces = emitter.vertices, emitter.faces
     if vertices is None:
@@ -266,4 +267,4 @@ def _area_and_place(emitter: Emitter, encoder: Encoder) -> tuple[float, NDArray[
     middle = (vertices[:, :3].min(axis=0) + vertices[:, :3].max(axis=0)) / 2.0
     if emitter.shape.kind in shape_records.ONE_OF:
         return float(4.0 * np.pi * (vertices[:, 3].astype(np.float64) ** 2).sum()), middle
-    return float(encoder.cache(triangles.triangle_areas, vertices, faces).sum()), middle
+    return float(cache(triangles.triangle_areas, vertices, faces).sum()), middle

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from clpt import transforms as tf
-from clpt.render.lowering.lights import image_lights
+from clpt.render.analysis.lights import image_lights
 from clpt.render.lowering.scene import Lowered, lower
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
@@ -262,7 +262,7 @@ def test_the_extent_of_an_image() -> None:
     faces[2] = 3.0
     for i in (0, 1, 4, 5):
         faces[i, :32] = 3.0
-    made = lower(scene_of(ROOM))
+    look = lower(scene_of(ROOM)).encoder.look
     for lamp in (Envmap(image=above), CubeMap(image=faces)):
         for share, part in ((0.5, 1 / 3), (0.75, 1 / 2), (1.0, 1.0)):
-            assert image_lights.extent(lamp, made.encoder, share) == pytest.approx(part, abs=0.01)
+            assert image_lights.extent(lamp, look, share) == pytest.approx(part, abs=0.01)
