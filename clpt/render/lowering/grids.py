@@ -123,7 +123,7 @@ def _mixed(
 
     whole = extinction(medium.coefficients(spectral))
     over = np.where(whole > 0.0, 1.0 / np.maximum(whole, 1e-30), 0.0)
-    most = np.unique([extinction(own) * over for own in medium.ofparts_of(spectral)], axis=1)
+    most = np.unique([extinction(own) * over for own in medium.of_parts(spectral)], axis=1)
     parts = np.stack([_at_points(part, medium) for part in medium.parts], axis=-1)
     rows = parts.reshape(-1, len(medium.parts))
     density = np.empty(len(rows), np.float32)
