@@ -40,6 +40,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         when(f.bodies, "path/vertex_bodies.cl")
         or either(f.absorption or f.media, "path/vertex_media.cl")
     ),
+    "generated/front_motion.cl": lambda f, _: either("camera" in f.moving, "path/front_motion.cl"),
     "generated/ghosts.cl": lambda f, _: either(f.lit_ghosts, "path/ghosts.cl"),
     "generated/first_ray.cl": lambda f, _: (
         f"path/first_ray{'_weighted' * (f.camera in WEIGHTED)}.cl",
@@ -54,9 +55,16 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         *_screen_motion(f),
     ),
     "generated/layers.cl": lambda f, _: (
-        when(f.layer_words > 0, "generated/layer_args.cl", *_screen_motion(f), "path/layers.cl")
+        when(
+            f.layer_words > 0,
+            "generated/layer_args.cl",
+            *_screen_motion(f),
+            *either(f.screen_motion, "path/screen_motion_record.cl"),
+            "path/layers.cl",
+        )
         or ("path/layers_none.cl",)
     ),
+    "generated/mattes.cl": lambda f, _: either(f.mattes, "path/mattes.cl"),
     "generated/light_layers.cl": lambda f, _: (
         *when(f.light_layers, "generated/light_layer_args.cl", "generated/sampler.cl"),
         *either(f.light_layers, "film/light_layers.cl"),

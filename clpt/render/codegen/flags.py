@@ -59,20 +59,20 @@ def has_lobe(features: Features, cls: type[Scatterer], name: str) -> bool:
     return name in declared and features.sources_of(cls.kind).get(name, none) != none
 
 
-def _layer_place(name: str) -> Callable[[Features], int | bool]:
-    """The first word of a layer, False where there is none."""
-    return lambda features: features.layer_places.get(name, False)
+def _layer_place(name: str) -> Callable[[Features], int]:
+    """The first word of a layer, 0 where there is none: kernels also ask for it by `if`."""
+    return lambda features: features.layer_places.get(name, 0)
 
 
-def _number(name: str, names: tuple[str, ...]) -> int | bool:
-    """1 more than where a name stands, False where it does not."""
-    return names.index(name) + 1 if name in names else False
+def _number(name: str, names: tuple[str, ...]) -> int:
+    """1 more than where a name stands, 0 where it does not."""
+    return names.index(name) + 1 if name in names else 0
 
 
-def _first_for_denoisers(features: Features) -> int | bool:
-    """The first word of the layers for denoisers, which come last; False where there is none."""
+def _first_for_denoisers(features: Features) -> int:
+    """The first word of the layers for denoisers, which come last; 0 where there is none."""
     places = features.layer_places
-    return min((places[name] for name in places if LAYERS[name].denoising), default=False)
+    return min((places[name] for name in places if LAYERS[name].denoising), default=0)
 
 
 def is_null(features: Features, cls: type[Scatterer]) -> bool:
@@ -112,7 +112,6 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "ONLY_INSTANCES": lambda f: f.only_instances,
     "FEW_INSTANCES": lambda f: f.few_instances or False,
     "USES_MOTION": lambda f: bool(f.moving),
-    "MOVES_CAMERA": lambda f: f.lit_ghosts and "camera" in f.moving,
     "MOVES_INSTANCES": lambda f: "instances" in f.moving,
     "MOVES_VERTICES": lambda f: "vertices" in f.moving,
     "MOVES_SPHERES": lambda f: "spheres" in f.moving,
@@ -171,7 +170,6 @@ SCENE: dict[str, Callable[[Features], str | int]] = {
     "FILM_WORDS": lambda f: f.weighed and f.film_words,
     "FILM_WEIGHTS": lambda f: f.film_weights,
     "USES_LAYERS": lambda f: f.layer_words > 0,
-    "LAYER_IDS": lambda f: any(LAYERS[name].form == "id" for name in f.layers),
     "SCREEN_MOTION": lambda f: f.screen_motion,
     "MATTES": lambda f: len(f.mattes) or False,
     "MATTE_SLOTS": lambda f: bool(f.mattes) and MATTE_SLOTS,
