@@ -240,4 +240,5 @@ def virtual_files() -> dict[str, str]:
 
 
 if __name__ == "__main__":
-    np.savez_compressed(FILE, **made())
+    arrays: dict[str, Any] = made()
+    np.savez_compressed(FILE, **arrays)
