@@ -196,7 +196,6 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
 }
 
 
-
 def _screen_motion(features: Features) -> tuple[str, ...]:
     """How what is seen moves across the film, where a layer tells it."""
     files = ("interface/camera.cl", "generated/camera.cl", "generated/screen.cl")
