@@ -119,7 +119,7 @@ class Flight:
         if kernel == "mix_materials":
             return int(self.met.sum())
         if kernel == "shade":
-            kinds = self.wavefront.features.materials
+            kinds = self.wavefront.features.materials.kinds
             return int((self.kinds == kinds.index(step.name.removeprefix("shade_"))).sum())
         if kernel in ("shadow", "splat"):
             return int(self.shadowed.sum())

@@ -48,7 +48,8 @@ def traffic(features: Features, layout: str, *, queued: bool = False) -> dict[st
     in `intersect` and `shade_...` a ray and its hit, in `shadow` a shadow ray, in `append` a slot.
     """
     texts = programs.sources(features, layout, 1, queued=queued)
-    return {name: _moved(name, source.text, features.mode) for name, source in texts.items()}
+    mode = features.spectra.mode
+    return {name: _moved(name, source.text, mode) for name, source in texts.items()}
 
 
 def _moved(name: str, text: str, mode: str) -> Moved:

@@ -42,10 +42,10 @@ NEEDED = {
 def members(features: Features) -> dict[str, list[str]]:
     """Return the members of each slab that a block takes, and as "changed" those of a path that
     shading may change, which come first."""
-    defined = flags.defines(flags.SCENE, features)
+    defined = flags.of_scene(features)
 
     def there(names: Iterable[str]) -> list[str]:
-        has = {"SPECTRAL": features.mode == "spectral", "": True, **defined}
+        has = {"SPECTRAL": features.spectra.spectral, "": True, **defined}
         wanted = {name: NEEDED[name].split() if name in NEEDED else [""] for name in names}
         return [name for name, of in wanted.items() if any(has.get(flag) for flag in of)]
 
@@ -84,6 +84,6 @@ def _words(features: Features, slab: str, names: Iterable[str]) -> list[int]:
     )
     found = []
     for member in (next(m for m in record.members if m.name == name) for name in names):
-        count = member.words - (member.type == "spectrum" and features.mode == "rgb")
+        count = member.words - (member.type == "spectrum" and not features.spectra.spectral)
         found += [member.word + i for i in range(count)]
     return found

@@ -7,67 +7,80 @@ from collections.abc import Callable
 from clpt import bvh
 from clpt.render.contract.features import Features
 
+Files = tuple[str, ...]
+
+
+def when(needed: object, *files: str) -> Files:
+    """Return files where they are needed, else none."""
+    return files if needed else ()
+
+
 # name: the files that stand for it, for a scene's features and the layout of its triangles
-CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
-    "generated/spectrum.cl": lambda f, _: (f"spectrum/{f.mode}.cl",),
+CHOICES: dict[str, Callable[[Features, str], Files]] = {
+    "generated/spectrum.cl": lambda f, _: (f"spectrum/{f.spectra.mode}.cl",),
     "generated/spectrum_read.cl": lambda f, _: _spectrum_read(f),
     "generated/sampler.cl": lambda f, _: (
-        f"sampler/{f.sampler}.cl",
-        f"path/pixel_sampler{'_z' * (f.sampler == 'zsobol')}.cl",
+        f"sampler/{f.transport.sampler}.cl",
+        f"path/pixel_sampler{'_z' * (f.transport.sampler == 'zsobol')}.cl",
     ),
     "generated/exposure.cl": lambda f, _: (
         "film/splatting.cl" if f.film_weights else "film/exposure.cl",
     ),
-    "generated/bands.cl": lambda f, _: ("film/bands.cl",) * f.bands,
-    "generated/integrator.cl": lambda f, _: (f"integrator/{f.integrator}.cl",),
-    "generated/merging.cl": lambda f, _: ("merging/area.cl",) * f.merged,
-    "generated/guide.cl": lambda f, _: ("guiding/guide.cl",) * f.guided,
-    "generated/gather.cl": lambda f, _: (
-        ("generated/photon.cl", "merging/gather.cl") * (f.merged and not f.light_paths)
+    "generated/bands.cl": lambda f, _: when(f.film.bands, "film/bands.cl"),
+    "generated/integrator.cl": lambda f, _: (f"integrator/{f.transport.integrator}.cl",),
+    "generated/merging.cl": lambda f, _: when(f.transport.merged, "merging/area.cl"),
+    "generated/guide.cl": lambda f, _: when(f.transport.guided, "guiding/guide.cl"),
+    "generated/gather.cl": lambda f, _: when(
+        f.transport.merged and not f.transport.light_paths,
+        "generated/photon.cl",
+        "merging/gather.cl",
     ),
     "generated/layer_sums.cl": lambda f, _: (
-        ("film/layers.cl",) * (f.layer_words > 0) + _screen_motion(f)
+        *when(f.film.layers.first_samples, "film/layers.cl"),
+        *_screen_motion(f),
     ),
-    "generated/layers.cl": lambda f, _: (
-        ("generated/layer_args.cl", *_screen_motion(f), "path/layers.cl") * (f.layer_words > 0)
+    "generated/layers.cl": lambda f, _: when(
+        f.film.layers.first_samples,
+        "generated/layer_args.cl",
+        *_screen_motion(f),
+        "path/layers.cl",
     ),
-    "generated/light_layers.cl": lambda f, _: (
-        ("generated/light_layer_args.cl", "generated/sampler.cl", "film/light_layers.cl")
-        * bool(f.light_layers)
+    "generated/light_layers.cl": lambda f, _: when(
+        f.film.layers.lights,
+        "generated/light_layer_args.cl",
+        "generated/sampler.cl",
+        "film/light_layers.cl",
     ),
-    "generated/flight_layers.cl": lambda f, _: (
-        ("film/light_layers.cl",)
-        * (bool(f.light_layers) and f.emissive_media and not f.light_paths)
+    "generated/flight_layers.cl": lambda f, _: when(
+        f.film.layers.lights and f.media.emissive and not f.transport.light_paths,
+        "film/light_layers.cl",
     ),
-    "generated/rivals.cl": lambda f, _: (
-        (
-            "generated/merging.cl",
-            "interface/camera.cl",
-            "generated/camera.cl",
-            "film/connect.cl",
-            "generated/connect.cl",
-            "lighting/rivals.cl",
-        )
-        if f.balanced
-        else ()
+    "generated/rivals.cl": lambda f, _: when(
+        f.transport.balanced,
+        "generated/merging.cl",
+        "interface/camera.cl",
+        "generated/camera.cl",
+        "film/connect.cl",
+        "generated/connect.cl",
+        "lighting/rivals.cl",
     ),
     "generated/medium.cl": lambda f, _: (
-        ("generated/medium_coefficients.cl", "optics/medium.cl") * (f.absorption or f.media)
-        + ("optics/dye_flight.cl",) * f.dyed_media
-        + ("optics/medium_grid.cl",) * f.grids
-        + ("optics/medium_grid_light.cl",) * f.emissive_grids
-        + ("generated/body_index.cl", "optics/bodies.cl") * f.bodies
+        *when(f.media.absorbing, "generated/medium_coefficients.cl", "optics/medium.cl"),
+        *when(f.media.dyed, "optics/dye_flight.cl"),
+        *when(f.media.grids.present, "optics/medium_grid.cl"),
+        *when(f.media.grids.emissive, "optics/medium_grid_light.cl"),
+        *when(f.media.bodies, "generated/body_index.cl", "optics/bodies.cl"),
     ),
     "generated/grid_flight.cl": lambda f, _: (
-        ("generated/lights.cl", "path/met_light.cl") * f.emissive_grids
-        + ("optics/grid_flight.cl",) * f.grids
+        *when(f.media.grids.emissive, "generated/lights.cl", "path/met_light.cl"),
+        *when(f.media.grids.present, "optics/grid_flight.cl"),
     ),
-    "generated/light_medium.cl": lambda f, _: (
-        ("generated/textures.cl", "generated/medium.cl") * f.light_media
+    "generated/light_medium.cl": lambda f, _: when(
+        f.light_media, "generated/textures.cl", "generated/medium.cl"
     ),
     "generated/shading_frame.cl": lambda f, _: (
         ("generated/normal_map.cl", "path/shading_frame_mapped.cl")
-        if f.normal_mapped
+        if f.materials.normal_mapped
         else ("path/shading_frame.cl",)
     ),
     "generated/transmittance.cl": lambda f, _: (f"tracing/transmittance{_passing(f)}.cl",),
@@ -76,49 +89,52 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         f"tracing/trace_{'lanes' if layout == 'brute' else 'one'}.cl",
     ),
     "generated/curve_others.cl": lambda f, _: (
-        f"tracing/curve_others{'_none' * (f.analytic == ('curves',))}.cl",
+        f"tracing/curve_others{'_none' * (f.geometry.analytic == ('curves',))}.cl",
     ),
-    "generated/shape_traversal.cl": lambda f, layout: (
-        (f"bvh/{bvh.shapes_layout(layout)}.cl", "bvh/shapes.cl") * bool(f.analytic)
+    "generated/shape_traversal.cl": lambda f, layout: when(
+        f.geometry.analytic, f"bvh/{bvh.shapes_layout(layout)}.cl", "bvh/shapes.cl"
     ),
-    "generated/instances.cl": lambda f, _: ("tracing/instances.cl",) * f.instances,
+    "generated/instances.cl": lambda f, _: when(f.geometry.instances, "tracing/instances.cl"),
     "generated/motion.cl": lambda f, _: (
-        ("tracing/motion.cl",) * bool(f.moving)
-        + ("tracing/vertex_keys.cl",) * bool({"vertices", "spheres"} & {*f.moving})
+        *when(f.motion.present, "tracing/motion.cl"),
+        *when(f.motion.vertices or f.motion.spheres, "tracing/vertex_keys.cl"),
     ),
-    "generated/keyed_layout.cl": lambda f, layout: (
-        (f"bvh/{layout}_keyed.cl",) * ("vertices" in f.moving and layout != "brute")
+    "generated/keyed_layout.cl": lambda f, layout: when(
+        f.motion.vertices and layout != "brute", f"bvh/{layout}_keyed.cl"
     ),
-    "generated/instance_traversal.cl": lambda f, layout: (
-        (
-            f"tracing/instances_{'few' if f.few_instances else layout}.cl",
-            "tracing/trace_instances.cl",
-        )
-        * f.instances
+    "generated/instance_traversal.cl": lambda f, layout: when(
+        f.geometry.instances,
+        f"tracing/instances_{'few' if f.geometry.few_instances else layout}.cl",
+        "tracing/trace_instances.cl",
     ),
 }
 
 
-def _screen_motion(features: Features) -> tuple[str, ...]:
+def _screen_motion(features: Features) -> Files:
     """How what is seen moves across the film, where a layer tells it."""
-    files = ("interface/camera.cl", "generated/camera.cl", "generated/screen.cl")
-    return (*files, "path/screen_motion.cl") * features.screen_motion
+    return when(
+        features.screen_motion,
+        "interface/camera.cl",
+        "generated/camera.cl",
+        "generated/screen.cl",
+        "path/screen_motion.cl",
+    )
 
 
 def _passing(features: Features) -> str:
     """How the name of what tells which light passes ends."""
     if features.shadow_media:
         return "_media"
-    return "" if features.null_surfaces else "_opaque"
+    return "" if features.materials.null_surfaces else "_opaque"
 
 
-def _spectrum_read(features: Features) -> tuple[str, ...]:
+def _spectrum_read(features: Features) -> Files:
     """The look-up of spectra, and in spectral mode how the camera draws wavelengths."""
-    read = f"spectrum/{features.mode}_read.cl"
-    drawn = f"spectrum/{'density' if features.tabulated_density else 'visible'}.cl"
-    return (read, drawn) if features.mode == "spectral" else (read,)
+    own = features.spectra
+    drawn = f"spectrum/{'density' if own.tabulated_density else 'visible'}.cl"
+    return (f"spectrum/{own.mode}_read.cl", *when(own.spectral, drawn))
 
 
-def virtual_files(features: Features, layout: str) -> dict[str, tuple[str, ...]]:
+def virtual_files(features: Features, layout: str) -> dict[str, Files]:
     """Return the files that stand for each name in CHOICES."""
     return {name: choose(features, layout) for name, choose in CHOICES.items()}

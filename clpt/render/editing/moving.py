@@ -115,13 +115,14 @@ class Moving:
 
     def _plan(self, scene: Scene, replaced: Replacements) -> list[Action]:
         """What enqueues a move. Raises CannotMove."""
-        if any(one.light_paths for one in self.target.lowered.features.passes):
+        features = self.target.lowered.features
+        if any(one.transport.light_paths for one in features.passes):
             raise CannotMove("light is traced from lights, whose choice follows from the shapes")
         if any(shape.motion is not None for shape in scene.shapes):
             raise CannotMove("shapes move while the shutter is open")
-        if "vertices" in self.target.lowered.features.moving:
+        if features.motion.vertices:
             raise CannotMove("vertices move while the shutter is open")
-        if "spheres" in self.target.lowered.features.moving:
+        if features.motion.spheres:
             raise CannotMove("spheres move by themselves while the shutter is open")
         numbers = {id(shape): number for number, shape in enumerate(scene.shapes)}
         actions: list[Action] = []

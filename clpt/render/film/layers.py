@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.render.contract.features import layer_places
+from clpt.render.contract.features.film import layer_places
 from clpt.render.film.cryptomatte import pairs_of
 from clpt.render.film.saved_film import PictureForm
 from clpt.render.lowering.camera.colour import output_matrix, sensor

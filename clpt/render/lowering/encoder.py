@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import SceneError
-from clpt.render.contract.features import Sources
+from clpt.render.contract.features.materials import Sources
 from clpt.render.contract.parameter_words import (
     LAYERS_WORDS,
     ORDERS_WORDS,

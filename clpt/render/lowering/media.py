@@ -101,11 +101,11 @@ class MediumWords:
             word |= GRID | (BYTES if getattr(medium, "bits", 16) == 8 else 0)
         before = 2 + (SPECTRUM_WORDS if self._index.emitting else 0)
         word |= before + self._encoder.store.size("materials")
-        if isinstance(medium, Lattice) and self._index.glowing:
+        if isinstance(medium, Lattice) and self._index.grids.emissive:
             rows.append(self._glow(medium, word, absorbs))
-        if isinstance(medium, Lattice) and self._index.tinted:
+        if isinstance(medium, Lattice) and self._index.grids.tinted:
             rows.append(self._tint(medium, "albedo_grid"))
-        if isinstance(medium, Lattice) and self._index.coloured:
+        if isinstance(medium, Lattice) and self._index.grids.coloured:
             rows.append(self._tint(medium, "colour_grid"))
         rows += mixture
         self._encoder.store.append("materials", np.concatenate(rows))
@@ -123,7 +123,7 @@ class MediumWords:
 
     def _mixture_words(self, medium: Medium) -> list[Words]:
         """What stands behind all: where the shares of parts begin, 0 for nowhere, and the parts."""
-        count, spectral = self._index.most_parts, self._index.spectral
+        count, spectral = self._index.grids.mixed, self._index.spectral
         if not isinstance(medium, Mixture):
             return [np.zeros(1, np.uint32)] if count and isinstance(medium, Lattice) else []
         first = self._encoder.store.append("images", grids.shares(medium, self._encoder, count))

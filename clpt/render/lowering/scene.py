@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.errors import SceneError
 from clpt.render.contract import shape_records
-from clpt.render.contract.features import Features
+from clpt.render.contract.features import Features, SpectraFeatures
 from clpt.render.contract.layer_names import LayerNames
 from clpt.render.contract.parameter_words import row_words
+from clpt.render.lowering import features as needs
 from clpt.render.lowering import open_boundaries, photons
 from clpt.render.lowering.bodies import BodyWords, matter_of
 from clpt.render.lowering.camera import cameras, filters
@@ -31,7 +32,6 @@ from clpt.render.lowering.checks import check
 from clpt.render.lowering.device_arrays import is_table
 from clpt.render.lowering.device_grids import DeviceGrid
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.features import features_of
 from clpt.render.lowering.geometry import shapes
 from clpt.render.lowering.geometry.geometry import (
     SHAPE_ONE_LIGHT,
@@ -46,7 +46,6 @@ from clpt.render.lowering.layer_names import lower_names
 from clpt.render.lowering.lights.aims import aims
 from clpt.render.lowering.lights.hard_light import Lit, decided
 from clpt.render.lowering.lights.light_bounds import Bounds
-from clpt.render.lowering.lights.light_level import light_level
 from clpt.render.lowering.lights.light_media import NOWHERE, LightMedia, light_media
 from clpt.render.lowering.lights.lights import Around, Emitter, LightRows, light_rows, row_order
 from clpt.render.lowering.lowering_cache import LoweringCache
@@ -54,7 +53,7 @@ from clpt.render.lowering.materials.material_words import MaterialWords
 from clpt.render.lowering.media import MediumWords, medium_aims
 from clpt.render.lowering.motion import at_rest, corners, lower_motion, swept
 from clpt.render.lowering.sealed import sealed_media
-from clpt.render.lowering.settings import DEEPEST, settings_of
+from clpt.render.lowering.settings import DEEPEST, Found, settings_of
 from clpt.render.lowering.textures.attributes import Owner, lower_attributes
 from clpt.scene import Scene
 from clpt.scene import materials as mt
@@ -64,8 +63,6 @@ from clpt.scene.media import Lattice
 from clpt.scene.shapes import Mesh
 
 TREE_FROM = 16  # lights from which a tree chooses among them, see bench/lights.py
-
-
 TANGENT_WORDS = 4
 
 
@@ -134,7 +131,7 @@ def lower(
     check(scene)
     index, film = SceneIndex.of(scene), scene.film
     if former:
-        index = replace(index, lit_before=former.features.lit_ghosts)
+        index = replace(index, lit_before=former.features.transport.lit_ghosts)
     cache = LoweringCache(former.cache if former else None)
     ends = film.lambda_min, film.lambda_max
     wavelengths = density(index) if index.spectral else Density(*ends)
@@ -172,7 +169,8 @@ def lower(
         noted = warnings_of(around)
     if index.motions and index.has_media and scene.camera.medium is None:
         noted += _passed_through(scene, index, cache)
-    density_row, tabulated, profile = _lower_film(index, encoder, wavelengths)
+    profile = _lower_profile(index, encoder)
+    density_row, tabulated = _lower_density(index, encoder, wavelengths)
     targets = aims(index, geometry, sphere[1])
     first_aim = encoder.store.append_floats("distributions", targets)
     lower_attributes(geometry.owners, encoder.textures, cache, geometry.single_count, geometry.keys)
@@ -184,25 +182,27 @@ def lower(
         *sorted(encoder.warnings), *geometry.warnings,
         *encoder.textures.finish(),
     )  # fmt: skip
-    aimed = len(targets) > 0
-    motion_row = 0
-    if index.motions:
-        rows = row_order(scene.lights)
-        rows += [-1] * ((*lights.first, len(lights.rows))[0] - len(rows))  # bricks of media
-        motion_row = lower_motion(index.motions, scene, rows, encoder.store)
-    features = features_of(
-        index, encoder, materials, geometry, lights, tabulated, profile, aimed, len(near),
-        bool(sealed), motion_row,
-    )  # fmt: skip
-    names, for_layers = lower_names(index, geometry, lights, encoder.store)
-    features = replace(features, **for_layers)
-    if features.tangents and geometry.tangents:
-        row = encoder.store.append_floats("distributions", _vertex_tangents(geometry))
-        features = replace(features, vertex_tangents=row + TANGENT_WORDS)
-    settings = settings_of(
-        index, geometry, lights, light_level(index, lights, sphere), wavelengths, density_row,
-        ambient_row, sphere, features.dispersion, (first_aim, len(targets)), camera,
-    )  # fmt: skip
+    motion = needs.of_motion(index, geometry, _lower_motion(index, lights, encoder))
+    spectra = SpectraFeatures(index.mode, encoder.spectra.samples, encoder.spectra.step, tabulated)
+    names, layers = lower_names(index, geometry, lights, encoder.store)
+    textures = needs.of_textures(encoder)
+    shaped = needs.of_geometry(index, geometry, materials, textures)
+    if shaped.tangents and geometry.tangents:
+        shaped = replace(shaped, vertex_tangents=_lower_tangents(geometry, encoder))
+    features = Features(
+        camera=needs.of_camera(index),
+        film=needs.of_film(index, layers),
+        transport=needs.of_transport(index, profile, aimed=len(targets) > 0),
+        lights=needs.of_lights(lights),
+        media=needs.of_media(index, materials, len(near), sealed=bool(sealed)),
+        motion=motion,
+        geometry=shaped,
+        textures=textures,
+        spectra=spectra,
+        materials=needs.of_materials(index, encoder, materials),
+    )
+    found = Found(density_row, ambient_row, (first_aim, len(targets)), camera, features.dispersion)
+    settings = settings_of(index, geometry, lights, wavelengths, sphere, found)
     cache.settle()
     tables = encoder.store.arrays()
     encoder.textures.images.joined(tables["images"])
@@ -247,29 +247,42 @@ def _begin_at_lights(
     return replace(index, lit_media=found.refusal), found
 
 
-def _vertex_tangents(geometry: Geometry) -> NDArray[np.float32]:
-    """Four words for each vertex: those that shapes say, else zero. A row of zeros is before them,
-    so that they begin behind word 0."""
+def _lower_motion(index: SceneIndex, lights: LightRows, encoder: Encoder) -> int:
+    """Append the table of what moves, if anything does; return where in `distributions` it is."""
+    if not index.motions:
+        return 0
+    rows = row_order(index.scene.lights)
+    rows += [-1] * ((*lights.first, len(lights.rows))[0] - len(rows))  # bricks of media
+    return lower_motion(index.motions, index.scene, rows, encoder.store)
+
+
+def _lower_tangents(geometry: Geometry, encoder: Encoder) -> int:
+    """Append four words for each vertex: the tangents that shapes say, else zero; return where in
+    `distributions` they are. A row of zeros is before them, so that this is never 0."""
     words = np.zeros((1 + len(geometry.vertices), TANGENT_WORDS), np.float32)
     for first, own in geometry.tangents:
         words[1 + first : 1 + first + len(own)] = own
-    return words
+    return encoder.store.append_floats("distributions", words) + TANGENT_WORDS
 
 
-def _lower_film(index: SceneIndex, encoder: Encoder, wavelengths: Density) -> tuple[int, bool, int]:
-    """Append the filter's values for light paths, and wavelengths' density if it is tabulated.
+def _lower_profile(index: SceneIndex, encoder: Encoder) -> int:
+    """Append the filter's values for light paths, if there are any; return where in
+    `distributions` they are."""
+    if not index.weighed:
+        return 0
+    return filters.lower_profile(index.scene.film.filter, encoder.store, index.splatting)
 
-    Return where the density would begin in `distributions`, whether it is there, and where the
-    filter's values begin.
+
+def _lower_density(index: SceneIndex, encoder: Encoder, wavelengths: Density) -> tuple[int, bool]:
+    """Append wavelengths' density if it is tabulated.
+
+    Return where in `distributions` it would begin, and whether it is there.
     """
-    chosen, profile = index.scene.film.filter, 0
-    if index.weighed:
-        profile = filters.lower_profile(chosen, encoder.store, index.splatting)
     density_row = encoder.store.size("distributions")
     tabulated = index.spectral and wavelengths.values is not None
     if tabulated:
         encoder.store.append_floats("distributions", wavelengths.words())
-    return density_row, tabulated, profile
+    return density_row, tabulated
 
 
 def _begin_materials(index: SceneIndex, encoder: Encoder) -> MaterialWords:

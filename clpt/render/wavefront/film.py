@@ -43,10 +43,10 @@ class Film:
         settings: NDArray[np.void],
         features: Features,
     ):
-        self.stream, self.has_bands, self._words = stream, features.bands, features.film_words
+        self.stream, self.has_bands, self._words = stream, features.film.bands, features.film_words
         self._allocate = buffers.allocate
         self.size = int(settings["width"]), int(settings["height"])
-        self.band_count = int(settings["bands"]) if features.bands else 0
+        self.band_count = int(settings["bands"]) if features.film.bands else 0
         self._band_sums = self.band_count * features.film_groups  # of a pixel
         self.halves = int(settings["halves"])
         self._settings, self._padded_pixels = settings, int(settings["padded_pixels"])
@@ -56,12 +56,15 @@ class Film:
         words = 4 * self._padded_pixels * self.halves
         pixels, advice = math.prod(self.size), "lower the image's size"
         sums, images = {"film": self._words * words}, {"image": 16 * pixels}
-        if features.bands:
+        if features.film.bands:
             advice += " or the number of bands"
             sums["bands"] = SUM_WORDS * self._band_sums * words
             images["band_image"] = 4 * self.band_count * pixels
-        self._layer_words, self._mattes = features.layer_words, len(features.mattes)
-        self._light_sums = 3 * features.light_pictures * features.film_groups
+        self._layer_words, self._mattes = (
+            features.film.layers.words,
+            len(features.film.layers.mattes),
+        )
+        self._light_sums = 3 * features.film.layers.light_pictures * features.film_groups
         for name, count in (
             ("layers", self._layer_words),
             ("light_layers", SUM_WORDS * self._light_sums),

@@ -15,7 +15,6 @@ from clpt.spectra import Tabulated
 OTHERS = {"LANES", "QUEUED", "SHADES_BOTH", "PART", "NOT_INLINED", "USES_MAPPINGS"}
 OPENCL = {"FP_FAST_FMAF"}  # what compilers define
 CONDITION = re.compile(r"^\s*#\s*(?:if|ifdef|ifndef|elif)\b(.*)", re.MULTILINE)
-TABLES = flags.SCENE.keys() | flags.MATERIAL.keys()
 
 
 def kernels() -> str:
@@ -30,11 +29,11 @@ def test_what_kernels_ask_for_is_a_flag() -> None:
     text = kernels()
     asked = {name for line in CONDITION.findall(text) for name in re.findall(r"\b[A-Z]\w*", line)}
     defined = set(re.findall(r"#\s*define (\w+)", text))
-    assert asked - defined - OTHERS - OPENCL <= TABLES
+    assert asked - defined - OTHERS - OPENCL <= flags.NAMES
 
 
 def test_every_flag_is_asked_for() -> None:
-    assert set(re.findall(r"\b[A-Z]\w*", kernels())) >= TABLES
+    assert set(re.findall(r"\b[A-Z]\w*", kernels())) >= flags.NAMES
 
 
 def test_a_flag_that_does_not_hold_is_not_in_the_text() -> None:

@@ -89,7 +89,7 @@ def test_mixtures_name_their_parts() -> None:
     assert word >> 24 == MIXTURE
     rule = made.tables["mixtures"][word & 0xFFFFFF :][:4]
     assert rule[:1].view(np.float32)[0] == 0.25
-    kinds = [made.features.materials[w >> 24] for w in rule[2:].tolist()]
+    kinds = [made.features.materials.kinds[w >> 24] for w in rule[2:].tolist()]
     assert kinds == ["null", "diffuse"]
 
 
@@ -122,9 +122,9 @@ def test_what_is_no_material_is_refused() -> None:
 def test_principled_is_what_its_parameters_say() -> None:
     """Two-sided while it is opaque; with tangents where it is stretched."""
     opaque = lower(scene(Rectangle(material=m.TwoSided(front=m.Principled())))).features
-    assert not opaque.tangents and not opaque.dispersion
+    assert not opaque.geometry.tangents and not opaque.dispersion
     for stretched in (m.Principled(anisotropic=0.5), m.PrincipledThin(anisotropic=0.5)):
-        assert lower(scene(Rectangle(material=stretched))).features.tangents
+        assert lower(scene(Rectangle(material=stretched))).features.geometry.tangents
     for passes in (m.Principled(spec_trans=0.1), m.PrincipledThin(), m.DiffuseTransmission()):
         with pytest.raises(clpt.SceneError, match="a transmissive"):
             lower(scene(Rectangle(material=m.TwoSided(front=passes))))
@@ -136,7 +136,7 @@ def test_few_lights_are_chosen_from_a_tree_where_they_stand_apart() -> None:
     cube = Cube(emission=Area())  # twelve rows, one as good as another
 
     def tree(*shapes: Shape, lights: list) -> bool:
-        return lower(scene(*shapes, lights=lights)).features.light_tree
+        return lower(scene(*shapes, lights=lights)).features.lights.tree
 
     assert tree(lights=points) and tree(lights=far + points)
     assert not tree(lights=points[:2]) and not tree(lights=far + points[:2])

@@ -1,0 +1,34 @@
+"""What the kernels need of motion while the shutter is open."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+from clpt.render.contract.features.macros import flag, macro, number
+
+
+@dataclass(frozen=True)
+class MotionFeatures:
+    """What moves, and where the table of that is."""
+
+    camera: bool = False
+    instances: bool = flag("MOVES_INSTANCES")
+    shapes: bool = flag("MOVES_SHAPES")  # analytic ones
+    lights: bool = False
+    vertices: bool = flag("MOVES_VERTICES")  # have a row for each key
+    spheres: bool = flag("MOVES_SPHERES")  # of shapes `spheres` have a row for each key
+    emitters: bool = False  # triangles of lights have a row for each key
+    scales: bool = flag("MOTION_SCALES")  # some motion scales
+    row: int | None = number("MOTION_ROW", None)  # where in `distributions` its table begins
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """The names of what moves."""
+        parts = (field.name for field in fields(self) if field.name not in ("scales", "row"))
+        return tuple(name for name in parts if getattr(self, name))
+
+    @property
+    @macro("USES_MOTION")
+    def present(self) -> bool:
+        """Whether anything moves."""
+        return bool(self.parts)
