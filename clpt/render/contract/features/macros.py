@@ -38,7 +38,7 @@ def macro(name: str, *, of_number: bool = False) -> Callable[[_Get], _Get]:
 def said(record: Any) -> Iterator[tuple[str, Value]]:
     """Return the macros of a record and of the records in it, each with its value."""
     for field in dataclasses.fields(record):
-        own = getattr(record, field.name)
+        own = vars(record)[field.name]
         if "macro" in field.metadata:
             yield _value(field.metadata["macro"], own)
         elif dataclasses.is_dataclass(own) and not isinstance(own, type):
