@@ -2,5 +2,6 @@
 
 traversal: rays against Embree; builders: how fast trees are made; renders: pictures against
 Mitsuba's; startup: a whole process, its seconds and its memory; compiling: what light paths and
-photons add to it. Records go to bench/results as JSON lines; bench.report makes a page of them.
+photons add to it; house: how long and tangled the code is. Records go to bench/results as JSON
+lines; bench.report makes a page of them.
 """

@@ -24,8 +24,8 @@ from rich.table import Table
 import clpt
 from bench import machine
 from bench.cluster import processor_time
-from clpt.cli.checkpoints import PERIOD, Checkpoints, path_of
-from clpt.cli.rendering import PASS_SECONDS
+from clpt.cli.files.checkpoints import PERIOD, Checkpoints, path_of
+from clpt.cli.opening.makers import DEVICE_SECONDS
 from clpt.cluster import processes
 from clpt.cluster.cluster_renderer import ClusterRenderer
 from clpt.render.film import film_file
@@ -99,8 +99,8 @@ def compare(size: tuple[int, int], period: float, rounds: int, folder: Path) -> 
         renderer.run(1)
         start = time.perf_counter()
         renderer.run(2)
-        samples = max(1, int(2 * PASS_SECONDS / (time.perf_counter() - start)))
-        count = max(2, round(2.0 * period / PASS_SECONDS))
+        samples = max(1, int(2 * DEVICE_SECONDS / (time.perf_counter() - start)))
+        count = max(2, round(2.0 * period / DEVICE_SECONDS))
         shares = []
         for _ in range(rounds):
             without = passes(renderer, samples, count, lambda: None)
@@ -115,7 +115,7 @@ def compare(size: tuple[int, int], period: float, rounds: int, folder: Path) -> 
         each = parts(renderer, path_of(target, (target,)), 5)
         size_of_file = path_of(target, (target,)).stat().st_size
     cores = without / seconds
-    total = each["copy"] * PERIOD / PASS_SECONDS + each["to_host"] + each["file"]
+    total = each["copy"] * PERIOD / DEVICE_SECONDS + each["to_host"] + each["file"]
     return {
         **figures(size, "one device", period, shares),
         **{f"{name}_ms": round(1e3 * value, 1) for name, value in each.items()},

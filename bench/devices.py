@@ -21,7 +21,7 @@ from rich.table import Table
 import clpt
 from bench import machine
 from clpt import device as dev
-from clpt.cli.scene_options import changed
+from clpt.cli.options.changes import SceneChanges, changed
 
 SCENES = ("scenes/cornell_box", "tests/scenes/textures.xml")
 
@@ -46,7 +46,7 @@ def timed(renderer: clpt.Renderer | clpt.MultiRenderer, samples: int) -> tuple[f
 
 def measure(path: Path, devices: list[dev.Device], seconds: float, rounds: int, size: int) -> dict:
     """The figures of a scene."""
-    scene = changed(clpt.load(path), size=(size, size))
+    scene = changed(clpt.load(path), SceneChanges.of(size=(size, size)))
     alone = [clpt.Renderer(scene, device) for device in devices]
     together = clpt.MultiRenderer(scene, devices)
     for renderer in (*alone, together):

@@ -19,11 +19,11 @@ import pyopencl as cl
 from bench import machine
 from clpt import device
 from clpt.records import SETTINGS, TABLES
+from clpt.render.analysis.lens import glasses
 from clpt.render.codegen import stages
 from clpt.render.codegen.signatures import scene_text
 from clpt.render.contract.features import CameraFeatures
-from clpt.render.lowering.camera import cameras
-from clpt.render.lowering.camera.lens import glasses
+from clpt.render.lowering.camera.cameras import lower_camera
 from clpt.scene.cameras import Lens
 
 RAYS, ROUNDS = 1 << 20, 7
@@ -53,7 +53,7 @@ kernel void trace(SCENE_ARGS, global const float *given, global float *made, uin
 def rate(on: device.Device, lens: Lens, lanes: int) -> float:
     """Rays in a second of processor time."""
     rows = glasses(lens)
-    _, words = cameras.lower_camera(lens, 90, 60, range(len(rows)))
+    _, words = lower_camera(lens, 90, 60, range(len(rows)))
     camera = CameraFeatures("lens", disperses=True, losses=lens.reflects)
     files = {
         "generated/scene.cl": scene_text(),

@@ -36,6 +36,7 @@ from clpt.render.codegen.library import kernel_source
 from clpt.render.film.denoised_picture import DenoisedPicture
 from clpt.render.film.layer_channels import write_layers
 from clpt.render.options import RenderOptions
+from clpt.render.pictures import Pictures as _Pictures
 from clpt.render.progress import Progress
 from clpt.render.renderer import Renderer, render
 from clpt.render.wavefront.film_state import FilmState
@@ -44,7 +45,9 @@ from clpt.spectral_exr import SpectralImage
 from clpt.spectral_exr import read as read_spectral
 from clpt.spectral_exr import write as write_spectral
 from clpt.version import VERSION as __version__
+from clpt.view.notebook import widget as _widget
 
+_Pictures.make_widget = _widget  # renderers know nothing of who shows their pictures
 logging.getLogger("clpt").addHandler(logging.NullHandler())  # quiet until the program asks
 
 __all__ = [

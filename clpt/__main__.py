@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 
 import click
 
-from .cli import allocator, cli, failures, stopping, streams
+from .cli import cli
+from .cli.process import allocator, failures, stopping, streams
 
 
 def main() -> None:
@@ -15,6 +17,8 @@ def main() -> None:
     streams.make_safe()
     allocator.return_large_blocks()
     stopping.raise_at_signals()
+    # PoCL compiles a kernel once for its binary, and once more for each size of groups, if it may
+    os.environ.setdefault("POCL_WORK_GROUP_SPECIALIZATION", "0")
     sys.exit(run(sys.argv[1:]))
 
 

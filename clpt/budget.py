@@ -1,4 +1,4 @@
-"""What a load may take: memory, seconds and parts. Whoever takes by what a file says asks first.
+"""Limits of a load in memory, time and parts: readers ask before they take what a file announces.
 
 A file of a few bytes can announce gigabytes. So each reader asks here, before it allocates, and the
 whole of a load has one account. What files hold themselves is always allowed, as far as there is
@@ -32,7 +32,7 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True)
 class Budget:
-    """What `clpt.load` may take at most; None: the usual.
+    """The most that `clpt.load` may take; None stands for the usual limit.
 
     memory: [bytes], by default half of what is available, and 768 MiB and 256 bytes for each byte
     of the files read; seconds: 600 by default; parts: elements, shapes, instances and textures, by
@@ -54,7 +54,7 @@ class Budget:
 
 @dataclass(eq=False)
 class _Account:
-    """What a load has taken so far."""
+    """A count of what a load has taken so far, with its limits."""
 
     limits: Budget
     available: int
@@ -69,14 +69,14 @@ class _Account:
 
     @property
     def memory(self) -> int:
-        """How many bytes may be held."""
+        """The most bytes that may be held."""
         if self.limits.memory is not None:
             return self.limits.memory
         return self.available if self.alone else min(self.available, FREE + RATIO * self.read)
 
     @property
     def most_parts(self) -> int:
-        """How many parts there may be."""
+        """The most parts that there may be."""
         given = self.limits.parts
         return PARTS + self.read // PER_PART if given is None else given
 

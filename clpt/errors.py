@@ -1,4 +1,4 @@
-"""What can go wrong, told to a person: what is wrong, where, and what to do.
+"""Errors of clpt, written for people: what is wrong, where, and what to do.
 
 ClptError
 ├── SceneError              a ValueError: a scene, mesh or image file, or a scene built in Python

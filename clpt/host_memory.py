@@ -1,4 +1,4 @@
-"""How much memory of the host is left to this process."""
+"""Memory of the host that is left to this process."""
 
 from __future__ import annotations
 

@@ -12,6 +12,7 @@ with the device. Four forms of text are made of a record:
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -191,12 +192,24 @@ class Record:
             ]
         )  # fmt: skip
 
-    def slab_text(self) -> str:
-        """Return `load_name_member(slab, at)` and `store_name_member(slab, at, m, v)`, for each."""
+    def slab_text(self, unused: Container[str] = ()) -> str:
+        """Return `load_name_member(slab, at)` and `store_name_member(slab, at, m, v)`, for each.
+
+        unused: members that a scene does not use, by name: to load one gives `Member.nothing`, to
+        store one does nothing. So kernels need not ask whether a scene has them.
+        """
         lower = self.snake_name
         parts = [f"#define {lower.upper()}_WORDS {self.words}"]
         for m in self.members:
             lane = TYPES[m.type][2]
+            if m.name in unused:
+                value = m.nothing or _ZERO.get(lane, "0.0f")
+                value = value if "(" in value else f"(({lane})({value}))"
+                parts += [
+                    f"#define load_{lower}_{m.name}(s, at) {value}",
+                    f"#define store_{lower}_{m.name}(s, at, m, v)",
+                ]
+                continue
             cast = _CASTS.get(m.type, "")
             load, store = [], []
             for i, component in enumerate(TYPES[m.type][3]):

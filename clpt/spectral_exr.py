@@ -84,7 +84,7 @@ class SpectralImage:
 
     @cached_property
     def _rgb_of_bands(self) -> NDArray[np.float64]:
-        """What a band of 1 adds to a pixel's colour, (n, 3): colour is linear in the values."""
+        """The colour that each band adds at a value of 1, (n, 3): colour is linear in them."""
         bands = np.eye(len(self.lambdas))
         curves = np.array([self.spectrum(band).sample(cie.GRID) for band in bands])
         light = 1.0 if self.emissive else d65().sample(cie.GRID)
@@ -240,7 +240,7 @@ def _other_kind(emissive: bool) -> str:
 
 
 def _left_out(parts: Mapping[str, Any], light: bool) -> tuple[str, ...]:
-    """What is told of a file's parts that are not read."""
+    """Return notes on parts of a file that are not read."""
     polarised = any(part in parts for part in ("S1", "S2", "S3"))
     made = ["its polarisation (S1 to S3) is left out"] if light and polarised else []
     if {"S0", "T"} <= parts.keys():

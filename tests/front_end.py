@@ -13,19 +13,24 @@ CLANG = shutil.which("clang")
 TARGETS = ("nvptx64-nvidia-nvcl", "amdgcn-amd-amdhsa", "spir64-unknown-unknown")
 LINE = re.compile(r'^#line \d+ "', re.MULTILINE)
 OWNER = re.compile(r"(\d+)\.cl[/:]")
+DRIVERS = ("-finclude-default-header", "-fdeclare-opencl-builtins")  # what a driver declares
+OURS = ("-include", "opencl-c-base.h")  # types alone: for `clpt.device.declarations`
+LANGUAGE = ("-x", "cl", "-cl-std=CL1.2")
 FLAGS = (
-    *("-x", "cl", "-cl-std=CL1.2", "-fsyntax-only", "-Wall", "-Werror"),
-    *("-finclude-default-header", "-fdeclare-opencl-builtins"),  # as the driver has them
+    *(*LANGUAGE, "-fsyntax-only", "-Wall", "-Werror"),
     *("-Wno-unused-function", "-Wno-unused-variable", "-Wno-unknown-warning-option"),
     *("-ferror-limit", "0"),  # an error does not end the texts behind it
     "-Wno-bitwise-instead-of-logical",  # masks are integers, in one lane as in eight
 )
 
 
-def errors(texts: Iterable[str], target: str = TARGETS[-1]) -> list[str]:
+def errors(
+    texts: Iterable[str], target: str = TARGETS[-1], functions: tuple[str, ...] = DRIVERS
+) -> list[str]:
     """What is wrong with each text, "" where nothing is. Warnings count.
 
-    One process takes them all: the front end itself, as clang's driver starts one for each.
+    functions: DRIVERS, or OURS where each text declares OpenCL's functions itself. One process
+    takes all texts: the front end itself, as clang's driver starts one for each.
     """
     found: list[list[str]] = []
     with tempfile.TemporaryDirectory() as folder:
@@ -33,7 +38,7 @@ def errors(texts: Iterable[str], target: str = TARGETS[-1]) -> list[str]:
             told = LINE.sub(rf"\g<0>{number}.cl/", text)  # so that an error names its text
             Path(folder, f"{number}.cl").write_text(told, encoding="utf-8")
             found.append([])
-        command = [str(CLANG), "-cc1", "-triple", target, *FLAGS]
+        command = [str(CLANG), "-cc1", "-triple", target, *FLAGS, *functions]
         command += [f"{number}.cl" for number in range(len(found))]
         if not found:
             return []
@@ -50,3 +55,14 @@ def errors(texts: Iterable[str], target: str = TARGETS[-1]) -> list[str]:
         number = int(owner[1]) if owner else number
         found[number].append(row[owner.end() :] if owner else row)
     return ["\n".join(own) for own in found]
+
+
+def compiled(text: str, *flags: str) -> str:
+    """A program in LLVM's language, before it is optimised: without functions that nobody calls."""
+    given = [word for flag in (*LANGUAGE[2:], *DRIVERS, "-disable-llvm-passes") for word in ("-Xclang", flag)]
+    command = [str(CLANG), *LANGUAGE[:2], *given, "-emit-llvm", "-S", "-w", *flags, "-o", "-", "-"]
+    done = subprocess.run(
+        command, input=text, capture_output=True, text=True, timeout=300, check=False
+    )
+    assert done.returncode == 0, done.stderr[:3000]
+    return done.stdout

@@ -1,49 +1,60 @@
-"""The house keeps its shape: who imports whom, what is public, where kernels stand."""
+"""The house keeps its shape: who imports whom, what is public, where kernels stand.
+
+Each rule is one test. It fails with every place that breaks the rule, and what to do there.
+"""
 
 from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
 import clpt
+from bench import imports as graphs
+from bench.python_files import full_name, read
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, KERNELS = ROOT / "clpt", ROOT / "kernels"
 
 BASE = {
-    "budget", "child_processes", "colour", "errors", "host_memory", "images", "input_files",
-    "layout", "measured", "numpy_files", "output_files", "records", "spectra", "text", "transforms",
-    "spectral_exr", "tev", "version",
+    "arrays", "budget", "child_processes", "colour", "errors", "host_memory", "images",
+    "input_files", "layout", "measured", "numpy_files", "output_files", "records", "spectra",
+    "spectral_exr", "tev", "text", "transforms", "version",
 }  # fmt: skip
-# What a part may import of the others; itself always.
+RENDERS = BASE | {"scene", "device", "denoise", "render", "formats"}
+# What a part may import of the others; itself always. Every part has a row.
 MAY_IMPORT = {
     **dict.fromkeys(BASE, BASE),
     "lenses": BASE,
-    "geometry": BASE,
     "scene": BASE | {"lenses"},
+    "geometry": BASE | {"scene"},
+    "sky": BASE | {"scene"},
     "device": BASE,
     "bvh": BASE | {"device"},
     "denoise": BASE | {"scene", "device"},
     "rays": BASE | {"device", "bvh"},
     "trimesh_ray": BASE | {"device", "rays"},
-    "render": BASE | {"lenses", "scene", "device", "bvh", "denoise"},
+    "render": BASE | {"lenses", "scene", "geometry", "sky", "device", "bvh", "denoise"},
     "formats": BASE | {"lenses", "geometry", "scene"},
     "mie": BASE | {"scene"},
-    "view": BASE | {"scene", "device", "denoise", "render", "formats"},
+    "testing": BASE | {"scene", "device", "render"},
+    "view": RENDERS,
+    "cluster": RENDERS,
     "benchmark": BASE | {"scene", "device", "bvh", "rays", "render", "formats"},
+    "cli": RENDERS | {"lenses", "geometry", "mie", "bvh", "view", "cluster", "benchmark"},
+    "__main__": {"cli"},
 }
 OPENCL = {"device", "bvh", "denoise", "rays", "render"}  # only these import pyopencl
 # clpt/render/<room>: arrows point down; rooms of one floor do not know each other.
-FLOORS = ({"contract"}, {"lowering", "codegen"}, {"wavefront"}, {"editing", "film"})
+FLOORS = ({"contract"}, {"analysis"}, {"lowering", "codegen"}, {"wavefront"}, {"editing", "film"})
 # What kinds share, by what a reader looks for.
 SHARED = {
-    "colour", "core", "denoising", "film", "guiding", "interface", "lighting", "merging", "optics",
-    "path", "spectrum", "texturing", "tracing",
+    "colour", "core", "denoising", "film", "guiding", "interface", "lighting", "media", "merging",
+    "optics", "path", "spectrum", "texturing", "tracing",
 }  # fmt: skip
 KINDS = {"bsdf", "phase", "camera", "emission", "light", "medium", "sampler", "shape", "texture"}
 # kernels/<folder>: the folders that its files may include; generated text stands between them.
@@ -55,6 +66,15 @@ MAY_INCLUDE = {
     "motion": {"core", "generated", "bvh"},
     "stage": SHARED | {"generated", "bvh"},
 }
+HAVE_KERNELS = {"stage", "bvh", "motion"}
+NOT_IN_MEMORY = {"float3", "int3", "uint3", "bool", "size_t"}
+# Names of kernel files, of other files of the repository, and of modules.
+NAMED = r"(?<![\w/<>*])[\w/]+\.cl\b|\b(?:clpt|tests|bench|docs)/[\w/]+\.\w+|\bclpt(?:\.\w+)+"
+# Modules from whose imports, at whatever distance, none leads to pyopencl.
+PLAIN = (
+    "scene", "lenses", "geometry", "sky", "formats", "spectra", "layout", "transforms", "images",
+    "spectral_exr",
+)  # fmt: skip
 
 
 def modules() -> list[Path]:
@@ -62,50 +82,30 @@ def modules() -> list[Path]:
     return sorted(PACKAGE.rglob("*.py"))
 
 
-def statements(path: Path) -> Iterator[tuple[str, list[str]]]:
-    """The imports of a file, anywhere in it: a module's full name, and the names taken from it."""
-    inside = path.relative_to(ROOT).with_suffix("").parts
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            yield from ((alias.name, []) for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            package = ".".join(inside[: len(inside) - node.level]) if node.level else ""
-            base = ".".join(part for part in (package, node.module or "") if part)
-            yield base, [alias.name for alias in node.names]
+def kernel_files() -> list[Path]:
+    """The OpenCL files."""
+    return sorted(KERNELS.rglob("*.cl"))
 
 
-def imports(path: Path) -> set[str]:
-    """The modules that a file imports, anywhere in it, with full names."""
-    return {
-        name
-        for base, taken in statements(path)
-        for name in (base, *(f"{base}.{part}" for part in taken))
-    }
+def keep(rule: str, broken: Iterable[str]) -> None:
+    """Fail with all places where a rule is broken; rule: also says what to do."""
+    if places := list(broken):
+        pytest.fail("\n  ".join([f"{rule}. Broken {len(places)} times:", *places]), pytrace=False)
 
 
-def module_names() -> dict[str, Path]:
-    """The modules of the package by their full names; a package is its __init__."""
-    names = {".".join(path.relative_to(ROOT).with_suffix("").parts): path for path in modules()}
-    return {name.removesuffix(".__init__"): path for name, path in names.items()}
+def imports(path: Path) -> Iterator[tuple[str, str]]:
+    """The modules that a file imports, anywhere in it, with full names; each with its place."""
+    for name, line in graphs.imports(path).items():
+        yield name, f"{path.relative_to(ROOT)}:{line}"
 
 
-def circle(graph: dict[str, set[str]]) -> list[str]:
-    """A circle of a graph, its first node again at the end; empty if there is none."""
-    done: set[str] = set()
-    for start in graph:
-        path: list[str] = []
-        open_ = [iter([start])]
-        while open_:
-            if (node := next(open_[-1], None)) is None:
-                open_.pop()
-                done |= set(path[-1:])
-                del path[-1:]
-            elif node in path:
-                return [*path[path.index(node) :], node]
-            elif node not in done:
-                path.append(node)
-                open_.append(iter(sorted(graph[node])))
-    return []
+def kernels(broken: Callable[[str, str], Iterable[tuple[int, str]]]) -> Iterator[str]:
+    """Ask each kernel file, by its folder and text, for positions of what is wrong, and what."""
+    for path in kernel_files():
+        text = path.read_text(encoding="utf-8")
+        for position, wrong in broken(path.relative_to(KERNELS).parts[0], text):
+            line = text.count("\n", 0, position) + 1
+            yield f"{path.relative_to(ROOT)}:{line}: {wrong}"
 
 
 def part_of(name: str) -> str | None:
@@ -114,90 +114,110 @@ def part_of(name: str) -> str | None:
     return parts[1] if parts[0] == "clpt" and len(parts) > 1 else None
 
 
-@pytest.mark.parametrize("path", modules(), ids=lambda p: str(p.relative_to(ROOT)))
-def test_imports_follow_the_direction(path: Path) -> None:
-    own = part_of(".".join(path.relative_to(ROOT).with_suffix("").parts))
-    if own not in MAY_IMPORT:
-        return
-    parts = {p.name.removesuffix(".py") for p in PACKAGE.iterdir()}
-    found = {part_of(name) for name in imports(path)} & parts
-    wrong = found - MAY_IMPORT[own] - {own, None}
-    assert not wrong, f"{own} imports {', '.join(sorted(wrong))}"
+def test_every_part_has_a_row() -> None:
+    parts = {p.name.removesuffix(".py") for p in PACKAGE.iterdir() if not p.name.startswith(".")}
+    assert parts - {"__init__", "__pycache__", "py.typed"} == MAY_IMPORT.keys()
 
 
-@pytest.mark.parametrize("path", modules(), ids=lambda p: str(p.relative_to(ROOT)))
-def test_rooms_of_render_know_only_lower_floors(path: Path) -> None:
-    parts = path.relative_to(ROOT).with_suffix("").parts
-    rooms = [room for floor in FLOORS for room in floor]
-    if parts[:2] != ("clpt", "render") or parts[2] not in rooms:
-        return
-    own = next(i for i, floor in enumerate(FLOORS) if parts[2] in floor)
-    known = {parts[2]}.union(*FLOORS[:own])
-    found = {name.split(".")[2] for name in imports(path) if name.startswith("clpt.render.")}
-    assert not found - known, f"{parts[2]} imports {', '.join(sorted(found - known))}"
+def test_imports_follow_the_direction() -> None:
+    parts = {path.name.removesuffix(".py") for path in PACKAGE.iterdir()}
+
+    def broken() -> Iterator[str]:
+        for path in modules():
+            own = part_of(full_name(path, ROOT))
+            for name, place in imports(path) if own in MAY_IMPORT else ():
+                other = part_of(name)
+                if other in parts - MAY_IMPORT[own] - {own}:
+                    yield f"{place}: {own} imports {other} ({name})"
+
+    keep("a part imports only those that MAY_IMPORT lists: move what it needs down", broken())
+
+
+def test_rooms_of_render_know_only_lower_floors() -> None:
+    below = {
+        room: {room}.union(*FLOORS[:floor]) for floor, rooms in enumerate(FLOORS) for room in rooms
+    }
+
+    def broken() -> Iterator[str]:
+        for path in modules():
+            parts = path.relative_to(PACKAGE).with_suffix("").parts
+            if parts[0] != "render" or parts[1] not in below:
+                continue
+            for name, place in imports(path):
+                if name.startswith("clpt.render.") and name.split(".")[2] not in below[parts[1]]:
+                    yield f"{place}: {parts[1]} imports {name}"
+
+    keep("a room of clpt/render imports only rooms of lower FLOORS", broken())
 
 
 def test_a_circle_is_found() -> None:
-    assert circle({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == []
-    assert circle({"a": {"b"}, "b": {"c", "d"}, "c": set(), "d": {"b"}}) == ["b", "d", "b"]
+    assert graphs.circle({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == []
+    assert graphs.circle({"a": {"b"}, "b": {"c", "d"}, "c": set(), "d": {"b"}}) == ["b", "d", "b"]
 
 
 def test_no_modules_import_each_other() -> None:
     """No circle of imports, those inside functions and for type checking included."""
-    paths = module_names()
-    graph: dict[str, set[str]] = {}
-    for name in sorted(paths):
-        taken = [(base, part) for base, parts in statements(paths[name]) for part in parts or [""]]
-        targets = {f"{b}.{part}" if f"{b}.{part}" in paths else b for b, part in taken}
-        graph[name] = targets & paths.keys()
-    assert not circle(graph), "a circle of imports: " + " -> ".join(circle(graph))
+    found = graphs.circle(graphs.graph(by_name=False))
+    assert not found, "a circle of imports: " + " -> ".join(found)
 
 
-@pytest.mark.parametrize("path", modules(), ids=lambda p: str(p.relative_to(ROOT)))
-def test_who_imports_pyopencl(path: Path) -> None:
-    own = part_of(".".join(path.relative_to(ROOT).with_suffix("").parts))
-    if own not in OPENCL:
-        assert not any(name.split(".")[0] == "pyopencl" for name in imports(path))
+def test_who_imports_pyopencl() -> None:
+    keep(
+        f"only {', '.join(sorted(OPENCL))} import pyopencl: take what is needed from clpt.device",
+        (
+            place
+            for path in modules()
+            if part_of(full_name(path, ROOT)) not in OPENCL
+            for name, place in imports(path)
+            if name.split(".")[0] == "pyopencl"
+        ),
+    )
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "scene",
-        "lenses",
-        "geometry",
-        "formats",
-        "spectra",
-        "layout",
-        "transforms",
-        "images",
-        "spectral_exr",
-    ],
-)
-def test_data_does_not_need_opencl(name: str) -> None:
+def test_data_does_not_need_opencl() -> None:
     """No chain of imports leads from plain data to pyopencl."""
-    seen: set[str] = set()
-    open_ = [f"clpt.{name}"]
-    while open_:
-        module = open_.pop()
-        if module in seen or module == "clpt":
-            continue
-        seen.add(module)
-        base = ROOT.joinpath(*module.split("."))
-        path = base / "__init__.py" if base.is_dir() else base.with_suffix(".py")
-        if path.is_file():
-            open_ += [m for m in imports(path) if m.split(".")[0] in ("clpt", "pyopencl")]
-    assert not any(m.split(".")[0] == "pyopencl" for m in seen)
+    links, paths = graphs.graph(by_name=False), graphs.modules()
+    uses = {
+        module
+        for module, path in paths.items()
+        if any(name.split(".")[0] == "pyopencl" for name, _ in imports(path))
+    }
+
+    def broken() -> Iterator[str]:
+        for part in PLAIN:
+            chains = [[name] for name in links if f"{name}.".startswith(f"clpt.{part}.")]
+            seen = {"clpt", *(name for (name,) in chains)}
+            while chains:  # the shortest first
+                chain = chains.pop(0)
+                if chain[-1] in uses:
+                    yield " -> ".join([*chain, "pyopencl"])
+                    break
+                chains += ([*chain, name] for name in sorted(links[chain[-1]] - seen))
+                seen |= links[chain[-1]]
+
+    keep("plain data is read without OpenCL: cut the chain of imports", broken())
 
 
-@pytest.mark.parametrize("path", modules(), ids=lambda p: str(p.relative_to(ROOT)))
-def test_the_library_never_prints(path: Path) -> None:
-    if "cli" in path.parts or path.name == "__main__.py" or path.name.startswith("make_"):
-        return
-    calls = [
-        n for n in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(n, ast.Call)
-    ]
-    assert not any(isinstance(c.func, ast.Name) and c.func.id == "print" for c in calls)
+def test_the_library_never_prints() -> None:
+    keep(
+        "the library never prints: log, or return what is to be told",
+        (
+            f"{path.relative_to(ROOT)}:{line}"
+            for path in modules()
+            if "cli" not in path.parts
+            and path.name != "__main__.py"
+            and not path.name.startswith("make_")
+            for line in read(path, ROOT).prints
+        ),
+    )
+
+
+def test_nobody_changes_the_filters_of_warnings() -> None:
+    """They belong to the whole process: another thread's warning would become an error."""
+    keep(
+        "no module imports `warnings`: log instead",
+        (place for path in modules() for name, place in imports(path) if name == "warnings"),
+    )
 
 
 def test_public_names() -> None:
@@ -210,6 +230,7 @@ def test_public_names() -> None:
         for node in tree.body
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("clpt")
         for alias in node.names
+        if not (alias.asname or alias.name).startswith("_")
     }
     assert set(clpt.__all__) == imported | {"__version__"}
     for name in clpt.__all__:
@@ -217,57 +238,86 @@ def test_public_names() -> None:
         assert getattr(clpt, name).__doc__ or name == "__version__"
 
 
-def kernel_files() -> list[Path]:
-    """The OpenCL files."""
-    return sorted(KERNELS.rglob("*.cl"))
+def test_kernel_files_begin_with_their_purpose() -> None:
+    keep(
+        "a kernel file begins with a comment that says what it is for",
+        kernels(lambda _, text: [] if text.startswith("/*") else [(0, text.splitlines()[0])]),
+    )
 
 
-@pytest.mark.parametrize("path", kernel_files(), ids=lambda p: str(p.relative_to(KERNELS)))
-def test_kernel_files(path: Path) -> None:
-    """A comment first; includes in their direction; kernels only in stage/, motion/ and bvh/."""
-    text = path.read_text(encoding="utf-8")
-    assert text.startswith("/*"), "a kernel file begins with what it is for"
-    folder = path.relative_to(KERNELS).parts[0]
-    included = {name.split("/")[0] for name in re.findall(r'#include "([^"]+)"', text)}
-    wrong = included - MAY_INCLUDE[folder]
-    assert not wrong, f"{folder}/ includes {', '.join(sorted(wrong))}/"
-    if re.search(r"\bkernel void\b", text):
-        assert folder in ("stage", "bvh", "motion")
-    code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
-    if folder in KINDS | {"integrator"}:
-        assert "#pragma" not in code
-    assert "double" not in re.findall(r"\w+", code)
-    in_memory = re.findall(r"global\s+(?:const\s+)?(\w+)\s*\*", code)
-    assert not {"float3", "int3", "uint3", "bool", "size_t"} & set(in_memory)
+def test_kernel_files_include_in_their_direction() -> None:
+    def broken(folder: str, text: str) -> Iterator[tuple[int, str]]:
+        for found in re.finditer(r'#include "([^"]+)"', text):
+            if found[1].split("/")[0] not in MAY_INCLUDE[folder]:
+                yield found.start(), f"{folder}/ includes {found[1]}"
+
+    keep("a kernel file includes only folders that MAY_INCLUDE lists", kernels(broken))
 
 
-@pytest.mark.parametrize("path", kernel_files(), ids=lambda p: str(p.relative_to(KERNELS)))
-def test_comments_of_kernels_name_what_exists(path: Path) -> None:
+def test_kernels_stand_where_host_code_looks_for_them() -> None:
+    def broken(folder: str, text: str) -> Iterator[tuple[int, str]]:
+        if folder not in HAVE_KERNELS:
+            yield from ((f.start(), f[0]) for f in re.finditer(r"\bkernel void \w*", text))
+
+    keep(f"kernels stand only in {', '.join(sorted(HAVE_KERNELS))}", kernels(broken))
+
+
+def test_kernel_files_keep_to_the_language() -> None:
+    """No double; nothing in memory whose size a compiler chooses; pragmas only in shared files."""
+
+    def broken(folder: str, text: str) -> Iterator[tuple[int, str]]:
+        code = without_comments(text)
+        yield from ((f.start(), "double") for f in re.finditer(r"\bdouble\b", code))
+        if folder in KINDS | {"integrator"}:
+            yield from ((f.start(), "#pragma") for f in re.finditer("#pragma", code))
+        for found in re.finditer(r"global\s+(?:const\s+)?(\w+)\s*\*", code):
+            if found[1] in NOT_IN_MEMORY:
+                yield found.start(), f"{found[1]} in memory"
+
+    rule = "kernels have no double, no #pragma in a kind, and in memory no type of unknown size"
+    keep(rule, kernels(broken))
+
+
+def test_comments_of_kernels_name_what_exists() -> None:
     """Kernel files as `folder/file.cl`, others by their path, modules by their full name."""
-    comments = " ".join(re.findall(r"/\*.*?\*/", path.read_text(encoding="utf-8"), re.DOTALL))
-    for name in re.findall(r"(?<![\w/<>*])[\w/]+\.cl\b", comments):
-        file = KERNELS / name.removeprefix("kernels/")
-        assert file.is_file() or name.startswith("generated/"), name
-    for name in re.findall(r"\b(?:clpt|tests|bench|docs)/[\w/]+\.\w+", comments):
-        assert (ROOT / name).is_file(), name
-    for name in re.findall(r"\bclpt(?:\.\w+)+", comments):
+
+    def broken(_: str, text: str) -> Iterator[tuple[int, str]]:
+        for comment in re.finditer(r"/\*.*?\*/", text, re.DOTALL):
+            for found in re.finditer(NAMED, comment[0]):
+                if not exists(found[0]):
+                    yield comment.start() + found.start(), found[0]
+
+    keep("a comment names files and modules that exist", kernels(broken))
+
+
+def test_lines_of_kernels() -> None:
+    """120 columns at most; the backslashes of a macro stand below each other."""
+
+    def broken(_: str, text: str) -> Iterator[tuple[int, str]]:
+        position = 0
+        for line, after in pairwise([*text.splitlines(), ""]):
+            if len(line) > 120:
+                yield position, f"{len(line)} columns"
+            position += len(line) + 1
+            if line.endswith("\\") and after.endswith("\\") and len(line) != len(after):
+                yield position, "its backslash does not stand below the one before"
+
+    keep("lines of kernels have 120 columns, and the backslashes of a macro one", kernels(broken))
+
+
+def without_comments(text: str) -> str:
+    """The text with blanks in the place of comments, so that all positions stay."""
+    return re.sub(r"/\*.*?\*/", lambda c: re.sub(r"[^\n]", " ", c[0]), text, flags=re.DOTALL)
+
+
+def exists(name: str) -> bool:
+    """Whether there is the kernel file, the file or the module that a comment names."""
+    if name.startswith("clpt."):
         module = ROOT.joinpath(*name.split("."))
         inside = module.parent.with_suffix(".py")  # of a module: the name that it must have
-        there = module.is_dir() or module.with_suffix(".py").is_file()
-        assert there or re.search(rf"\b{module.name}\b", inside.read_text("utf-8")), name
-
-
-@pytest.mark.parametrize("path", kernel_files(), ids=lambda p: str(p.relative_to(KERNELS)))
-def test_lines_of_kernels(path: Path) -> None:
-    """120 columns at most; the backslashes of a macro stand below each other."""
-    lines = path.read_text(encoding="utf-8").splitlines()
-    assert max(map(len, lines)) <= 120
-    for line, after in pairwise(lines):
-        if line.endswith("\\") and after.endswith("\\"):
-            assert len(line) == len(after), after
-
-
-@pytest.mark.parametrize("path", modules(), ids=lambda p: str(p.relative_to(PACKAGE)))
-def test_nobody_changes_the_filters_of_warnings(path: Path) -> None:
-    """They belong to the whole process: another thread's warning would become an error."""
-    assert "warnings" not in imports(path)
+        if inside.is_file():
+            return bool(re.search(rf"\b{module.name}\b", inside.read_text("utf-8")))
+        return module.is_dir() or module.with_suffix(".py").is_file()
+    if name.endswith(".cl"):
+        return name.startswith("generated/") or (KERNELS / name.removeprefix("kernels/")).is_file()
+    return (ROOT / name).is_file()

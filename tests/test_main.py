@@ -13,7 +13,7 @@ import pytest
 
 from clpt import __main__ as entry
 from clpt import cli
-from clpt.cli import failures
+from clpt.cli.process import failures
 from clpt.errors import SceneError
 
 

@@ -15,7 +15,8 @@ import numpy as np
 
 import clpt
 from clpt import images, measured, output_files, scene, spectral_exr
-from clpt.cli import checkpoints, video
+from clpt.cli.files import checkpoints
+from clpt.cli.render import video
 from clpt.formats.meshes import particles, strands
 from clpt.formats.native import motion
 from clpt.measured import tensor_file
@@ -70,7 +71,7 @@ def plot(path: Path) -> None:
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    from clpt.cli import plots
+    from clpt.cli.plots import pixels as plots
 
     same = {"SOURCE_DATE_EPOCH": "0"}
     with rc_context({"svg.hashsalt": "same"}), mock.patch.dict(os.environ, same):

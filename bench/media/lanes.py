@@ -2,7 +2,7 @@
 
 `python -m bench.media.lanes [SCENE ...]`
 
-A copy of the kernels counts in flights (kernels/optics/grid_flight.cl) the steps that a path takes
+A copy of the kernels counts in flights (kernels/media/grid_flight.cl) the steps that a path takes
 and those that its block takes: a path's light is outshone by them, and a picture has their means.
 `busy` is their ratio, lanes without a ray in a grid counted, and `flights` how many a path begins.
 """
@@ -46,7 +46,7 @@ COUNT = """        {
 """.replace("UNIT", f"{UNIT:.1e}f")
 KEEP = "            hero_keep(path, at, gridded, own.ratio);"
 CHANGES = {  # what is put before and after a text
-    "optics/grid_flight.cl": [
+    "media/grid_flight.cl": [
         ("    mask collides;", "", MEMBERS),
         ("    while (any(active)) {", BEGIN, None),
         ("f = {mask_of(0), ", "", ZEROS),

@@ -1,4 +1,4 @@
-"""What a kernel that only copies moves: the measure of how well others use the memory."""
+"""Bytes a second that a kernel moves which only copies: others are compared with it."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Copying:
         self._rates: dict[int, float] = {}
 
     def rounds(self, nbytes: int, rounds: int) -> tuple[list[Taken], str]:
-        """What each copy of about so many bytes took, and what is wrong with it."""
+        """Time copies of about `nbytes` bytes; return the times, and what is wrong if anything."""
         items = max(nbytes // 64, 64)
         give = device.Buffers(self.device)
         source = (np.arange(items * 16, dtype=np.uint32) * WORD).view(np.uint32)

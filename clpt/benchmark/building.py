@@ -1,4 +1,4 @@
-"""How fast trees are built of triangles on the device, and follow them when they move."""
+"""Speed of building trees on the device, and of refitting them to triangles that have moved."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class _Work:
         self, name: str, layout: str, quality: Quality, seconds: list[float], tree: bvh.Bvh,
         *, moves: bool,
     ) -> Figure:  # fmt: skip
-        """What the rounds gave after the first one, which compiles; looked at."""
+        """Return the speed of all rounds but the first, which compiles; check the hits."""
         count = len(self.given.faces)
         stats = {} if moves else {k: v for k, v in tree.stats.items() if k != "seconds"}
         more = {"layout": layout, "quality": quality, "triangles": count, **stats}
@@ -102,12 +102,12 @@ class _Work:
 
     @cached_property
     def _truths(self) -> tuple[Truth, Truth]:
-        """What is known of the rays before triangles move, and after."""
+        """The expected hits of the rays, before the triangles move and after."""
         faces, rays = self.given.faces, self.rays
         return Truth(self.given.vertices, faces, rays), Truth(self.bent, faces, rays)
 
     def _answers(self, layout: str, quality: Quality, *, moves: bool) -> str:
-        """What is wrong with what such a tree answers; "" if nothing."""
+        """Trace the rays through such a tree; return what is wrong with its hits, or ""."""
         queue, given = self.device.queue, self.given
         tree = self.accel(queue, given.vertices, given.faces, layout=layout, quality=quality)
         if moves:

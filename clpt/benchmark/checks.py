@@ -16,7 +16,7 @@ MISS = -1
 
 
 class Truth:
-    """What is known of a set of rays beforehand.
+    """Expected hits of a set of rays, which the hits of a tree are checked against.
 
     vertices: (n, 3) float32; faces: (m, 3) uint32; rays: a clpt.benchmark.rays.Rays.
     """
@@ -35,7 +35,7 @@ class Truth:
         self._nearest: list[tuple[float, float]] = [self._brute(i) for i in self.sample]
 
     def closest(self, hits: Mapping[str, NDArray]) -> str:
-        """What is wrong with hits, by the names of clpt.rays.Hits; "" if nothing."""
+        """Check hits, named as in clpt.rays.Hits; return what is wrong with them, or ""."""
         prim, t = hits["primitive"], hits["t"]
         unknown = (prim < MISS) | (prim >= len(self.corners))
         if unknown.any():
@@ -91,7 +91,7 @@ class Truth:
 
 
 def differ(hits: Mapping[str, NDArray], others: Mapping[str, NDArray]) -> str:
-    """What is wrong where two layouts met the same rays; "" if they agree."""
+    """Compare the hits of the same rays in two layouts; return what is wrong, or ""."""
     met, theirs = hits["primitive"] >= 0, others["primitive"] >= 0
     with np.errstate(invalid="ignore"):
         near = np.abs(hits["t"] - others["t"]) <= AGREE * others["t"]
@@ -100,7 +100,7 @@ def differ(hits: Mapping[str, NDArray], others: Mapping[str, NDArray]) -> str:
 
 
 def any_hit(met: NDArray, hits: Mapping[str, NDArray]) -> str:
-    """What is wrong with answers of any hit, (n,) 0 or 1, beside the closest hits of the rays."""
+    """Compare any-hit answers (n,), 0 or 1, with the closest hits; return what is wrong, or ""."""
     if (met > 1).any():
         return f"{(met > 1).sum():,} of {len(met):,} rays were not traced"
     share = float(((met != 0) == (hits["primitive"] >= 0)).mean())

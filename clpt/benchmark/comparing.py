@@ -17,7 +17,7 @@ _KEY = ("bench", "scene", "figure", "unit", "mode")
 
 @dataclass(frozen=True)
 class Ratio:
-    """How a figure compares with one of a record.
+    """A figure that is measured now beside the same figure in a record.
 
     ratio: above 1 where it is better now, whatever the unit; noise: by which it may be off, from
     the spread of both; then: the record.
@@ -34,7 +34,7 @@ class Ratio:
 
 
 def key(record: Row) -> tuple[Any, ...]:
-    """What two records of the same figure have in common."""
+    """Return the values of a record that are equal in all records of the same figure."""
     return tuple(record.get(name) for name in _KEY)
 
 

@@ -47,14 +47,14 @@ class Figure:
         return float((high - low) / 2 / self.value)
 
     def refuse(self, *complaints: str) -> Figure:
-        """The same figure, refused if any complaint is not empty."""
+        """Return a copy of this figure, refused if any complaint is not empty."""
         all_complaints = [self.refused, *complaints]
         return dataclasses.replace(
             self, refused="; ".join(dict.fromkeys(filter(None, all_complaints)))
         )
 
     def record(self) -> dict[str, Any]:
-        """What is kept of it, as JSON takes it."""
+        """Return this figure as a record of values that JSON can hold."""
         own = {"scene": self.scene} if self.scene else {}
         return {
             "bench": self.part,
@@ -83,7 +83,7 @@ class Taken:
 
 
 def timed(on: device.Device, enqueue: Callable[[], Iterable[Any]]) -> Taken:
-    """How long the commands took whose events `enqueue` returns. The queue must be profiling."""
+    """Time the commands whose events `enqueue` returns, on a queue with profiling."""
     timings = Timings(on.queue)
     on.queue.finish()
     start = time.perf_counter()

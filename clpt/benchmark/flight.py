@@ -110,7 +110,7 @@ class Flight:
         return np.where(self.met, (word >> 24).astype(np.int32), -1)
 
     def items(self, step: Step) -> int:
-        """How many slots the stage has work for."""
+        """Count the slots that a stage has work for."""
         kernel = step.bound.kernel.name
         if kernel in ("generate", "emit"):
             return int(self.waiting.sum())

@@ -1,4 +1,4 @@
-"""How fast layouts answer rays, taken from the scene itself, and whether they answer right.
+"""Speed of each layout for rays of the scene itself, and a check of its hits.
 
 `primary`: the camera's, in tiles of 4 x 4 pixels; `diffuse`: cosine-distributed from what those
 met; `shadow`: from there to the scene's lights, as its integrator chooses them. `closest` asks for

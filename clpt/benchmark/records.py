@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def processor() -> str:
-    """What the host's processor calls itself."""
+    """Return the name of the host's processor."""
     try:
         found = re.search(r"model name\s*:\s*(.+)", Path("/proc/cpuinfo").read_text())
     except OSError:
@@ -63,7 +63,7 @@ def version() -> str:
 
 
 def circumstances() -> dict[str, Any]:
-    """What every record tells: when, on what host, at which commit, and how busy that was."""
+    """Return the part of all records: date, version, commit, processor, its cores and its load."""
     busy = {"load": round(os.getloadavg()[0], 1)} if hasattr(os, "getloadavg") else {}
     return {
         "date": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"),
@@ -76,7 +76,7 @@ def circumstances() -> dict[str, Any]:
 
 
 def of_device(info: device.DeviceInfo) -> dict[str, Any]:
-    """What a record tells of the device that was measured."""
+    """Return the part of a record that describes the device."""
     return {
         "device": info.label,
         "kind": info.kind,

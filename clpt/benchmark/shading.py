@@ -1,4 +1,4 @@
-"""What every kind of material costs: items a second, beside `diffuse`.
+"""Cost of each kind of material: items that are shaded a second, beside `diffuse`.
 
 A closed box of one material, so that all slots wait for that kind in every bounce. The yardstick is
 a box of constant `diffuse`, measured by turns with each of the others.

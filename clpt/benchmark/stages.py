@@ -1,4 +1,4 @@
-"""What the stages of a render get through: items a second, and bytes beside a copy's.
+"""Speed of each stage of a render: items a second, and bytes a second beside those of a copy.
 
 Each stage runs on the state that the stages before have left; its items are the slots that it has
 work for. Bytes are those of clpt.benchmark.traffic: what it must move of each path's state, without
@@ -84,7 +84,7 @@ def _asked(name: str, only: Sequence[str]) -> bool:
 def _figure(
     flight: Flight, copying: Copying, name: str, nbytes: float, found: list[Work]
 ) -> Figure:
-    """What a stage got through; rounds in which it had nothing to do count for nothing."""
+    """Return the speed of a stage; rounds in which no slot had work for it are left out."""
     busy = [(items, taken) for items, taken in found if items]
     within = 4 * sum(record.words for record in SLABS) * flight.slots
     speeds = tuple(items * 1e-6 / taken.device for items, taken in busy)

@@ -31,7 +31,7 @@ SIDE = 64
 
 @dataclass(frozen=True)
 class Process:
-    """What a process took: seconds from start to end, and of processor time."""
+    """Time of a process [s]: from its start to its end, and of the processor."""
 
     seconds: float
     cpu: float

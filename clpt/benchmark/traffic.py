@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from clpt.records import SLABS
-from clpt.render.codegen import programs
+from clpt.render.codegen import blocks, programs
 from clpt.render.contract.features import Features
 
 _WORD = 4  # bytes
@@ -48,17 +48,19 @@ def traffic(features: Features, layout: str, *, queued: bool = False) -> dict[st
     in `intersect` and `shade_...` a ray and its hit, in `shadow` a shadow ray, in `append` a slot.
     """
     texts = programs.sources(features, layout, 1, queued=queued)
-    mode = features.spectra.mode
-    return {name: _moved(name, source.text, mode) for name, source in texts.items()}
-
-
-def _moved(name: str, text: str, mode: str) -> Moved:
+    unused = blocks.unused(features)
     sizes = {
         f"{record.name.lower()}_{member.name}": member.words
-        - (member.type == "spectrum" and mode == "rgb")
+        - (member.type == "spectrum" and not features.spectra.spectral)
         for record in SLABS
         for member in record.members
+        if member.name not in unused
     }
+    return {name: _moved(name, source.text, sizes) for name, source in texts.items()}
+
+
+def _moved(name: str, text: str, sizes: Mapping[str, int]) -> Moved:
+    """What an item moves; sizes: in words, of the members of slabs."""
     words: dict[str, set[str]] = {"load": set(), "store": set()}
     for line in kept_lines(text):
         for call in _CALL.finditer(line):

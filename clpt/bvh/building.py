@@ -1,4 +1,4 @@
-"""What the steps of a build share: the device, memory, kernels."""
+"""State that the steps of a build share: the device, its memory, kernels."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ _DEEPEST = 48  # BVH_DEPTH of kernels/bvh/node.cl
 
 @dataclass(frozen=True)
 class Collapse:
-    """What stands in the wide nodes of a binary tree, on the device.
+    """A choice of the binary nodes that become wide nodes and leaves, on the device.
 
     costs, occlusion: of the binary nodes; roots: the binary nodes that become wide ones; firsts: a
     wide node's first child and first leaf; leaf_roots: the binary nodes that become wide leaves;

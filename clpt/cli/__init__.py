@@ -1,4 +1,7 @@
-"""The command line: one module for each of COMMANDS, imported when it is used."""
+"""The command line: a module or package for each of COMMANDS, imported when it is used.
+
+The other packages hold what several commands share.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ import logging
 
 import click
 
-from .verbosity import verbose_option
+from .options.verbosity import verbose_option
 
 COMMANDS = (
     "render", "view", "merge", "warm", "worker", "cluster", "devices", "info", "inspect", "kernels",

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +20,62 @@ from ..benchmark.comparing import Ratio
 from ..benchmark.figures import Figure
 from ..bvh import TREES
 from ..device.context import trial
-from .extras import extra
-from .output_console import output_console
+from .options.records import with_records
+from .printing.console import output_console
+from .process.extras import extra
 
 SLOWER = 3  # the exit status if a figure was refused, or is below --fail-below
 STAGES = (
     "generate", "emit", "intersect", "mix", "shade", "shadow", "splat", "append", "accumulate",
 )  # fmt: skip
 HEADINGS = ("figure", "", "unit", "±", "GB/s", "of a copy", "")
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What is measured: see `clpt.benchmark.measure`."""
+
+    scene: str | None
+    stages: tuple[str, ...]
+    layouts: tuple[str, ...]
+    mode: str | None
+    rounds: int
+    count: int | None
+
+    def settings(self) -> dict[str, Any]:
+        """Return the arguments of `clpt.benchmark.measure`. Raises click.BadParameter."""
+        parts, only, kinds = _chosen(self.stages)
+        return {
+            "parts": parts, "only": only, "kinds": kinds, "scene": self.scene,
+            "layouts": self.layouts or TREES, "mode": self.mode, "rounds": self.rounds,
+            "count": self.count,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Report:
+    """Files that get figures, and a record to compare them with."""
+
+    target: Path | None
+    record: Path | None
+    fail_below: float | None
+    plot: Path | None
+
+    def check(self) -> None:
+        """Raise what is wrong with a file, before anything is measured."""
+        if self.fail_below is not None and self.record is None:
+            raise click.UsageError("--fail-below compares: give --compare FILE too")
+        if self.plot is not None:
+            with extra("plot", "a plot"):
+                from .plots import bench as bench_plot  # here: matplotlib is an extra, and slow
+
+            bench_plot.check(self.plot)
+        _ = self.before
+
+    @cached_property
+    def before(self) -> list[dict[str, Any]] | None:
+        """The figures of the record."""
+        return None if self.record is None else records.read(self.record)
 
 
 @click.command()
@@ -57,18 +107,8 @@ HEADINGS = ("figure", "", "unit", "±", "GB/s", "of a copy", "")
     help="Plot the figures to a .png, .svg or .pdf; of several devices the last one's.",
 )  # fmt: skip
 @click.option("--list", "list_all", is_flag=True, help="List what can be measured, and where.")
-def bench(
-    scene: str | None,
-    stages: tuple[str, ...],
-    layouts: tuple[str, ...],
-    device: str | None,
-    target: Path | None,
-    record: Path | None,
-    fail_below: float | None,
-    plot: Path | None,
-    list_all: bool,
-    **settings: Any,
-) -> int:
+@with_records(subject=Subject, report=Report)
+def bench(subject: Subject, report: Report, device: str | None, list_all: bool) -> int:
     """Measure rays, stages of rendering, builds and starts of an OpenCL device.
 
     Figures are medians of rounds; ± is half the distance of their quartiles. A result that cannot
@@ -79,39 +119,36 @@ def bench(
     if list_all:
         _list(console)
         return 0
-    if fail_below is not None and record is None:
-        raise click.UsageError("--fail-below compares: give --compare FILE too")
-    if plot is not None:
-        with extra("plot", "a plot"):
-            from . import bench_plot  # here: matplotlib is an extra, and slow to import
+    report.check()
+    settings = subject.settings()
+    failed = [_report(console, info, settings, report) for info in _infos(device)]
+    return SLOWER if any(failed) else 0
 
-        bench_plot.check(plot)
-    before = None if record is None else records.read(record)
-    parts, only, kinds = _chosen(stages)
-    failed = False
-    for info in _infos(device):
-        on = dev.Device.open(info, profiling=True)
-        console.print(
-            f"[bold]{info.label}[/], {info.version}, driver {info.driver}", highlight=False
-        )
-        figures = _measured(
-            console, on, parts=parts, only=only, kinds=kinds, scene=scene,
-            layouts=layouts or TREES, **settings,
-        )  # fmt: skip
+
+def _report(
+    console: Console, info: dev.DeviceInfo, settings: Mapping[str, Any], report: Report
+) -> bool:
+    """Measure a device, and tell of it; return whether a figure is refused, or too low."""
+    on = dev.Device.open(info, profiling=True)
+    console.print(f"[bold]{info.label}[/], {info.version}, driver {info.driver}", highlight=False)
+    figures = _measured(console, on, settings)
+    failed = any(figure.refused for figure in figures)
+    if report.target is not None:
+        about = records.of_device(info)
         good = [figure for figure in figures if figure.rounds and not figure.refused]
-        failed |= any(figure.refused for figure in figures)
-        if target is not None:
-            about = records.of_device(info)
-            records.append(target, [{**figure.record(), **about} for figure in good])
-        ratios = []
-        if before is not None:
-            ratios = comparing.against(figures, before, info.label)
-            _show_ratios(console, ratios, fail_below)
-            failed |= fail_below is not None and any(r.below(fail_below) for r in ratios)
-        if plot is not None:
-            then = {figures.index(one.figure): float(one.then["value"]) for one in ratios}
-            bench_plot.write(plot, f"{info.label}, clpt bench", figures, then)
-    return SLOWER if failed else 0
+        records.append(report.target, [{**figure.record(), **about} for figure in good])
+    ratios = []
+    if report.before is not None:
+        ratios = comparing.against(figures, report.before, info.label)
+        limit = report.fail_below
+        _show_ratios(console, ratios, limit)
+        failed |= limit is not None and any(ratio.below(limit) for ratio in ratios)
+    if report.plot is not None:
+        from .plots import bench as bench_plot
+
+        then = {figures.index(one.figure): float(one.then["value"]) for one in ratios}
+        bench_plot.write(report.plot, f"{info.label}, clpt bench", figures, then)
+    return failed
 
 
 def _chosen(names: Sequence[str]) -> tuple[list[str], list[str], list[str]]:
@@ -141,7 +178,7 @@ def _infos(device: str | None) -> list[dev.DeviceInfo]:
     return [info for info in dev.devices() if trial(info) is None]
 
 
-def _measured(console: Console, on: dev.Device, **settings: Any) -> list[Figure]:
+def _measured(console: Console, on: dev.Device, settings: Mapping[str, Any]) -> list[Figure]:
     """Return all figures; print each table when it is complete."""
     figures: list[Figure] = []
     table = None

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from .verbosity import verbose_option
+from .options.verbosity import verbose_option
 
 
 @click.group()

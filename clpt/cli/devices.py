@@ -11,7 +11,7 @@ from .. import device
 from ..device import runtimes
 from ..device.context import DeviceInfo, selection, trial
 from ..errors import DeviceError
-from .output_console import output_console
+from .printing.console import output_console
 
 
 @click.command()

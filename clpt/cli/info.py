@@ -14,15 +14,15 @@ from rich.table import Table
 
 from clpt.formats import load
 from clpt.formats.meshes import framing
-from clpt.render.lowering.geometry.triangles import triangulate
+from clpt.geometry.triangles import triangulate
 
 from ..images import READERS
 from ..scene import Scene, materials, shapes, textures
 from ..scene.params import Kind
-from .film_contents import film_summary, is_film
-from .image_contents import read_contents
-from .loading_options import loading_options
-from .output_console import output_console, shown
+from .files.film_contents import film_summary, is_film
+from .files.image_contents import read_contents
+from .options.loading_options import loading_options
+from .printing.console import output_console, shown
 
 OF_FILES = ("scenes", "variables", "asset")  # what some formats tell besides
 FLAT_TRIANGLES = {shapes.Rectangle: 2, shapes.Cube: 12}

@@ -11,10 +11,10 @@ import click
 import numpy as np
 from rich.table import Table
 
-from .extras import extra
-from .film_contents import film_contents, is_film
-from .image_contents import ImageContents, Pixel, read_contents
-from .output_console import output_console, shown
+from .files.film_contents import film_contents, is_film
+from .files.image_contents import ImageContents, Pixel, read_contents
+from .printing.console import output_console, shown
+from .process.extras import extra
 
 
 class PixelType(click.ParamType):
@@ -54,7 +54,7 @@ def inspect(file: Path, pixels: tuple[Pixel, ...], output: Path | None, as_json:
         _print(image, values)
     if pixels:
         with extra("plot", "a plot"):
-            from . import plots  # here: matplotlib is an extra, and slow to import
+            from .plots import pixels as plots  # here: matplotlib is an extra, and slow to import
 
         target = output or Path(f"{file.stem}.spectrum.png")
         plots.write(target, image, values)

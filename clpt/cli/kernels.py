@@ -14,7 +14,7 @@ from .. import output_files
 from ..bvh.layouts import LAYOUTS
 from ..errors import SceneError
 from ..formats import load
-from .loading_options import loading_options
+from .options.loading_options import loading_options
 
 
 @click.command()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -10,8 +11,8 @@ from rich.table import Table
 from .. import lenses
 from ..errors import SceneError
 from ..lenses.glasses import LINE_C, LINE_D, LINE_F
-from .extras import extra
-from .output_console import output_console
+from .printing.console import output_console
+from .process.extras import extra
 
 
 @click.command()
@@ -46,33 +47,43 @@ def lens(
     console.print(
         f"{made.name}, {len(made.surfaces)} surfaces" + f"; {made.source}" * bool(made.source)
     )
+    console.print(_cardinal(made, waves))
+    console.print(_spots(made, waves, angles))
+    if plot is not None:
+        with extra("plot", "a plot"):
+            from .plots import lens as lens_plot  # here: matplotlib is an extra, and slow to import
+
+        lens_plot.write(plot, made, waves, angles)
+        click.echo(str(plot), err=True)
+
+
+def _cardinal(lens: lenses.Prescription, waves: Sequence[float]) -> Table:
+    """Return what a lens does near its axis, a row for each wavelength [nm]."""
     table = Table(box=None, pad_edge=False)
     headings = ("nm", "focal length", "back focus", "f-number", "entrance pupil", "exit pupil")
     for heading in headings:
         table.add_column(heading, justify="right")
     for wavelength in waves:
-        found = lenses.cardinal(made, wavelength)
+        found = lenses.cardinal(lens, wavelength)
         table.add_row(
             f"{wavelength:g}", f"{found.focal_length:.5g}", f"{found.back_focus:.5g}",
             f"{found.f_number:.4g}", f"{2.0 * found.entrance_radius:.4g} at {found.entrance:.4g}",
             f"{2.0 * found.exit_radius:.4g} at {found.exit:.4g}",
         )  # fmt: skip
-    console.print(table)
-    spots = Table(box=None, pad_edge=False)
+    return table
+
+
+def _spots(lens: lenses.Prescription, waves: Sequence[float], angles: Sequence[float]) -> Table:
+    """Return the spots of points at angles [degrees], a row for each and a wavelength [nm]."""
+    table = Table(box=None, pad_edge=False)
     for heading in ("degrees", "nm", "spot [um]", "light through"):
-        spots.add_column(heading, justify="right")
+        table.add_column(heading, justify="right")
     for angle in angles:
         for wavelength in waves:
-            spot = lenses.spots.spot(made, angle, wavelength)
+            spot = lenses.spots.spot(lens, angle, wavelength)
             size = f"{spot.radius * 1e3:.4g}" if len(spot.points) else "-"
-            spots.add_row(f"{angle:g}", f"{wavelength:g}", size, f"{spot.through:.3f}")
-    console.print(spots)
-    if plot is not None:
-        with extra("plot", "a plot"):
-            from . import lens_plot  # here: matplotlib is an extra, and slow to import
-
-        lens_plot.write(plot, made, waves, angles)
-        click.echo(str(plot), err=True)
+            table.add_row(f"{angle:g}", f"{wavelength:g}", size, f"{spot.through:.3f}")
+    return table
 
 
 def _numbers(text: str, option: str, low: float, high: float) -> list[float]:

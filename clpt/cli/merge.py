@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -12,9 +11,11 @@ from ..errors import SceneError
 from ..render.film import film_file
 from ..render.film.host_picture import HostPicture
 from ..render.film.saved_film import SavedFilm, other_devices
-from . import checkpoints, outputs
-from .grading import grading, grading_options, names_option
-from .scene_options import denoise_option
+from .files import checkpoints, outputs
+from .files.targets import checked
+from .options.grading import GradingOptions, grading_options, names_option
+from .options.records import with_records
+from .options.scene_options import denoise_option
 
 
 @click.command()
@@ -27,12 +28,13 @@ from .scene_options import denoise_option
 @grading_options
 @names_option
 @click.option("--quiet", is_flag=True, help="Print no warnings.")
+@with_records(graded=GradingOptions)
 def merge(
     films: tuple[Path, ...],
     paths: tuple[Path, ...],
     denoise: str | None,
     quiet: bool,
-    **graded: Any,
+    graded: GradingOptions,
 ) -> None:
     """Add FILMS, of `clpt render --samples FIRST:END -o NAME.film`, and write the picture.
 
@@ -40,8 +42,8 @@ def merge(
     (NAME.resume.exr) are films too. Films of another scene, setting or version are refused, and
     those that have a sample that another one has. No device is needed.
     """
-    how = grading(**graded)
-    targets = outputs.checked(paths)
+    how = graded.grading
+    targets = checked(paths)
 
     def note(text: str) -> None:
         if not quiet:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,32 @@ from .. import mie as theory
 from .. import output_files, spectra
 from ..errors import SceneError
 from ..formats.native.write import write_medium
-from .extras import extra
-from .output_console import output_console
+from .options.records import with_records
+from .printing.console import output_console
+from .process.extras import extra
 
 DIGITS = 6  # of the table in a file
+
+
+@dataclass(frozen=True)
+class Drops:
+    """How large drops are, see `clpt.mie.sizes`, and their share of the volume; radius [um]."""
+
+    radius: float
+    law: str
+    spread: float
+    share: float
+    radii: int
+
+
+@dataclass(frozen=True)
+class Indices:
+    """Indices of drops and of what is around them, absorption of drops, and wavelengths."""
+
+    index: str
+    k: str
+    host: str
+    wavelengths: str
 
 
 @click.command()
@@ -62,18 +85,17 @@ DIGITS = 6  # of the table in a file
     "--plot", type=click.Path(path_type=Path),
     help="The phase function by angle and wavelength, .png, .svg or .pdf.",
 )  # fmt: skip
-def mie(
-    radius: float, law: str, spread: float, share: float, index: str, k: str, host: str,
-    wavelengths: str, radii: int, output: Path | None, plot: Path | None,
-) -> None:  # fmt: skip
+@with_records(drops=Drops, indices=Indices)
+def mie(drops: Drops, indices: Indices, output: Path | None, plot: Path | None) -> None:
     """Make the medium of spheres of RADIUS micrometres: fog, mist, milk.
 
     It follows from Mie's theory (1908), for each wavelength. Without -o, a table of it is shown.
     """
-    at = _wavelengths(wavelengths)
+    at = _wavelengths(indices.wavelengths)
     medium = theory.droplets(
-        theory.sizes(law, radius * 1e-6, spread, radii), share,
-        index=_index(index, "eta"), k=_index(k, "k"), host=_index(host, "eta"), lambdas=at,
+        theory.sizes(drops.law, drops.radius * 1e-6, drops.spread, drops.radii), drops.share,
+        index=_index(indices.index, "eta"), k=_index(indices.k, "k"),
+        host=_index(indices.host, "eta"), lambdas=at,
     )  # fmt: skip
     if output is not None:
         if output.suffix.lower() != ".json":
@@ -85,9 +107,10 @@ def mie(
         click.echo(str(output), err=True)
     if plot is not None:
         with extra("plot", "a plot"):
-            from . import mie_plot  # here: matplotlib is an extra, and slow to import
+            from .plots import mie as mie_plot  # here: matplotlib is an extra, and slow to import
 
-        mie_plot.write(plot, medium, f"{law}, {radius:g} um, {index} in {host}")
+        title = f"{drops.law}, {drops.radius:g} um, {indices.index} in {indices.host}"
+        mie_plot.write(plot, medium, title)
         click.echo(str(plot), err=True)
     if output is None and plot is None:
         _print(medium, at)

@@ -5,13 +5,12 @@ from __future__ import annotations
 import time
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
 
 import click
 
-from .display import display
-from .scene_options import denoise_option, open_renderer, scene_options
-from .verbosity import verbose_option
+from .options.records import with_records
+from .options.scene_options import SceneOptions, denoise_option, scene_options
+from .options.verbosity import verbose_option
 
 
 @click.command()
@@ -20,22 +19,28 @@ from .verbosity import verbose_option
 @denoise_option
 @verbose_option("Log more; twice for everything.")
 @click.option("--quiet", is_flag=True, help="Show no progress and no warnings.")
-def warm(scenes: tuple[Path, ...], verbose: int, quiet: bool, **options: Any) -> None:
+@with_records(options=SceneOptions)
+def warm(scenes: tuple[Path, ...], options: SceneOptions, verbose: int, quiet: bool) -> None:
     """Compile the programs of SCENES into the caches, and render nothing.
 
     Give the options of the renders that come: mode, size, device and others decide what is
     compiled. Scenes of the same kinds of materials, lights and shapes share programs.
     """
+    from .opening.makers import DeviceMaker
+    from .opening.scenes import open_scene
+    from .printing.display import display
+
     for scene in scenes:
         shown, began = display(quiet, None), time.perf_counter()
         with ExitStack() as resources:
-            renderer, loading = open_renderer(scene, shown, resources, keep=True, **options)
+            opened = open_scene(scene, options, shown, resources)
+            renderer = DeviceMaker(opened.devices, options).make(opened.scene, shown)
             with shown.phase("compiling for the first samples"):
                 renderer.prepare()
         builds, seconds = [on.builds for on in renderer.devices], time.perf_counter() - began
         programs, found = sum(b.programs for b in builds), sum(b.cached for b in builds)
         click.echo(
             f"{scene}: {programs} programs, {found} of them found, in {seconds:.1f}"
-            f" s; the scene took {loading:.1f} s of it"
+            f" s; the scene took {opened.loading:.1f} s of it"
         )
         renderer.close()

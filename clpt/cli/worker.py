@@ -6,7 +6,9 @@ from pathlib import Path
 
 import click
 
-from .verbosity import verbose_option
+from .options.records import with_records
+from .options.scene_options import Machine
+from .options.verbosity import verbose_option
 
 
 @click.command()
@@ -24,10 +26,10 @@ from .verbosity import verbose_option
 @click.option("--name", help="What the worker is called.  [default: its address]")
 @verbose_option("Log more; twice for everything.")
 @click.option("--quiet", is_flag=True, help="Print nothing.")
+@with_records(machine=Machine)
 def worker(
     address: str,
-    device: str | None,
-    threads: int | None,
+    machine: Machine,
     host: str | None,
     keys: Path | None,
     name: str | None,
@@ -41,7 +43,9 @@ def worker(
     """
     from ..cluster import processes, tasks
 
-    chosen = " and ".join(on.info.label for on in tasks.choose_devices(device, threads))
+    chosen = " and ".join(
+        on.info.label for on in tasks.choose_devices(machine.device, machine.threads)
+    )
 
     def tell(text: str) -> None:
         if not quiet:

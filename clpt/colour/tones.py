@@ -63,7 +63,7 @@ def agx(c: Colours) -> Colours:
 
 
 def agx_scales() -> tuple[float, float]:
-    """How much the sigmoid of AgX bends below and above grey, so that it ends at 0 and at 1."""
+    """Return the scales of AgX's sigmoid below and above grey with which it ends at 0 and at 1."""
     low, high = AGX_STOPS
     pivot = -low / (high - low)
     ends = ((pivot, AGX_POWERS[0]), (1 - pivot, AGX_POWERS[1]))

@@ -37,7 +37,7 @@ class Table:
 
 
 class View:
-    """How a display shows light, by a config of OpenColorIO.
+    """A view of OpenColorIO: the transform from light to the values of a display.
 
     name: of the view; display, look: by default the config's first display and no look; config: a
     file, or a name such as ocio://default, or "$OCIO" for what the environment names. By default

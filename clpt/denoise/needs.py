@@ -1,4 +1,4 @@
-"""What denoisers want of a scene, and of which scenes they make poor pictures."""
+"""Requirements of denoisers on a scene, and remarks on scenes that they render badly."""
 
 from __future__ import annotations
 

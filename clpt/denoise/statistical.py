@@ -170,7 +170,7 @@ class Statistical:
         return made
 
     def _decide(self, halves: Any, once: Any, twice: Any) -> Image:
-        """How much of each picture is taken, (h, w, 4), the last one 0."""
+        """Return the share of each picture in the result, (h, w, 4); the last one is 0."""
         errors, shares = self._allocate(1), self._allocate(1)
         self._run(
             "denoise_errors", flat=True, halves=halves, once=once, twice=twice, errors=errors,

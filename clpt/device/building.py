@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import logging
 import os
@@ -10,11 +9,12 @@ import re
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 import pyopencl as cl
 from pyopencl.characterize import has_src_build_cache
 
-from clpt.device import disk_cache, native_programs
+from clpt.device import declarations, disk_cache, native_programs
 
 from ..errors import DeviceError, KernelBuildError
 from .compilers import Job
@@ -69,16 +69,18 @@ def link(
         return program
     start = time.perf_counter()
     try:
-        linked, binaries = _linked(device, sources, flags, _part)
+        linked = _linked(device, sources, flags, _part)
     except cl.Error as refusal:
         log.debug("%s is compiled again: %s", whole.name, refusal)
         try:
-            linked, binaries = _linked(device, sources, flags, _compiled)
+            linked = _linked(device, sources, flags, _compiled)
         except cl.Error as error:
             raise _build_error(whole, str(error)) from error
     program = Program(whole.name, linked, signatures)
     if _has_binaries(device):
-        program = _keep_linked(device, whole, flags, program, binaries)
+        entry = _entry(device, whole, flags)
+        disk_cache.store(entry, encode(signatures), _binary(linked))
+        program = _from_cache(device, whole, flags, entry) or program
     return _built(device, whole, flags, program, time.perf_counter() - start)
 
 
@@ -93,11 +95,13 @@ def compile_ahead(device: Device, sources: Mapping[str, Source], main: str) -> N
     for source in sources.values():
         part = _entry(device, source, [*flags, _PART])
         if not disk_cache.holds(part):
-            device.compilers.submit(part, _job(device, "compile", flags, source.text))
+            text, options = next(declarations.forms(device, source.text, flags))
+            job = Job(device.info.platform, device.info.name, " ".join(options), text)
+            device.compilers.submit(part, job)
 
 
 def _whole(sources: Mapping[str, Source], main: str) -> Source:
-    """What the texts of a linked program are together, for its key and for errors."""
+    """Join the texts of a linked program into one, for its key and for errors."""
     files = dict.fromkeys(file for source in sources.values() for file in source.files)
     text = "\n".join(source.text for source in sources.values())
     return Source(sources[main].name, text, tuple(files))
@@ -107,20 +111,18 @@ def _linked(
     device: Device,
     sources: Mapping[str, Source],
     flags: list[str],
-    part: Callable[[Device, Source, list[str]], tuple[cl.Program, bytes]],
-) -> tuple[cl.Program, list[bytes]]:
-    """A linked program and the binaries of its parts; `part` makes these. Raises pyopencl.Error."""
+    part: Callable[[Device, Source, list[str]], cl.Program],
+) -> cl.Program:
+    """Return a linked program whose parts `part` makes. Raises pyopencl.Error."""
     parts = [part(device, source, flags) for source in reversed(list(sources.values()))]
-    programs = [program for program, _ in parts]
-    linked = cl.link_program(device.context, programs, [], [device.info.cl_device])
-    return linked, [binary for _, binary in parts]
+    return cl.link_program(device.context, parts, [], [device.info.cl_device])
 
 
-def _part(device: Device, source: Source, flags: list[str]) -> tuple[cl.Program, bytes]:
-    """A compiled part of a program: of the cache folder, another process, or this one.
+def _part(device: Device, source: Source, flags: list[str]) -> cl.Program:
+    """Return a compiled part of a program: of the cache folder, another process, or this one.
 
-    Its binary too, which is empty where the device has none. Raises pyopencl.Error if the driver
-    refuses a binary that was not made here, at once or when it is linked.
+    Raises pyopencl.Error if the driver refuses a binary that was not made here, at once or when it
+    is linked.
     """
     entry = _entry(device, source, [*flags, _PART])
     stored = disk_cache.load(entry) if _has_binaries(device) else None
@@ -131,45 +133,19 @@ def _part(device: Device, source: Source, flags: list[str]) -> tuple[cl.Program,
             disk_cache.store(entry, _PART, binary)
     if binary is None:
         return _compiled(device, source, flags)
-    return cl.Program(device.context, [device.info.cl_device], [binary]), binary
+    return cl.Program(device.context, [device.info.cl_device], [binary])
 
 
-def _compiled(device: Device, source: Source, flags: list[str]) -> tuple[cl.Program, bytes]:
-    """A part of a program that this process compiles, and its binary. Raises KernelBuildError."""
+def _compiled(device: Device, source: Source, flags: list[str]) -> cl.Program:
+    """Return a part of a program that this process compiles. Raises KernelBuildError."""
     try:
-        part = native_programs.compile_part(
-            device.context, device.info.cl_device, source.text, flags
-        )
+        make = partial(native_programs.compile_part, device.context, device.info.cl_device)
+        part = declarations.built(device, source.text, flags, make)
     except cl.Error as error:
         raise _build_error(source, str(error)) from error
-    if not _has_binaries(device):
-        return part, b""
-    binary = _binary(part)
-    disk_cache.store(_entry(device, source, [*flags, _PART]), _PART, binary)
-    return part, binary
-
-
-def _keep_linked(
-    device: Device, whole: Source, flags: list[str], program: Program, parts: list[bytes]
-) -> Program:
-    """Write a linked program's binary to the cache folder; return the program to use.
-
-    parts: their binaries.
-    Making one takes as long as compiling it for its first call, so another process does it if there
-    is one, and the program is the one that was given.
-    """
-    entry, header = _entry(device, whole, flags), encode(program.signatures)
-    if device.compilers is None:
-        disk_cache.store(entry, header, _binary(program.cl_program))
-        return _from_cache(device, whole, flags, entry) or program
-    job = _job(device, "link", flags, parts)
-    place = entry, header, disk_cache.folder()
-    device.compilers.leave(dataclasses.replace(job, place=place))
-    return program
-
-
-def _job(device: Device, kind: str, flags: list[str], given: str | list[bytes]) -> Job:
-    return Job(kind, device.info.platform, device.info.name, " ".join(flags), given)
+    if _has_binaries(device):
+        disk_cache.store(_entry(device, source, [*flags, _PART]), _PART, _binary(part))
+    return part
 
 
 def _has_binaries(device: Device) -> bool:
@@ -240,7 +216,8 @@ def _is_oclgrind(device: Device) -> bool:
 
 def _from_source(device: Device, source: Source, flags: list[str]) -> Program:
     try:
-        built = native_programs.build(device.context, device.info.cl_device, source.text, flags)
+        make = partial(native_programs.build, device.context, device.info.cl_device)
+        built = declarations.built(device, source.text, flags, make)
     except cl.Error as error:
         raise _build_error(source, str(error)) from error
     try:
@@ -278,9 +255,10 @@ def _build_error(source: Source, log: str) -> KernelBuildError:
     location = re.compile(rf"""(?<![\w/.])({names})["']?(?::|, line |\()(\d+)""")
     rows = [row for row in log.splitlines() if re.search(r"\berror\b", row)]
     first = next(filter(None, map(location.search, rows)), None)
+    file: str | None = None
+    line: int | None = None
     if first:
         file, line = first[1], int(first[2])
-    else:  # NVIDIA's compiler reads no `#line`: it counts the rows of the whole text
-        counted = next(filter(None, map(_COUNTED.search, rows)), None)
-        file, line = source.place(int(counted[1])) if counted else (None, None)
+    elif counted := next(filter(None, map(_COUNTED.search, rows)), None):
+        file, line = source.place(int(counted[1]))  # NVIDIA's compiler reads no `#line`
     return KernelBuildError(source.name, file, line, log, disk_cache.keep_failed(source))

@@ -1,8 +1,7 @@
 """A process that compiles, see `clpt.device.compilers`.
 
-It is run by its path, and imports nothing of clpt to begin with, so it begins soon. It reads
-requests from its standard input until that ends, as it does when whoever started it ends. What it
-then still has to keep in the cache folder it finishes, in some seconds, at a low priority.
+It is run by its path, and imports nothing of clpt, so it begins soon. It reads requests from its
+standard input until that ends, as it does when whoever started it ends.
 """
 
 from __future__ import annotations
@@ -19,50 +18,32 @@ from pyopencl import _cl
 
 
 def main() -> None:
-    """Answer (job, platform, device, options, text) with a binary or None.
-
-    (job, platform, device, options, binaries, place) has no answer: the result is kept.
-    """
+    """Answer each (platform, device, options, text) with a binary, or None if it has a fault."""
     replies = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what drivers print is no reply
     requests: queue.SimpleQueue[Any] = queue.SimpleQueue()
     threading.Thread(target=_read, args=(requests,), daemon=True).start()
     opened: dict[tuple[str, str], cl.Context] = {}
     while True:
-        request = requests.get()
-        if request is None:
-            os._exit(0)
-        _, platform, device, options, given, place = request
+        platform, device, options, text = requests.get()
         try:
             if (platform, device) not in opened:
                 opened[platform, device] = cl.Context([_device(platform, device)])
-            context = opened[platform, device]
-            if place is not None:
-                _keep(_link(context, given), *place)
-                continue
-            binary = _compile(context, options, given)
+            binary = _compile(opened[platform, device], options, text)
         except Exception:  # the caller compiles it again, and finds the error
-            if place is not None:
-                continue
             binary = None
         pickle.dump(binary, replies)
         replies.flush()
 
 
 def _read(requests: queue.SimpleQueue[Any]) -> None:
-    """Hand requests on; at the end of them end the process, or let it do first what is kept."""
-    keeps = False
+    """Hand requests on; end the process at the end of them, whatever it is at."""
     while True:
         try:
             request = pickle.load(sys.stdin.buffer)
         except Exception:  # the end
-            if not keeps:
-                os._exit(0)
-            request = None
+            os._exit(0)
         requests.put(request)
-        if request is None:
-            return
-        keeps |= request[-1] is not None
 
 
 def _device(platform: str, device: str) -> cl.Device:
@@ -71,24 +52,7 @@ def _device(platform: str, device: str) -> cl.Device:
 
 
 def _compile(context: cl.Context, options: str, text: str) -> bytes:
-    program = _cl._Program(context, text)
+    program: Any = _cl._Program(context, text)
     program.compile(options.encode(), context.devices, [])
-    return _binary(program)
-
-
-def _link(context: cl.Context, binaries: list[bytes]) -> bytes:
-    if hasattr(os, "nice"):
-        os.nice(10)  # a picture may be rendered meanwhile
-    parts = [cl.Program(_cl._Program(context, context.devices, [it])) for it in binaries]
-    return _binary(cl.link_program(context, parts, [], context.devices))
-
-
-def _keep(binary: bytes, entry: str, header: str, folder: Any) -> None:
-    from clpt.device import disk_cache  # here: it imports all of clpt
-
-    disk_cache.store(entry, header, binary, folder)
-
-
-def _binary(program: Any) -> bytes:
     binary: bytes = program.get_info(cl.program_info.BINARIES)[0]
     return binary

@@ -13,7 +13,7 @@ import subprocess
 import threading
 import weakref
 from collections import deque
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable
 from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -30,18 +30,15 @@ _MOST = 4  # processes: more than parts of a loop that take long
 
 @dataclass(frozen=True)
 class Job:
-    """What a process does: "compile" a text to a binary, or "link" binaries and keep the result.
+    """A text that a process compiles to a binary.
 
-    platform, device: their names; options: of the compiler; place: in the cache folder, as
-    `disk_cache.store` takes it, of a result that is kept.
+    platform, device: their names; options: of the compiler.
     """
 
-    kind: str
     platform: str
     device: str
     options: str
-    given: str | Sequence[bytes]
-    place: tuple[str, str, Path] | None = None  # entry, header, folder
+    text: str
 
 
 @dataclass
@@ -63,12 +60,11 @@ class Compilers:
     """Some processes, that start when there is something to do for them.
 
     count: how many there are at most. With `with` they end after what they are at, or at once where
-    an exception is raised. wait_for_kept: also wait for what is kept for the next time; else a
-    process may end after the one that started it.
+    an exception is raised.
     """
 
-    def __init__(self, count: int, wait_for_kept: bool = False):
-        self.count, self.wait_for_kept = min(count, _MOST), wait_for_kept
+    def __init__(self, count: int):
+        self.count = min(count, _MOST)
         self._tasks: dict[Hashable, _Task] = {}
         self._waiting: deque[_Task] = deque()
         self._changed = threading.Condition()
@@ -104,15 +100,8 @@ class Compilers:
                 return None
         return task.result.result()
 
-    def leave(self, job: Job) -> None:
-        """Let a process do a job of which only its place in the cache folder will tell."""
-        self.submit(job.place, job)
-
     def close(self) -> None:
-        """Let the processes do what was submitted, then end them.
-
-        Wait for that, but for what is kept only with `wait_for_kept`.
-        """
+        """Let the processes do what was submitted, then end them, and wait for that."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()
@@ -156,11 +145,9 @@ class Compilers:
             return
         with self._changed:
             self._processes.append(process)
-        keeps = False
         try:
             while task := self._next():
                 try:
-                    keeps |= task.job.place is not None
                     task.result.set_result(_answer(process, task.job))
                 except BaseException:
                     task.result.set_result(None)
@@ -168,7 +155,7 @@ class Compilers:
         except Exception as error:  # a process that died
             log.debug("nothing is compiled in another process: %s", error)
         finally:
-            _end(process, wait=self.wait_for_kept or not keeps)
+            _end(process)
 
     def _next(self) -> _Task | None:
         with self._changed:
@@ -179,14 +166,13 @@ class Compilers:
             return self._waiting.popleft()
 
 
-def _end(process: subprocess.Popen[bytes], wait: bool) -> None:
-    """Let a process end after what it keeps."""
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """Let a process end, and wait for it."""
     for pipe in (process.stdin, process.stdout):
         assert pipe is not None
         with suppress(OSError):
             pipe.close()
-    if wait:
-        process.wait()
+    process.wait()
 
 
 def spare_cores() -> int:
@@ -204,10 +190,7 @@ def _command() -> list[str]:
 def _answer(process: subprocess.Popen[bytes], job: Job) -> bytes | None:
     assert process.stdin is not None
     assert process.stdout is not None
-    request = (job.kind, job.platform, job.device, job.options, job.given, job.place)
-    pickle.dump(request, process.stdin)
+    pickle.dump((job.platform, job.device, job.options, job.text), process.stdin)
     process.stdin.flush()
-    if job.place is not None:
-        return None
     binary: bytes | None = pickle.load(process.stdout)  # from our own program
     return binary

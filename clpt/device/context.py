@@ -344,7 +344,7 @@ def _same_processor(one: DeviceInfo, other: DeviceInfo) -> bool:
 
 
 def _measured(info: DeviceInfo) -> float:
-    """What a trial takes on a device [s], in the process's own context; raises what drivers do."""
+    """Time a trial on a device [s], in the process's own context; raises what drivers raise."""
     return speed_trial.measure(_first(info).queue, info.lanes)
 
 

@@ -1,4 +1,4 @@
-"""What a forked process has lost: other threads.
+"""Repair of a forked process, which has only one of its parent's threads.
 
 Without those of PoCL its commands never end, and a lock that one of them held is never given back.
 """

@@ -1,4 +1,4 @@
-"""How much memory a device has left; OpenCL itself has no query for that."""
+"""Estimate of a device's free memory: OpenCL itself has no query for it."""
 
 from __future__ import annotations
 

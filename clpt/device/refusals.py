@@ -1,4 +1,4 @@
-"""What a driver refuses, as an error of clpt that says what to do."""
+"""Errors of drivers, made errors of clpt that say what to do."""
 
 from __future__ import annotations
 

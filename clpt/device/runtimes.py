@@ -1,4 +1,4 @@
-"""What OpenCL's runtimes need before the loader looks for platforms.
+"""Preparation of OpenCL's runtimes before the loader looks for platforms.
 
 Runtimes that pip installed are made known to the loader.
 

@@ -3,28 +3,27 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import NoReturn
 
 from ..errors import KernelBuildError
+from .conditions import OPENING, Macros, taken
+from .definitions import Paragraph, macro, named, paragraphs, whole
+from .text_rows import Row, rows_of
 
-_INCLUDE = re.compile(r'\s*#\s*include\s+"([^"]+)"\s*(?://.*|/\*.*\*/\s*)?$')
-_LINE = re.compile(r'\s*#\s*line (\d+) "([^"]+)"')
-_WORD = re.compile(r"\w+")
-_OPEN_IF = re.compile(r"\s*#\s*if")
-_FUNCTION = re.compile(  # at the beginning of a line: type, name, and a first argument or "void"
-    r"^(?:static )?(?P<rest>(?!static\b|kernel\b|typedef\b|return\b|else\b|void loop_)"
-    r"[A-Za-z_]\w*(?: \w+)* \*?(?P<name>\w+)\((?=[A-Za-z_]))",
+_GENERATED = "generated/"  # begins the names of files that are made for a scene
+_QUOTED = re.compile(r'"([^"]+)"$')
+_LINE = re.compile(r'\s*#\s*line (\d+)(?: "([^"]+)")?')
+_PRIVATE = re.compile(  # at the beginning of a line: a constant, or a function with an argument
+    r"^(?:static )?(?=[A-Za-z_])(?P<rest>"
+    r"constant\b[^;=\[]*?(?P<constant>\w+)\s*(?=[=\[])"
+    r"|(?!static\b|kernel\b|typedef\b|return\b|else\b|void loop_)"
+    r"[A-Za-z_]\w*(?: \w+)* \*?(?P<function>\w+)\((?=[A-Za-z_]))",
     re.MULTILINE,
 )
-_CONSTANT = re.compile(
-    r"^(?:static )?(?P<rest>constant\b[^;=\[]*?(?P<name>\w+)\s*(?=[=\[]))", re.MULTILINE
-)
-_PRIVATE = (_FUNCTION, _CONSTANT)
-_CLOSE_IF = re.compile(r"\s*#\s*endif")
 
 
 @dataclass(frozen=True)
@@ -47,7 +46,7 @@ class Source:
         file, line = None, None
         for text in self.text.splitlines()[: row - 1]:
             if told := _LINE.match(text):
-                file, line = told[2].removeprefix("kernels/"), int(told[1])
+                file, line = told[2].removeprefix("kernels/") if told[2] else file, int(told[1])
             elif line is not None:
                 line += 1
         return file, line
@@ -59,23 +58,23 @@ class Source:
         functions that a macro names, stay as they are. A compiler leaves out what is not used, and
         does not optimise by itself what it puts into its callers: a third less time.
         """
-        text = self.text
-        for pattern in _PRIVATE:
-            text = pattern.sub(r"static \g<rest>", text)
-        return Source(self.name, text, self.files)
+        return Source(self.name, _PRIVATE.sub(r"static \g<rest>", self.text), self.files)
 
-    def with_private(self, prefix: str, defines: Mapping[str, str] | None = None) -> Source:
+    def with_private(self, prefix: str) -> Source:
         """Return a source whose functions and constants other programs do not see, to be linked.
 
         They are static, see `with_static`, and get the prefix, since some linkers look at nothing
-        but names. defines: more `#define` lines at the top.
+        but names.
         """
-        matches = (match for pattern in _PRIVATE for match in pattern.finditer(self.text))
-        names = dict.fromkeys(match["name"] for match in matches)
-        renamed = {name: f"{prefix}_{name}" for name in names}
-        head = [f"#define {name} {value}" for name, value in {**(defines or {}), **renamed}.items()]
-        static = self.with_static()
-        return Source(self.name, "\n".join([*head, static.text]), self.files)
+        names: dict[str, None] = {}
+
+        def note(match: re.Match[str]) -> str:
+            names[match["function"] or match["constant"]] = None
+            return f"static {match['rest']}"
+
+        text = _PRIVATE.sub(note, self.text)
+        head = [f"#define {name} {prefix}_{name}" for name in names]
+        return Source(self.name, "\n".join([*head, text]), self.files)
 
 
 @dataclass(frozen=True)
@@ -101,27 +100,33 @@ def assemble(
     root: str,
     virtual: Virtual | None = None,
     defines: Mapping[str, str | int | float] | None = None,
+    *,
+    library: bool = False,
 ) -> Source:
-    """Return the text of `root` with its includes in place, each file once.
+    """Return the text of `root` with its includes in place, each file once, and what it needs alone.
 
     root: a path under the kernels folder ("stage/shade.cl") or the name of a virtual file.
     virtual: name -> generated text, a Part, or the names of files that stand for it, includable by
     that name; it wins over a file of that name.
-    defines: written as `#define` lines at the top, but for those that the text does not name; so
-    programs that differ by nothing else are built once.
+    defines: written as `#define` lines at the top.
+    library: whether another text will name what this one defines.
 
-    A `#line` before every part lets a compiler name our file and line. Includes are resolved before
+    What an `#if` leaves out is not in the text, nor is the `#if`, but for those that ask for what
+    compilers define (`conditions.OUTSIDE`). Functions, types, constants and macros that nothing in
+    the text names are left out too, unless it is a library or they are of a Part. So programs that
+    differ by nothing else are built once.
+
+    A `#line` before every part, and where rows are left out of a file, lets a compiler name our file
+    and line; generated files are numbered as they stand in the text. Includes are resolved before
     the preprocessor runs, so they have to stand outside of `#if`.
 
-    Raises KernelBuildError for an include that names nothing, or that stands inside an `#if`.
+    Raises KernelBuildError for an include that names nothing, or that stands inside an `#if`, and
+    for an `#if` without its end.
     """
-    assembly = _Assembly(root, virtual or {}, kernels_folder())
+    given = {name: str(value) for name, value in (defines or {}).items()}
+    assembly = _Assembly(root, virtual or {}, given, library)
     assembly.add(root, None, 0)
-    text = "\n".join([*assembly.rows, ""])
-    given = {name: f"#define {name} {value}\n" for name, value in (defines or {}).items()}
-    named = assembly.words.union(*(_WORD.findall(row)[2:] for row in given.values()))
-    head = "".join(row for name, row in given.items() if name.partition("(")[0] in named)
-    return Source(root, head + text, tuple(assembly.files))
+    return assembly.source()
 
 
 @cache
@@ -133,51 +138,112 @@ def _text(folder: Path, name: str) -> str:
     return path.read_text(encoding="utf-8")
 
 
+class _BadRow(Exception):
+    """What is wrong with a row of a file, and its number."""
+
+    def __init__(self, line: int, message: str):
+        super().__init__(message)
+        self.line = line
+
+
+@dataclass
+class _Piece:
+    """What a file has up to an include or its end: directives, and groups of other rows."""
+
+    rows: list[Row | list[Row]]
+    include: Row | None = None
+
+
 @lru_cache(maxsize=1024)
-def _words(text: str) -> frozenset[str]:
-    """The words of a file, most of which are in many programs."""
-    return frozenset(_WORD.findall(text))
+def _pieces(text: str, first: int) -> tuple[_Piece, ...]:
+    """The pieces of a file; first: the number of its first line. Raises _BadRow."""
+    found = [_Piece([])]
+    openings: list[int] = []
+    for row in rows_of(text, first):
+        rows = found[-1].rows
+        if not row.directive:
+            if not (rows and isinstance(rows[-1], list)):
+                rows.append([])
+            rows[-1].append(row)
+            continue
+        if row.directive in OPENING:
+            openings.append(row.number)
+        elif row.directive == "endif" and openings:
+            openings.pop()
+        if not (row.directive == "include" and _QUOTED.match(row.argument)):
+            rows.append(row)
+        elif openings:
+            raise _BadRow(
+                row.number,
+                f"#include {row.argument} stands inside an #if; every file is put in once, so it "
+                "needs no include guard",
+            )
+        else:
+            found[-1].include = row
+            found.append(_Piece([]))
+    if openings:
+        raise _BadRow(openings[-1], "there is no #endif of this #if")
+    return tuple(found)
+
+
+@dataclass(eq=False)
+class _File:
+    """A file that goes in: what errors call it, and the comment at its head.
+
+    generated: whether nobody can open it, so that its lines are those that are in the text; lines:
+    how many they are so far.
+    """
+
+    label: str
+    generated: bool
+    header: tuple[Row, ...] = ()
+    lines: int = 0
 
 
 class _Assembly:
-    """The state of one `assemble`: rows written so far, their words, the files they came from."""
+    """The state of one `assemble`: the macros so far, and what files have between includes."""
 
-    def __init__(self, root: str, virtual: Virtual, folder: Path):
-        self.root, self.virtual, self.folder = root, virtual, folder
-        self.rows: list[str] = []
-        self.files: list[str] = []
+    def __init__(self, root: str, virtual: Virtual, defines: dict[str, str], library: bool):
+        self.root, self.virtual, self.defines = root, virtual, defines
+        self.library, self.folder = library, kernels_folder()
+        self.macros = Macros(defines)
         self.names: set[str] = set()
-        self.words: set[str] = set()
+        self.pieces: list[tuple[_File, tuple[Paragraph, ...]]] = []
 
     def add(self, name: str, includer: str | None, line: int) -> None:
         """Append the file `name` and, in place of its includes, the files that it names."""
         part = self._read(name, includer, line)
-        label = part.file
         self.names.add(name)
-        self.words |= _words(part.text)
-        self.files.append(label.removeprefix("kernels/"))
-        self.rows.append(f'#line {part.line} "{label}"')
-        depth = 0
-        for number, row in enumerate(part.text.splitlines(), start=part.line):
-            if "#" not in row:  # most are no directives
-                self.rows.append(row)
-                continue
-            depth += bool(_OPEN_IF.match(row)) - bool(_CLOSE_IF.match(row))
-            include = _INCLUDE.match(row)
-            if include is None:
-                self.rows.append(row)
-            elif depth > 0:
-                self._fail(
-                    label,
-                    number,
-                    f'#include "{include[1]}" stands inside an #if; every file is put in once, '
-                    "so it needs no include guard",
-                )
-            elif include[1] in self.names:
-                self.rows.append("")
-            else:
-                self.add(include[1], label, number)
-                self.rows.append(f'#line {number + 1} "{label}"')
+        try:
+            pieces = _pieces(part.text, part.line)
+        except _BadRow as error:
+            self._fail(part.file, error.line, str(error))
+        keeps_all = self.library or isinstance(self.virtual.get(name), Part)
+        generated = name.startswith(_GENERATED)
+        file = _File(part.file, generated)
+        for number, piece in enumerate(pieces):
+            kept = taken(piece.rows, self.macros)
+            if number == 0 and kept and kept[0].is_comment and not (keeps_all or generated):
+                file.header, kept = kept[:1], kept[1:]
+            self.pieces.append((file, whole(kept) if keeps_all else paragraphs(kept)))
+            include = piece.include and _QUOTED.match(piece.include.argument)
+            if piece.include and include and include[1] not in self.names:
+                self.add(include[1], part.file, piece.include.number)
+
+    def source(self) -> Source:
+        """Return the text, without definitions that nothing in it names."""
+        defines = [macro(name, value) for name, value in self.defines.items()]
+        stay = named([*defines, *(d for _, ps in self.pieces for p in ps for d in p.definitions)])
+        left = [(file, [p.left(stay) for p in ps]) for file, ps in self.pieces]
+        files = {file for file, found in left if any(rows for rows, _ in found)}
+        text = _Text([row.text for one in defines if one in stay for row in one.rows])
+        for file, found in left:
+            if file in files and file.label not in text.files:
+                text.add(file, file.header)
+            for rows, apart in found:
+                text.add(file, rows, apart)
+        names = tuple(label.removeprefix("kernels/") for label in text.files)
+        return Source(self.root, "\n".join([*text.rows, ""]), names)
 
     def _read(self, name: str, includer: str | None, line: int) -> Part:
         if name in self.virtual:
@@ -192,3 +258,38 @@ class _Assembly:
 
     def _fail(self, file: str | None, line: int, message: str) -> NoReturn:
         raise KernelBuildError(self.root, file, line or None, f"error: {message}", None)
+
+
+class _Text:
+    """A text that is written row by row, with a `#line` where a compiler would count wrongly."""
+
+    def __init__(self, rows: list[str]):
+        self.rows = rows
+        self.files: dict[str, None] = {}
+        self._label, self._line = "", 0  # of the next row, as a compiler counts
+
+    def add(self, file: _File, rows: Sequence[Row], apart: bool = False) -> None:
+        """Append rows of a file; apart: with a blank row before them."""
+        for row in rows:
+            self.files.setdefault(file.label)
+            self._place(file, row, apart)
+            apart = False
+            self.rows.append(row.text)
+            self._line += row.lines
+            file.lines += row.lines
+
+    def _place(self, file: _File, row: Row, apart: bool) -> None:
+        """Let a compiler count a row right: by nothing, a blank row or a `#line`."""
+        wanted = file.lines + 1 if file.generated else row.number
+        if self._label != file.label:
+            self.rows.append(f'#line {wanted} "{file.label}"')
+        elif file.generated and apart:
+            self.rows.append("")
+            file.lines += 1
+            wanted += 1
+        elif wanted == self._line + 1:
+            self.rows.append("")
+        elif wanted != self._line:
+            self.rows += [""] * apart
+            self.rows.append(f"#line {wanted}")
+        self._label, self._line = file.label, wanted

@@ -1,4 +1,4 @@
-"""How long kernels took, by name, from the device's own clock."""
+"""Time of kernels by their names, from the device's own clock."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What three numbers mean: it depends on the role of the parameter that they stand for."""
+"""The spectrum that three numbers stand for, by the role of their parameter."""
 
 from __future__ import annotations
 

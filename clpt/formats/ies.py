@@ -32,7 +32,7 @@ HEADER = (
 
 @dataclass(frozen=True)
 class Photometry:
-    """What an IES file says.
+    """Intensities of a lamp by direction, as an IES file holds them.
 
     vertical (v,): angles from straight down, 0 to 180; horizontal (h,): about the vertical, 0 to
     360 [degrees]; candela (h, v): intensity there [cd].
@@ -143,7 +143,7 @@ class _Reader:
         return Photometry(vertical, horizontal, candela)
 
     def _check_around(self, angles: NDArray[np.float64]) -> None:
-        """What is measured goes around whole, or is a half or a quarter of it."""
+        """Raise SceneError unless the angles go around wholly, or cover a half or a quarter."""
         if len(angles) == 1:
             return
         ends = angles[[0, -1]]

@@ -1,4 +1,4 @@
-"""What stands for an image that a scene names and that is not there, where its user allows it."""
+"""Images that stand for missing image files, if the user allows it."""
 
 from __future__ import annotations
 

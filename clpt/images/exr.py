@@ -103,7 +103,7 @@ def write(
 
 
 def _matrix(header: Header, choice: Choice) -> tuple[Matrix | None, tuple[str, ...]]:
-    """What takes a picture's colours to Rec. 709, and what of that is left out."""
+    """Return the matrix from a picture's colours to Rec. 709, and notes on what is left out."""
     if choice.form == "xyz":
         return spaces.from_xyz("rec709"), ()
     if choice.form not in ("rgb", "chroma"):
@@ -115,7 +115,7 @@ def _matrix(header: Header, choice: Choice) -> tuple[Matrix | None, tuple[str, .
 
 
 def _notes(header: Header, choice: Choice) -> tuple[str, ...]:
-    """What a picture's attributes say that is left out."""
+    """Return notes on attributes of a picture that are left out."""
     made = [choice.note] if choice.note else []
     aspect = float(header.get("pixelAspectRatio", 1.0))
     if aspect != 1.0:

@@ -110,7 +110,7 @@ _WHAT = "what its channels hold"
 
 
 def _size(header: Header, names: Sequence[str]) -> int:
-    """What channels of a part take at most [bytes]: as they are stored, and made float32."""
+    """Return the most memory [bytes] that channels of a part take: as stored and as float32."""
     areas = []
     for name in ("dataWindow", "displayWindow"):
         x0, y0, x1, y1 = window(header, name)

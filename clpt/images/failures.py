@@ -1,4 +1,4 @@
-"""What goes wrong in a library that reads a picture, told as one of our errors."""
+"""Failures of libraries that read pictures, raised as errors of clpt."""
 
 from __future__ import annotations
 

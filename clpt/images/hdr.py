@@ -33,7 +33,7 @@ KNOWN = ("FORMAT", "EXPOSURE", "COLORCORR", "PRIMARIES", "PIXASPECT", "GAMMA")
 
 @dataclass
 class _Header:
-    """What the lines of a header say; end: where scanlines begin."""
+    """The header of a Radiance picture; end: the offset of its scanlines."""
 
     format: str = RGBE
     divide: Array = field(default_factory=lambda: np.ones(3, np.float32))

@@ -153,7 +153,7 @@ def _floats(values: NDArray[np.uint16], key: Sequence[int] | None) -> NDArray[np
 
 
 def _raw_mode(image: ImageFile) -> str:
-    """How the file stores pixels, in Pillow's words, such as "RGB;16B"."""
+    """Return Pillow's name of the form in which the file stores pixels, such as "RGB;16B"."""
     if len(image.tile) != 1:
         return ""
     given: Any = image.tile[0][3]
@@ -194,7 +194,7 @@ def _bytes_as(image: ImageFile, raw: str) -> NDArray[np.uint8]:
 
 
 def _notes(image: ImageFile) -> tuple[str, ...]:
-    """What a file has that is left out, of pixels."""
+    """Return notes on pictures and orientations of a file that are left out."""
     made = []
     frames = getattr(image, "n_frames", 1) if image.format != "MPO" else 1
     if frames > 1:
@@ -206,7 +206,7 @@ def _notes(image: ImageFile) -> tuple[str, ...]:
 
 
 def _colour_notes(image: ImageFile) -> tuple[str, ...]:
-    """What a file says of its colours that is left out."""
+    """Return notes on a file's description of its colours that are left out."""
     made = []
     icc = image.info.get("icc_profile") or b""
     if icc and b"sRGB" not in icc and "sRGB".encode("utf-16-be") not in icc:

@@ -29,7 +29,7 @@ SRGB_CICP = b"\x01\x0d\x00\x01"
 
 @dataclass(frozen=True)
 class Profile:
-    """What a file's chunks say of its colours, as in `clpt.images.Stored`."""
+    """Colours of a PNG file as its chunks describe them, with the names of `clpt.images.Stored`."""
 
     gamma: float | None = None
     matrix: Matrix | None = None
@@ -37,7 +37,7 @@ class Profile:
 
 
 def profile(file: BinaryIO) -> Profile:
-    """What the chunks before the pixels say of colours; of iCCP Pillow tells."""
+    """Read the colours that the chunks before the pixels describe; Pillow reads iCCP."""
     chunks = dict(_chunks(file))
     if b"cICP" in chunks and chunks[b"cICP"] != SRGB_CICP:
         return Profile(notes=("its cICP chunk is left out: its colours are taken as sRGB",))
@@ -47,7 +47,7 @@ def profile(file: BinaryIO) -> Profile:
 
 
 def _stated(chunks: Mapping[bytes, bytes]) -> Profile:
-    """What gAMA and cHRM say."""
+    """Read the gamma of gAMA and the primaries of cHRM."""
     gamma, matrix, notes = None, None, []
     if len(chunks.get(b"gAMA", b"")) == 4:
         given = struct.unpack(">I", chunks[b"gAMA"])[0] / 100000.0

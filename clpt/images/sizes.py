@@ -1,4 +1,4 @@
-"""How large an image may be; asked before there are pixels.
+"""A limit on the size of an image, checked before memory is taken for its pixels.
 
 A file of a few kilobytes can announce gigabytes of pixels, so what its header says is enough to
 refuse it. What reading takes is asked of `clpt.budget`.

@@ -52,14 +52,14 @@ class Stored:
             raise SceneError(message) from None
 
     def meant(self, raw: bool) -> Stored:
-        """The same image without gamma and matrix: as data if raw, else with its colours sRGB, or
+        """Return the image without gamma and matrix: as data if raw, else with its colours sRGB, or
         linear Rec. 709."""
         if raw or not self.is_profiled:
             return Stored(self.values, self.encoded)
         return Stored(self.decoded(), encoded=False)
 
     def notes_of(self, raw: bool) -> tuple[str, ...]:
-        """What is left out of what the file says, for one who takes it as data or as colours."""
+        """Return notes on what is left out, for values that are data if raw, else colours."""
         return self.notes if raw else (*self.notes, *self.colour_notes)
 
     def _numbers(self) -> Array:

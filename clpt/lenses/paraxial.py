@@ -21,7 +21,7 @@ NO_POWER = 1e-9  # [1/mm], below which nothing is brought to a focus
 
 @dataclass(frozen=True)
 class Cardinal:
-    """What a lens does near its axis, at one wavelength [nm]; lengths [mm].
+    """Properties of a lens near its axis, at one wavelength [nm]; lengths [mm].
 
     focal_length: of the whole; back_focus: from the last surface to the image of what is far away;
     front_focus: from the first surface to the front focus, below 0 in front of it; entrance, exit:

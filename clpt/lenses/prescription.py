@@ -1,4 +1,4 @@
-"""What a lens is made of: surfaces from the front to the film, as patents and lens files list them.
+"""Surfaces of a lens from the front to the film, as patents and lens files list them.
 
 Lengths are in millimetres. A radius is above 0 where the centre lies behind the surface; 0 is a
 plane. Light that makes a picture meets the first surface first.

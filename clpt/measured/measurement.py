@@ -1,4 +1,4 @@
-"""What was measured of a material: how it reflects, by direction and wavelength."""
+"""Measured reflection of a material, by direction and wavelength."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ class Measurement:
 
     @property
     def reduction(self) -> int:
-        """Of how many equal parts of the azimuths one is stored."""
+        """The number of equal parts of the azimuths; only one part is stored."""
         if self.isotropic:
             return 1
         return round(2.0 * math.pi / float(self.phi_i[-1] - self.phi_i[0]))

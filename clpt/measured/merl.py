@@ -106,8 +106,10 @@ def filled(table: MerlTable) -> NDArray[Any]:
 
 
 def densities(values: NDArray[Any]) -> tuple[Values, Values, Values]:
-    """How light is sampled: angles of viewers (n,) [rad], densities over the square of halfway
-    directions (n, rows, columns), and the share of light (3,) that a viewer along the normal sees.
+    """Return tables by which light is sampled.
+
+    They are angles of viewers (n,) [rad], densities over the square of halfway directions
+    (n, rows, columns), and the share of light (3,) that a viewer along the normal sees.
 
     values: of `filled`. Of the brightest of neighbours each, so that nothing bright is missed.
     """

@@ -1,4 +1,4 @@
-"""How many spheres of a cloud have which radius."""
+"""Distributions of the radii of a cloud's spheres."""
 
 from __future__ import annotations
 

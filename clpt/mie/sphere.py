@@ -1,4 +1,4 @@
-"""What spheres scatter: Mie 1908, as in Bohren and Huffman 1983, chapter 4, in float64."""
+"""Scattering by spheres: Mie 1908, as in Bohren and Huffman 1983, chapter 4, in float64."""
 
 from __future__ import annotations
 

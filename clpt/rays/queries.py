@@ -52,7 +52,7 @@ _Self = TypeVar("_Self", bound="Queries")
 
 @dataclass(frozen=True)
 class Hits:
-    """What rays meet first, in numpy or PyOpenCL arrays as the rays were.
+    """The first hits of rays, in arrays of numpy or PyOpenCL as the rays were.
 
     t: (n,) float32 in units of the direction, inf where nothing is met; primitive: (n,) int32 row
     of `faces`, -1 where nothing is met; barycentrics: (n, 2) float32 of the face's second and third
@@ -121,7 +121,7 @@ class Queries:
         out: Hits | None = None,
         wait_for: Events = None,
     ) -> Hits:
-        """What each ray meets first, at t_min < t < t_max but for a rounding.
+        """Return the first hit of each ray, at t_min < t < t_max but for a rounding.
 
         origins, directions: (n, 3) float32, directions of any length; t_min, t_max: numbers or (n,)
         float32. If origins or directions are on the device, so are the hits, and all is only
@@ -276,5 +276,5 @@ class Queries:
         return _INTERLEAVED if self._interleaved and root == _ONE_BY_ONE else root
 
     def _instances_text(self) -> str:
-        """What traversal of instances includes."""
+        """Return the text that traversal of instances includes."""
         return ""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import Any
+from collections.abc import Callable
+from typing import Any, ClassVar
 
 import numpy as np
 import pyopencl as cl
@@ -13,7 +13,7 @@ from pyopencl.array import Array
 from clpt import device as dev
 from clpt import images
 from clpt.colour.view import View
-from clpt.errors import ClptError, SceneError
+from clpt.errors import SceneError
 from clpt.render.contents import FilmOwner
 from clpt.render.film.layers import layers_of
 from clpt.render.film.resolve import Resolve
@@ -29,8 +29,10 @@ Image = NDArray[np.float32]
 class Pictures(FilmOwner):
     """Base of renderers: their picture as an array, on the device or the host.
 
-    wavefronts: its one.
+    wavefronts: its one; make_widget: given by who shows pictures in notebooks, see `clpt/__init__`.
     """
+
+    make_widget: ClassVar[Callable[..., Any]]
 
     scene: Scene
     device: dev.Device
@@ -92,12 +94,7 @@ class Pictures(FilmOwner):
         It is rendered by another renderer, with these options, in a thread of its own; see
         clpt.view.widget.Widget. Raises ClptError where clpt[notebook] is not installed.
         """
-        try:  # by its name: a renderer knows nothing of those who show its pictures
-            room = import_module("clpt.view.widget")
-        except ImportError as error:
-            message = f"a widget needs {error.name}: pip install 'clpt[notebook]'"
-            raise ClptError(message) from error
-        return room.Widget(self.scene, self.device, **options)
+        return type(self).make_widget(self.scene, self.device, **options)
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         """`image()`, for numpy.asarray(renderer): a copy, which waits."""

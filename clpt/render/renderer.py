@@ -14,6 +14,8 @@ import pyopencl as cl
 from clpt import device as dev
 from clpt.denoise import needs
 from clpt.errors import DeviceError, MemoryBudgetError, SceneError
+from clpt.render.analysis.bodies import matter_of
+from clpt.render.analysis.surroundings import bodies_around, media_around
 from clpt.render.contents import Change, Contents
 from clpt.render.editing import parameter_patch, rebuild
 from clpt.render.editing.blurring import between
@@ -28,8 +30,6 @@ from clpt.render.editing.scene_edit import (
     resolve_device_arrays,
 )
 from clpt.render.locking import Stop, healing, synchronized
-from clpt.render.lowering.bodies import matter_of
-from clpt.render.lowering.camera.surroundings import bodies_around, media_around
 from clpt.render.lowering.scene import Lowered, lower
 from clpt.render.options import RenderOptions, check_changes, check_options, check_scene
 from clpt.render.pictures import Image

@@ -1,4 +1,4 @@
-"""What to render: plain data, no OpenCL. `KINDS` is the table of all that exists, by category."""
+"""Scenes as plain data, without OpenCL. `KINDS` is the table of all kinds by category."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What no scatterer may do: send on more light than comes."""
+"""A check of scatterers: none may send on more light than it receives."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ PIECE = 1 << 20  # bytes of a file that are read at once
 
 @dataclass(frozen=True)
 class Fingerprint:
-    """What decides the samples of a scene, as plain values by flat names such as "camera.fov".
+    """The values that decide a scene's samples, by flat names such as "camera.fov".
 
     Arrays, files and long lists stand as the SHA-256 of their content.
     """
@@ -236,7 +236,7 @@ def _digest(values: Any) -> str:
 
 
 def _change(own: Plain, given: Plain) -> str:
-    """What became of a value, for people."""
+    """Describe the change of a value for people."""
     shown = [_shown(value) for value in (own, given)]
     return "its content differs" if shown == ["..", ".."] else " -> ".join(shown)
 

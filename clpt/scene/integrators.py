@@ -242,7 +242,7 @@ class BlackmanHarris(Filter):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Film(Kind):
-    """What is recorded: size, mode, wavelengths, filter, and how light becomes colour.
+    """The picture that is recorded: size, mode, wavelengths, filter, and how light becomes colour.
 
     With `bands` a pixel holds the mean radiance [W m^-2 sr^-1 nm^-1] of as many equal parts of the
     range of wavelengths. `white_balance` makes that illuminant the white of `output_space`

@@ -127,7 +127,7 @@ class Directional(Light):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Constant(Light):
-    """The same radiance from every direction."""
+    """A light that surrounds the scene with the same radiance from every direction."""
 
     reach = "infinite"
 

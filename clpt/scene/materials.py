@@ -35,9 +35,10 @@ from clpt.scene.params import (
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.textures import Bitmap
 from clpt.scene.values import IndexLike, SpectrumLike, Textured, TexturedNumber
-from clpt.spectra import Reradiation, Spectrum
+from clpt.spectra import Constant, Reradiation, Spectrum
 
 DISTRIBUTIONS = ("ggx", "beckmann")
+CLEAR = Constant(0.0)  # absorption of what absorbs nothing
 FILMS = "thin films on the surface, from the outside in"
 
 
@@ -565,7 +566,7 @@ class Hair(Material):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Measured(Material):
-    """What was measured of a real surface (Dupuy and Jakob 2018), from a file `.bsdf`; front side.
+    """A surface by measurement (Dupuy and Jakob 2018), from a file `.bsdf`; front side only.
 
     By default a matt grey. It is as reciprocal as what was measured, and its numbers are linear in
     between.

@@ -67,7 +67,7 @@ class Phase(Scatterer):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Isotropic(Phase):
-    """The same in all directions."""
+    """Scattering with the same strength in all directions."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -198,12 +198,12 @@ class Blend(Phase):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Rayleigh(Phase):
-    """Of what is far smaller than the wavelength, as the air: 3 (1 + cos^2) / 16 pi."""
+    """Scattering by particles far smaller than the wavelength, as air: 3 (1 + cos^2) / 16 pi."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Reradiating(Phase):
-    """The same in all directions, of light that also comes from shorter wavelengths than it leaves.
+    """Isotropic scattering with fluorescence: light also leaves at longer wavelengths than it came.
 
     Of what collides the share `reflectance` keeps its wavelength, and `reradiation` tells what is
     given out at others. For particles that collide with all wavelengths alike; `dyed` makes one for
@@ -226,7 +226,7 @@ class Reradiating(Phase):
 
 @dataclass(frozen=True, eq=False)
 class PerCollision(Reradiation):
-    """What a dye gives out, over the collisions of the wavelength that leaves.
+    """Re-radiation of a dye, over the collisions at the wavelength that leaves.
 
     factor: the dye's absorption where that of `dye` is 1, over the collisions, a spectrum.
     """
@@ -282,7 +282,7 @@ class Medium(Kind):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Homogeneous(Medium):
-    """The same everywhere: given by `sigma_a` and `sigma_s`, or by `sigma_t` and `albedo`."""
+    """A uniform medium, given by `sigma_a` and `sigma_s`, or by `sigma_t` and `albedo`."""
 
     sigma_a: SpectrumLike = coefficient(0.0, "how much a metre absorbs")
     sigma_s: SpectrumLike = coefficient(0.0, "how much a metre scatters")
@@ -436,7 +436,7 @@ class Dyed(Homogeneous):
 
     @property
     def _given(self) -> Spectrum:
-        """What it gives out at a wavelength, where light is the same at all."""
+        """Return the spectrum that the dye emits under light that is equal at all wavelengths."""
         dye: Any = self.dye
         out, into, values = dye.table
         sums = 0.5 * (values[:, 1:] + values[:, :-1]) @ np.diff(into)
@@ -655,7 +655,7 @@ class Soot(Grid):
 
 
 def _combined(values: list[Any], combine: Callable[[list[Any]], Any], spectral: bool) -> Spectrum:
-    """What becomes of spectra at each wavelength, or of each of three numbers."""
+    """Combine spectra at each wavelength, or each of three numbers."""
     if all(isinstance(value, Constant) for value in values):
         return Constant(float(combine([value.value for value in values])))
     if not spectral:
@@ -669,7 +669,7 @@ def _alone(value: Spectrum, spectral: bool) -> Spectrum:
 
 
 def _mapped(value: Any, function: Callable[[Any], Any]) -> Spectrum:
-    """What becomes of a spectrum at each wavelength, or of a colour's three numbers."""
+    """Apply a function to a spectrum at each wavelength, or to a colour's three numbers."""
     if isinstance(value, RGB | RGBUnbounded):
         return type(value)(*(float(function(v)) for v in (value.r, value.g, value.b)))
     if isinstance(value, Constant):
@@ -755,7 +755,7 @@ class Mixture(Lattice):
 
     @property
     def grids(self) -> tuple[Grid, ...]:
-        """Those of the parts that have a density of their own."""
+        """The parts that are grids, with a density of their own."""
         return tuple(part for part in self.parts if isinstance(part, Grid))
 
     @property

@@ -1,4 +1,4 @@
-"""How the parameters of a kind are declared.
+"""Declarations of the parameters of a kind.
 
 A kind is a frozen dataclass that derives from `Kind`. One of the functions below declares each
 field and gives it a role. The role decides which values it accepts, its type in the kernels, and
@@ -146,7 +146,7 @@ def factor(default: Any, doc: str) -> Any:
 def coefficient(default: Any, doc: str, unit: str = "1/m") -> Any:
     """Declare a property of the inside of a body; it is no member of its kind's struct.
 
-    It acts between surfaces: kernels/optics/medium.cl reads it after the kind's row.
+    It acts between surfaces: kernels/media/medium.cl reads it after the kind's row.
     """
     return _field(default, Param("coefficient", doc, unit, low=0.0))
 

@@ -1,4 +1,4 @@
-"""What materials and phase functions have in common: they say where light goes from a point."""
+"""The base of materials and phase functions: both decide where light goes from a point."""
 
 from __future__ import annotations
 

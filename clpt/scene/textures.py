@@ -109,7 +109,7 @@ class Mix(Texture):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeshAttribute(Texture):
-    """What a mesh says per vertex or face: its `attributes` of that name."""
+    """Values that a mesh holds per vertex or face: those of its `attributes` with this name."""
 
     name: str = host("vertex_color", "begins with vertex_ or face_")
     channel: str = choice(

@@ -1,4 +1,4 @@
-"""What the parameters of a scene accept, as types for type checkers.
+"""Types of the values that parameters of a scene accept, for type checkers.
 
 The dataclasses convert what they are given: a colour becomes a `clpt.spectra.Spectrum`. So a
 parameter that was read back has one of these types too.

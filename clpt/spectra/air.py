@@ -56,7 +56,7 @@ def share(height: ArrayLike) -> Floats:
 
 @dataclass(frozen=True)
 class Atmosphere:
-    """What is in the air.
+    """Contents of the air: aerosol and ozone.
 
     aerosol: optical depth at 550 nm; exponent: of its fall with wavelength; aerosol_albedo: share
     that is scattered; asymmetry: g of its phase function; ozone [Dobson units].

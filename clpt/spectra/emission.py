@@ -132,7 +132,7 @@ class Illuminant(Spectrum):
 
     @property
     def knots(self) -> tuple[Samples, Samples] | None:
-        """Those of the table or the lines that it stands for."""
+        """Wavelengths and values of the table or the lines that the illuminant stands for."""
         known = _of_luminance_one(self.name).knots
         return None if known is None else (known[0], self.scale * known[1])
 

@@ -54,7 +54,7 @@ def glass(name: str, dispersion: bool = True) -> Constant | Sellmeier:
 
 
 def index(value: Spectrum | str) -> Spectrum:
-    """What an index or a coefficient means: a glass by its name, or a colour that may exceed 1.
+    """Return the spectrum of an index or a coefficient: of a glass by its name, or of a colour.
 
     A table holds its end values, as nothing has an index of 0. Raises UnknownKindError.
     """

@@ -156,7 +156,7 @@ class Fluorophore(Reradiation):
 
 
 def _weights(nodes: Matrix) -> Matrix:
-    """Of the trapezoid rule."""
+    """Return the weights of the trapezoid rule."""
     half = 0.5 * np.diff(nodes)
     return np.append(half, 0.0) + np.append(0.0, half)
 

@@ -54,7 +54,7 @@ class Spectrum(ABC):
 
 @dataclass(frozen=True)
 class Constant(Spectrum):
-    """The same value at every wavelength."""
+    """A spectrum with one value at every wavelength."""
 
     value: float
 

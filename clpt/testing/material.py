@@ -9,7 +9,7 @@ import numpy as np
 from clpt import device, spectra
 from clpt.render.contract import custom_materials
 from clpt.render.contract.parameter_words import ORDERS_WORDS
-from clpt.render.lowering.spectra_table import RGB_ROLES
+from clpt.render.lowering.spectra.spectra_table import RGB_ROLES
 from clpt.scene.materials import LEAVES, Material
 from clpt.scene.params import Param, device_params
 from clpt.testing import checks

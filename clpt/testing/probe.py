@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import device
+from clpt.render.codegen import rough_coat_table
 from clpt.render.codegen.library import BSDF
 from clpt.render.codegen.parameters import array_size, lane_type, struct_text
 from clpt.render.contract import custom_materials
 from clpt.render.contract.parameter_words import FILM_COSINES
-from clpt.render.lowering.materials import measurements
-from clpt.render.lowering.materials.thin_films import film_colours
-from clpt.render.lowering.spectra_table import angular_values
+from clpt.render.lowering.spectra import measurements
+from clpt.render.lowering.spectra.spectra_table import angular_values
+from clpt.render.lowering.spectra.thin_films import film_colours
 from clpt.scene.materials import Layer, Material
 from clpt.scene.params import Param, device_params
 from clpt.spectra.spectrum import primaries
@@ -39,14 +40,16 @@ def run(
     given: NDArray,
     rows: int,
     table: NDArray = NOTHING,
+    options: Sequence[str] = (),
 ) -> NDArray[np.float32]:
     """Run `kernel void probe(global const float *in, global float *out, uint n)` of "probe.cl".
 
     given: (k, n) float32, streams of `in`; table: what follows them there; virtual: the program's
-    files. Returns (rows, n) float32. n is padded to whole lane blocks.
+    files; options: more of the compiler's. Returns (rows, n) float32. n is padded to whole blocks.
     """
-    source = device.assemble("probe.cl", virtual, {"LANES": lanes})
-    program = device.build(on, source)
+    files = {**rough_coat_table.virtual_files(), **virtual}
+    source = device.assemble("probe.cl", files, {"LANES": lanes})
+    program = device.build(on, source, options)
     n = given.shape[1]
     padded = -(-n // 16) * 16
     data = np.empty((given.shape[0], padded), np.float32)
@@ -118,7 +121,7 @@ class Probe:
         return next((k for k, p in device_params(self.cls).items() if p.role == role), "")
 
     def _angular_text(self, params: Mapping[str, Any], rows: int) -> list[str]:
-        """What an AngularTable is, and setting m's, which stands in `in` after its rows."""
+        """Return the text that sets m's AngularTable, whose data follow the rows in `in`."""
         spectral = self.mode == "spectral"
         kind: Any = self.cls(**params)
         cosines, values, start, step = kind.device_rows(spectral)
@@ -137,7 +140,7 @@ class Probe:
         return measurements.rows(params[self._named("measurement")], film)
 
     def _measurement_text(self, params: Mapping[str, Any], rows: int) -> list[str]:
-        """What a Measurement is, and setting m's, which stands in `in` after its rows."""
+        """Return the text that sets m's Measurement, whose data follow the rows in `in`."""
         nodes = self._measurement(params).wavelengths
         at = np.interp(LAMBDAS, nodes, np.arange(len(nodes))) if len(nodes) else np.arange(3.0)
         row = ", ".join(f"(real)({one:.9e}f)" for one in at)
@@ -149,7 +152,7 @@ class Probe:
         ]
 
     def _merl_text(self, rows: int) -> list[str]:
-        """What a MerlTable is, and setting m's, which stands in `in` after its rows."""
+        """Return the text that sets m's MerlTable, whose data follow the rows in `in`."""
         one = np.eye(3)
         if self.mode == "spectral":
             one = np.array([curve.sample(LAMBDAS) for curve in primaries()])
@@ -166,7 +169,7 @@ class Probe:
         return [(k, p) for k, p in device_params(self.cls).items() if p.role not in beside]
 
     def _table(self, params: Mapping[str, Any], layers: Sequence[Layer]) -> NDArray:
-        """What stands in `in` after the streams: the layers, or in RGB mode their colours."""
+        """Return the data that follow the streams in `in`: a table, layers, or layers' colours."""
         if self._named("measurement"):
             return np.append(0.0, self._measurement(params).values)
         if name := self._named("merl"):

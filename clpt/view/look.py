@@ -1,4 +1,4 @@
-"""How a scene is looked at: what is hidden, under which lamp, at which wavelengths, which region.
+"""Looks at a scene: without some parts, under one lamp, at some wavelengths, in one region.
 
 A look changes no scene: it makes another one of it for the renderers.
 """

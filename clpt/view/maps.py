@@ -1,4 +1,4 @@
-"""What the page shows in the place of the picture: layers, samples, and the error that is left."""
+"""Maps that the page shows in place of the picture: layers, samples, the error that is left."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ Bytes = NDArray[np.uint8]
 
 @dataclass(frozen=True)
 class Legend:
-    """What the colours of a map mean: words for both ends of the scale."""
+    """The legend of a map: its colours, with words for both ends of the scale."""
 
     low: str
     high: str
@@ -53,7 +53,7 @@ def samples(film: Film) -> tuple[Bytes, Legend]:
 
 
 class ErrorMap:
-    """How far each pixel may be from what it converges to, from the films of one render.
+    """An estimate of each pixel's error, from the films of one render.
 
     With n samples the mean is m, with n1 of them it was m1: the variance of m is the mean of
     (m - m1)^2 n1 / (n - n1), where samples are independent; where they are stratified it is less.

@@ -1,4 +1,4 @@
-"""How a drag moves a camera. Cameras are plain data: each move returns another one."""
+"""Moves of a camera by drags. Cameras are plain data: each move returns another one."""
 
 from __future__ import annotations
 

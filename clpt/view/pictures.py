@@ -38,7 +38,7 @@ def png(pixels: NDArray[np.uint8]) -> bytes:
 
 @dataclass(frozen=True)
 class Display:
-    """How the picture is shown; the render does not know of it.
+    """Settings by which a page shows the picture; the render does not know of them.
 
     exposure [stops]; tone: a curve of clpt.colour.tones, or that of `view`, of OpenColorIO.
     """

@@ -1,4 +1,4 @@
-"""What is in one pixel: its first hit, and its spectrum with the error that is left.
+"""The contents of one pixel: its first hit, and its spectrum with the error that is left.
 
 A probe has renderers of a film of one pixel, and a thread and a queue of its own: it works while
 the picture goes on. The camera is turned into one that sees that pixel alone.
@@ -114,14 +114,14 @@ class Follower:
 
 
 def _frame(scene: Scene) -> tuple[Any, ...]:
-    """What a renderer cannot change: its film's size and kind."""
+    """Return the settings that a renderer cannot change: its film's form and its integrator."""
     film = scene.film
     return film.width, film.height, film.crop, film.bands, film.mode, type(scene.integrator)
 
 
 @dataclasses.dataclass(frozen=True)
 class Question:
-    """What is asked of a pixel of a scene; then: gets the first hit, if it is given."""
+    """A question about a pixel of a scene; then: gets the first hit, if it is given."""
 
     scene: Scene
     x: int

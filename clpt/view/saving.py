@@ -1,4 +1,4 @@
-"""What a page saves: new files in the folder that was given at the start, never elsewhere.
+"""Files that a page saves: new ones in the folder that was given at the start, never elsewhere.
 
 The name of a file is taken by making the file, which fails where anything has that name, a link to
 nowhere too. So two viewers that save in one folder never get the same name.

@@ -86,7 +86,7 @@ def page_files() -> dict[str, tuple[str, bytes]]:
 
 
 class Rate:
-    """How often something may be: `rate` a second, and `burst` at once."""
+    """A limit on how often something happens: `rate` times a second, and `burst` at once."""
 
     def __init__(self, rate: float, burst: float):
         self.rate, self.burst = rate, burst

@@ -18,7 +18,7 @@ Make = Callable[..., Renderer]  # called with a scene
 
 @dataclasses.dataclass(frozen=True)
 class Change:
-    """How a scene differs from the one before: in its camera, in materials, or in anything.
+    """The difference of a scene from the one before: its camera, materials, or anything.
 
     materials: new ones by those that they replace; whole: anything else differs too.
     """

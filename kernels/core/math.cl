@@ -112,7 +112,7 @@ inline real atan2_r(real y, real x)
     return sel(y < 0.0f, -r, r);
 }
 
-/* The error function, |error| < 5e-7 (Abramowitz and Stegun 7.1.26). */
+/* The error function, |error| < 7e-7 (Abramowitz and Stegun 7.1.26). */
 inline real erf_r(real x)
 {
     real a = fabs(x), t = 1.0f / (1.0f + 0.3275911f * a);

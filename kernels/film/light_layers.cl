@@ -3,6 +3,7 @@
  * added when it is found. The sums of all groups, and direct with indirect light, are the picture. Where paths start at
  * lights too, as many pictures follow of what these bring, which are divided by the number of light paths. */
 #include "film/sums.cl"
+#include "path/seen_wavelengths.cl"
 #define LIGHT_PICTURE_WORDS 9
 
 inline void light_layer_sum(Scene scene, mask m, integer pixel_index, integer picture, vec3 value,
@@ -47,11 +48,7 @@ inline void light_layers_sum(Scene scene, mask m, integer pixel_index, integer s
 inline void light_layers_add(Scene scene, Slab path, uint at, mask m, integer surfaces, integer row, Spectrum light,
                              global uint *light_layers)
 {
-    Wavelengths lambdas = load_path_lambdas(path, at);
-#if USES_FLUORESCENCE /* the film sees the camera's wavelengths */
-    Sampler begun = pixel_sampler(scene.settings, load_path_pixel_key(path, at), load_path_sample(path, at));
-    lambdas = wavelengths_sample(scene, sampler_pair(begun, (natural)(DIMENSION_WAVELENGTH)).x);
-#endif
+    Wavelengths lambdas = seen_wavelengths(scene, path, at, load_path_lambdas(path, at));
     vec3 v = scale3(film_value(scene, light, lambdas), load_path_weight(path, at) * scene.settings->film_scale);
     light_layers_sum(scene, m, load_path_pixel_index(path, at), surfaces, row, 0, v, light_layers);
 }

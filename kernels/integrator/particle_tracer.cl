@@ -17,7 +17,7 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
 {
     global const Settings *settings = scene.settings;
     Surface s = v.s;
-    Spectrum beta = v.beta, ratio = hero_ratio(path, at);
+    Spectrum beta = v.beta, ratio = load_path_ratio(path, at);
     integer state = v.state, depth = v.depth;
 
     Sampler sampler = light_path_sampler(settings, load_path_pixel_index(path, at), load_path_sample(path, at));
@@ -104,7 +104,7 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
     path_scattered(path, at, next & !null);
 #endif
     vertex_leave(path, at, next, null, v, onward, beta);
-    hero_keep(path, at, next, ratio);
+    store_path_ratio(path, at, next, ratio);
     vertex_end(path, at, active, next, null, state);
 }
 

@@ -12,7 +12,7 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
 {
     global const Settings *settings = scene.settings;
     Surface s = v.s;
-    Spectrum beta = v.beta, ratio = hero_ratio(path, at);
+    Spectrum beta = v.beta, ratio = load_path_ratio(path, at);
     integer state = v.state, depth = v.depth;
 
     /* The light that this ray has met; the camera's ray goes on behind one that is to be hidden. */
@@ -22,9 +22,7 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     if (any(hidden)) {
         store_path_o(path, at, hidden, surface_offset(s, v.d));
         store_path_pdf(path, at, hidden, load_path_pdf(path, at) + v.t);
-#if USES_MIPS
         store_path_cone(path, at, hidden, cone_word(v.cone));
-#endif
 #if WEIGHS_LIGHT_PATHS /* the light is in the way of what light paths bring to the camera */
         store_path_rival(path, at, hidden, (real)(0.0f));
 #endif
@@ -35,7 +33,7 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
 #endif
     if (any(lit)) {
         integer light = sel_i(lit, s.light, (integer)(0));
-        real pdf = load_path_pdf(path, at), null_distance = path_null_distance(path, at);
+        real pdf = load_path_pdf(path, at), null_distance = load_path_null_distance(path, at);
         vec3 from = madd3(v.d, -null_distance, v.o), side = path_hemisphere(path, at);
         real other = light_pdf(scene, light, from, side, v.d, v.t + null_distance, s.n);
         real w = sel(pdf < 0.0f, (real)(1.0f), mis_weight(pdf, other));
@@ -173,9 +171,7 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
 #endif
 
     vertex_leave(path, at, next, null, v, onward, beta);
-#if USES_MIPS
     store_path_cone(path, at, next, cone_scattered(v.cone, bs.pdf, (bs.lobe & LOBE_DELTA) != 0));
-#endif
 #if !BSDF_IS_NULL
     mask scatters = next & !null;
     path_scattered(path, at, scatters);
@@ -198,7 +194,7 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
 #endif
 #endif
     store_path_eta(path, at, next, eta);
-    hero_keep(path, at, next, ratio);
+    store_path_ratio(path, at, next, ratio);
     vertex_end(path, at, met, next, null, state);
 }
 

@@ -44,12 +44,12 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     mask next = active & (mirror > 0.0f) & (wo.z > 0.0f);
 #else
     vec2 uv = sampler_pair(sampler, scatter.dimension + DIMENSION_BSDF);
-    Spectrum ratio = hero_ratio(path, at);
+    Spectrum ratio = load_path_ratio(path, at);
     BsdfSample bs = hero_sample(m, wo, v3(uv.x, uv.y, scatter.choice.y), &ratio);
     vec3 wi = bs.wi;
     beta = spectrum_mul(beta, bs.weight);
     mask next = active & (bs.pdf > 0.0f);
-    hero_keep(path, at, next, ratio);
+    store_path_ratio(path, at, next, ratio);
 #endif
     mask null = vertex_is_null((integer)(0));
     next = next & vertex_continues(scene, v, null);
@@ -57,9 +57,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     beta = spectrum_scale(beta, shading_frame_share(scatter.shading, onward));
     store_path_radiance(path, at, active, radiance);
     vertex_leave(path, at, next, null, v, onward, beta);
-#if USES_MIPS
     store_path_cone(path, at, next, cone_word(v.cone));
-#endif
 #if !BSDF_IS_NULL
     store_path_pdf(path, at, next, (real)(-1.0f));
 #endif

@@ -2,13 +2,13 @@
  * point emits into a metre counts as if it came from all of the brick's mean chord c, four times its volume over its
  * surface. So its radiance is c times that, and its density [1/sr] that of the point, t^2 times 1 / V, times c: on
  * average one over the solid angle of the brick. Rays that go through the medium weigh what they gather against that,
- * see optics/grid_flight.cl (Villemin and Hery 2013 sample flames as lights; the weights are ours). */
+ * see media/grid_flight.cl (Villemin and Hery 2013 sample flames as lights; the weights are ours). */
 
 real emissive_brick_pdf(EmissiveBrick l, real t) { return l.inverse * l.chord * t * t; }
 
 LightSample emissive_brick_sample(EmissiveBrick l, Scene scene, vec3 p, vec2 u, Wavelengths lambdas)
 {
-    natural bits = hash_natural(as_natural(u.x) ^ hash_natural(as_natural(u.y)));
+    natural bits = hash_natural(as_natural(u.y) ^ 0x68bc21ebu); /* u.x may be what a choice left, and rounded */
     real third = unit_interval(bits);
     vec3 q = madd3(l.x, u.x, madd3(l.y, u.y, madd3(l.z, third, l.corner)));
     vec3 to = sub3(q, p);

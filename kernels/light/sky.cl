@@ -3,7 +3,7 @@
  * to the nadir, both dense at the horizon (their angle to it is a square); columns go around from z toward x. Its two
  * halves are alike, so that texels hold one. The disc has an image of its own: its rows run from its lower edge to its
  * upper one, its columns from the edge to the middle by the cosine at the sun's surface. Radiance [W m^-2 sr^-1 nm^-1]
- * is what clpt/render/lowering/lights/skylight.py found. */
+ * is what clpt/sky/skylight.py found. */
 #include "core/grid.cl"
 
 #define SKY_SUN_ROWS 24

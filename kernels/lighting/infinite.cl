@@ -1,38 +1,31 @@
-/* What all infinite lights add to a path that leaves the scene along d [W m^-2 sr^-1 nm^-1]. The direction was chosen
- * with `pdf` [1/sr] (below 0: delta) at a point p of a surface that sends light to `hemisphere`, see
- * interface/light.cl; the power heuristic weighs that against its choice on the light (Veach 1997, 9.2.4), and, by the
- * path's `rival`, against paths from the light (lighting/rivals.cl). */
+/* What one infinite light sends to a path that leaves the scene along d [W m^-2 sr^-1 nm^-1], and the share `w` of it
+ * that counts. The direction was chosen with `pdf` [1/sr] (below 0: delta) at a point p of a surface that sends light to
+ * `hemisphere`, see interface/light.cl; the power heuristic weighs that against its choice on the light (Veach 1997,
+ * 9.2.4), and, by the path's `rival`, against paths from the light (lighting/rivals.cl). */
+inline Spectrum infinite_met(Scene scene, int row, vec3 p, vec3 hemisphere, vec3 d, real pdf, real rival,
+                             Wavelengths lambdas, real *w)
+{
+    Spectrum radiance;
+    real other;
+    infinite_light(scene, row, p, hemisphere, d, lambdas, &radiance, &other);
+#if WEIGHS_LIGHT_PATHS
+    real emission = light_path_pdf(scene, (integer)(row), p, d, (real)(FAR), neg3(d));
+    *w = mis_weight_of_three(pdf, other, rival * emission);
+#else
+    *w = sel(pdf < 0.0f, (real)(1.0f), mis_weight(pdf, other));
+#endif
+    return radiance;
+}
+
+/* What all of them add. */
 inline Spectrum infinite_gather(Scene scene, vec3 p, vec3 hemisphere, vec3 d, real pdf, real rival,
                                 Wavelengths lambdas)
 {
     Spectrum sum = spectrum_of(0.0f);
     for (int row = 0; row < scene.settings->infinite_count; row++) {
-        Spectrum radiance;
-        real other;
-        infinite_light(scene, row, p, hemisphere, d, lambdas, &radiance, &other);
-        real w = sel(pdf < 0.0f, (real)(1.0f), mis_weight(pdf, other));
-#if WEIGHS_LIGHT_PATHS
-        real emission = light_path_pdf(scene, (integer)(row), p, d, (real)(FAR), neg3(d));
-        w = mis_weight_of_three(pdf, other, rival * emission);
-#endif
+        real w;
+        Spectrum radiance = infinite_met(scene, row, p, hemisphere, d, pdf, rival, lambdas, &w);
         sum = spectrum_madd(radiance, w, sum);
     }
     return sum;
 }
-
-#if LIGHT_LAYERS
-/* What one infinite light adds. */
-inline Spectrum infinite_weighed(Scene scene, int row, vec3 p, vec3 hemisphere, vec3 d, real pdf, real rival,
-                                 Wavelengths lambdas)
-{
-    Spectrum radiance;
-    real other;
-    infinite_light(scene, row, p, hemisphere, d, lambdas, &radiance, &other);
-    real w = sel(pdf < 0.0f, (real)(1.0f), mis_weight(pdf, other));
-#if WEIGHS_LIGHT_PATHS
-    real emission = light_path_pdf(scene, (integer)(row), p, d, (real)(FAR), neg3(d));
-    w = mis_weight_of_three(pdf, other, rival * emission);
-#endif
-    return spectrum_scale(radiance, w);
-}
-#endif

@@ -10,11 +10,12 @@ inline LightRow light_at(Scene scene, integer row)
 #define FEW_LIGHTS 0
 #endif
 
-/* A random number has 23 bits, and every choice by it spends some. This stands for those below: uniform in [0, grain),
- * where u is a multiple of `grain`; other: a random number of the same sample. */
-inline real light_bits(real u, real other, real grain)
+/* A random number has 23 bits, and every choice by it spends some. This stands for those below: uniform in [0, grain);
+ * other: a random number of the same sample; choice: another word for each choice. Neither may follow from a number
+ * that was rounded: a device that rounds otherwise would choose other lights everywhere. */
+inline real light_bits(natural choice, real other, real grain)
 {
-    return unit_interval(hash_natural(as_natural(u) ^ hash_natural(as_natural(other)))) * grain;
+    return unit_interval(hash_natural(choice ^ hash_natural(as_natural(other)))) * grain;
 }
 
 /* A row of `lights`: *u chooses a row, and by its fraction either that row or its alias; what is left of it is uniform
@@ -25,7 +26,7 @@ inline integer light_pick(Scene scene, real *u, real other)
     if (count == 1) return (integer)(0);
     real position = *u * (float)count, whole = floor(position), remainder = position - whole;
 #if !FEW_LIGHTS
-    remainder += light_bits(*u, other, (real)((float)count * UNIT_GRAIN));
+    remainder += light_bits(as_natural(*u), other, (real)((float)count * UNIT_GRAIN));
     whole += floor(remainder);
     remainder -= floor(remainder);
 #endif

@@ -91,8 +91,8 @@ inline integer light_tree_pick(Scene scene, vec3 p, vec3 hemisphere, real *u, re
         grain /= sel(open, max_r(chance, (real)(1e-20f)), (real)(1.0f));
         mask coarse = open & (grain > 0x1p-11f);
         if (any(coarse)) {
-            real finer = min_r(*u + light_bits(*u, other, min_r(grain, (real)(1.0f))), (real)(0.99999994f));
-            *u = sel(coarse, finer, *u);
+            real finer = *u + light_bits(as_natural(next), other, min_r(grain, (real)(1.0f)));
+            *u = sel(coarse, min_r(finer, (real)(0.99999994f)), *u);
             grain = sel(coarse, (real)(UNIT_GRAIN), grain);
         }
 #endif

@@ -191,7 +191,7 @@ inline Rival rival_of_emission(Scene scene, Slab path, uint at, Vertex v, vec3 h
     if (any(r.first)) {
         integer row = sel_i(r.first, load_path_light(path, at), (integer)(0));
         vec3 wi = neg3(v.d), n = load_path_sampled_hemisphere(path, at);
-        real t = v.t + path_null_distance(path, at);
+        real t = v.t + load_path_null_distance(path, at);
         real emission = light_emit_pdf(scene, row, wi, t);
         r.arrives = r.arrives / sel(r.first, max_r(emission, (real)(1e-30f)), (real)(1.0f));
         r.found = light_found_pdf(scene, row, v.s.p, hemisphere, wi, t, n);

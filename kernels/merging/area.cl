@@ -1,5 +1,6 @@
 /* The disk in which paths from the camera and photons are merged. A pass is a sample of every pixel, with the light
  * paths beside it; its radius shrinks from pass to pass, so that the picture converges (Hachisuka and Jensen 2009). */
+#define PATH_BEGUN (PATH_ALIVE | PATH_SHARP) /* the state in which a path begins at the camera */
 
 /* The pass of a light path. That of a sample of the camera has the sample's number. */
 inline integer merging_pass(Scene scene, integer light_path)
@@ -38,17 +39,15 @@ inline integer merging_group(Scene scene, real u)
     return min_i(to_integer(u * (float)groups), (integer)(groups - 1));
 }
 
-#if USES_MOTION
-/* What stands for a random number where the time is drawn: all paths of a pass and a group are at one time, so that
- * photons are met where and as they were left. From pass to pass it goes in steps of the golden ratio. */
-inline real merging_moment(Scene scene, real u, integer pass)
+/* What stands for `own`, a random number, where the time is drawn: all paths of a pass and a group are at one time, so
+ * that photons are met where and as they were left. From pass to pass it goes in steps of the golden ratio. */
+inline real merging_moment(Scene scene, real u, real own, integer pass)
 {
     float groups = (float)scene.settings->wavelength_groups;
     natural begin = hash_natural((natural)(scene.settings->seed ^ 0x2545f491u));
     real moment = unit_interval(as_natural(pass) * 0x9e3779b9u + begin) + to_real(merging_group(scene, u)) / groups;
     return moment - floor(moment);
 }
-#endif
 
 /* What stands for u where wavelengths are drawn: the same for all of a group. From pass to pass it goes through the
  * group's part of the unit interval as van der Corput's sequence, whose beginning the seed chooses. */

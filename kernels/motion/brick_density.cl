@@ -1,4 +1,4 @@
-/* A density on the device becomes the bricks of kernels/optics/medium_grid.cl, which has their form: here every brick
+/* A density on the device becomes the bricks of kernels/media/medium_grid.cl, which has their form: here every brick
  * has points, whether it holds any density or not, so that nobody need know before. The numbers are to the bit those of
  * clpt.render.lowering.grids.
  *

@@ -3,7 +3,7 @@
  *
  * A row of `source` is x y z, or x y z and the radius, before `matrix`: its first three rows, which take it
  * to the world [m]; `scale` is by how much it enlarges. padding: of a box, relative, see
- * clpt.render.lowering.geometry.shapes.
+ * clpt.geometry.shapes.
  */
 #define FARTHEST 1e12f /* so that products of three coordinates stay inside a float */
 

@@ -1,5 +1,5 @@
 /* What a boundary with thin films does with light in RGB mode: the colours that it reflects and lets through under
- * D65, which the host has summed over the wavelengths (clpt/render/lowering/materials/thin_films.py). A table has up
+ * D65, which the host has summed over the wavelengths (clpt/render/lowering/spectra/thin_films.py). A table has up
  * to three parts: light from outside, from inside, and from the denser side beyond the critical angle. Each holds six
  * numbers, r and t in linear Rec. 709, by profile and by the cosine on the less dense side, where both sides' light
  * agrees; beyond the critical angle by that cosine's imaginary part. */

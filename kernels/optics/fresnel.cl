@@ -61,7 +61,8 @@ inline real fresnel_metal(real cos_i, real eta, real k)
     real c2 = cos_i * cos_i, s2 = 1.0f - c2;
     real d = eta * eta - k * k - s2;
     real q = sqrt_r(d * d + 4.0f * eta * eta * k * k); /* a^2 + b^2, where a + i b is the normal component */
-    real a = sqrt_r(0.5f * (q + d));
+    real large = sqrt_r(0.5f * (q + fabs(d))); /* of a and b; eta k is their product */
+    real a = sel(d < 0.0f, eta * k / max_r(large, (real)(1e-15f)), large);
     real t = 2.0f * cos_i * a;
     real s_polarised = (q + c2 - t) / max_r(q + c2 + t, (real)(1e-20f));
     real p = (q * c2 + s2 * s2 - t * s2) / max_r(q * c2 + s2 * s2 + t * s2, (real)(1e-20f));

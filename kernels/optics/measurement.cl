@@ -2,7 +2,7 @@
  * `values` has from `first` on the numbers of MEASUREMENT_HEAD, phi_i and theta_i as `warp_node` reads them, the
  * share that each colour reflects, ndf, sigma, the slices of vndf and of luminance, and the spectra: of every
  * phi_i, pair of neighbouring colours, row and column those of every theta_i, two halves in a word
- * (clpt/render/lowering/materials/measurements.py). */
+ * (clpt/render/lowering/spectra/measurements.py). */
 #include "optics/halfway_square.cl"
 #include "optics/warp_table.cl"
 #define MEASUREMENT_HEAD 17

@@ -1,7 +1,7 @@
 /* Isotropic reflection over the halfway and the difference angles (Rusinkiewicz 1998), as MERL measured it. `values`
  * has from `first` on the numbers of MERL_HEAD, the slices of a warp for viewers at even angles to the normal, and f
  * [1/sr]: of every halfway angle, difference angle and azimuth its red, green and blue as halves in two words; after
- * the last azimuth the first again (clpt/render/lowering/materials/measurements.py). */
+ * the last azimuth the first again (clpt/render/lowering/spectra/measurements.py). */
 #include "optics/halfway_square.cl"
 #include "optics/warp_table.cl"
 #define MERL_HEAD 12

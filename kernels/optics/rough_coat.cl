@@ -3,7 +3,7 @@
  * From 1 on the integrals stand in tables, linear in the roots of alpha and of 1 - 1 / eta: within 0.01 of
  * float64 sums for an index of 1.2 to 3, where grazing light meets one below within 0.05; what a smooth coat throws
  * back of a metal's light within 0.01 in the mean, near the critical angle of a smooth metal within 0.07. */
-#include "optics/rough_coat_table.cl"
+#include "generated/rough_coat_table.cl"
 
 /* A node of the tables by roughness and index, and how far it is to the next ones. */
 typedef struct {

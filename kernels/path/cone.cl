@@ -2,7 +2,6 @@
  * Level of Detail Strategies for Real-Time Ray Tracing"). It begins as wide as a pixel. A lobe that it is scattered by
  * widens it, the more the lower the density of the sampled direction; a mirror keeps it, curved or not. A cone without
  * width asks for the images themselves: so have paths from lights. */
-#if USES_MIPS
 typedef struct {
     real width;  /* [m] */
     real spread; /* what it grows by, per metre */
@@ -51,4 +50,3 @@ inline real cone_footprint(Cone c, vec3 d, vec3 n, vec3 dpdu, vec3 dpdv)
     real area = wide_length3(cross3(dpdu, dpdv)), cosine = max_r(fabs(dot3(n, d)), (real)(1e-3f));
     return sel(area > 1e-36f, c.width / (cosine * sqrt(area)), (real)(0.0f));
 }
-#endif

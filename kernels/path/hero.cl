@@ -5,7 +5,6 @@
  * four, so the pdf of a direction is the mean of ratio p, and ratio becomes ratio p over that mean. A
  * direction that holds for the hero alone leaves (4, 0, 0, 0), and the path goes on with one wavelength.
  */
-#include "path/ratio.cl"
 
 #define HERO_CHROMATIC (USES_RATIO && BSDF_CHROMATIC && SPECTRUM_SIZE == 4)
 

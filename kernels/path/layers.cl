@@ -51,7 +51,7 @@ inline integer layers_record(Scene scene, Slab path, uint at, LAYER_ARGS, mask m
     layer_put(words + LAYER_GEOMETRIC_NORMAL, first, scale3(v.s.n, weight));
 #endif
 #if LAYER_DEPTH
-    layer_put_long(words + LAYER_DEPTH, first, (v.t + path_null_distance(path, at)) * weight);
+    layer_put_long(words + LAYER_DEPTH, first, (v.t + load_path_null_distance(path, at)) * weight);
 #endif
 #if LAYER_Z
     layer_put_long(words + LAYER_Z, first, layer_z(scene, v.s.p) * weight);

@@ -9,8 +9,4 @@
 
 /* What light paths do, over the path's own density (lighting/rivals.cl): nothing where the camera or its first surface
  * sees the light, which is left to paths from the camera. */
-#if WEIGHS_LIGHT_PATHS
 #define path_rival(path, at, depth) sel((depth) > 1, load_path_rival(path, at), (real)(0.0f))
-#else
-#define path_rival(path, at, depth) ((real)(0.0f))
-#endif

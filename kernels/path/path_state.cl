@@ -13,11 +13,6 @@
  * goes straight through it) is no step of a path: it adds nothing to the depth. A path crosses this many of them, and
  * then ends; a shadow ray that meets more is blocked. */
 #define MOST_NULL_SURFACES 1024
-#if USES_NULL_SURFACES
-#define path_nulls(path, at) load_path_nulls(path, at)
-#else
-#define path_nulls(path, at) ((integer)(0))
-#endif
 
 /* Dimensions of a sample, in pairs: film, lens, wavelength and time, then DIMENSIONS_A_VERTEX per surface that is met,
  * null ones among them; beyond all these DIMENSION_TEXEL, DIMENSION_FLIGHT and DIMENSION_AIM, one pair per surface
@@ -38,10 +33,4 @@
 
 /* To weigh a light that a ray has met, the pdf of the ray's direction counts, and the point where it was chosen: that
  * lies `null_distance` [m] before the ray's origin if the path has crossed null boundaries since. */
-#if USES_NULL_SURFACES
-#define path_null_distance(path, at) load_path_null_distance(path, at)
 #define path_scattered(path, at, m) store_path_null_distance(path, at, m, (real)(0.0f))
-#else
-#define path_null_distance(path, at) ((real)(0.0f))
-#define path_scattered(path, at, m)
-#endif

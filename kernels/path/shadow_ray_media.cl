@@ -12,7 +12,7 @@ inline Spectrum shadow_ray_transmittance(TRACE_ARGS, Scene scene, Slab path, Sla
     natural key = 0u;
     integer into = 0;
 #if USES_GRIDS
-    integer vertex = (load_path_state(path, at) & PATH_DEPTH) + path_nulls(path, at);
+    integer vertex = (load_path_state(path, at) & PATH_DEPTH) + load_path_nulls(path, at);
     key = ~grid_key(scene, load_path_pixel_key(path, at), load_path_sample(path, at), vertex);
 #endif
 #if BRICK_LIGHTS

@@ -19,9 +19,7 @@ typedef struct {
     integer attributes, face; /* of triangles, see texturing/texture_point.cl */
     vec2 b;
 #endif
-#if USES_MIPS
     real footprint; /* of the path's cone, see texturing/texture_point.cl */
-#endif
 #if SCREEN_MOTION && (MOVES_VERTICES || MOVES_SPHERES)
     vec3 to_open, to_close; /* from p to where what deforms has the point when the shutter opens, closes [m] */
 #endif
@@ -81,9 +79,7 @@ inline Surface surface_at(Scene scene, TraceHit h, mask active, vec3 o, vec3 d, 
     s.dpdv = v3(0.0f, 0.0f, 0.0f);
     s.light = -1;
     integer prim = sel_i(active, h.prim, (integer)(0));
-#if USES_MIPS
     s.footprint = 0.0f;
-#endif
 #if USES_ATTRIBUTES
     s.attributes = shape.attributes;
     s.face = sel_i(active & (shape.kind == 0), prim, (integer)(0));
@@ -258,9 +254,7 @@ inline Surface surface_of_point(vec3 p)
     s.uv.y = 0.0f;
     s.flipped = mask_of(0);
     s.light = -1;
-#if USES_MIPS
     s.footprint = 0.0f;
-#endif
 #if USES_ATTRIBUTES
     s.attributes = 0;
     s.face = 0;
@@ -292,9 +286,7 @@ inline TexturePoint surface_texture_point(Surface s)
     t.face = s.face;
     t.b = s.b;
 #endif
-#if USES_MIPS
     t.footprint = s.footprint;
-#endif
     return t;
 }
 

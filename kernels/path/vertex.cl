@@ -1,6 +1,6 @@
 /* What integrators share at a vertex of a path: the ray that arrives, the surface that it meets, how the material
  * scatters there, and how the path goes on. The ray's throughput has been dimmed by what absorbs along it. */
-#include "path/cone.cl"
+#include "generated/cone.cl"
 
 typedef struct {
     vec3 o, d;            /* the ray that arrives; d of unit length */
@@ -12,9 +12,7 @@ typedef struct {
     Surface s;
     mask front;           /* the front was hit */
     integer row;          /* of the material */
-#if USES_MIPS
     Cone cone;            /* around the ray, here */
-#endif
 #if NAMES_SURFACES
     integer object, primitive, material; /* index in the scene's shapes, number in the shape, number of the material */
 #endif
@@ -57,17 +55,15 @@ inline Vertex vertex_load(Scene scene, Slab path, Slab hit, uint at, mask active
     v.beta = load_path_beta(path, at);
     v.state = load_path_state(path, at);
     v.depth = v.state & PATH_DEPTH;
-    v.met = v.depth + path_nulls(path, at);
+    v.met = v.depth + load_path_nulls(path, at);
 #if BSDF_IS_PHASE
     v.s = surface_of_point(madd3(v.d, v.t, v.o));
     v.front = mask_of(1);
 #else
     v.s = surface_load(scene, hit, at, active, v.o, v.d, &v.front);
 #endif
-#if USES_MIPS
     v.cone = cone_after(load_path_cone(path, at), v.t);
     v.s.footprint = cone_footprint(v.cone, v.d, v.s.n, v.s.dpdu, v.s.dpdv);
-#endif
     v.row = MATERIAL_ROW(sel_i(active, load_hit_material(hit, at), (integer)(0)));
 #if NAMES_SURFACES && BSDF_IS_PHASE
     v.object = v.primitive = v.material = -1;

@@ -7,8 +7,8 @@
  *
  * That loses digits where g is near 0: up to DRAINE_CLOSED, K is summed at six Gauss points, whose error is below
  * rounding there. */
-#include "optics/phase.cl"
-#include "optics/henyey_greenstein.cl"
+#include "media/phase.cl"
+#include "media/henyey_greenstein.cl"
 #define DRAINE_CLOSED 0.25f
 #define DRAINE_STEPS 24
 

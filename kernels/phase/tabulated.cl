@@ -1,6 +1,6 @@
 /* A table over the cosine of the angle by which light turns, linear between its points: sampled by the inverse of its
  * integral, which is exact. */
-#include "optics/phase.cl"
+#include "media/phase.cl"
 
 Spectrum tabulated_eval(Tabulated m, vec3 wo, vec3 wi) { return angular_density(m.values, -dot3(wo, wi)); }
 

@@ -1,9 +1,9 @@
 /* Wavelengths by a tabulated density, linear between nodes of equal distance
- * (clpt/render/lowering/camera/wavelengths.py).
+ * (clpt/render/analysis/wavelengths.py).
  * At settings->density in `distributions`: the number of cells n, the first node and the distance
  * [nm], n + 1 cumulative shares, n + 1 densities [1/nm], and the cells in which the shares i / GUIDES
  * lie, for i from 0 to GUIDES. Same functions in spectrum/visible.cl. */
-#define GUIDES 1024 /* a power of two, so that u * GUIDES is exact; as in clpt/render/lowering/camera/wavelengths.py */
+#define GUIDES 1024 /* a power of two, so that u * GUIDES is exact; as in clpt/render/analysis/wavelengths.py */
 
 /* The wavelength below which a share u of the density lies [nm]. */
 inline real density_invert(Scene scene, real u)

@@ -26,9 +26,7 @@ STAGE(deposit)(SLAB_ARGS, SCENE_ARGS DEPOSIT_ARGS STAGE_AT_ARG)
     mask active = ((state & PATH_ALIVE) != 0) & ((state & PATH_SHARP) != 0) & (load_hit_prim(hit, at) >= 0);
     active = active & (depth < settings->max_depth) & (pixel_index < settings->photon_pixels) & photon_met(kind);
     if (any(active)) {
-#if USES_MOTION
         scene.time = load_path_time(path, at);
-#endif
         integer sample = load_path_sample(path, at), pass = merging_pass(scene, sample), group = 0;
         mask front;
         vec3 d = load_path_d(path, at);

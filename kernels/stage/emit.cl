@@ -24,6 +24,29 @@
 #include "generated/light_medium.cl"
 #include "generated/merging.cl"
 #include "generated/motion.cl"
+#include "generated/join_light.cl"
+
+/* The ray with which a light path begins, and the wavelengths that it has; sets the scene's time. */
+inline LightRay first_light_ray(Scene *scene, Sampler sampler, integer sample, Wavelengths *lambdas)
+{
+    vec2 u = sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH));
+    real moment = sampler_pair(sampler, (natural)(DIMENSION_LIGHT_TIME)).x;
+    integer pass = merging_pass(*scene, sample);
+    scene->time = motion_time(*scene, merging_moment(*scene, u.x, moment, pass));
+    *lambdas = wavelengths_sample(*scene, merging_wavelength(*scene, u.x, pass));
+    return light_emit(*scene, u.y, sampler_pair(sampler, (natural)(DIMENSION_FILM)),
+                      sampler_pair(sampler, (natural)(DIMENSION_LENS)), *lambdas);
+}
+
+/* The rival of a light path that begins, see lighting/rivals.cl. */
+inline real first_rival(Scene scene, LightRay r)
+{
+    real rival = 1.0f / scene.settings->light_paths;
+#if AIMS_LIGHT_PATHS
+    rival /= r.gain;
+#endif
+    return rival;
+}
 
 /* Puts a ray from a light into the slots that `go` on, and, where the camera sees lights, one from it to the camera
  * into the shadow slab. Returns the bits of Path.state that follow. */
@@ -32,90 +55,39 @@ inline integer begin_light_path(Scene scene, Slab path, Slab shadow, uint at, ma
 {
     global const Settings *settings = scene.settings;
     Sampler sampler = light_path_sampler(settings, pixel_index, sample);
-    vec2 u = sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH));
-#if USES_MOTION
-    real moment = sampler_pair(sampler, (natural)(DIMENSION_LIGHT_TIME)).x;
-#if MERGES
-    moment = merging_moment(scene, u.x, merging_pass(scene, sample));
-#endif
-    scene.time = motion_time(scene, moment);
-    store_path_time(path, at, go, scene.time);
-#endif
-#if MERGES
-    u.x = merging_wavelength(scene, u.x, merging_pass(scene, sample));
-#endif
-    Wavelengths lambdas = wavelengths_sample(scene, u.x);
-    LightRay r = light_emit(scene, u.y, sampler_pair(sampler, (natural)(DIMENSION_FILM)),
-                            sampler_pair(sampler, (natural)(DIMENSION_LENS)), lambdas);
+    Wavelengths lambdas;
+    LightRay r = first_light_ray(&scene, sampler, sample, &lambdas);
     real strength = spectrum_max(r.power);
 #if USES_GUIDE
     go = go & (light_path_number(settings, pixel_index, sample) < settings->guide_paths);
 #endif
     mask alive = go & (strength > 0.0f) & mask_of(settings->max_depth > 1);
+    integer lit = sel_i(go, r.row, (integer)(0));
     Surface s;
     s.p = r.o;
     s.n = r.n;
     s.size = r.size;
     store_path_o(path, at, go, sel3(r.away, r.o, surface_offset(s, r.d)));
     store_path_d(path, at, go, r.d);
-#if USES_MIPS
+    store_path_time(path, at, go, scene.time);
     store_path_cone(path, at, go, (integer)(0));
-#endif
     store_path_lambdas(path, at, go, lambdas);
     store_path_beta(path, at, go, r.power);
     store_path_weight(path, at, go, 1.0f / max_r(strength, (real)(1e-37f)));
+    store_path_nulls(path, at, go, (integer)(0));
+    store_path_null_distance(path, at, go, (real)(0.0f));
+    store_path_medium(path, at, go, light_medium(scene, lit));
+    store_path_bodies(path, at, go, light_bodies(scene, lit));
+    store_path_lead(path, at, go, (real)(0.0f));
+    store_path_ratio(path, at, go, spectrum_of(1.0f));
+    store_path_pending(path, at, go, (real)(0.0f));
+    store_path_rival(path, at, go, first_rival(scene, r));
 #if WEIGHS_LIGHT_PATHS
     store_path_light(path, at, go, r.row);
     store_path_sampled_hemisphere(path, at, go, r.n);
-    real rival = 1.0f / settings->light_paths;
-#if AIMS_LIGHT_PATHS
-    rival /= r.gain;
-#endif
-    store_path_rival(path, at, go, rival);
-#if MERGES
-    store_path_pending(path, at, go, (real)(0.0f));
-#endif
-#endif
-#if USES_NULL_SURFACES
-    store_path_nulls(path, at, go, (integer)(0));
-    store_path_null_distance(path, at, go, (real)(0.0f));
-#endif
-#if USES_ABSORPTION
-#if LIGHT_MEDIA
-    integer lit = sel_i(go, r.row, (integer)(0)), medium = light_medium(scene, lit);
-    store_path_medium(path, at, go, medium);
-#if USES_BODIES
-    store_path_bodies(path, at, go, light_bodies(scene, lit));
-#endif
-#else
-    store_path_medium(path, at, go, (integer)(0));
-#endif
-    store_path_lead(path, at, go, (real)(0.0f));
-#endif
-#if USES_RATIO
-    store_path_ratio(path, at, go, spectrum_of(1.0f));
 #endif
     integer state = sel_i(alive, (integer)(PATH_ALIVE), (integer)(0));
-#if USES_VISIBLE_LIGHTS
-    vec2 lens = sampler_pair(sampler, (natural)(DIMENSION_VERTEX + DIMENSION_LIGHT));
-    CameraPoint c = camera_connect(scene, sel3(r.away, neg3(r.d), r.o), r.away, lens);
-    real cosine = sel(r.away, (real)(1.0f), -dot3(r.n, c.d));
-    mask seen = go & c.seen & (cosine > 0.0f) & (spectrum_max(r.seen) > 0.0f);
-    mask shine = seen & mask_of(settings->hide_lights == 0);
-#if LIGHT_MEDIA && SHADOW_MEDIA /* a ray from infinity is traced from the camera */
-#if USES_BODIES
-    integer through = sel_i(r.away, (integer)(settings->camera_bodies), light_bodies(scene, lit));
-#else
-    integer through = sel_i(r.away, (integer)(settings->camera_medium), medium);
-#endif
-    store_shadow_through(shadow, at, shine, through);
-#elif LIGHT_MEDIA
-    r.seen = spectrum_mul(r.seen, medium_transmittance(scene, sel_i(go, medium, (integer)(0)), c.t, lambdas));
-#endif
-    connect_camera(shadow, at, ended, shine, s, c, spectrum_scale(r.seen, cosine * c.importance));
-    state += sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
-#endif
-    return state;
+    return state + light_joined(scene, shadow, at, ended, go, sampler, s, r, lambdas);
 }
 
 STAGE(emit)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)

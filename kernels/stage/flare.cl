@@ -31,13 +31,9 @@ inline integer begin_ghost(Scene scene, Slab path, Slab shadow, uint at, mask en
     vec2 other = sampler_pair(sampler, (natural)(DIMENSION_LIGHT_TIME));
     Wavelengths lambdas = wavelengths_sample(scene, u.x);
     store_path_lambdas(path, at, go, lambdas);
-#if USES_NULL_SURFACES
     store_path_nulls(path, at, go, (integer)(0));
-#endif
-#if USES_MOTION
     scene.time = motion_time(scene, other.x);
     store_path_time(path, at, go, scene.time);
-#endif
     LensFront f = lens_front(scene, camera, sampler_pair(sampler, (natural)(DIMENSION_FILM)));
     vec3 p = matrix_point(camera->to_world, f.p.x, f.p.y, f.p.z);
     vec3 n = matrix_vector(camera->to_world, f.n.x, f.n.y, f.n.z);
@@ -68,15 +64,9 @@ inline integer begin_ghost(Scene scene, Slab path, Slab shadow, uint at, mask en
     shine = shine & !(away & mask_of(settings->alpha != 0)); /* the film sees no sky */
     real w = c.importance * grows / sel(shine, fabs(ls.pdf), (real)(1.0f));
     Spectrum value = spectrum_scale(spectrum_mul(ls.radiance, spectrum_mul(camera_start(), share)), w);
-#if SHADOW_MEDIA
-#if USES_BODIES
-    store_shadow_through(shadow, at, shine, (integer)(settings->camera_bodies));
-#else
-    store_shadow_through(shadow, at, shine, (integer)(settings->camera_medium));
-#endif
-#elif USES_ABSORPTION
-    integer medium = MEDIUM_LEFT((integer)(settings->camera_medium));
-    value = spectrum_mul(value, medium_transmittance(scene, medium, ls.t, lambdas));
+    store_shadow_through(shadow, at, shine, camera_through(settings));
+#if USES_ABSORPTION
+    value = medium_dims(scene, MEDIUM_LEFT((integer)(settings->camera_medium)), ls.t, lambdas, value);
 #endif
     store_shadow_o(shadow, at, shine, p);
     store_shadow_d(shadow, at, shine, ls.wi);

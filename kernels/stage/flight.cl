@@ -2,18 +2,17 @@
  * ends, and the medium's phase function is its material. Both are chosen by the extinction at the hero wavelength, and
  * weighed over all of the path's wavelengths (Miller, Georgiev and Jarosz 2019, with one sample): `ratio` does it as
  * for directions, see path/hero.cl. Light that is absorbed is a weight, never an end. Some flights end near lamps, see
- * optics/equiangular.cl; both ways to choose are weighed by their sum. */
+ * media/equiangular.cl; both ways to choose are weighed by their sum. */
 #include "core/base.cl"
 #include "interface/stage.cl"
 #include "generated/sampler.cl"
 #include "path/path_state.cl"
-#include "path/ratio.cl"
 #include "generated/textures.cl"
 #include "generated/medium.cl"
 #include "generated/grid_flight.cl"
 #include "generated/flight_args.cl"
 #include "generated/flight_layers.cl"
-#include "optics/equiangular.cl"
+#include "media/equiangular.cl"
 
 #define FLIES_NEAR_LAMPS (MEDIUM_AIMS && !LIGHT_PATHS) /* paths from lamps have no reason to stay there */
 
@@ -48,9 +47,9 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS FLIGHT_ARGS STAGE_AT_ARG)
     if (any(flies)) {
         Wavelengths lambdas = load_path_lambdas(path, at);
         Medium m = medium_load(scene, sel_i(flies, name, (integer)(0)), lambdas);
-        Spectrum ratio = hero_ratio(path, at);
+        Spectrum ratio = load_path_ratio(path, at);
         Sampler sampler = pixel_sampler(settings, load_path_pixel_key(path, at), load_path_sample(path, at));
-        integer vertex = (state & PATH_DEPTH) + path_nulls(path, at);
+        integer vertex = (state & PATH_DEPTH) + load_path_nulls(path, at);
         vec2 u = sampler_pair(sampler, as_natural(DIMENSION_FLIGHT + vertex));
         mask scatters = flies & (spectrum_max(m.sigma_s) > 0.0f);
         /* The medium begins at the surface, before the ray's origin, which lies off it. */
@@ -97,7 +96,7 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS FLIGHT_ARGS STAGE_AT_ARG)
 #if USES_RATIO
         Spectrum pdfs = spectrum_mul(ratio, pdf);
         real mean = spectrum_mean(pdfs), inverse = sel(mean > 1e-30f, 1.0f / mean, (real)(0.0f));
-        hero_keep(path, at, flies, spectrum_scale(pdfs, inverse));
+        store_path_ratio(path, at, flies, spectrum_scale(pdfs, inverse));
         Spectrum weight = spectrum_scale(f, inverse);
 #else
         Spectrum weight = spectrum_scale(f, 1.0f / max_r(pdf.x, (real)(1e-30f)));
@@ -112,7 +111,7 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS FLIGHT_ARGS STAGE_AT_ARG)
             GridOrigin origin = {(real)(0.0f), (real)(0.0f), o, d};
 #if GRIDS_EMIT
             origin.pdf = load_path_pdf(path, at);
-            origin.before = path_null_distance(path, at) - lead;
+            origin.before = load_path_null_distance(path, at) - lead;
             origin.from = madd3(d, -origin.before, o);
             origin.hemisphere = path_hemisphere(path, at);
 #endif
@@ -123,7 +122,7 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS FLIGHT_ARGS STAGE_AT_ARG)
             weight = spectrum_sel(gridded, own.weight, weight);
             collides = sel_i(gridded, own.collides, collides);
             t = sel(gridded, own.t, t);
-            hero_keep(path, at, gridded, own.ratio);
+            store_path_ratio(path, at, gridded, own.ratio);
             m.phase = sel_i(gridded, own.phase, m.phase);
         }
 #endif

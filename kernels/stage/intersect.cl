@@ -15,9 +15,7 @@ STAGE(intersect)(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS STAGE_AT_ARG)
     integer state = load_path_state(path, at);
     mask active = (state & PATH_ALIVE) != 0;
     if (any(active)) {
-#if USES_MOTION
         scene.time = load_path_time(path, at);
-#endif
         vec3 o = load_path_o(path, at), d = load_path_d(path, at);
         real far = sel((state & PATH_DEPTH) == 0, -load_path_pdf(path, at), (real)(FAR));
         TraceHit h = trace_closest(TRACE_PASSED, scene, o, d, far, active);
@@ -31,9 +29,7 @@ STAGE(intersect)(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS STAGE_AT_ARG)
         store_hit_side(hit, at, active, h.side);
         store_hit_prim(hit, at, active, h.prim);
         store_hit_shape(hit, at, active, shape);
-#if USES_INSTANCES
         store_hit_instance(hit, at, active, h.instance);
-#endif
         store_hit_material(hit, at, active, sel_i(dot3(h.n, d) < 0.0f, s.front, s.back));
     }
 }

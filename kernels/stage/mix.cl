@@ -21,14 +21,12 @@ STAGE(mix_materials)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
     mask active = ((state & PATH_ALIVE) != 0) & (load_hit_prim(hit, at) >= 0);
     mask open = active & (MATERIAL_KIND(word) == MIXTURE);
     if (any(open)) {
-#if USES_MOTION
         scene.time = load_path_time(path, at);
-#endif
         mask front, chosen = open;
         Surface s = surface_load(scene, hit, at, open, load_path_o(path, at), load_path_d(path, at), &front);
         Wavelengths lambdas = load_path_lambdas(path, at);
         Sampler sampler = pixel_sampler(scene.settings, load_path_pixel_key(path, at), load_path_sample(path, at));
-        integer met = (state & PATH_DEPTH) + path_nulls(path, at);
+        integer met = (state & PATH_DEPTH) + load_path_nulls(path, at);
         natural dimension = as_natural(DIMENSION_VERTEX + met * DIMENSIONS_A_VERTEX + DIMENSION_ROULETTE);
         real u = sampler_pair(sampler, dimension).y;
         for (; any(open); open = open & (MATERIAL_KIND(word) == MIXTURE)) {

@@ -44,9 +44,7 @@ STAGE(shade)(SLAB_ARGS, SCENE_ARGS SHADE_ARGS WHICH_ARG QUEUE_ARGS)
 #if QUEUED
     uint entry = get_global_id(0);
     if (entry < queue_counts[BSDF_KIND]) {
-#if USES_MOTION
         scene.time = load_path_time(path, queue[queue_starts[BSDF_KIND] + entry]);
-#endif
         integrator_vertex(scene, path, hit, shadow, queue[queue_starts[BSDF_KIND] + entry], mask_of(1) SHADE_PASSED);
     }
 #else
@@ -55,9 +53,7 @@ STAGE(shade)(SLAB_ARGS, SCENE_ARGS SHADE_ARGS WHICH_ARG QUEUE_ARGS)
 #if BSDF_COUNT > 1
     active = active & (MATERIAL_KIND(load_hit_material(hit, at)) == BSDF_KIND);
 #endif
-#if USES_MOTION
     scene.time = load_path_time(path, at);
-#endif
     if (any(active)) integrator_vertex(scene, path, hit, shadow, at, active SHADE_PASSED WHICH_PASSED);
 #endif
 }

@@ -13,9 +13,7 @@ STAGE(shadow)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)
     real t = load_shadow_t(shadow, at);
     mask active = t > 0.0f;
     if (any(active)) {
-#if USES_MOTION
         scene.time = load_path_time(path, at);
-#endif
 #if SHADOW_MEDIA || FREE_PANES
         Spectrum passes = shadow_ray_transmittance(TRACE_PASSED, scene, path, shadow, at, t, active);
         mask lit = active & (spectrum_max(passes) > 0.0f);

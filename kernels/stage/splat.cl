@@ -16,9 +16,7 @@ STAGE(splat)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)
     real t = load_shadow_t(shadow, at);
     mask active = t > 0.0f;
     if (any(active)) {
-#if USES_MOTION
         scene.time = load_path_time(path, at);
-#endif
 #if SHADOW_MEDIA || FREE_PANES
         Spectrum passes = shadow_ray_transmittance(TRACE_PASSED, scene, path, shadow, at, t, active);
         mask arrives = active & (spectrum_max(passes) > 0.0f);

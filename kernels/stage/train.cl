@@ -18,9 +18,7 @@ STAGE(train)(SLAB_ARGS, SCENE_ARGS DEPOSIT_ARGS STAGE_AT_ARG)
     integer state = load_path_state(path, at);
     mask active = ((state & PATH_ALIVE) != 0) & ((state & PATH_DEPTH) > 1) & (load_hit_prim(hit, at) >= 0);
     if (any(active)) {
-#if USES_MOTION
         scene.time = load_path_time(path, at);
-#endif
         mask front;
         vec3 d = load_path_d(path, at);
         Surface s = surface_load(scene, hit, at, active, load_path_o(path, at), d, &front);

@@ -1,6 +1,6 @@
 /* What a texture may look at: every loader of parameters gets it. What a scene's textures do not ask for
  * is never computed. USES_ATTRIBUTES: some texture reads what a mesh says per vertex or face. STOCHASTIC_FILTERING:
- * a random texel stands for some parameter of the material. USES_MIPS: some image has levels. */
+ * a random texel stands for some parameter of the material. */
 typedef struct {
     vec2 uv;
     vec3 p; /* in the world [m] */
@@ -12,9 +12,7 @@ typedef struct {
 #if STOCHASTIC_FILTERING
     vec2 u; /* uniform numbers, which choose the texel */
 #endif
-#if USES_MIPS
     real footprint; /* how wide what is looked at is, in units of uv; 0: a point */
-#endif
 } TexturePoint;
 
 #if USES_ATTRIBUTES
@@ -45,9 +43,7 @@ inline TexturePoint texture_point(vec2 uv, vec3 p)
     t.u.x = 0.0f;
     t.u.y = 0.0f;
 #endif
-#if USES_MIPS
     t.footprint = 0.0f;
-#endif
     return t;
 }
 /* For what is on no surface. */
@@ -67,8 +63,6 @@ inline TexturePoint texture_point_sel(mask m, TexturePoint a, TexturePoint b)
     a.b.x = sel(m, a.b.x, b.b.x);
     a.b.y = sel(m, a.b.y, b.b.y);
 #endif
-#if USES_MIPS
     a.footprint = sel(m, a.footprint, b.footprint);
-#endif
     return a;
 }

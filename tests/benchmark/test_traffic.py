@@ -23,10 +23,11 @@ def test_a_ray_and_its_hit() -> None:
 
 
 def test_a_path_that_ends_and_the_next() -> None:
-    """Spectra have three words in rgb mode, four in spectral; a sky takes o, side, d, pdf, beta."""
+    """A spectrum has three words in rgb mode, else four, and wavelengths; a sky takes o, side, d,
+    pdf, beta."""
     sums = 3 + 3 + 3 + 1  # low, middle, high, samples
     rest = sums + 1 + 1 + 1 + 1 + 1  # weight, place, sample, state, prim
-    assert moved("rgb", False)["generate"].read == 4 * (rest + 2 * 3)
+    assert moved("rgb", False)["generate"].read == 4 * (rest + 3)
     assert moved("spectral", False)["generate"].read == 4 * (rest + 2 * 4)
     with_sky = moved("spectral", False, lights.Constant())["generate"].read
     assert with_sky == 4 * (rest + 2 * 4 + 3 + 3 + 3 + 1 + 4)

@@ -230,15 +230,17 @@ def test_memory_of_a_build(device, monkeypatch, layout, quality):
     sizes, create = [], dev.Buffers._create
 
     def noted(buffers, what, nbytes, advice, host):
-        sizes.append(nbytes)
+        if host is None:  # a GPU gets copies of the input
+            sizes.append(nbytes)
         return create(buffers, what, nbytes, advice, host)
 
     monkeypatch.setattr(dev.Buffers, "_create", noted)
     sphere = trimesh.creation.icosphere(5)
     bvh.build(device, sphere.vertices, sphere.faces, layout=layout, quality=quality)
     n = len(sphere.faces)
-    assert sum(sizes) < (250 if quality == "high" else 240) * n + (1 << 18)
-    assert max(sizes) <= 64 * n
+    counters = 0 if device.info.is_cpu else 45_000 * device.info.compute_units
+    assert sum(sizes) < (250 if quality == "high" else 240) * n + (1 << 18) + counters
+    assert max(sizes) <= max(64 * n, counters)
 
 
 def test_a_buffer_beyond_the_device_is_refused(device):

@@ -6,6 +6,7 @@ import pytest
 import trimesh
 
 from clpt import bvh
+from clpt.testing.rounding import contracts
 
 MISS = 0xFFFFFFFF
 LAYOUTS = [*bvh.LAYOUTS]
@@ -119,7 +120,12 @@ def test_what_is_no_number_is_met_by_nothing_and_may_come_back(device, building,
             assert (occluded == same).mean() > 0.999
     bvh.refit(building, tree, on_device(device, vertices), on_device(device, faces))
     building.stream.wait()
-    assert content(device, tree) == before
+    again = content(device, tree)
+    if layout == "brute" and contracts(device):  # a host made the records, and rounds otherwise
+        found, made = (np.frombuffer(c["tris"], np.float32) for c in (again, before))
+        np.testing.assert_allclose(found, made, rtol=0, atol=1e-6)
+    else:
+        assert again == before
 
 
 @pytest.mark.parametrize("layout", bvh.TREES)

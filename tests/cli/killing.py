@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from clpt.cli import checkpoints
+from clpt.cli.files import checkpoints
 from clpt.output_files import PARTIAL
 from clpt.render.film import film_file
 from clpt.render.film.saved_film import SavedFilm

@@ -11,7 +11,7 @@ import pytest
 PROGRAM = """
 import re
 import numpy as np
-from clpt.cli import allocator
+from clpt.cli.process import allocator
 allocator.return_large_blocks()
 def resident():
     return int(re.search(r"VmRSS:\\s*(\\d+)", open("/proc/self/status").read())[1]) / 1024

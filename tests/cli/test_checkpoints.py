@@ -14,7 +14,8 @@ import pytest
 
 from clpt import images, output_files
 from clpt.__main__ import run
-from clpt.cli import checkpoints, outputs, rendering
+from clpt.cli.files import checkpoints, outputs
+from clpt.cli.render import passes
 from clpt.errors import MemoryBudgetError, SceneError
 from clpt.output_files import PARTIAL
 from clpt.render.film import film_file
@@ -209,12 +210,8 @@ class Stopped:
 
 def test_only_whole_passes_are_kept():
     renderer, kept = Stopped(3), []
-    rendering.render_samples(
-        renderer,
-        None,
-        None,
-        lambda progress: None,
-        after_pass=lambda: kept.append(renderer.samples),
+    passes.render_samples(
+        renderer, passes.End(), lambda progress: None, lambda: kept.append(renderer.samples)
     )
     assert kept == [1, 4, 16] and renderer.samples > 16
 
@@ -243,7 +240,7 @@ def test_a_film_without_a_pass(tmp_path):
 
 
 def killing_scene():
-    from clpt.cli.scene_options import changed
+    from clpt.cli.options.changes import SceneChanges, changed
     from clpt.formats import load
 
-    return changed(load(killing.SCENE), size=(8, 8), mode="rgb")
+    return changed(load(killing.SCENE), SceneChanges.of(size=(8, 8), mode="rgb"))

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from clpt import images, transforms
 from clpt.__main__ import run
-from clpt.cli.composition import CameraType, CropType, Orbit, composed, up_of
-from clpt.cli.scene_options import changed
+from clpt.cli.options.changes import SceneChanges, changed
+from clpt.cli.options.composition import CameraType, Composition, CropType, Orbit, composed, up_of
 from clpt.errors import SceneError
 from clpt.formats import load
 from clpt.formats.meshes import framing
@@ -23,11 +23,10 @@ from clpt.scene import Film, Scene, cameras, lights, shapes
 from clpt.view.navigation import pose
 
 CORNELL = str(Path(__file__).resolve().parents[2] / "scenes" / "cornell_box")
-NOTHING = {"camera": None, "crop": None, "env": None, "env_rotation": None}
 
 
 def seen_from(scene: Scene, *orbit: float) -> cameras.Camera:
-    return composed(scene, **{**NOTHING, "camera": Orbit(*orbit)}).camera
+    return composed(scene, Composition(camera=Orbit(*orbit))).camera
 
 
 @pytest.fixture
@@ -84,11 +83,11 @@ def test_an_stl_stands_upright(tmp_path):
 
 def test_an_image_takes_the_place_of_sky_and_studio(scenes, sky):
     studio = load(scenes / "bowl.obj")
-    made = composed(studio, **{**NOTHING, "env": sky})
+    made = composed(studio, Composition(env=sky))
     assert [light.kind for light in made.lights] == ["envmap"]
     assert [shape.kind for shape in made.shapes] == ["mesh"] and len(studio.shapes) == 3
     own = dataclasses.replace(studio, extra={}, lights=[lights.Constant(), lights.Point()])
-    made = composed(own, **{**NOTHING, "env": sky, "env_rotation": 90.0})
+    made = composed(own, Composition(env=sky, env_rotation=90.0))
     assert [light.kind for light in made.lights] == ["point", "envmap"] and len(made.shapes) == 3
     ahead = np.asarray(made.lights[1].to_world) @ (0, 0, 1, 0)  # the middle of the image
     assert np.allclose(ahead, (1, 0, 0, 0))  # where azimuth 90 is
@@ -124,8 +123,8 @@ def test_a_crop_replaces_that_of_the_file():
     film = Film(width=100, height=50, crop=(90, 40, 10, 10))
     scene = dataclasses.replace(scene, film=film)
     crop = CropType()("0:50%,10:20")
-    assert changed(scene, crop=crop).film.crop == (0, 10, 50, 10)
-    assert changed(scene, crop=crop, size=(30, 20)).film.crop == (0, 10, 15, 10)
+    assert changed(scene, SceneChanges.of(crop=crop)).film.crop == (0, 10, 50, 10)
+    assert changed(scene, SceneChanges.of(crop=crop, size=(30, 20))).film.crop == (0, 10, 15, 10)
 
 
 def test_a_camera_by_its_name(tmp_path, capsys):
@@ -188,7 +187,7 @@ def test_any_text_is_a_value_or_is_refused(text):
 def test_a_camera_that_flattens_space_has_no_up():
     """It matters only to who asks for it."""
     scene = Scene(camera=cameras.Matrix(view=np.zeros((4, 4))), shapes=[shapes.Sphere()])
-    assert composed(scene, **NOTHING) is scene
+    assert composed(scene, Composition()) is scene
     with pytest.raises(SceneError, match="its up is not known"):
         seen_from(scene, 0.0, 0.0)
 

@@ -13,9 +13,9 @@ import pytest
 
 from clpt import device, images
 from clpt.__main__ import run
-from clpt.cli import frame_crews
-from clpt.cli import frames as frames_module
-from clpt.cli.frame_values import Frames, expanded, numbered
+from clpt.cli.opening import makers
+from clpt.cli.render import frames as frames_module
+from clpt.cli.render.frame_values import Frames, expanded, numbered
 from clpt.device.stream import Stream
 
 SIZE = ["--size", "16x12", "--spp", "2", "--mode", "rgb"]
@@ -121,7 +121,7 @@ def test_a_signal_keeps_whole_frames_only(scene, tmp_path, capsys, monkeypatch):
     def stop_in_the_third(*args, **named):
         count[0] += 1
         if count[0] == 3:
-            args[5].append(signal.SIGINT)
+            args[1].stopped.append(signal.SIGINT)
         original(*args, **named)
 
     monkeypatch.setattr(frames_module, "render_samples", stop_in_the_third)
@@ -137,20 +137,20 @@ def test_a_signal_keeps_whole_frames_only(scene, tmp_path, capsys, monkeypatch):
 @pytest.fixture
 def two_devices(monkeypatch) -> list[device.Device]:
     pair = [device.choose(), device.choose()]
-    monkeypatch.setattr(frame_crews, "choose_devices", lambda *args, **named: pair)
+    monkeypatch.setattr(frames_module, "choose_devices", lambda machine: pair)
     return pair
 
 
 @pytest.mark.parametrize("count", [1, 5])
 def test_several_devices(scene, tmp_path, two_devices, monkeypatch, count):
     """A frame is a device's, but where there are fewer frames than devices."""
-    used, original = set(), frame_crews.new_renderer
+    used, original = set(), makers.new_renderer
 
     def note(plan, devices, **made):
         used.add(len(devices))
         return original(plan, devices, **made)
 
-    monkeypatch.setattr(frame_crews, "new_renderer", note)
+    monkeypatch.setattr(makers, "new_renderer", note)
     assert run(["render", "turn.xml", "--frames", f"1:{count}", *TURN, *SIZE]) == 0
     assert used == {2 if count == 1 else 1}
     for frame in range(1, count + 1):

@@ -12,7 +12,7 @@ from PIL import Image
 
 from clpt import images, spectral_exr
 from clpt.__main__ import run
-from clpt.cli.plots import strip
+from clpt.cli.plots.pixels import strip
 from clpt.render.renderer import Renderer
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Perspective
@@ -122,8 +122,8 @@ def test_the_strip_is_a_rainbow():
 def test_without_matplotlib_the_extra_is_named(here, capsys, monkeypatch):
     """The values are printed all the same."""
     spectral_exr.write("a.exr", SpectralImage(VALUES, NM))
-    monkeypatch.delitem(sys.modules, "clpt.cli.plots")
-    monkeypatch.delattr("clpt.cli.plots")
+    monkeypatch.delitem(sys.modules, "clpt.cli.plots.pixels")
+    monkeypatch.delattr("clpt.cli.plots.pixels")
     monkeypatch.setitem(sys.modules, "matplotlib.axes", None)
     assert run(["inspect", "a.exr", "--at", "0,0"]) == 2
     out, err = capsys.readouterr()
@@ -225,7 +225,7 @@ def test_a_film_is_an_image_too(here, capsys, name, film):
 
 def test_colours_are_those_of_the_file_s_space(tmp_path):
     """The same colour in two spaces is shown alike; a space of no colours is passed over."""
-    from clpt.cli.image_contents import read_contents
+    from clpt.cli.files.image_contents import read_contents
     from clpt.spectra import spaces
 
     rgb = np.array([0.5, 0.3, 0.2])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import os
 import signal
 import subprocess
@@ -14,22 +13,25 @@ import pytest
 
 from clpt import images
 from clpt.__main__ import run
-from clpt.cli import checkpoints, outputs, scene_options, stopping
+from clpt.cli.files import checkpoints, outputs, targets
+from clpt.cli.opening import makers, scenes
+from clpt.cli.options import scene_options
+from clpt.cli.process import stopping
+from clpt.cli.render import picture
 from tests.cli import interrupting
 
-render_module = importlib.import_module("clpt.cli.render")
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 
 # Where a signal comes, and whether there is a picture then.
 POINTS = {
-    "outputs are checked": (outputs, "checked", False),
+    "outputs are checked": (targets, "checked", False),
     "a film is looked for": (checkpoints, "find", False),
-    "the device is opened": (scene_options, "share_compilers", False),
+    "the device is opened": (scenes, "share_compilers", False),
     "the scene is read": (scene_options, "load", False),
-    "the scene is checked": (scene_options, "check", False),
-    "kernels are built": (scene_options, "new_renderer", False),
+    "the scene is checked": (scenes, "check", False),
+    "kernels are built": (makers, "new_renderer", False),
     "checkpoints begin": (checkpoints.Checkpoints, "__init__", False),
-    "samples are taken": (render_module, "render_samples", False),
+    "samples are taken": (picture, "render_samples", False),
     "a film is saved": (checkpoints.Checkpoints, "save", True),
     "a picture is made": (outputs, "metadata", True),
     "a picture is written": (outputs, "write", True),
@@ -73,12 +75,12 @@ def test_a_signal_at_each_point(tmp_path, monkeypatch, capsys, heeded, point, nu
 
 BUILDING = """
 import hashlib, sys
-import clpt.cli.scene_options as options
+import clpt.cli.opening.makers as makers
 from clpt.__main__ import main
 def build(*_, **__):  # C, that no signal ends
     print("builds", file=sys.stderr, flush=True)
     hashlib.pbkdf2_hmac("sha256", b"", b"", 2_000_000_000)
-options.new_renderer = build
+makers.new_renderer = build
 main()
 """
 

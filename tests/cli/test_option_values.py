@@ -9,13 +9,14 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from clpt.cli.composition import CameraType, CropType
-from clpt.cli.frame_values import Frames
 from clpt.cli.inspect import PixelType
-from clpt.cli.on_cluster import Where
-from clpt.cli.render import Duration, Period, SampleRange
-from clpt.cli.scene_options import Bytes, LightPaths, Names, SensorName, Size, White, changed
-from clpt.cli.tev_viewer import Address
+from clpt.cli.options.changes import SceneChanges, changed
+from clpt.cli.options.composition import CameraType, CropType
+from clpt.cli.options.loading_options import Bytes
+from clpt.cli.options.values import LightPaths, Names, SensorName, Size, White
+from clpt.cli.options.workers import Where
+from clpt.cli.render.frame_values import Frames
+from clpt.cli.render.settings import Address, Duration, Period, SampleRange
 from clpt.errors import SceneError
 from clpt.scene import Scene
 from clpt.scene.cameras import Perspective
@@ -50,7 +51,7 @@ def test_what_is_accepted_makes_a_scene_or_is_refused(size, crop, camera):
     scene = Scene(camera=Perspective())
     try:
         orbit = CameraType()(",".join(map(repr, camera)))
-        made = changed(scene, size=size, crop=CropType()(crop), camera=orbit)
+        made = changed(scene, SceneChanges.of(size=size, crop=CropType()(crop), camera=orbit))
     except click.BadParameter as error:
         assert error.format_message()
         return

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib
+import dataclasses
 import json
 import logging
 import os
@@ -19,8 +19,11 @@ import pytest
 
 from clpt import __version__, device, images, spectral_exr
 from clpt.__main__ import run
-from clpt.cli import outputs, stopping
-from clpt.cli.scene_options import changed
+from clpt.cli.files import outputs
+from clpt.cli.files import targets as names
+from clpt.cli.options.changes import SceneChanges, changed
+from clpt.cli.process import stopping
+from clpt.cli.render import picture
 from clpt.colour.view import View
 from clpt.errors import DeviceError, SceneError
 from clpt.formats import load
@@ -32,7 +35,6 @@ from clpt.spectra import read_sensor
 ROOT = Path(__file__).resolve().parents[2]
 CORNELL = str(ROOT / "scenes" / "cornell_box")
 SMALL = ["--size", "8x8", "--spp", "1", "--mode", "rgb"]
-render_module = importlib.import_module("clpt.cli.render")  # the package has the command
 
 
 def test_several_formats_and_the_facts_in_the_exr(tmp_path, capsys):
@@ -55,7 +57,7 @@ def test_passes_add_up_to_one_step(tmp_path):
     path = tmp_path / "out.npy"
     common = ["--size", "17x9", "--spp", "21", "--mode", "rgb", "--quiet"]
     assert run(["render", CORNELL, "-o", str(path), *common]) == 0
-    whole = Renderer(changed(load(CORNELL), size=(17, 9), mode="rgb"))
+    whole = Renderer(changed(load(CORNELL), SceneChanges.of(size=(17, 9), mode="rgb")))
     whole.run(21)
     assert np.array_equal(np.load(path), whole.image())
 
@@ -68,7 +70,10 @@ def test_noise_ends_a_render(tmp_path, capsys):
     assert "below 0.5 in 100.0% of the pixels" in capsys.readouterr().err
     samples = images.read_layers(path)["samples.X"]
     assert samples.shape == (9, 17) and samples.min() >= 16
-    assert changed(changed(load(CORNELL), noise=0.5), noise=0.0).noise is None
+    assert (
+        changed(dataclasses.replace(load(CORNELL), noise=0.5), SceneChanges.of(noise=0.0)).noise
+        is None
+    )
 
 
 def test_a_limit_of_time_leaves_a_whole_picture(tmp_path, capsys):
@@ -113,7 +118,7 @@ def test_targets_are_tried_before_anything_is_read(tmp_path, monkeypatch, capsys
     def refuse(*_, **__):
         raise AssertionError("the scene is read")
 
-    monkeypatch.setattr(sys.modules["clpt.cli.scene_options"], "load", refuse)
+    monkeypatch.setattr(sys.modules["clpt.cli.options.scene_options"], "load", refuse)
     targets = {tmp_path / "no" / "a.png": "its folder does not exist"}
     (tmp_path / "folder.png").mkdir()
     targets[tmp_path / "folder.png"] = "it is a folder"
@@ -171,14 +176,14 @@ def test_a_film_is_kept_where_no_picture_can_be_made(tmp_path, monkeypatch, caps
 
 def test_an_output_folder_that_vanishes(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(outputs.tempfile, "tempdir", str(tmp_path))
-    folder, samples = tmp_path / "folder", render_module.render_samples
+    folder, samples = tmp_path / "folder", picture.render_samples
     folder.mkdir()
 
     def render(*given, **named):
         samples(*given, **named)
         shutil.rmtree(folder)
 
-    monkeypatch.setattr(render_module, "render_samples", render)
+    monkeypatch.setattr(picture, "render_samples", render)
     command = ["render", CORNELL, "-o", str(folder / "a.exr"), *SMALL, "--checkpoint", "1h"]
     assert run(command) == 2
     told, said = capsys.readouterr().err.splitlines()[-2:]
@@ -189,13 +194,13 @@ def test_an_output_folder_that_vanishes(tmp_path, monkeypatch, capsys):
 
 @pytest.mark.parametrize("error", [DeviceError("the device is gone"), MemoryError(), ValueError(1)])
 def test_a_render_that_fails_keeps_what_it_has(tmp_path, monkeypatch, capsys, error):
-    samples = render_module.render_samples
+    samples = picture.render_samples
 
     def render(*given, **named):
         samples(*given, **named)
         raise error
 
-    monkeypatch.setattr(render_module, "render_samples", render)
+    monkeypatch.setattr(picture, "render_samples", render)
     command = ["render", CORNELL, "-o", str(tmp_path / "a.exr"), *SMALL, "--checkpoint", "1h"]
     assert run(command) == (2 if isinstance(error, DeviceError) else 1)
     said = capsys.readouterr().err
@@ -298,7 +303,7 @@ def test_the_renderer_gets_the_tree_that_was_asked_for(given, told, monkeypatch,
     def refuse(*_, tree_quality, layout, **__):
         raise SceneError(f"{tree_quality} {layout}")
 
-    monkeypatch.setattr(sys.modules["clpt.cli.scene_options"], "Renderer", refuse)
+    monkeypatch.setattr(sys.modules["clpt.cli.opening.makers"], "Renderer", refuse)
     assert run(["render", CORNELL, "--quiet", *given]) == 2
     assert f"clpt: error: {told}" in capsys.readouterr().err
 
@@ -329,16 +334,16 @@ def test_a_sensor_and_its_white(tmp_path):
     common = ["--size", "9x8", "--spp", "2", "--quiet", "--sensor", str(curves)]
     assert run(["render", CORNELL, "-o", str(path), *common, "--white-balance", "4500"]) == 0
     film = {"sensor": read_sensor(curves), "white_balance": 4500.0}
-    whole = Renderer(changed(load(CORNELL), size=(9, 8), **film))
+    whole = Renderer(changed(load(CORNELL), SceneChanges.of(size=(9, 8), **film)))
     whole.run(2)
     assert np.array_equal(np.load(path), whole.image())
 
 
 def test_names_of_pictures():
-    assert outputs.default(Path(CORNELL)) == (Path("cornell_box.exr"), Path("cornell_box.png"))
-    assert outputs.default(Path("a/scene.json"))[0] == Path("a.exr")  # though there is no such file
-    assert outputs.default(ROOT / "tests" / "scenes" / "bowl.obj")[1] == Path("bowl.png")
-    assert outputs.default(Path("a/b.pbrt.gz"))[0] == Path("b.exr")
+    assert names.default(Path(CORNELL)) == (Path("cornell_box.exr"), Path("cornell_box.png"))
+    assert names.default(Path("a/scene.json"))[0] == Path("a.exr")  # though there is no such file
+    assert names.default(ROOT / "tests" / "scenes" / "bowl.obj")[1] == Path("bowl.png")
+    assert names.default(Path("a/b.pbrt.gz"))[0] == Path("b.exr")
 
 
 def test_the_picture_goes_to_the_current_folder(tmp_path, monkeypatch):
@@ -349,21 +354,31 @@ def test_the_picture_goes_to_the_current_folder(tmp_path, monkeypatch):
 
 
 def test_changes_of_a_scene():
-    scene = changed(load(CORNELL), size=(30, 20), spp=7, integrator="direct", seed=3)
+    scene = changed(
+        load(CORNELL), SceneChanges.of(size=(30, 20), spp=7, integrator="direct", seed=3)
+    )
     assert (scene.film.width, scene.film.height) == (30, 20)
     assert (scene.spp, scene.integrator.kind, scene.seed) == (7, "direct", 3)
-    assert changed(load(CORNELL), max_depth=3).integrator.max_depth == 3
-    both = changed(load(CORNELL), max_depth=3, light_paths=2).integrator
+    assert changed(load(CORNELL), SceneChanges.of(max_depth=3)).integrator.max_depth == 3
+    both = changed(load(CORNELL), SceneChanges.of(max_depth=3, light_paths=2)).integrator
     assert (both.max_depth, both.light_paths) == (3, 2)
-    photons = changed(load(CORNELL), integrator="vcm", light_paths=2, radius=0.5).integrator
+    photons = changed(
+        load(CORNELL), SceneChanges.of(integrator="vcm", light_paths=2, radius=0.5)
+    ).integrator
     assert (photons.kind, photons.light_paths, photons.radius) == ("vcm", 2, 0.5)
-    assert changed(load(CORNELL), radius=0.5).integrator.kind == "vcm"
-    assert changed(load(CORNELL), spp=3).integrator.kind == "auto"
-    auto = changed(load(CORNELL), light_paths="auto")
+    assert changed(load(CORNELL), SceneChanges.of(radius=0.5)).integrator.kind == "vcm"
+    assert changed(load(CORNELL), SceneChanges.of(spp=3)).integrator.kind == "auto"
+    auto = changed(load(CORNELL), SceneChanges.of(light_paths="auto"))
     assert auto.integrator.light_paths == "auto"
-    assert changed(auto, integrator="vcm").integrator.light_paths == 1  # vcm has no "auto"
-    assert changed(load(CORNELL), sampler="independent").sampler.kind == "independent"
-    assert changed(load(CORNELL), integrator="whitted").integrator.max_depth == 8  # as it was
+    assert (
+        changed(auto, SceneChanges.of(integrator="vcm")).integrator.light_paths == 1
+    )  # vcm has no "auto"
+    assert (
+        changed(load(CORNELL), SceneChanges.of(sampler="independent")).sampler.kind == "independent"
+    )
+    assert (
+        changed(load(CORNELL), SceneChanges.of(integrator="whitted")).integrator.max_depth == 8
+    )  # as it was
 
 
 @pytest.mark.parametrize(

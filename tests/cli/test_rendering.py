@@ -10,9 +10,10 @@ import time
 import pytest
 from rich.console import Console
 
-from clpt.cli import rendering, stopping
-from clpt.cli.display import Bar, Lines, clock, figures
-from clpt.cli.rendering import pass_size, render_samples
+from clpt.cli.opening.makers import DEVICE_SECONDS
+from clpt.cli.printing.display import Bar, Lines, clock, figures
+from clpt.cli.process import stopping
+from clpt.cli.render.passes import GROWTH, End, pass_size, render_samples
 from clpt.render.progress import Progress
 
 
@@ -38,23 +39,23 @@ class Counting:
 
 def test_passes_grow_and_end_at_the_last_sample():
     renderer = Counting()
-    render_samples(renderer, 100, None, lambda progress: None)
+    render_samples(renderer, End(100), lambda progress: None)
     assert renderer.passes == [1, 3, 12, 48, 36]
 
 
 def test_noise_ends_it():
     renderer = Counting()
-    render_samples(renderer, None, None, lambda progress: None, noise=1.0)
+    render_samples(renderer, End(noise=1.0), lambda progress: None)
     assert renderer.passes == [1, 3, 12, 48, 192]
 
 
 def test_the_limit_ends_a_pass():
     renderer = Counting(0.05)
-    render_samples(renderer, None, 0.01, lambda progress: None)
+    render_samples(renderer, End(seconds=0.01), lambda progress: None)
     assert renderer.passes == [1] and renderer.samples == 0
     renderer = Counting(0.01)
     began = time.perf_counter()
-    render_samples(renderer, None, 0.3, lambda progress: None)
+    render_samples(renderer, End(seconds=0.3), lambda progress: None)
     assert 0.3 <= time.perf_counter() - began < 30.0
 
 
@@ -83,7 +84,7 @@ def test_a_signal_ends_the_rendering_and_a_second_one_the_program(listening, num
 
     before = signal.getsignal(number)
     with stopping.stops() as stopped:
-        render_samples(Counting(), 1000, None, press, stopped=stopped)
+        render_samples(Counting(), End(1000, stopped=stopped), press)
     assert len(shown) == 9 and stopped == [number]
     assert signal.getsignal(number) is before
 
@@ -106,8 +107,8 @@ def test_a_signal_that_is_ignored_stays_ignored(listening):
 
 def test_size_of_a_pass():
     everything = float("inf")
-    assert pass_size(10, 1e9, everything, everything) == 10 * rendering.GROWTH
-    assert pass_size(1000, 2.0, everything, everything) == int(2 * rendering.PASS_SECONDS)
+    assert pass_size(10, 1e9, everything, everything) == 10 * GROWTH
+    assert pass_size(1000, 2.0, everything, everything) == int(2 * DEVICE_SECONDS)
     assert pass_size(1000, 2.0, 3, everything) == 3
     assert pass_size(1000, 2.0, everything, 0.9) == 1
     assert pass_size(1, 1e-3, everything, everything) == 1  # slower than a sample in a pass

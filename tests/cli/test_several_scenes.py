@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import importlib
 import signal
-import sys
 from pathlib import Path
 
 import pytest
 
 from clpt import images
 from clpt.__main__ import run
-from clpt.cli import outputs, stopping
+from clpt.cli.files import outputs
+from clpt.cli.process import stopping
 
 CORNELL = str(Path(__file__).resolve().parents[2] / "scenes" / "cornell_box")
 COMMON = ["--size", "8x6", "--spp", "1", "--mode", "rgb"]
@@ -59,12 +60,12 @@ def test_faults_of_ours_do_not_stop_the_rest_either(meshes, monkeypatch, capsys)
 
 def test_a_signal_ends_all(meshes, monkeypatch, capsys):
     (meshes / "c.obj").write_text(TRIANGLE)
-    rendering = sys.modules["clpt.cli.render"]
+    rendering = importlib.import_module("clpt.cli.render.picture")
     seen = []
 
-    def stop(renderer, end, left, show, noise, stopped, after_pass):
+    def stop(renderer, end, *_, **__):
         seen.append(renderer.scene.name)
-        stopped.append(signal.SIGINT)
+        end.stopped.append(signal.SIGINT)
         renderer.run(1)
 
     monkeypatch.setattr(rendering, "render_samples", stop)

@@ -9,9 +9,10 @@ import pytest
 
 from clpt import images
 from clpt.__main__ import run
-from clpt.cli import outputs, so_far
-from clpt.cli.grading import Grading
-from clpt.cli.so_far import PictureSoFar
+from clpt.cli.files import outputs
+from clpt.cli.options.grading import Grading
+from clpt.cli.render import so_far
+from clpt.cli.render.so_far import PictureSoFar
 from clpt.errors import SceneError
 
 CORNELL = str(Path(__file__).resolve().parents[2] / "scenes" / "cornell_box")

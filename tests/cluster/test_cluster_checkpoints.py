@@ -20,7 +20,7 @@ from machines import ENVIRONMENT, LONGEST, ROOT, machines, wait_until  # noqa: E
 from machines import scene as box  # noqa: E402
 
 from clpt.__main__ import run  # noqa: E402
-from clpt.cli import outputs  # noqa: E402
+from clpt.cli.files import outputs  # noqa: E402
 from clpt.cluster import processes  # noqa: E402
 from clpt.cluster.cluster_renderer import ClusterRenderer  # noqa: E402
 from clpt.cluster.tasks import film_digest  # noqa: E402

@@ -22,7 +22,7 @@ from clpt.scene import Scene
 from clpt.scene.integrators import Mitchell, ParticleTracer, Vcm
 from clpt.scene.integrators import Path as PathIntegrator
 from clpt.scene.motion import Shutter
-from tests.renders.support import with_film
+from tests.pictures.support import with_film
 
 SPP = 12
 SIZE = {"width": 26, "height": 18}

@@ -129,7 +129,7 @@ def test_a_user_without_a_home_has_temporary_caches_and_one_warning(homeless, ca
 
 @posix
 def test_a_fault_of_a_user_without_a_home_is_told(homeless):
-    from clpt.cli import failures
+    from clpt.cli.process import failures
 
     try:
         raise ValueError("a fault")

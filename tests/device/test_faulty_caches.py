@@ -13,6 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from pyopencl.characterize import has_src_build_cache
 
 import clpt
 from clpt import device, output_files
@@ -217,12 +218,15 @@ def test_a_file_of_a_scene_that_is_swapped_is_missing(user: Path) -> None:
 
 def test_a_render_with_damaged_programs(user: Path, caplog) -> None:
     """Whatever the driver's own cache holds, clpt's is only looked at where its files are whole."""
+    info = device.choose().info
+    if has_src_build_cache(info.cl_device) and not info.is_cpu:
+        pytest.skip("the driver keeps all programs itself, and none is linked")
     scene = clpt.load(Path(__file__).resolve().parents[2] / "scenes" / "cornell_box")
     scene = dataclasses.replace(scene, film=dataclasses.replace(scene.film, width=8, height=8))
     made = []
     for _ in range(2):
-        on = device.Device.open(device.choose().info)  # its own context, without programs
-        with device.Compilers(1, wait_for_kept=True) as on.compilers:
+        on = device.Device.open(info)  # its own context, without programs
+        with device.Compilers(1) as on.compilers:
             made.append(clpt.render(scene, 1, device=on))
         kept = [path for path in (user / "programs").iterdir() if path.is_file()]
         assert kept

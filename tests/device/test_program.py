@@ -144,7 +144,7 @@ def test_a_log_that_counts_rows_of_the_whole_text(device, monkeypatch):
     row = 1 + text.text.splitlines().index("constant int broken = nothing;")
 
     def refuse(*_):
-        raise cl.Error(f"warnings\n<kernel>:{row}:23: error: use of undeclared identifier 'nothing'")
+        raise cl.Error(f"warnings\n<kernel>:{row}:23: error: undeclared identifier 'nothing'")
 
     monkeypatch.setattr(native_programs, "build", refuse)
     with pytest.raises(KernelBuildError, match=r"at part\.cl:2: <kernel>"):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from clpt.device.source import assemble, kernels_folder
+from clpt.device.source import Part, assemble, kernels_folder
 from clpt.errors import KernelBuildError
 
 
@@ -13,16 +13,16 @@ def test_the_kernels_are_found():
 
 
 def test_a_kernel_file_is_named_by_its_path():
-    source = assemble("root", {"root": '#include "core/lanes.cl"\nint after;'})
-    assert source.files[:2] == ("root", "core/lanes.cl")
+    source = assemble("root", {"root": '#include "core/lanes.cl"\nreal after;'}, {"LANES": 1})
+    assert source.files == ("core/lanes.cl", "root")
     assert '#line 1 "kernels/core/lanes.cl"' in source.text
-    assert source.text.endswith('#line 2 "root"\nint after;\n')
+    assert source.text.endswith('#line 2 "root"\nreal after;\n')
 
 
 def test_each_file_once_even_in_a_circle():
     virtual = {"a": '#include "b"\nint a;', "b": '#include "a"\n#include "b"\nint b;'}
     source = assemble("a", virtual)
-    assert source.files == ("a", "b")
+    assert source.files == ("b", "a")
     assert source.text.count("int a;") == source.text.count("int b;") == 1
 
 
@@ -40,6 +40,75 @@ def test_defines_come_first_if_the_text_names_them():
     defines = {"N": "K", "K": 3, "M": "uint", "NONE": 0}
     text = assemble("a", {"a": "M x = N;"}, defines).text
     assert text == '#define N K\n#define K 3\n#define M uint\n#line 1 "a"\nM x = N;\n'
+
+
+USED = """\
+/* Of one. */
+real one(real x);
+real one(real x) { return x; }
+
+/* Of two and its helper. */
+typedef struct {
+    real y;
+} Two;
+real helper(Two *two) { return two->y + ONE; }
+constant float table[2][2] = {{1.0f, 2.0f}, {3.0f, 4.0f}};
+#define ONE one(1.0f)
+#define UNUSED one(2.0f)
+
+/* Of nothing that is named. */
+real unused(real x)
+{
+    return helper(0) + table[0][0];
+}
+#undef UNUSED
+
+/* The kernel. */
+kernel void run(global float *x) { x[0] = helper(0); }
+"""
+
+
+def test_what_nothing_names_is_left_out():
+    text = assemble("a", {"a": USED}).text
+    without = USED.replace("constant float table[2][2] = {{1.0f, 2.0f}, {3.0f, 4.0f}};\n", "\n")
+    head, rest = without.split("#define UNUSED")
+    number = USED.splitlines().index("/* The kernel. */") + 1
+    kernel = rest[rest.index("\n/* The kernel") :].replace("/* The", f"#line {number}\n/* The")
+    assert text == f'#line 1 "a"\n{head}{kernel}'
+    assert assemble("a", {"a": USED}, library=True).text == f'#line 1 "a"\n{USED}'
+    part = {"a": '#include "part"\nkernel void run(void) {}', "part": Part(USED, "b.py", 7)}
+    assert assemble("a", part).text.startswith(f'#line 7 "b.py"\n{USED}#line 2 "a"\n')
+
+
+def test_generated_files_are_numbered_as_they_stand():
+    virtual = {"generated/a": '#include "b"\n' + USED, "b": "int b;"}
+    rows = assemble("generated/a", virtual).text.splitlines()
+    assert rows.count('#line 1 "generated/a"') == sum(row.startswith("#line") for row in rows) - 1
+    assert rows[-2:] == USED.splitlines()[-2:] and rows[-3] == ""
+
+
+@pytest.mark.parametrize(
+    "kept",
+    [
+        "#pragma OPENCL FP_CONTRACT OFF", "STAGE(name)(real x) { }", "int several; int more;",
+        "real a(void) { return 0; } real b(void) { return 0; }", "kernel void k(void) { }",
+        "struct Named { int x; };", "enum { A, B };", "real LAYOUT(verb)(real x) { return x; }",
+        "#if __AVX__\nreal a(real x)\n#else\nreal b(real x)\n#endif\n{ return x; }",
+    ],
+)  # fmt: skip
+def test_what_is_not_a_definition_stays(kept: str):
+    text = f"real used(void) {{ return 0; }}\nreal unused(void);\n{kept}"
+    assert kept in assemble("a", {"a": text}).text
+    assert "unused" not in assemble("a", {"a": text}).text
+
+
+@pytest.mark.parametrize("macro", ["LAYOUT(verb) wide_##verb", "END(x) x##_closest", "A(x) f(wide_##x)"])
+def test_names_that_are_pasted_together_are_named(macro: str):
+    name = macro.split("(")[0]
+    text = f"#define {macro}\nreal wide_closest(void);\nkernel void k(void) {{ {name}(closest); }}"
+    assert "real wide_closest" in assemble("a", {"a": text}).text
+    text = "real t(void);\nreal s_t(void);\nkernel void k(void) {\n#define F(i) v.s##i;\nF(1) }"
+    assert "real" not in assemble("a", {"a": text}).text, "members are no functions"
 
 
 def test_a_generated_file_wins_over_one_on_disk():

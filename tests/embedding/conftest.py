@@ -10,7 +10,7 @@ import pytest
 
 import clpt
 from clpt.device import choose
-from tests.renders.support import with_film
+from tests.pictures.support import with_film
 
 SLOTS = 1024
 

@@ -20,7 +20,7 @@ import pyopencl.array as cl_array
 
 import clpt
 from clpt.scene.materials import Diffuse
-from tests.renders.support import with_film
+from tests.pictures.support import with_film
 
 NAMES = (
     "clFinish", "clWaitForEvents", "clEnqueueReadBuffer", "clEnqueueMapBuffer",

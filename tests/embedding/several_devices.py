@@ -9,7 +9,7 @@ import numpy as np
 import pyopencl as cl
 
 import clpt
-from tests.renders.support import with_film
+from tests.pictures.support import with_film
 
 
 def main(scene_file: str) -> None:

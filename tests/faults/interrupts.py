@@ -25,10 +25,10 @@ from numpy.typing import NDArray
 
 import clpt
 from clpt import device as dev
+from clpt.geometry import shapes as placing
 from clpt.render.film import film_file
-from clpt.render.lowering.geometry import shapes as placing
 from clpt.render.wavefront.film_state import FilmState, Ranges
-from tests.renders.support import with_film
+from tests.pictures.support import with_film
 
 CODE = str(Path(clpt.__file__).parent)
 NUMBERS = 8  # samples whose films are known one by one

@@ -10,6 +10,7 @@ from clpt import device, testing
 from clpt.scene.materials import LEAVES, Material
 from clpt.testing import probe
 from clpt.testing.probe import COMPONENTS, NOTHING, root_text
+from clpt.testing.rounding import CONTRACTED, contracts
 
 MODES = tuple(COMPONENTS)
 
@@ -42,10 +43,21 @@ class Probe(testing.Probe):
 
 
 def run(
-    text: str, lanes: int, given: np.ndarray, rows: int, table: np.ndarray = NOTHING
+    text: str,
+    lanes: int,
+    given: np.ndarray,
+    rows: int,
+    table: np.ndarray = NOTHING,
+    options: tuple[str, ...] = (),
 ) -> np.ndarray:
     """Run the kernel `probe` of a text on that device, see clpt.testing.probe."""
-    return probe.run(opened(), {"probe.cl": text}, lanes, given, rows, table)
+    return probe.run(opened(), {"probe.cl": text}, lanes, given, rows, table, options)
+
+
+def assert_lanes_agree(found: np.ndarray, expected: np.ndarray) -> None:
+    """Numbers of two widths are equal to the bit, or nearly where the compiler contracts."""
+    near = CONTRACTED if contracts(opened()) else {"rtol": 0.0, "atol": 0.0}
+    np.testing.assert_allclose(found, expected, **near)
 
 
 def map_text(body: str, arguments: int, results: int, mode: str = "rgb", files=()) -> str:

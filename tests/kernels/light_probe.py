@@ -10,19 +10,18 @@ import numpy as np
 import pyopencl as cl
 
 from clpt import device
+from clpt.geometry import analytic, shape_records, triangles
 from clpt.records import SETTINGS, SHAPE
 from clpt.render.codegen import lights as light_dispatch
 from clpt.render.codegen import parameters
 from clpt.render.codegen import shapes as shape_text
 from clpt.render.codegen import textures as texture_text
 from clpt.render.codegen.signatures import scene_text
-from clpt.render.contract import shape_records
 from clpt.render.contract.features import Features, MaterialFeatures
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.features import of_lights, of_textures
-from clpt.render.lowering.geometry import analytic, triangles
 from clpt.render.lowering.lights import lights
-from clpt.render.lowering.spectra_table import STEP
+from clpt.render.lowering.spectra.spectra_table import STEP
 from tests.kernels.harness import opened
 
 LAMBDAS = (450.0, 520.0, 580.0, 640.0)  # of the spectral mode's probes [nm]

@@ -2,7 +2,7 @@
 
 Weighed by what aiming makes them denser, they go wherever they went before, and carry the same
 light there. Counts in bins, in independent batches, are compared at the significance of
-tests/renders/support.py.
+tests/pictures/support.py.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from clpt.scene.lights import (
 from clpt.scene.shapes import Curves, Disk, Rectangle, Shape, Sphere
 from clpt.scene.textures import Bitmap
 from tests.kernels.scene_harness import SceneProbe
-from tests.renders.support import assert_agree
+from tests.pictures.support import assert_agree
 
 UP = [0.0, 1.0, 0.0]
 GLASS = ((0.0, 0.5, 0.0, 0.3), (2.5, 0.5, 1.0, 0.45), (-1.0, 2.0, 0.0, 0.2))  # centres and radii

@@ -12,7 +12,7 @@ from clpt.errors import SceneError
 from clpt.render.codegen import stages
 from clpt.render.contract import camera_records
 from clpt.render.contract.features import CameraFeatures
-from clpt.render.lowering.camera import cameras
+from clpt.render.lowering.camera.cameras import lower_camera
 from clpt.scene import cameras as scene
 from tests.kernels.scene_harness import SceneProbe
 from tests.rotation import rotating
@@ -34,7 +34,7 @@ def _text(kind: str) -> dict[str, str]:
 
 def rays(camera, width, height, film, lens=None, lanes=8, index=None):
     """Origins and directions (n, 3) at film positions (n, 2); index: of a lens's glass."""
-    kind, words = cameras.lower_camera(camera, width, height)
+    kind, words = lower_camera(camera, width, height)
     call = f"{kind}_ray(camera, film, lens)"
     if kind in camera_records.WEIGHTED:
         call = f"{kind}_ray(scene, camera, film, lens, lambdas, &weight)"
@@ -270,4 +270,4 @@ SINGULAR = np.diag([1.0, 0.0, 1.0, 1.0])
 )
 def test_unusable_cameras(camera, part):
     with pytest.raises(SceneError, match=part.replace(".", r"\.")):
-        cameras.lower_camera(camera, 4, 4)
+        lower_camera(camera, 4, 4)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from clpt.errors import SceneError
+from clpt.render.analysis.filters import radius
 from clpt.render.lowering.camera import filters
 from clpt.scene import integrators as scene
 from clpt.scene.params import params
@@ -57,8 +58,8 @@ def test_samples_follow_the_filter(chosen):
     """Along either axis, the weighted share of samples up to x is the filter's integral up to x."""
     n = 20 * filters.CELLS
     even, half = (np.arange(n) + 0.5) / n, np.full(n, 0.5)
-    radius = filters.radius(chosen)
-    edges = np.linspace(-radius, radius, 4001)
+    end = radius(chosen)
+    edges = np.linspace(-end, end, 4001)
     integral = np.concatenate([[0], np.cumsum(filters.value(chosen, (edges[1:] + edges[:-1]) / 2))])
     for axis, u in enumerate((np.column_stack([even, half]), np.column_stack([half, even]))):
         offsets, weights = sampled(chosen, u)
@@ -76,7 +77,7 @@ def test_samples_stay_inside(chosen):
     ends = np.float32([0.0, 0.25, 0.5, np.nextafter(np.float32(1), np.float32(0))])
     u = np.stack(np.meshgrid(ends, ends), axis=-1).reshape(-1, 2)
     offsets, weights = sampled(chosen, u)
-    assert np.abs(offsets).max() <= np.float32(filters.radius(chosen))
+    assert np.abs(offsets).max() <= np.float32(radius(chosen))
     assert np.isfinite(weights).all()
 
 
@@ -130,9 +131,9 @@ def test_same_functions_as_mitsuba(chosen):
     if chosen.kind != "tent":
         given.pop("radius")
     theirs = mi.load_dict({"type": chosen.kind, **given})
-    x = np.linspace(0.0, 0.999 * filters.radius(chosen), 57)
+    x = np.linspace(0.0, 0.999 * radius(chosen), 57)
     values = np.array([theirs.eval(float(v)) for v in x])
-    assert theirs.radius() == pytest.approx(filters.radius(chosen))
+    assert theirs.radius() == pytest.approx(radius(chosen))
     ours = filters.value(chosen, x)
     scale = values[0] / ours[0]  # only the shape matters
     within = 7e-4 if chosen.kind == "gaussian" else 2e-6  # theirs is a polynomial

@@ -10,10 +10,11 @@ from clpt.errors import SceneError
 from clpt.lenses import Prescription, Surface
 from clpt.lenses.coatings import quarter_wave
 from clpt.lenses.tracing import Rays, trace
+from clpt.render.analysis.lens import glasses
 from clpt.render.codegen import stages
 from clpt.render.contract.features import CameraFeatures
-from clpt.render.lowering.camera import cameras
-from clpt.render.lowering.camera.lens import ghost_pairs, glasses
+from clpt.render.lowering.camera.cameras import lower_camera
+from clpt.render.lowering.camera.lens import ghost_pairs
 from clpt.scene.cameras import Lens
 from clpt.spectra import Constant
 from tests.kernels.scene_harness import SceneProbe
@@ -33,7 +34,7 @@ GRID = np.linspace(360.0, 830.0, 471)
 def probe(camera: Lens, lanes: int = 8, ghosts: bool = False) -> SceneProbe:
     """The lens as a function of film x and y, two random numbers and a wavelength [nm]."""
     rows = glasses(camera)
-    _, words = cameras.lower_camera(camera, WIDTH, HEIGHT, range(len(rows)))
+    _, words = lower_camera(camera, WIDTH, HEIGHT, range(len(rows)))
     table = np.concatenate([np.zeros(1), *(glass.sample(GRID) for glass in rows)])[bool(rows) :]
     features = CameraFeatures("lens", disperses=bool(rows), losses=camera.reflects)
     return SceneProbe(
@@ -191,4 +192,4 @@ def test_energy_of_ghosts():
 )
 def test_unusable_lenses(given, message):
     with pytest.raises(SceneError, match=message):
-        cameras.lower_camera(Lens(**given), 4, 4)
+        lower_camera(Lens(**given), 4, 4)

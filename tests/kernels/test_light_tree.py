@@ -16,6 +16,7 @@ from clpt.render.contract.light_records import LINE, WIDTH
 from clpt.render.lowering.lights import light_bounds, light_tree
 from clpt.scene.lights import Area, Constant, Directional, Goniometric, Point, Projector, Spot
 from clpt.scene.shapes import Disk, Mesh, Rectangle, Sphere
+from tests.kernels.harness import assert_lanes_agree
 from tests.kernels.light_probe import Lit, lit
 
 DEEPEST = 16  # groups on the way to a light: two bits each of a trail
@@ -262,7 +263,7 @@ def test_lanes_agree(lanes):
     p = points(500, 3)
     given = np.vstack([p, np.random.default_rng(3).random((2, 500)), sides(p)])
     one, other = (scene()(PICK, given, 3, lanes=k) for k in (8, lanes))
-    np.testing.assert_array_equal(one, other)
+    assert_lanes_agree(one, other)
 
 
 # ---- the build

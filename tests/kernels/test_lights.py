@@ -10,8 +10,8 @@ from scipy.stats import chi2
 
 from clpt import transforms as T
 from clpt.errors import SceneError
+from clpt.geometry import triangles
 from clpt.render.contract import light_records
-from clpt.render.lowering.geometry import triangles
 from clpt.render.lowering.lights import image_lights, lights
 from clpt.render.lowering.lights.image_lights import face_coordinates, face_directions
 from clpt.scene.lights import (

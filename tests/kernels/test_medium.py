@@ -34,7 +34,7 @@ def transmittance(lanes: int, medium: np.ndarray, t: np.ndarray, lambdas: np.nda
         lanes=lanes,
         virtual={
             "generated/medium.cl": medium_text({"absorption": frozenset({"constant", "table"})})
-            + '#include "optics/medium.cl"\n'
+            + '#include "media/medium.cl"\n'
         },
         tables=encoder.store.arrays(),
         settings={"lambda_min": 360.0, "lambda_max": 830.0},
@@ -92,7 +92,7 @@ CASES = [
 def test_which_medium(lanes: int) -> None:
     text = (
         "#define medium_absorption(s, at, uv, l) spectrum_of(0.0f)\n"
-        + '#include "optics/medium.cl"\n'
+        + '#include "media/medium.cl"\n'
     )
     probe = SceneProbe(
         MEDIA,

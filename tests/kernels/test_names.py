@@ -13,6 +13,7 @@ from clpt.scene import KINDS
 
 ALTERNATIVES = (  # files, of each row of which a program has one at most
     ("bvh/*_keyed.cl",),
+    ("media/medium.cl", "media/light_medium_none.cl"),
     ("bvh/query*.cl",),
     ("bvh/shapes_*.cl",),
     ("film/exposure.cl", "film/splatting.cl"),
@@ -20,6 +21,7 @@ ALTERNATIVES = (  # files, of each row of which a program has one at most
     ("optics/boundary_*.cl",),
     ("optics/boundary_bare.cl", "optics/layers_*.cl"),
     ("path/*_frame*.cl",),
+    ("path/first_ray*.cl",),
     ("path/pixel_sampler*.cl",),
     ("path/shadow_ray*.cl",),
     ("sampler/independent.cl", "core/sobol.cl"),
@@ -62,6 +64,8 @@ def files() -> dict[str, str]:
 
 def meet(first: str, second: str, texts: dict[str, str]) -> bool:
     """Whether one program may have both files."""
+    if second == f"{first.removesuffix('.cl')}_none.cl":  # the twin that does nothing
+        return False
     if second in INCLUDE.findall(texts[first]) or first in INCLUDE.findall(texts[second]):
         return True
     return not any(
@@ -120,5 +124,5 @@ def test_flags_have_names_of_their_own() -> None:
     generated = {name for text in texts for name in re.findall(r"#define ([A-Z]\w*)[ (]", text)}
     generated |= {f"{cls.kind.upper()}_WORDS" for row in KINDS.values() for cls in row}
     assert "LAYER_WORDS" in generated  # of a thin film
-    chosen = {name.partition("(")[0] for name in flags.NAMES}
+    chosen = flags.SCENE | flags.MATERIAL.keys()
     assert chosen & (own | generated) == set(DEFAULTS)

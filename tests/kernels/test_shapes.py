@@ -8,8 +8,7 @@ from scipy.stats import chi2
 
 from clpt import transforms as T
 from clpt.errors import SceneError
-from clpt.render.contract import shape_records
-from clpt.render.lowering.geometry import analytic, triangles
+from clpt.geometry import analytic, shape_records, triangles
 from clpt.scene.shapes import Cube, Cylinder, Disk, Mesh, Rectangle, Sphere
 from tests.kernels.light_probe import shape_probe
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from clpt.render.lowering.camera.wavelengths import Density
+from clpt.render.analysis.wavelengths import Density
 from tests.kernels.scene_harness import SceneProbe, scene_files
 
 SIGNIFICANCE = 1e-4

@@ -13,7 +13,7 @@ from PIL import Image
 
 import clpt
 from clpt import images
-from tests.renders.support import with_film
+from tests.pictures.support import with_film
 
 ROOT = Path(__file__).resolve().parents[2]
 SAMPLES = 4

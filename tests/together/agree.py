@@ -34,7 +34,7 @@ from clpt.errors import ClptError
 from clpt.scene import Film, Scene, lights
 from clpt.scene import materials as m
 from clpt.scene.integrators import Independent, ParticleTracer, Path, Sobol, Vcm
-from tests.renders.support import ROUNDING, blocks, exposures
+from tests.pictures.support import ROUNDING, blocks, exposures
 from tests.together.equivalents import every_shape
 from tests.together.strategies import scene_of
 

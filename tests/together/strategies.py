@@ -18,8 +18,8 @@ import numpy as np
 from clpt import bvh, measured, spectra, transforms
 from clpt.errors import SceneError
 from clpt.lenses import Prescription, Surface
-from clpt.render.lowering.bodies import BENDS, OPEN
-from clpt.render.lowering.camera.cameras import CONNECTED
+from clpt.render.analysis.bodies import BENDS, OPEN
+from clpt.render.analysis.cameras import CONNECTED
 from clpt.scene import Scene, cameras, integrators, lights, materials, media, shapes, textures
 from clpt.scene.air import clear_air
 from clpt.scene.layers import LAYERS

@@ -18,8 +18,8 @@ import pytest
 from PIL import Image
 
 from clpt import device, images, load, spectra
-from clpt.cli import outputs
-from clpt.cli.grading import Grading
+from clpt.cli.files import outputs
+from clpt.cli.options.grading import Grading
 from clpt.cluster.multi_renderer import MultiRenderer
 from clpt.errors import SceneError
 from clpt.render.renderer import Renderer

@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 
 from clpt import device, load
-from clpt.cli import allocator
+from clpt.cli.process import allocator
 
 pytest.importorskip("websockets", reason="the extra clpt[view] is not installed")
 

@@ -134,7 +134,7 @@ def _length(view: int, owner: Element) -> int:
 
 @dataclass(frozen=True)
 class _Form:
-    """How an accessor's elements lie in its view; `gap` follows the columns of small matrices."""
+    """Layout of an accessor's elements in its view; `gap` follows the columns of small matrices."""
 
     dtype: np.dtype[Any]
     count: int

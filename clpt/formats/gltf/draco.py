@@ -74,7 +74,7 @@ def _decoded(compressed: Element) -> Any:
 
 
 def _claimed_faces(data: bytes) -> int:
-    """What a mesh's header says before memory is taken for it (Draco bitstream 2.2, section 3)."""
+    """Read the number of faces from a mesh's header (Draco bitstream 2.2, section 3)."""
     stream = _Stream(data, 11)
     if int.from_bytes(data[9:11], "little") & METADATA:
         for _ in range(stream.number()):

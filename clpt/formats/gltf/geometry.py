@@ -1,4 +1,4 @@
-"""What is read of a primitive: its triangles, and the attributes of its vertices."""
+"""Geometry of a primitive: its triangles, and the attributes of its vertices."""
 
 from __future__ import annotations
 

@@ -74,7 +74,7 @@ def _with_normal_map(element: Element, inner: Material) -> Material:
 
 
 def _emission(element: Element, both: bool) -> Area | None:
-    """What the surface emits: the factor times the texture times the strength."""
+    """Return the emission of a surface: the factor times the texture times the strength."""
     factor = element.numbers("emissiveFactor", 3, (0.0, 0.0, 0.0), low=0.0)
     extension = element.extension(EMISSIVE)
     strength = 1.0 if extension is None else extension.number("emissiveStrength", 1.0, low=0.0)

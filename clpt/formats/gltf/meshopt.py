@@ -122,7 +122,7 @@ def _groups(
 
 
 def _sentinels(stream: Bytes, bits: int) -> list[int]:
-    """How many deltas of all ones, `bits` wide, stand before each byte."""
+    """Count the deltas before each byte, `bits` wide, whose bits are all one."""
     values = np.arange(256)
     per_byte = sum(
         (values >> shift & (1 << bits) - 1) == (1 << bits) - 1 for shift in range(0, 8, bits)

@@ -43,7 +43,7 @@ def sequence(stream: Bytes, count: int) -> NDArray[np.uint32]:
 
 
 class _Triangles:
-    """What the decoder of triangles carries from one to the next."""
+    """A decoder of triangles, with the edges and vertices that the next triangle may refer to."""
 
     def __init__(self, data: list[int]):
         self.data, self.table = data, data[-TABLE:]

@@ -95,7 +95,7 @@ def _deforming(
 
 
 def _step(points: NDArray[np.float32]) -> int:
-    """Of keys at even times (k, n, 3) every which is enough, k - 1 a power of two."""
+    """Return the step of the keys that are enough; (k, n, 3), even, k - 1 a power of two."""
     last = len(points) - 1
     allowed = NEAR * float(np.ptp(points.reshape(-1, 3), axis=0).max())
     step = last

@@ -1,4 +1,4 @@
-"""How a glTF material reflects and lets light through: its extensions as one GltfSurface.
+"""Reflection and transmission of a glTF material: its extensions as one GltfSurface.
 
 The meaning of every parameter, and the formulas' sources, are in docs/gltf.md.
 """

@@ -1,4 +1,4 @@
-"""What is inside of a glTF body: KHR_materials_volume and KHR_materials_volume_scatter.
+"""The medium inside a glTF body: KHR_materials_volume and KHR_materials_volume_scatter.
 
 A body lets light through and has a thickness. docs/gltf.md has the formulas.
 """

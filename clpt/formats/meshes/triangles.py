@@ -1,4 +1,4 @@
-"""What the readers of plain mesh formats return, and its colours as attributes of a mesh."""
+"""Triangles as readers of plain mesh formats return them, and their colours as attributes."""
 
 from __future__ import annotations
 

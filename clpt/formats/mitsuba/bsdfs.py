@@ -194,7 +194,7 @@ def _polarized_plastic(props: Properties) -> Parameters:
 
 
 def _polarizing(share: float) -> Callable[[Properties], Parameters]:
-    """What lets a share of unpolarised light through, straight on."""
+    """Return the reader of a plate that lets a share of unpolarised light straight through."""
 
     def read(props: Properties) -> Parameters:
         props.ignore("theta", "delta", "polarizing", "left_handed")

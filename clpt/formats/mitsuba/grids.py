@@ -68,7 +68,7 @@ def channels(element: Element, context: Context) -> Volume:
 def _kept(
     what: str, element: Element, context: Context, make: Callable[[Element, Context], Any]
 ) -> Any:
-    """What is made of a grid, the same arrays for all references."""
+    """Make something of a grid once, so that all references to the grid share its arrays."""
     key = what, id(element)
     if key not in context.volumes:
         context.volumes[key] = make(element, context)

@@ -37,7 +37,7 @@ LARGEST_INTEGER = 2**31 - 1
 
 
 class Context:
-    """What all parts of the loader share: the document, its ids, the objects made, warnings.
+    """State that all parts of the loader share: the document, its ids, the objects made, warnings.
 
     layers: of the film, which integrators ask for; rooms: the corners of the box that each endless
     medium fills, by the id of its element; endless: media of which that is still to be known;

@@ -47,7 +47,7 @@ NO_LAYERS = ("dp_du", "dp_dv", "duv_dx", "duv_dy", "boundary_test")
 
 @dataclass
 class Sensor:
-    """What a <sensor> and its children describe; sampler: its name there; name: its id, or ""."""
+    """A <sensor> with its children; sampler: the plugin's name; name: the sensor's id, or ""."""
 
     camera: cameras.Camera
     film: Film
@@ -245,7 +245,7 @@ def _film(element: Element, context: Context) -> Film:
 
 
 def _own_film(props: Properties) -> dict[str, Any]:
-    """What only clpt's film has: see docs/mitsuba_plugins.md."""
+    """Return the parameters that only clpt's film has: see docs/mitsuba_plugins.md."""
     given: dict[str, Any] = {"bands": props.integer("bands", 0)}
     for name, choices in (("output_space", spaces.SPACES), ("mode", ("spectral", "rgb"))):
         if name in props.named:
@@ -383,7 +383,7 @@ def _volume_path(props: Properties) -> Integrator:
 
 
 def _replayed(free_panes: bool) -> Callable[[Properties], Integrator]:
-    """What differentiates in Mitsuba: its picture is that of `path`, or of `volpath`."""
+    """Return the reader of an integrator for derivatives, whose picture is that of `path`."""
 
     def read(props: Properties) -> Integrator:
         depths = _depths(props, REPLAYED_DEPTH)
@@ -412,7 +412,7 @@ def _depth(props: Properties) -> Integrator:
 
 
 def _no_light() -> Integrator:
-    """What goes to the first surface only, for the layers of the film."""
+    """Return an integrator whose paths end at the first surface, for the layers of the film."""
     return integrators.Path(max_depth=1, light_paths=0)
 
 

@@ -1,4 +1,4 @@
-"""How a parameter stands in scene.json: read, written, in the schema, and in words.
+"""Forms of parameters in scene.json: how each is read, written, and described.
 
 FORMS has an entry for each role and for each form of a host parameter (`clpt.scene.params`).
 """
@@ -28,7 +28,7 @@ from clpt.spectra.spaces import TEMPERATURES
 
 
 class Reader(Protocol):
-    """What reads those parts of a scene that a parameter holds or refers to."""
+    """A reader of the parts of a scene that a parameter can hold or refer to."""
 
     def kind(self, cursor: Cursor, category: str) -> Any: ...
     def layer(self, cursor: Cursor) -> Any: ...
@@ -43,7 +43,7 @@ class Reader(Protocol):
 
 
 class Writer(Protocol):
-    """What writes those parts."""
+    """A writer of the parts of a scene that a parameter can hold or refer to."""
 
     def kind(self, value: Kind) -> Any: ...
     def layer(self, value: Any) -> Any: ...

@@ -110,7 +110,7 @@ def text() -> str:
 
 
 def _spectra() -> list[str]:
-    """What the objects and names that stand for spectra are."""
+    """Return the paragraphs on objects and names that stand for spectra."""
     file = "the same from a file of columns, or a page of refractiveindex.info (.yml, .csv)"
     rows = [
         "| object | what it is |",
@@ -134,7 +134,7 @@ def _spectra() -> list[str]:
 
 
 def _reradiations() -> list[str]:
-    """What the objects that stand for fluorescence are."""
+    """Return the paragraphs on objects that stand for fluorescence."""
     file = "a measured BFC matrix (whose diagonal is a spectrum of the same `file`), or a table"
     rows = ["| object | what it is |", "| --- | --- |", f'| `{{"file": "name"}}` | {file} |']
     for name, cls in RERADIATIONS.items():

@@ -27,7 +27,7 @@ MESH_ARRAYS = ("vertices", "faces", "normals", "uvs", "tangents")
 
 @dataclass(frozen=True)
 class ShapeFile:
-    """What the key `file` means for a shape.
+    """A kind of file that a shape may name by its key `file`.
 
     accepts, meaning: for the schema and the reference; replaces: the parameters that the file
     holds; read: returns these, None where one file makes several shapes.

@@ -1,4 +1,4 @@
-"""What stands before WorldBegin: camera, film, filter, sampler and integrator.
+"""The part of a file before WorldBegin: camera, film, filter, sampler and integrator.
 
 pbrt's camera space has x to the right of the picture, ours to the left; `Scale -1 1 1` in a file
 mirrors the picture, as it does in pbrt.

@@ -1,4 +1,4 @@
-"""What lies below a dielectric boundary: pbrt's coats and its scattering bodies, as diffuse bases.
+"""Diffuse bases below a dielectric boundary, for pbrt's coats and its scattering bodies.
 
 Our plastics reflect (1 - F(wi)) (1 - F(wo)) r / (pi eta^2 (1 - f r)) from a base of albedo r, f
 being the share that the boundary reflects back inside. These functions give r.

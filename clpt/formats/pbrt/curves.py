@@ -134,7 +134,7 @@ def joined(things: Iterable[Shape]) -> Iterator[Shape]:
 
 
 def _shared(shape: Shape) -> tuple[Any, ...] | None:
-    """What curves that may be one have in common."""
+    """Return the values that are equal in all curves that may be joined; None for other shapes."""
     if not isinstance(shape, Curves) or shape.motion is not None:
         return None
     placed = np.asarray(shape.to_world).tobytes()

@@ -18,7 +18,7 @@ DEEPEST = 32  # files that include each other
 
 @dataclass(eq=False)
 class Contents:
-    """What a file holds: definitions in the order of the file; groups and uses of them by name."""
+    """The contents of a file: definitions in their order, and groups with their uses, by name."""
 
     shared: Shared
     shapes: list[Definition] = field(default_factory=list)

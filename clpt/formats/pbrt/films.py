@@ -224,7 +224,7 @@ def integrator(definition: Definition | None, film: Film) -> Integrator:
 
 
 def _photons(params: Parameters, film: Film) -> dict[str, Any]:
-    """What `sppm` says of its photons; pbrt's own radius of 1 suits no scene of another size."""
+    """Read the photons of `sppm`; pbrt's default radius of 1 suits few scenes: 0 takes ours."""
     params.ignore("seed")
     radius = params.above_zero("radius", 0.0) if "radius" in params else 0.0
     each = params.one("photonsperiteration", "integer", -1) / math.prod(film.size)

@@ -148,7 +148,7 @@ def _infinite(params: Parameters, state: State) -> Light:
 
 
 def _upward(image: np.ndarray) -> float:
-    """What pbrt takes for the illuminance of a surface that faces an octahedral image's +z.
+    """Return the illuminance by pbrt's measure of a surface that faces +z of an octahedral image.
 
     pbrt gives each pixel 2 pi / n^2 of solid angle, half of what it has; its pictures show that.
     """

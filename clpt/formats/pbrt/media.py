@@ -65,7 +65,7 @@ def _made(name: str, definition: Definition) -> Medium:
 
 
 def _light(params: Parameters, state: State) -> Any:
-    """What a homogeneous medium emits."""
+    """Read the emission of a homogeneous medium."""
     light = spectrum(params, "Le", "emission", state, Constant(0.0))
     return scaled(light, params.one("Lescale", "float", 1.0))
 

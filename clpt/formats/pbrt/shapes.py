@@ -66,7 +66,7 @@ class Geometry:
         return np.bincount(self.pieces, triangles) / self.split
 
     def shares(self) -> NDArray[np.float32] | None:
-        """How much brighter each triangle shines than by the mean area, None where all are alike.
+        """Return each triangle's brightness over that of a mean area; None where all are alike.
 
         Each of pbrt's lights has the whole power, so that small ones are the brighter.
         """

@@ -59,7 +59,7 @@ def spectrum(params: Parameters, name: str, role: str, state: State, default: An
 
 
 def value_of(given: Parameter, role: str, state: State) -> Any:
-    """What a parameter of a type "float" or among SPECTRUM_TYPES means in a role."""
+    """Return the value in a role of a parameter whose type is "float" or among SPECTRUM_TYPES."""
     if given.type == "float":
         return given.numbers(1)[0]
     if given.type == "rgb":

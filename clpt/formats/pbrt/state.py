@@ -1,4 +1,4 @@
-"""What a PBRT file has set so far: the graphics state, and what all of its parts share."""
+"""State while a PBRT file is read: the graphics state, and what all parts of the file share."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Definition:
 
 @dataclass(eq=False)
 class Shared:
-    """What all states of a file, and of those that it includes, have in common."""
+    """Data that all graphics states of a file share, and those of the files that it includes."""
 
     folder: Path
     warnings: list[str] = field(default_factory=list)

@@ -1,4 +1,4 @@
-"""What packs parts of .vdb and .nvdb files: zlib, and Blosc by the package `blosc`."""
+"""Unpacking of parts of .vdb and .nvdb files: by zlib, and by Blosc of the package `blosc`."""
 
 from __future__ import annotations
 

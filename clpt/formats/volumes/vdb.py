@@ -283,7 +283,7 @@ class _Tree:
         return np.stack(np.unravel_index(np.flatnonzero(is_child), (count,) * 3), axis=1)
 
     def _inactive(self, mask_bytes: int) -> tuple[int, float, float, NDArray[np.uint8] | None]:
-        """What a node tells of its inactive values: how, two values, and which have the second."""
+        """Read a node's inactive values: their encoding, two values, and the mask of the second."""
         (tells,) = self._stream.take("B")
         if tells > ALL_VALUES:
             raise SceneError("is damaged: a node's values are told in an unknown way")

@@ -10,9 +10,14 @@ from clpt.render.contract.features import Features
 Files = tuple[str, ...]
 
 
-def when(needed: object, *files: str) -> Files:
-    """Return files where they are needed, else none."""
-    return files if needed else ()
+def when(holds: object, *files: str) -> Files:
+    """Return the files where a condition holds, else none."""
+    return files if holds else ()
+
+
+def either(holds: object, file: str) -> Files:
+    """Return a file where a condition holds, else its twin that does nothing, `<name>_none.cl`."""
+    return (file if holds else f"{file.removesuffix('.cl')}_none.cl",)
 
 
 # name: the files that stand for it, for a scene's features and the layout of its triangles
@@ -28,7 +33,15 @@ CHOICES: dict[str, Callable[[Features, str], Files]] = {
     ),
     "generated/bands.cl": lambda f, _: when(f.film.bands, "film/bands.cl"),
     "generated/integrator.cl": lambda f, _: (f"integrator/{f.transport.integrator}.cl",),
-    "generated/merging.cl": lambda f, _: when(f.transport.merged, "merging/area.cl"),
+    "generated/merging.cl": lambda f, _: either(f.transport.merged, "merging/area.cl"),
+    "generated/cone.cl": lambda f, _: either(f.textures.mips, "path/cone.cl"),
+    "generated/ghosts.cl": lambda f, _: either(f.transport.lit_ghosts, "path/ghosts.cl"),
+    "generated/first_ray.cl": lambda f, _: (f"path/first_ray{'_weighted' * f.camera.weighs}.cl",),
+    "generated/sky.cl": lambda f, _: (
+        *either(f.lights.infinite, "path/sky.cl"),
+        *either(f.lights.infinite and f.film.layers.lights, "path/sky_layers.cl"),
+    ),
+    "generated/join_light.cl": lambda f, _: either(f.shows_lights, "lighting/join_light.cl"),
     "generated/guide.cl": lambda f, _: when(f.transport.guided, "guiding/guide.cl"),
     "generated/gather.cl": lambda f, _: when(
         f.transport.merged and not f.transport.light_paths,
@@ -36,7 +49,7 @@ CHOICES: dict[str, Callable[[Features, str], Files]] = {
         "merging/gather.cl",
     ),
     "generated/layer_sums.cl": lambda f, _: (
-        *when(f.film.layers.first_samples, "film/layers.cl"),
+        *either(f.film.layers.first_samples, "film/layers.cl"),
         *_screen_motion(f),
     ),
     "generated/layers.cl": lambda f, _: when(
@@ -65,18 +78,21 @@ CHOICES: dict[str, Callable[[Features, str], Files]] = {
         "lighting/rivals.cl",
     ),
     "generated/medium.cl": lambda f, _: (
-        *when(f.media.absorbing, "generated/medium_coefficients.cl", "optics/medium.cl"),
-        *when(f.media.dyed, "optics/dye_flight.cl"),
-        *when(f.media.grids.present, "optics/medium_grid.cl"),
-        *when(f.media.grids.emissive, "optics/medium_grid_light.cl"),
-        *when(f.media.bodies, "generated/body_index.cl", "optics/bodies.cl"),
+        *when(f.media.absorbing, "generated/medium_coefficients.cl", "media/medium.cl"),
+        *when(f.media.dyed, "media/dye_flight.cl"),
+        *when(f.media.grids.present, "media/medium_grid.cl"),
+        *when(f.media.grids.emissive, "media/medium_grid_light.cl"),
+        *when(f.media.bodies, "generated/body_index.cl"),
+        *when(f.media.present, *either(f.media.bodies, "media/bodies.cl")),
     ),
     "generated/grid_flight.cl": lambda f, _: (
         *when(f.media.grids.emissive, "generated/lights.cl", "path/met_light.cl"),
-        *when(f.media.grids.present, "optics/grid_flight.cl"),
+        *when(f.media.grids.present, "media/grid_flight.cl"),
     ),
-    "generated/light_medium.cl": lambda f, _: when(
-        f.light_media, "generated/textures.cl", "generated/medium.cl"
+    "generated/light_medium.cl": lambda f, _: (
+        ("generated/textures.cl", "generated/medium.cl")
+        if f.light_media
+        else ("media/light_medium_none.cl",)
     ),
     "generated/shading_frame.cl": lambda f, _: (
         ("generated/normal_map.cl", "path/shading_frame_mapped.cl")
@@ -96,7 +112,7 @@ CHOICES: dict[str, Callable[[Features, str], Files]] = {
     ),
     "generated/instances.cl": lambda f, _: when(f.geometry.instances, "tracing/instances.cl"),
     "generated/motion.cl": lambda f, _: (
-        *when(f.motion.present, "tracing/motion.cl"),
+        *either(f.motion.present, "tracing/motion.cl"),
         *when(f.motion.vertices or f.motion.spheres, "tracing/vertex_keys.cl"),
     ),
     "generated/keyed_layout.cl": lambda f, layout: when(
@@ -112,13 +128,9 @@ CHOICES: dict[str, Callable[[Features, str], Files]] = {
 
 def _screen_motion(features: Features) -> Files:
     """How what is seen moves across the film, where a layer tells it."""
-    return when(
-        features.screen_motion,
-        "interface/camera.cl",
-        "generated/camera.cl",
-        "generated/screen.cl",
-        "path/screen_motion.cl",
-    )
+    files = ("interface/camera.cl", "generated/camera.cl", "generated/screen.cl")
+    needed = when(features.screen_motion, *files)
+    return (*needed, *either(features.screen_motion, "path/screen_motion.cl"))
 
 
 def _passing(features: Features) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from clpt.geometry import shape_records
 from clpt.render.codegen.dispatch import Case, Function, choose, function
 from clpt.render.codegen.lights import (
     NOWHERE,
@@ -14,7 +15,6 @@ from clpt.render.codegen.lights import (
     surfaces_of,
     textured,
 )
-from clpt.render.contract import shape_records
 from clpt.render.contract.features import Features
 from clpt.render.contract.light_records import (
     ALONG,

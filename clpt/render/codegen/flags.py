@@ -80,7 +80,7 @@ MATERIAL: dict[str, Callable[[Features, type[Scatterer]], int]] = {
 # the layers whose words in a pixel begin at a place of their own, by the macros that tell it
 _LAYERS = {f"LAYER_{name.upper()}": name for name in LAYERS if LAYERS[name].form in WORDS}
 
-NAMES = frozenset({*dict(said(Features())), *_LAYERS, *MATERIAL})  # of all flags
+SCENE = frozenset({*dict(said(Features())), *_LAYERS})  # the names of flags of a scene
 
 
 def of_scene(features: Features) -> Defines:

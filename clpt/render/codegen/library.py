@@ -6,6 +6,7 @@ import re
 
 from clpt import bvh, device
 from clpt.errors import SceneError, UnknownKindError
+from clpt.render.codegen import rough_coat_table
 from clpt.render.codegen.stages import functions_text
 from clpt.render.contract import custom_materials
 from clpt.scene.integrators import PIXELWISE
@@ -67,12 +68,14 @@ def kernel_source(
         "generated/spectrum.cl": (f"spectrum/{mode}.cl",),
         "generated/sampler.cl": (f"sampler/{sampler}.cl",),
         "generated/layout.cl": bvh.traversal_text(layout),
+        **rough_coat_table.virtual_files(),
     }
     files: list[str] = []
     for part in parts:
         files += PARTS[part] if part in PARTS else _bsdf(part, mode, virtual)
     virtual["library"] = tuple(files)
-    text = _own_inline(device.assemble("library", virtual, {"LANES": lanes}).text)
+    made = device.assemble("library", virtual, {"LANES": lanes}, library=True)
+    text = _own_inline(made.text)
     if lines:
         return text + '#line 1 "program"\n'
     return re.sub(r"^#line .*\n", "", text, flags=re.MULTILINE)

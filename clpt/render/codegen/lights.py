@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from clpt.geometry import shape_records
 from clpt.records import LIGHT, SHAPE
 from clpt.render.codegen.dispatch import Case, Function, active, choose, function, masked
-from clpt.render.contract import light_records, shape_records
+from clpt.render.contract import light_records
 from clpt.render.contract.features import Features
 from clpt.render.contract.light_records import (
     BASES,

@@ -17,6 +17,7 @@ from clpt.render.codegen import (
     flags,
     lights,
     parameters,
+    rough_coat_table,
     shapes,
     signatures,
     stages,
@@ -51,10 +52,11 @@ def sources(
 
 
 def _stages(
-    features: Features, layout: str, lanes: int, interleaved: bool
+    features: Features, layout: str, lanes: int, interleaved: bool, part: bool = False
 ) -> dict[str, device.Source]:
-    """The texts of a bounce but for queues and shading, see `sources`."""
+    """The texts of a bounce but for queues and shading, see `sources`; part: of a loop."""
     files, defines = _shared(features, layout), flags.of_scene(features)
+    make = functools.partial(_source, part=part)
     begin, join = bounce.begin_and_join(features)
     trace_lanes = bounce.trace_lanes(layout, lanes)
     join_lanes = bounce.join_lanes(features, layout, lanes, interleaved)
@@ -65,32 +67,33 @@ def _stages(
     joins = {**files, **(rays if features.geometry.analytic else {})}
     if begin == "flare":
         return {
-            begin: _source(begin, files, defines, lanes),
-            join: _source(join, joins, defines, join_lanes),
+            begin: make(begin, files, defines, lanes),
+            join: make(join, joins, defines, join_lanes),
         }
     texts = {
-        begin: _source(begin, files, defines, lanes),
-        "intersect": _source(
+        begin: make(begin, files, defines, lanes),
+        "intersect": make(
             "intersect", {**files, **rays}, defines, lanes if interleaved else trace_lanes
         ),
     }
     if bounce.joins(features):
-        texts[join] = _source(join, joins, defines, join_lanes)
+        texts[join] = make(join, joins, defines, join_lanes)
     if bounce.deposits(features):
-        texts["deposit"] = _source("deposit", files, defines, lanes)
+        texts["deposit"] = make("deposit", files, defines, lanes)
     if bounce.trains(features):
-        texts["train"] = _source("train", files, defines, lanes)
+        texts["train"] = make("train", files, defines, lanes)
     if features.media.present:
-        texts[bounce.flight(features)] = _source("flight", files, defines, lanes)
+        flight = bounce.flight(features)
+        texts[flight] = make(flight, files, defines, lanes, "flight")
     if features.materials.mixtures:
-        texts["mix"] = _source("mix", files, defines, lanes)
+        texts["mix"] = make("mix", files, defines, lanes)
     return texts
 
 
 def _shading(
-    features: Features, layout: str, lanes: int, *, queued: bool = False, both: bool = False
+    features: Features, layout: str, lanes: int, *, queued: bool = False, part: bool = False
 ) -> dict[str, device.Source]:
-    """The texts that shade, see `sources`; both: paths from the camera and those from lights."""
+    """The texts that shade, see `sources`; part: of a loop, for all kinds of paths of the scene."""
     files, defines = _shared(features, layout), flags.of_scene(features)
     texts = {}
     for cls in features.materials.leaves:
@@ -100,10 +103,11 @@ def _shading(
         if cls.source is not None:
             own[f"{cls.folder}/{cls.kind}.cl"] = custom_materials.text(cls)
         kind = {**flags.of_material(features, cls), "QUEUED": int(queued)}
-        if both:
+        if part and bounce.has_both(features):
             own["generated/integrator.cl"] = BOTH
             kind["SHADES_BOTH"] = 1
-        texts[f"shade_{cls.kind}"] = _source("shade", own, {**defines, **kind}, lanes)
+        name = f"shade_{cls.kind}"
+        texts[name] = _source(name, own, {**defines, **kind}, lanes, "shade", part=part)
     return texts
 
 
@@ -129,10 +133,10 @@ def loop_sources(
     stages that are the same for them stand there once. They are kept, since a renderer asks twice:
     to compile ahead, and to link.
     """
-    made = _shading(features, layout, lanes, both=bounce.has_both(features))
+    made = _shading(features, layout, lanes, part=True)
     used: dict[str, None] = {}
     for own in features.passes:
-        made |= _stages(own, layout, lanes, interleaved)
+        made |= _stages(own, layout, lanes, interleaved, part=True)
         stages_ = bounce.order(own, layout, lanes, interleaved)
         used |= dict.fromkeys(stage.program for stage in stages_)
     files = {
@@ -142,7 +146,7 @@ def loop_sources(
         "generated/loop.cl": bounce.loop_text(features, layout, lanes, interleaved),
     }
     loop = _source("loop", files, flags.of_scene(features), lanes)
-    parts = {name: made[name].with_private(name, {"PART": f"loop_{name}"}) for name in used}
+    parts = {name: made[name].with_private(name) for name in used}
     return {**parts, "loop": loop.with_private("loop")}
 
 
@@ -157,15 +161,25 @@ def _static(texts: dict[str, device.Source]) -> dict[str, device.Source]:
 
 
 def _source(
-    stage: str, virtual: device.Virtual, defines: flags.Defines, lanes: int
+    name: str,
+    virtual: device.Virtual,
+    defines: flags.Defines,
+    lanes: int,
+    stage: str | None = None,
+    *,
+    part: bool = False,
 ) -> device.Source:
-    return device.assemble(f"stage/{stage}.cl", virtual, {"LANES": lanes, "QUEUED": 0, **defines})
+    """The text of a program; stage: its file, if it is not called so; part: of a loop."""
+    own: flags.Defines = {"PART": f"loop_{name}"} if part else {}
+    given = {"LANES": lanes, "QUEUED": 0, **own, **defines}
+    return device.assemble(f"stage/{stage or name}.cl", virtual, given)
 
 
 def _shared(features: Features, layout: str) -> Files:
     """The generated files that are the same for all programs of a scene."""
     return {
         **shapes.virtual_files(),
+        **rough_coat_table.virtual_files(),
         **lights.virtual_files(),
         **signatures.virtual_files(features, layout),
         **parameters.virtual_files(features),

@@ -1,30 +1,47 @@
 """The tables of kernels/optics/rough_coat.cl: integrals over a rough coat's normals, in float64.
 
-`python -m clpt.render.codegen.rough_coat_table` writes kernels/optics/rough_coat_table.cl.
+`python -m clpt.render.codegen.rough_coat_table` writes data/rough_coat.npz, which becomes text.
 Isotropic microfacets of roughness alpha; eta: index of the coat over that outside, from 1 on.
 """
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
-from clpt import output_files
 from clpt.scene.materials import DISTRIBUTIONS
 
 Floats = NDArray[np.float64]
 Made = Callable[[str, float, float], "Floats | float"]
+Tables = dict[str, NDArray[Any]]
 
-FILE = Path(__file__).parents[3] / "kernels/optics/rough_coat_table.cl"
+FILE = Path(__file__).parent / "data/rough_coat.npz"
+LARGEST = 65535  # of a table's numbers, as they are kept
 ALPHAS, INDICES, COSINES = 16, 14, 16
 STEEPS = 6  # cosines by which light that a coat throws back came, even in their roots
 HIGHEST = 3.0  # index up to which the tables go
 BOUNCE = 0.77  # cosine of light within a coat, see kernels/bsdf/coated_conductor.cl
 _RADII, _AZIMUTHS = leggauss(40), 48
+
+HEAD = """\
+/* Integrals over the normals of a rough coat, by distribution, roughness and index, made by
+ * `python -m clpt.render.codegen.rough_coat_table`, which has their formulas. A word holds a
+ * number and, in its upper half, the next along the last axis; `_UNIT`: what 1 of them means. */
+"""
+DOCS = {
+    "passed": "Transmittance over a smooth coat's, by cosine too",
+    "inside": "Reflectance for diffuse light below",
+    "bounce": f"Of light of cosine {BOUNCE}, what leaves facets that reflect all,"
+    " by roughness alone",
+    "thrown": "1, and what a smooth coat throws back of light from these less from smooth ones,"
+    " by cosine",
+}
 
 
 def alphas() -> Floats:
@@ -164,29 +181,45 @@ def _thrown(distribution: str, alpha: float, eta: float) -> Floats:
     return 1.0 + thrown_back(distribution, alpha, eta, cos_i) - fresnel(cos_i, eta)
 
 
-def _array(name: str, table: Floats) -> str:
+def made() -> Tables:
+    """Return the tables by name, in the order of DOCS: a minute of work."""
+    tables = {
+        "passed": _rows(_passed),
+        "inside": _rows(inside_reflectance),
+        "bounce": _bounces(),
+        "thrown": _rows(_thrown),
+    }
+    found = {}
+    for name, table in tables.items():
+        most = table.max()
+        found[name] = np.round(table / most * LARGEST).astype(np.uint16)
+        found[f"{name}_most"] = most
+    return found
+
+
+def kept() -> Tables:
+    """Return the tables of FILE by name."""
+    with np.load(FILE, allow_pickle=False) as file:
+        return dict(file)
+
+
+def _array(name: str, doc: str, shares: NDArray[np.uint16], most: float) -> str:
     """The text of a table of 16-bit shares of its largest number, and in upper halves the next's.
 
     The next: along the last axis, on which the last node has none.
     """
-    most = float(table.max())
-    shares = np.round(table / most * 65535.0).astype(np.uint32)
-    pairs = (shares[..., :-1] | shares[..., 1:] << np.uint32(16)).reshape(-1).tolist()
-    lines = [f"#define {name.upper()}_UNIT {most / 65535.0:.9g}f"]
+    words = shares.astype(np.uint32)
+    pairs = (words[..., :-1] | words[..., 1:] << np.uint32(16)).reshape(-1).tolist()
+    lines = [f"/* {doc}. */", f"#define {name.upper()}_UNIT {most / LARGEST:.9g}f"]
     lines += [f"constant uint {name}[{len(pairs)}] = {{"]
     lines += [",".join(map(str, pairs[i : i + 10])) + "," for i in range(0, len(pairs), 10)]
     return "\n".join([*lines, "};", ""])
 
 
-HEAD = """\
-/* Integrals over the normals of a rough coat, by distribution, roughness and index, made by
- * `python -m clpt.render.codegen.rough_coat_table`, which has their formulas. A word holds a
- * number and, in its upper half, the next along the last axis; `_UNIT`: what 1 of them means. */
-"""
-
-
+@functools.cache
 def text() -> str:
-    """The text of FILE."""
+    """Return the text of the kept tables, as kernels/optics/rough_coat.cl reads them."""
+    tables = kept()
     scale = (INDICES - 1) / np.sqrt(1.0 - 1.0 / HIGHEST)
     numbers = {
         "COAT_ALPHAS": ALPHAS,
@@ -195,23 +228,16 @@ def text() -> str:
         "COAT_STEEPS": STEEPS,
         "COAT_INDEX_SCALE": f"{scale:.9g}f",
     }
-    tables = {
-        "passed": ("Transmittance over a smooth coat's, by cosine too", _rows(_passed)),
-        "inside": ("Reflectance for diffuse light below", _rows(inside_reflectance)),
-        "bounce": (
-            f"Of light of cosine {BOUNCE}, what leaves facets that reflect all, by roughness alone",
-            _bounces(),
-        ),
-        "thrown": (
-            "1, and what a smooth coat throws back of light from these less from smooth ones,"
-            " by cosine",
-            _rows(_thrown),
-        ),
-    }
-    made = [f"#define {name} {value}\n" for name, value in numbers.items()]
-    made += [f"/* {doc}. */\n" + _array(f"coat_{n}", t) for n, (doc, t) in tables.items()]
-    return HEAD + "".join(made)
+    rows = [f"#define {name} {value}\n" for name, value in numbers.items()]
+    for name, doc in DOCS.items():
+        rows.append(_array(f"coat_{name}", doc, tables[name], float(tables[f"{name}_most"])))
+    return HEAD + "".join(rows)
+
+
+def virtual_files() -> dict[str, str]:
+    """Return the generated file that kernels/optics/rough_coat.cl includes."""
+    return {"generated/rough_coat_table.cl": text()}
 
 
 if __name__ == "__main__":
-    output_files.write_text(FILE, text())
+    np.savez_compressed(FILE, **made())

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from clpt.geometry.shape_records import ANALYTIC, ONE_OF, ROWS, VALUES
 from clpt.records import SHAPE
 from clpt.render.codegen.dispatch import Case, Function, active, function
 from clpt.render.contract.features import Features
-from clpt.render.contract.shape_records import ANALYTIC, ONE_OF, ROWS, VALUES
 
 _FIRST = next(m.word for m in ROWS["curve"].members if m.name == "first")
 

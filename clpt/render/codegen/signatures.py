@@ -6,11 +6,11 @@ kernel, the one that passes it on, and what the host binds.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container
 
 from clpt import device
-from clpt.layout import Record
 from clpt.records import INSTANCE, LIGHT, SETTINGS, SHAPE, SLABS, TABLES
+from clpt.render.codegen import blocks
 from clpt.render.contract.features import Features
 
 SLAB_ARGS = {f"{record.name.lower()}_words": "global float *restrict " for record in SLABS}
@@ -46,16 +46,19 @@ def virtual_files(features: Features, layout: str) -> dict[str, str]:
         "light_layer": (light_layer_args(features), True),
         "flight": (flight_args(features), True),
     }
-    files = {"generated/scene.cl": scene_text(features.slabs)}
+    files = {"generated/scene.cl": scene_text(blocks.unused(features))}
     for name, (args, behind) in groups.items():
         rows = args_text(name.upper(), args, behind)
         files[f"generated/{name}_args.cl"] = "\n".join([*rows, ""])
     return files
 
 
-def scene_text(records: Sequence[Record] = SLABS) -> str:
-    """Return records, the `Scene` struct and the macros that carry it through arguments."""
-    slabs = [record.slab_text() for record in records]
+def scene_text(unused: Container[str] = ()) -> str:
+    """Return records, the `Scene` struct and the macros that carry it through arguments.
+
+    unused: members of the slabs that no kernel of the scene uses.
+    """
+    slabs = [record.slab_text(unused) for record in SLABS]
     rows = [record.row_text() for record in (SHAPE, INSTANCE, LIGHT)]
     members = [
         f"    global const {element} *{name}; /* {doc} */"
@@ -72,9 +75,7 @@ def scene_text(records: Sequence[Record] = SLABS) -> str:
             "typedef struct {",
             *members,
             "    global const Settings *settings;",
-            "#if USES_MOTION",
-            "    real time; /* of the path that is traced or shaded [s] */",
-            "#endif",
+            "    real time; /* of the path that is traced or shaded [s]; 0 where nothing moves */",
             "} Scene;",
             *rows,
             f"#define SHAPE_ROW_WORDS {SHAPE.words}",

@@ -233,7 +233,7 @@ def bsdf_text(features: Features, cls: type[Scatterer]) -> str:
 
 
 def _interior_text(cls: type[Scatterer]) -> list[str]:
-    """`BSDF_INTERIOR`: the name of the medium inside, see kernels/optics/medium.cl."""
+    """`BSDF_INTERIOR`: the name of the medium inside, see kernels/media/medium.cl."""
     interior = interior_params(cls)
     first = row_words(cls) - sum(map(words, interior.values()))
     inside = f"((row) + {1 + first})" if interior else "((integer)(0))"

@@ -15,8 +15,9 @@ from textwrap import dedent
 
 from clpt import device
 from clpt.errors import SceneError
+from clpt.geometry import shape_records
 from clpt.records import INSTANCE, LIGHT, SETTINGS, SHAPE, SLABS
-from clpt.render.contract import light_records, shape_records
+from clpt.render.contract import light_records
 from clpt.scene import KINDS
 from clpt.scene.materials import LEAVES, Material
 from clpt.scene.scatterer import Scatterer

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from clpt.geometry import shape_records
 from clpt.layout import Record
-from clpt.render.contract import shape_records
 from clpt.scene.lights import KINDS as LIGHTS
 from clpt.scene.lights import Light
 from clpt.scene.params import Param, params
@@ -148,8 +148,8 @@ RECORDS: dict[str, Record] = {
     VOLUME: Record(
         "EmissiveBrick",
         "A brick of a grid that emits.",
-        medium=("integer", "the medium, see kernels/optics/medium.cl"),
-        number=("integer", "of the brick, see kernels/optics/medium_grid.cl"),
+        medium=("integer", "the medium, see kernels/media/medium.cl"),
+        number=("integer", "of the brick, see kernels/media/medium_grid.cl"),
         corner=("vec3", "[m]"),
         x=("vec3", "edges from there [m]"),
         y=("vec3", ""),

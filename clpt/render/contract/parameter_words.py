@@ -24,7 +24,7 @@ ORDERS_WORDS = 2 * ORDERS + 1
 ANGULAR_WORDS = 5  # of the table: first value, cosines, rows; first wavelength, rows a nm
 MEASUREMENT_WORDS = 1 + SPECTRUM_WORDS  # its first number; which colour a wavelength has
 MERL_WORDS = 4  # its first number; rows of what red, green and blue are
-LAYERS_WORDS = 2  # where the layers lie, see clpt.render.lowering.materials.thin_films; how many
+LAYERS_WORDS = 2  # where the layers lie, see clpt.render.lowering.spectra.thin_films; how many
 
 
 def words(param: Param) -> int:

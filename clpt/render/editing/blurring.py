@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import on_host
 from clpt.errors import SceneError
-from clpt.render.lowering.device_arrays import on_host
-from clpt.render.lowering.geometry import shapes
+from clpt.geometry import shapes
 from clpt.scene import Scene
 from clpt.scene.motion import Deformation, Shutter, placement, through
 from clpt.scene.shapes import Curves, Group, Instance, Mesh, Spheres

@@ -16,14 +16,14 @@ import pyopencl as cl
 from numpy.typing import NDArray
 
 from clpt import bvh, transforms
+from clpt.arrays import on_device
+from clpt.geometry import analytic, shapes, strands, triangles
+from clpt.geometry.tessellate import keeps_its_kind
 from clpt.records import SHAPE
 from clpt.render.editing.cannot_move import CannotMove
 from clpt.render.editing.moving_instances import Boxes, Location, MovingInstances
 from clpt.render.editing.moving_spheres import MovingSpheres
 from clpt.render.editing.scene_edit import Replacements
-from clpt.render.lowering.device_arrays import on_device
-from clpt.render.lowering.geometry import analytic, shapes, strands, triangles
-from clpt.render.lowering.geometry.tessellate import keeps_its_kind
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene import Scene
 from clpt.scene.params import fields_of

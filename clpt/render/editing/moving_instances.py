@@ -9,10 +9,10 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
+from clpt.arrays import on_device
 from clpt.bvh import Building
+from clpt.geometry import instancing, shapes
 from clpt.records import INSTANCE
-from clpt.render.lowering.device_arrays import on_device
-from clpt.render.lowering.geometry import instancing, shapes
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene.shapes import Shape
 

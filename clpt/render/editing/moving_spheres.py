@@ -11,12 +11,13 @@ import pyopencl as cl
 from numpy.typing import NDArray
 
 from clpt import transforms
+from clpt.arrays import on_device
 from clpt.bvh import Building
+from clpt.geometry import analytic, shapes, spheres
 from clpt.records import SHAPE
 from clpt.render.editing.cannot_move import CannotMove
 from clpt.render.editing.moving_instances import Boxes
-from clpt.render.lowering.device_arrays import as_array, on_device
-from clpt.render.lowering.geometry import analytic, shapes, spheres
+from clpt.render.lowering.device_arrays import as_array
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene.shapes import Spheres
 

@@ -6,16 +6,16 @@ import dataclasses
 from collections.abc import Callable
 from typing import Any
 
+from clpt.geometry.instancing import distinct
+from clpt.render.analysis.cameras import dispersive_glasses
 from clpt.render.editing.rebuild import ranges
 from clpt.render.editing.scene_edit import Replacements
-from clpt.render.lowering.camera.cameras import dispersive_glasses, lower_camera
-from clpt.render.lowering.geometry.instancing import distinct
+from clpt.render.lowering.camera.cameras import lower_camera
 from clpt.render.lowering.lights.aims import is_sharp
-from clpt.render.lowering.materials.material_words import CLEAR
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera, Lens
-from clpt.scene.materials import COMPOSITES, Material
+from clpt.scene.materials import CLEAR, COMPOSITES, Material
 from clpt.scene.params import params
 
 

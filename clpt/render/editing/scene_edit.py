@@ -10,10 +10,11 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import pyopencl as cl
 
+from clpt.arrays import on_device
 from clpt.errors import SceneError
-from clpt.render.lowering.device_arrays import fresh_view, on_device, readable
-from clpt.render.lowering.geometry import shapes
-from clpt.render.lowering.geometry.instancing import distinct
+from clpt.geometry import shapes
+from clpt.geometry.instancing import distinct
+from clpt.render.lowering.device_arrays import fresh_view, readable
 from clpt.scene import Scene
 from clpt.scene.materials import Material, inner, parts
 from clpt.scene.shapes import SMOOTH, Group, Instance, Shape

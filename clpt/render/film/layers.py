@@ -8,10 +8,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.render.analysis.colour import output_matrix, sensor
 from clpt.render.contract.features.film import layer_places
 from clpt.render.film.cryptomatte import pairs_of
 from clpt.render.film.saved_film import PictureForm
-from clpt.render.lowering.camera.colour import output_matrix, sensor
 from clpt.render.wavefront.film_state import numbers
 from clpt.scene.integrators import Film
 from clpt.scene.layers import LAYERS

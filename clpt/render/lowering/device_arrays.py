@@ -8,6 +8,7 @@ import numpy as np
 import pyopencl as cl
 import pyopencl.array as cl_array
 
+from clpt.arrays import on_device
 from clpt.errors import SceneError
 
 # What shapes have of arrays: numbers in a row (0: the array is flat), and their type.
@@ -20,16 +21,6 @@ COLUMNS: dict[str, tuple[int, type]] = {
     "centers": (3, np.float32),
     "radii": (0, np.float32),
 }
-
-
-def on_device(values: Any) -> bool:
-    """Return whether values lie in device memory."""
-    return isinstance(values, (cl_array.Array, cl.Buffer))
-
-
-def on_host(values: Any) -> Any:
-    """Return values in host memory; of an array on a device a copy, for which it waits."""
-    return values.get() if isinstance(values, cl_array.Array) else values
 
 
 def is_table(values: Any, kind: str) -> bool:

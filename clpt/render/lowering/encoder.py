@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import SceneError
+from clpt.render.analysis.wavelengths import Density
 from clpt.render.contract.features.materials import Sources
 from clpt.render.contract.parameter_words import (
     LAYERS_WORDS,
@@ -15,10 +16,9 @@ from clpt.render.contract.parameter_words import (
     REAL_WORDS,
     SPECTRUM_WORDS,
 )
-from clpt.render.lowering.camera.wavelengths import Density
 from clpt.render.lowering.lowering_cache import LoweringCache
-from clpt.render.lowering.materials import thin_films
-from clpt.render.lowering.spectra_table import SpectraTable
+from clpt.render.lowering.spectra import thin_films
+from clpt.render.lowering.spectra.spectra_table import SpectraTable
 from clpt.render.lowering.tables import TableStore, Words, as_words
 from clpt.render.lowering.textures.bitmaps import Images
 from clpt.render.lowering.textures.textures import TextureTable

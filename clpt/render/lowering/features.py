@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from clpt.render.contract import shape_records
+from clpt.geometry import shape_records
+from clpt.render.analysis.cameras import dispersive_glasses
+from clpt.render.analysis.index import SceneIndex
 from clpt.render.contract.features import (
     CameraFeatures,
     FilmFeatures,
@@ -18,10 +20,8 @@ from clpt.render.contract.features import (
     TextureFeatures,
     TransportFeatures,
 )
-from clpt.render.lowering.camera.cameras import dispersive_glasses
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.geometry.geometry import Geometry, spheres_move
-from clpt.render.lowering.index import SceneIndex
+from clpt.render.lowering.geometry import Geometry, spheres_move
 from clpt.render.lowering.lights.lights import LightRows
 from clpt.render.lowering.materials.material_words import MaterialWords
 from clpt.scene.cameras import Lens

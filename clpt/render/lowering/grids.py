@@ -1,4 +1,4 @@
-"""Densities on grids as bricks of words, see kernels/optics/medium_grid.cl."""
+"""Densities on grids as bricks of words, see kernels/media/medium_grid.cl."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import on_host
 from clpt.render.lowering import device_grids
-from clpt.render.lowering.device_arrays import on_host
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.tables import Words, as_words
 from clpt.scene.media import Cloud, Grid, Lattice, Medium, Mixture
@@ -25,7 +25,7 @@ AT_ONCE = 4096  # bricks
 LEAST = 0.01  # of what a brick would emit whose density and light were spread evenly
 FAINT = 1e-3  # of all light, which bricks may emit that are not lights
 ROUNDED = 1e-4  # by how much a mixture's density bounds more than its parts
-GLOW_WORDS = 6  # behind the row of a grid, see kernels/optics/medium_grid_light.cl
+GLOW_WORDS = 6  # behind the row of a grid, see kernels/media/medium_grid_light.cl
 BODIES = 1024  # temperatures in a table of black bodies
 PEAK = 4.0956747e-15  # highest radiance of a black body over T^5 [W m^-2 sr^-1 nm^-1 K^-5]
 

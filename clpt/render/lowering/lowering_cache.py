@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from clpt.render.lowering.device_arrays import on_device
+from clpt.arrays import on_device
 
 Made = TypeVar("Made")
 _BY_VALUE = (str, bytes, int, float, bool, type(None), type)

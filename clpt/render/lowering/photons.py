@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.records import PHOTON
-from clpt.render.lowering.camera import cameras
-from clpt.render.lowering.geometry.geometry import Geometry
+from clpt.render.analysis import cameras
+from clpt.render.lowering.geometry import Geometry
 from clpt.scene.cameras import Camera
 from clpt.scene.integrators import Vcm
 

@@ -10,16 +10,17 @@ from numpy.typing import NDArray
 
 from clpt import transforms
 from clpt.errors import SceneError
-from clpt.render.contract import shape_records
-from clpt.render.contract.features import Features, SpectraFeatures
-from clpt.render.contract.layer_names import LayerNames
-from clpt.render.contract.parameter_words import row_words
-from clpt.render.lowering import features as needs
-from clpt.render.lowering import open_boundaries, photons
-from clpt.render.lowering.bodies import BodyWords, matter_of
-from clpt.render.lowering.camera import cameras, filters
-from clpt.render.lowering.camera.colour import sensor
-from clpt.render.lowering.camera.surroundings import (
+from clpt.geometry import shape_records, shapes
+from clpt.geometry.instancing import Instances
+from clpt.geometry.motion import at_rest, corners, swept
+from clpt.geometry.refining import is_refined
+from clpt.render.analysis import cameras, open_boundaries
+from clpt.render.analysis.bodies import matter_of
+from clpt.render.analysis.checks import check
+from clpt.render.analysis.colour import sensor
+from clpt.render.analysis.index import SceneIndex
+from clpt.render.analysis.sealed import sealed_media
+from clpt.render.analysis.surroundings import (
     bodies_around,
     boundaries,
     contested,
@@ -27,32 +28,35 @@ from clpt.render.lowering.camera.surroundings import (
     stands_still,
     warnings_of,
 )
-from clpt.render.lowering.camera.wavelengths import Density, density, emissions
-from clpt.render.lowering.checks import check
+from clpt.render.analysis.wavelengths import Density, density, emissions
+from clpt.render.contract.features import Features, SpectraFeatures
+from clpt.render.contract.layer_names import LayerNames
+from clpt.render.contract.parameter_words import row_words
+from clpt.render.lowering import features as needs
+from clpt.render.lowering import photons
+from clpt.render.lowering.camera import filters
+from clpt.render.lowering.camera.cameras import lower_camera
 from clpt.render.lowering.device_arrays import is_table
 from clpt.render.lowering.device_grids import DeviceGrid
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.geometry import shapes
-from clpt.render.lowering.geometry.geometry import (
+from clpt.render.lowering.geometry import (
     SHAPE_ONE_LIGHT,
+    Emitter,
     Geometry,
     lower_geometry,
     shape_words,
 )
-from clpt.render.lowering.geometry.instancing import Instances
-from clpt.render.lowering.geometry.refining import is_refined
-from clpt.render.lowering.index import SceneIndex
 from clpt.render.lowering.layer_names import lower_names
 from clpt.render.lowering.lights.aims import aims
 from clpt.render.lowering.lights.hard_light import Lit, decided
 from clpt.render.lowering.lights.light_bounds import Bounds
-from clpt.render.lowering.lights.light_media import NOWHERE, LightMedia, light_media
-from clpt.render.lowering.lights.lights import Around, Emitter, LightRows, light_rows, row_order
+from clpt.render.lowering.lights.lights import Around, LightRows, light_rows, row_order
 from clpt.render.lowering.lowering_cache import LoweringCache
 from clpt.render.lowering.materials.material_words import MaterialWords
-from clpt.render.lowering.media import MediumWords, medium_aims
-from clpt.render.lowering.motion import at_rest, corners, lower_motion, swept
-from clpt.render.lowering.sealed import sealed_media
+from clpt.render.lowering.media.body_words import BodyWords
+from clpt.render.lowering.media.light_media import NOWHERE, LightMedia, light_media
+from clpt.render.lowering.media.medium_words import MediumWords, medium_aims
+from clpt.render.lowering.motion import lower_motion
 from clpt.render.lowering.settings import DEEPEST, Found, settings_of
 from clpt.render.lowering.textures.attributes import Owner, lower_attributes
 from clpt.scene import Scene
@@ -350,7 +354,7 @@ def _lower_camera(index: SceneIndex, encoder: Encoder) -> tuple[int, ...]:
     for glass in glasses:
         encoder.spectra.check_index(glass, f"{camera.kind}.glass")
     rows = tuple(encoder.spectra.row(glass) for glass in glasses) if index.spectral else ()
-    _, words = cameras.lower_camera(camera, film.width, film.height, rows)
+    _, words = lower_camera(camera, film.width, film.height, rows)
     encoder.store.append_floats("camera", words)
     return rows
 

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.records import SETTINGS
+from clpt.render.analysis.colour import film_scale, output_matrix
+from clpt.render.analysis.index import SceneIndex
+from clpt.render.analysis.wavelengths import Density
 from clpt.render.lowering import guides, photons
-from clpt.render.lowering.camera.colour import film_scale, output_matrix
-from clpt.render.lowering.camera.wavelengths import Density
-from clpt.render.lowering.geometry.geometry import Geometry
-from clpt.render.lowering.index import SceneIndex
+from clpt.render.lowering.geometry import Geometry
 from clpt.render.lowering.lights.light_level import light_level
 from clpt.render.lowering.lights.lights import LightRows
 from clpt.spectra.cie import tanh_ends

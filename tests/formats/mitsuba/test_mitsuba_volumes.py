@@ -13,7 +13,7 @@ from clpt.formats.volumes import vol
 from clpt.scene import media
 from clpt.scene.volumes import resampled
 from clpt.spectra import RGB, Constant
-from tests.renders.support import assert_agree, assert_mean, blocks, exposures, mitsubas, with_film
+from tests.pictures.support import assert_agree, assert_mean, blocks, exposures, mitsubas, with_film
 
 NUMBERS = np.random.default_rng(5).random((3, 2, 4), np.float32)
 AROUND = '<transform name="to_world"><translate value="-.5,-.5,-.5"/><scale value="2"/></transform>'

@@ -8,7 +8,7 @@ import pytest
 import clpt
 from clpt import images
 from clpt.scene.textures import Product
-from tests.renders.support import with_film, with_path
+from tests.pictures.support import with_film, with_path
 
 POWER = 100.0
 SQUARE = "[-1 -1 0 1 -1 0 -1 1 0 1 1 0]"  # of a patch: its rows run along u

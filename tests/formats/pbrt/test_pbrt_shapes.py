@@ -8,7 +8,7 @@ import pytest
 from clpt import transforms
 from clpt.errors import SceneError
 from clpt.formats import load
-from clpt.render.lowering.geometry import triangles
+from clpt.geometry import triangles
 from clpt.scene import shapes, subdivision
 from clpt.scene.materials import Mask, Null, TwoSided
 

@@ -11,7 +11,7 @@ from clpt import transforms
 from clpt.errors import SceneError
 from clpt.formats.pbrt.map_values import map_values
 from clpt.formats.pbrt.textures import textured
-from clpt.render.lowering.textures.texels import pixels
+from clpt.scene.pixels import pixels
 from clpt.scene.textures import Bitmap, Checkerboard, Checkers, Dots, Mix, Noise, Product
 from tests.formats.pbrt.directives import define, params, state
 

@@ -14,6 +14,7 @@ from clpt.spectra import Tabulated
 # Of a program, not of a scene: how it is built, and what generated files define.
 OTHERS = {"LANES", "QUEUED", "SHADES_BOTH", "PART", "NOT_INLINED", "USES_MAPPINGS"}
 OPENCL = {"FP_FAST_FMAF"}  # what compilers define
+TABLES = flags.SCENE | flags.MATERIAL.keys()
 CONDITION = re.compile(r"^\s*#\s*(?:if|ifdef|ifndef|elif)\b(.*)", re.MULTILINE)
 
 
@@ -29,19 +30,22 @@ def test_what_kernels_ask_for_is_a_flag() -> None:
     text = kernels()
     asked = {name for line in CONDITION.findall(text) for name in re.findall(r"\b[A-Z]\w*", line)}
     defined = set(re.findall(r"#\s*define (\w+)", text))
-    assert asked - defined - OTHERS - OPENCL <= flags.NAMES
+    assert asked - defined - OTHERS - OPENCL <= TABLES
 
 
 def test_every_flag_is_asked_for() -> None:
-    assert set(re.findall(r"\b[A-Z]\w*", kernels())) >= flags.NAMES
+    assert set(re.findall(r"\b[A-Z]\w*", kernels())) >= TABLES
 
 
 def test_a_flag_that_does_not_hold_is_not_in_the_text() -> None:
+    """What asks for it is decided: of flags a text names those alone that it calculates with."""
     scene = Scene(camera=Perspective(), shapes=[shapes.Sphere()], film=Film(width=4, height=4))
-    texts = programs.sources(lower(scene).features, "wide8", 1, queued=False)
-    head = texts["shade_diffuse"].text.split("#line", 1)[0]
-    assert "#define USES_ANALYTIC 1\n" in head and "USES_INSTANCES" not in head
-    assert "#define BSDF_TRANSMITS 0\n" in head, "kernels calculate with it"
+    features = lower(scene).features
+    hold = flags.of_scene(features) | flags.of_material(features, materials.Diffuse)
+    text = programs.sources(features, "wide8", 1, queued=False)["shade_diffuse"].text
+    named = set(re.findall(r"\b[A-Z]\w*", re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)))
+    assert "USES_ANALYTIC" in hold and "USES_INSTANCES" not in hold
+    assert named & TABLES <= hold.keys()
 
 
 def test_features_are_told_apart_by_their_values() -> None:

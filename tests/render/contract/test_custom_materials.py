@@ -126,6 +126,16 @@ def test_a_fault_names_the_line_in_the_users_file() -> None:
     assert "nonsense" in lines[raised.value.line - 1]
 
 
+def test_a_row_of_the_whole_text_is_found_in_the_users_file() -> None:
+    """NVIDIA's compiler tells no more of a fault."""
+    broken = dataclasses.replace(scene(m.Diffuse), shapes=[shapes.Cube(material=Flawed())])
+    made = programs.sources(lower(broken).features, "wide8", 8, queued=False)["shade_flawed"]
+    rows = made.text.splitlines()
+    file, line = made.place(1 + next(i for i, row in enumerate(rows) if "nonsense" in row))
+    assert file is not None and line is not None and Path(file) == Path(__file__)
+    assert "nonsense" in Path(file).read_text(encoding="utf-8").splitlines()[line - 1]
+
+
 def test_its_functions_and_constants_are_its_own() -> None:
     """Where stages are linked to one program two kinds may have helpers of one name."""
     helped = """

@@ -11,8 +11,8 @@ import clpt
 from clpt.errors import SceneError
 from clpt.records import SETTINGS, SHAPE, TABLES
 from clpt.render.contract.parameter_words import MIXTURE
-from clpt.render.lowering.geometry import geometry
-from clpt.render.lowering.geometry.geometry import SHAPE_NORMALS, SHAPE_TWO_SIDED, SHAPE_UVS
+from clpt.render.lowering import geometry
+from clpt.render.lowering.geometry import SHAPE_NORMALS, SHAPE_TWO_SIDED, SHAPE_UVS
 from clpt.render.lowering.scene import lower
 from clpt.render.lowering.settings import DEEPEST
 from clpt.scene import Film, Scene

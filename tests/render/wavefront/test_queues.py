@@ -16,7 +16,7 @@ from clpt.benchmark.traffic import kept_lines
 from clpt.device import Source
 from clpt.records import HIT, PATH, SHADOW, SLABS
 from clpt.render.codegen import programs
-from clpt.render.codegen.blocks import blocks_text, members
+from clpt.render.codegen.blocks import blocks_text, members, unused
 from clpt.render.codegen.signatures import scene_text
 from clpt.render.lowering.scene import lower
 from clpt.render.wavefront import queues
@@ -217,5 +217,5 @@ def test_blocks_hold_what_shading_uses(name: str, mode: str) -> None:
             calls = set(CALL.findall("\n".join(kept_lines(texts[program].text))))
             assert len(calls) > 10
             for verb, slab, member in calls:
-                own = [*kept.get(f"{verb} {slab}", kept[slab]), *(["lambdas"] * (mode == "rgb"))]
+                own = [*kept.get(f"{verb} {slab}", kept[slab]), *unused(features)]
                 assert member in own, f"{program}: {verb}_{slab}_{member}"

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from clpt.layout import Record
-from clpt.records import HIT, PATH, SHADOW
 from clpt.render.contract.features.camera import CameraFeatures
 from clpt.render.contract.features.film import FilmFeatures, FilterFeatures, LayerFeatures
 from clpt.render.contract.features.geometry import GeometryFeatures
@@ -48,7 +46,7 @@ GROUP_WORDS = 3 * SUM_WORDS + 1  # of a pixel: three sums and a count, see kerne
 
 @dataclass(frozen=True)
 class Features:
-    """What occurs in a scene, and in one kind of its paths, see `passes`."""
+    """Features of a scene, and of one kind of its paths, see `passes`."""
 
     camera: CameraFeatures = CameraFeatures()
     film: FilmFeatures = FilmFeatures()
@@ -60,14 +58,6 @@ class Features:
     textures: TextureFeatures = TextureFeatures()
     spectra: SpectraFeatures = SpectraFeatures()
     materials: MaterialFeatures = MaterialFeatures()
-
-    @property
-    def slabs(self) -> tuple[Record, ...]:
-        """The records of the state of paths, see clpt.records, as the scene's kernels have them.
-
-        Their memory is that of `SLABS`, so that it serves whatever a scene changes to.
-        """
-        return (PATH if self.textures.mips else PATH.without("cone"), HIT, SHADOW)
 
     @property
     def passes(self) -> tuple[Features, ...]:
@@ -124,7 +114,6 @@ class Features:
         return self.lights.infinite or self.lights.tree or weighed_there
 
     @property
-    @macro("USES_VISIBLE_LIGHTS")
     def shows_lights(self) -> bool:
         """Whether paths that start at lights join these to the camera."""
         own = self.transport

@@ -1,11 +1,11 @@
-"""What the kernels need of a camera."""
+"""Features of a camera: its kind, and what its lens does."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from clpt.render.contract.camera_records import WEIGHTED
-from clpt.render.contract.features.macros import flag, macro
+from clpt.render.contract.features.macros import flag
 
 
 @dataclass(frozen=True)
@@ -18,7 +18,6 @@ class CameraFeatures:
     ghosts: bool = flag("LENS_GHOSTS")  # and samples follow it
 
     @property
-    @macro("CAMERA_WEIGHS")
     def weighs(self) -> bool:
         """Whether its rays have weights."""
         return self.kind in WEIGHTED

@@ -1,4 +1,4 @@
-"""What the kernels need of a film: its filter, its sums, and its layers beside the picture."""
+"""Features of a film: its filter, its sums, and its layers beside the picture."""
 
 from __future__ import annotations
 
@@ -85,13 +85,13 @@ class LayerFeatures:
     @property
     @macro("MATTES")
     def matte_count(self) -> int:
-        """How many layers are lists of names."""
+        """Number of layers that are lists of names."""
         return len(self.mattes)
 
     @property
     @macro("MATTE_SLOTS")
     def matte_slots(self) -> int:
-        """How many names a list holds."""
+        """Number of names that a list holds."""
         return MATTE_SLOTS if self.mattes else 0
 
     @property
@@ -114,7 +114,7 @@ class LayerFeatures:
     @property
     @macro("LIGHT_LAYERS")
     def light_pictures(self) -> int:
-        """How many pictures of light there are beside the picture, of each group of sums."""
+        """Number of pictures of light beside the picture, of each group of sums."""
         groups = self.light_groups if "light_groups" in self.lights else 1
         return len(self.lights) - 1 + groups if self.lights else 0
 
@@ -147,7 +147,7 @@ def _number(name: str, names: tuple[str, ...]) -> int:
 
 @dataclass(frozen=True)
 class FilmFeatures:
-    """What a pixel of the film holds."""
+    """The sums of a pixel of the film."""
 
     filter: FilterFeatures = FilterFeatures()
     layers: LayerFeatures = LayerFeatures()

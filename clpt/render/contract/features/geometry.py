@@ -1,4 +1,4 @@
-"""What the kernels need of shapes."""
+"""Features of shapes: the kinds that are no triangles, instances, and values of vertices."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the kernels need of lights."""
+"""Features of lights: their kinds, and how one is chosen."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class LightFeatures:
     """The device kinds of lights, see clpt.render.contract.light_records, and what they do."""
 
     kinds: tuple[str, ...] = ()
-    infinite: bool = flag("USES_INFINITE")  # some light is met by rays that leave the scene
+    infinite: bool = False  # some light is met by rays that leave the scene
     visible: bool = False  # some light is no delta light: a camera may see it
     two_sided: bool = False  # some shape emits from its back too
     tree: bool = False  # a tree chooses among the lights

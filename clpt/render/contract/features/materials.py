@@ -1,4 +1,4 @@
-"""What the kernels need of materials, and where all values that they load come from."""
+"""Features of materials, and where all values that kernels load come from."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Sources = frozenset[tuple[str, str, str]]
 
 @dataclass(frozen=True)
 class MaterialFeatures:
-    """What materials a path may meet.
+    """The materials that a path may meet.
 
     leaves: classes of leaf materials in their order, then of phase functions: a material word's
     upper bits count in it; transmitting: kinds of leaves of which some let light through; shining:
@@ -32,7 +32,7 @@ class MaterialFeatures:
     @property
     @macro("BSDF_COUNT")
     def count(self) -> int:
-        """How many kinds there are."""
+        """Number of kinds."""
         return len(self.leaves)
 
     @property
@@ -41,7 +41,6 @@ class MaterialFeatures:
         return tuple(cls.kind for cls in self.leaves)
 
     @property
-    @macro("USES_NULL_SURFACES")
     def null_surfaces(self) -> bool:
         """Whether some surface lets light through as if it were not there."""
         return self.free_panes or any(cls.is_null for cls in self.leaves)

@@ -1,4 +1,4 @@
-"""What the kernels need of media: inside or outside of shapes, or around the camera."""
+"""Features of media, inside or outside of shapes, or around the camera."""
 
 from __future__ import annotations
 

@@ -1,15 +1,15 @@
-"""What the kernels need of motion while the shutter is open."""
+"""Features of motion while the shutter is open."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
-from clpt.render.contract.features.macros import flag, macro, number
+from clpt.render.contract.features.macros import flag, number
 
 
 @dataclass(frozen=True)
 class MotionFeatures:
-    """What moves, and where the table of that is."""
+    """The things that move, and where the table of them is."""
 
     camera: bool = False
     instances: bool = flag("MOVES_INSTANCES")
@@ -28,7 +28,6 @@ class MotionFeatures:
         return tuple(name for name in parts if getattr(self, name))
 
     @property
-    @macro("USES_MOTION")
     def present(self) -> bool:
         """Whether anything moves."""
         return bool(self.parts)

@@ -1,4 +1,4 @@
-"""What the kernels need of spectra."""
+"""Features of spectra: the mode, and the grid of tabulated ones."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""What the kernels need of textures."""
+"""Features of textures: their kinds and roles."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from clpt.render.contract.features.macros import flag, macro
+from clpt.render.contract.features.macros import flag
 from clpt.render.contract.texture_records import MIPS
 
 
@@ -23,7 +23,6 @@ class TextureFeatures:
         return tuple(sorted({kind for kind, _ in self.roles}))
 
     @property
-    @macro("USES_MIPS")
     def mips(self) -> bool:
         """Whether some image has smaller copies, which the cones around rays choose."""
         return not MIPS.keys().isdisjoint(self.kinds)

@@ -1,4 +1,4 @@
-"""What the kernels need of light transport: which paths there are, and how they are joined."""
+"""Features of light transport: which paths there are, and how they are joined."""
 
 from __future__ import annotations
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt.errors import SceneError
+from clpt.render.analysis.filters import radius
 from clpt.render.lowering.tables import TableStore
 from clpt.scene.integrators import (
     BlackmanHarris,
@@ -25,7 +25,6 @@ Values = NDArray[np.float64]
 CELLS = 1024  # of equal probability, on one side
 STEPS = 1 << 16  # in which a filter is integrated
 PROFILE = 256  # steps of a filter's values
-CUT = 4.0  # standard deviations at which a Gaussian ends that has no radius
 
 
 def lower_filter(chosen: Filter, store: TableStore, splatting: bool) -> None:
@@ -44,23 +43,6 @@ def lower_profile(chosen: Filter, store: TableStore, splatting: bool) -> int:
     splatting: as of `lower_filter`; where samples serve their own pixel the values are appended.
     """
     return 0 if splatting else store.append_floats("distributions", profile(chosen))
-
-
-def reach(chosen: Filter) -> int:
-    """Return how many pixels beside its own a sample may serve, along an axis to one side."""
-    return max(math.ceil(radius(chosen) - 0.5), 0)
-
-
-def taps(chosen: Filter) -> int:
-    """Return how many pixels of an axis have a point in their filters at most."""
-    return math.ceil(2.0 * radius(chosen))
-
-
-def radius(chosen: Filter) -> float:
-    """Return the half width of a filter [pixels]."""
-    if isinstance(chosen, Gaussian) and chosen.radius == 0.0:
-        return CUT * chosen.stddev
-    return float(chosen.radius)  # type: ignore[attr-defined]
 
 
 def value(chosen: Filter, distance: ArrayLike) -> Values:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -18,66 +17,17 @@ from clpt.errors import SceneError
 from clpt.lenses import COATINGS, Prescription
 from clpt.lenses.coatings import DESIGN, reflectance
 from clpt.lenses.glasses import LINE_D
-from clpt.lenses.paraxial import film_distance, stop_radius
-from clpt.lenses.pupils import ZONES, axis_solid_angle, zones
+from clpt.lenses.pupils import ZONES
 from clpt.lenses.tracing import sag
+from clpt.render.analysis.lens import focused
 from clpt.render.contract.camera_records import GHOST_CELLS, LENS_SURFACE, RECORDS
 from clpt.scene.cameras import Lens
 from clpt.spectra import Constant, Spectrum
 
 Values = NDArray[np.float64]
 
-MARGIN = 1.05  # of the film's radius that has zones, as filters reach beyond the film
 GHOST_LAMBDAS = np.linspace(420.0, 680.0, 14)  # [nm], for which pairs of surfaces are weighed
 EVEN = 0.1  # part of the ghosts' samples that all pairs share alike
-
-
-def glasses(camera: Lens) -> tuple[Spectrum, ...]:
-    """Return the indices of a lens that differ between wavelengths, each once."""
-    surfaces = camera.prescription.surfaces
-    return tuple(dict.fromkeys(s.glass for s in surfaces if not isinstance(s.glass, Constant)))
-
-
-@lru_cache(maxsize=64)
-def _placed(
-    lens: Prescription, f_number: float, focus: float, shift: float, radius: float
-) -> tuple[Prescription, float, Values, float]:
-    """A lens at an f-number, the way from it to its film [mm], what its film sees, at its middle
-    the projected solid angle [sr]. focus, shift, radius of the film [mm]."""
-    try:
-        made = lens if f_number == 0.0 else lens.with_stop(stop_radius(lens, f_number))
-    except SceneError as error:
-        raise SceneError(error.message, where="lens.f_number") from None
-    try:
-        distance = film_distance(lens, focus) + shift
-    except SceneError as error:
-        raise SceneError(error.message, where="lens.focus_distance") from None
-    if not distance > 0.0:
-        raise SceneError(
-            f"the film would stand {-distance:.4g} mm inside of the lens", where="lens.film_shift"
-        )
-    return made, distance, zones(made, distance, radius), axis_solid_angle(made, distance)
-
-
-def _focused(camera: Lens, aspect: float) -> tuple[Prescription, float, Values, float, float]:
-    """What `_placed` tells of a camera, whose film's height over its width is `aspect`, and the
-    radius of the film that has zones [mm]. Raises SceneError."""
-    unit = camera.unit
-    radius = MARGIN * 0.5 * camera.film_width * math.hypot(1.0, aspect) / unit
-    placed = _placed(
-        camera.prescription, camera.f_number, camera.focus_distance / unit,
-        camera.film_shift / unit, radius,
-    )  # fmt: skip
-    return *placed, radius
-
-
-def front(camera: Lens, aspect: float) -> float:
-    """Return how far the front of the lens is from its film [m]: there light comes in.
-
-    aspect: of the film, height over width. Raises SceneError for a lens that cannot be used.
-    """
-    lens, back, *_ = _focused(camera, aspect)
-    return (back + lens.length) * camera.unit
 
 
 def lens_words(
@@ -89,7 +39,7 @@ def lens_words(
     """
     unit = camera.unit
     extent = np.array([camera.film_width, camera.film_width * height / width])
-    lens, back, ellipses, angle, radius = _focused(camera, height / width)
+    lens, back, ellipses, angle, radius = focused(camera, height / width)
     if not angle > 0.0:
         raise SceneError("no light comes through to the middle of the film", where="lens")
     lens = lens.with_coating(COATINGS[camera.coating])

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.render.contract import shape_records
-from clpt.render.lowering.geometry.geometry import Geometry
-from clpt.render.lowering.index import SceneIndex
+from clpt.geometry import shape_records
+from clpt.render.analysis.index import SceneIndex
+from clpt.render.lowering.geometry import Geometry
 from clpt.scene import materials as mt
 
 AIMED = 0.7  # share of the light paths that aim

@@ -15,15 +15,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.render.contract import shape_records
-from clpt.render.lowering.camera import cameras, surroundings
+from clpt.geometry import analytic, shape_records, shapes, triangles
+from clpt.render.analysis import cameras, surroundings
+from clpt.render.analysis.index import SceneIndex
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.geometry import analytic, shapes, triangles
-from clpt.render.lowering.geometry.geometry import Geometry
-from clpt.render.lowering.index import SceneIndex
+from clpt.render.lowering.geometry import Emitter, Geometry
 from clpt.render.lowering.lights import image_lights, light_bounds, sky
 from clpt.render.lowering.lights.aims import is_sharp, sharp_pieces
-from clpt.render.lowering.lights.lights import Emitter, LightRows, row_order
+from clpt.render.lowering.lights.lights import LightRows, row_order
 from clpt.scene import materials as mt
 from clpt.scene.integrators import AUTO, Auto, Integrator, Path, Vcm
 from clpt.scene.lights import CubeMap, Envmap, Sky

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt import images, spectral_exr, transforms
+from clpt.arrays import on_host
 from clpt.errors import SceneError
-from clpt.render.lowering.device_arrays import on_host
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.lights import block_grids
 from clpt.render.lowering.lowering_cache import version

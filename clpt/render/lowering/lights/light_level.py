@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.render.lowering.index import SceneIndex
+from clpt.render.analysis.index import SceneIndex
 from clpt.render.lowering.lights.light_bounds import concatenated
 from clpt.render.lowering.lights.lights import LightRows
 from clpt.render.lowering.lights.non_shape_lights import brightness

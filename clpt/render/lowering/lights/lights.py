@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt.errors import SceneError
+from clpt.geometry import analytic, shape_records, shapes, spheres, triangles
 from clpt.records import LIGHT
-from clpt.render.contract import shape_records
 from clpt.render.contract.light_records import ALONG, BOTH, FRONT, INFINITE, KINDS, VOLUME
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.geometry import analytic, shapes, spheres, triangles
+from clpt.render.lowering.geometry import Emitter
 from clpt.render.lowering.lights import light_bounds, light_tree
 from clpt.render.lowering.lights.brick_lights import BrickLights
 from clpt.render.lowering.lights.non_shape_lights import blank_row, brightness, lower_lamp
@@ -33,23 +33,6 @@ PLACED_LIGHT_WEIGHT = (
     6  # triangles that a light at a place of its own counts as, where a tree is thought of
 )
 INFINITE_SHARE = 0.5  # of the choices, where there are other lights too
-
-
-@dataclass(frozen=True)
-class Emitter:
-    """A shape with an `emission`.
-
-    shape_row: its row in `shapes`; vertices, faces, uvs: its triangles as `shapes.triangles` gave
-    them, needed for a mesh and a cube; of `spheres`, vertices are their balls; keys: rows of each
-    vertex, as of `triangles.keyed`.
-    """
-
-    shape: Shape
-    shape_row: int
-    vertices: shapes.Points | None = None
-    faces: shapes.Faces | None = None
-    uvs: shapes.Points | None = None
-    keys: int = 1
 
 
 Around: TypeAlias = Callable[[int | Emitter, light_bounds.Bounds], light_bounds.Bounds] | None

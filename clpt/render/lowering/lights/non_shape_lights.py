@@ -12,10 +12,10 @@ from clpt.render.contract import light_records
 from clpt.render.contract.light_records import RECORDS
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.lights import image_lights, projected, sky
-from clpt.render.lowering.textures.texels import pixels
 from clpt.scene import lights
 from clpt.scene.lights import Light
 from clpt.scene.params import params
+from clpt.scene.pixels import pixels
 from clpt.scene.textures import Bitmap, Checkerboard, Dots, MeshAttribute, Mix, Product, Solid
 
 

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from clpt import transforms
 from clpt.errors import SceneError
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.textures.texels import pixels, spectral_image
 from clpt.scene.lights import SPOT_EDGES, Goniometric, Light, Projector, Spot
+from clpt.scene.pixels import pixels, spectral_image
 from clpt.scene.textures import Bitmap
 
 

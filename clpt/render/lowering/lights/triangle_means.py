@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.render.lowering.lights.non_shape_lights import brightness
-from clpt.render.lowering.textures.texels import pixels
+from clpt.scene.pixels import pixels
 from clpt.scene.textures import Bitmap, Checkerboard, MeshAttribute, Mix, Product
 
 Floats = NDArray[np.float64]

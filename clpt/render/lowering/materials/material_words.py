@@ -11,19 +11,17 @@ from dataclasses import dataclass
 from typing import Any
 
 from clpt.errors import SceneError
+from clpt.geometry import shapes
+from clpt.render.analysis.index import any_of
 from clpt.render.contract.parameter_words import MIXTURE
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.geometry import shapes
-from clpt.render.lowering.index import any_of
 from clpt.render.lowering.materials.normal_maps import NormalPerturbation
 from clpt.scene import materials as mt
 from clpt.scene.media import Blend, Phase
 from clpt.scene.params import device_params
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.shapes import Shape
-from clpt.spectra import Constant
 
-CLEAR = Constant(0.0)  # absorption of what absorbs nothing
 _NULL, _BLACK = mt.Null(), mt.Diffuse(reflectance=0.0)
 
 
@@ -119,7 +117,7 @@ class MaterialWords:
             raise SceneError("the scene has more than 16 million words of material parameters")
         self.uvs |= any(map(_has_textures, (material, *getattr(material, "layers", ()))))
         self.tangents |= material.uses_tangents
-        self.absorption |= getattr(material, "absorption", CLEAR) != CLEAR
+        self.absorption |= getattr(material, "absorption", mt.CLEAR) != mt.CLEAR
         if material.transmits:
             self.transmitting.add(material.kind)
         return self._leaves.index(type(material)) << 24 | row

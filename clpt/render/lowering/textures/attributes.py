@@ -13,8 +13,7 @@ import numpy as np
 
 from clpt import spectra
 from clpt.errors import SceneError
-from clpt.render.contract import shape_records
-from clpt.render.lowering.geometry import shapes, triangles
+from clpt.geometry import shape_records, shapes, triangles
 from clpt.render.lowering.lowering_cache import LoweringCache
 from clpt.render.lowering.textures.texels import texels
 from clpt.render.lowering.textures.textures import TextureTable, per_face

@@ -22,13 +22,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import images, spectra
+from clpt.arrays import on_host
 from clpt.errors import SceneError
 from clpt.images import Stored
 from clpt.render.contract.texture_records import KINDS, MIPS
-from clpt.render.lowering.device_arrays import on_host
 from clpt.render.lowering.lowering_cache import LoweringCache, version
 from clpt.render.lowering.tables import TableStore, Words
-from clpt.render.lowering.textures.texels import channel, spectral_image, texels
+from clpt.render.lowering.textures.texels import texels
+from clpt.scene.pixels import channel, spectral_image
 from clpt.scene.textures import Bitmap
 
 NODES = np.array([400.0, 550.0, 700.0])  # [nm] of packed spectra, as in spectral_read.cl

@@ -14,13 +14,14 @@ import numpy as np
 from clpt.errors import SceneError
 from clpt.render.contract.parameter_words import SPECTRUM_WORDS
 from clpt.render.contract.texture_records import KINDS, PROGRAM, RECORDS
-from clpt.render.lowering.spectra_table import SpectraTable
+from clpt.render.lowering.spectra.spectra_table import SpectraTable
 from clpt.render.lowering.tables import TableStore
 from clpt.render.lowering.textures import noise
 from clpt.render.lowering.textures.bitmaps import Images, has_levels, identity
-from clpt.render.lowering.textures.texels import bands, spectral_image
+from clpt.render.lowering.textures.texels import bands
 from clpt.render.lowering.textures.texture_programs import folded, is_composite, program, separated
 from clpt.scene.params import params
+from clpt.scene.pixels import spectral_image
 from clpt.scene.textures import (
     MAPPINGS,
     PATTERNS,

@@ -14,7 +14,7 @@ from clpt.render.lowering.scene import lower
 from clpt.scene import Scene, cameras, integrators, materials, shapes
 from clpt.scene.textures import Bitmap, MeshAttribute, Mix, Product, textures_in
 from clpt.spectra import luminance
-from tests.renders.support import layers_of
+from tests.pictures.support import layers_of
 
 RNG = np.random.default_rng(7)
 CORNERS = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0], [5, 5, 0]], np.float32)

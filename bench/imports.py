@@ -1,0 +1,108 @@
+"""Who imports whom in the package: by statements, wherever they stand, and by `import_module`.
+
+A module has its full name; a package is its __init__. `import_module(f"clpt.formats.{kind}")`
+imports whatever is there.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+from bench.python_files import full_name, read
+
+ROOT = Path(__file__).resolve().parents[1]
+Graph = dict[str, set[str]]
+
+
+def imports(path: Path, root: Path = ROOT) -> dict[str, int]:
+    """The full names of all that a file imports, and takes from what it imports; with lines."""
+    return {
+        name: found.line
+        for found in read(path, root).imports
+        for name in (found.module, *(f"{found.module}.{part}" for part in found.names))
+    }
+
+
+def modules(root: Path = ROOT) -> dict[str, Path]:
+    """The modules of the package by their full names."""
+    paths = sorted((root / "clpt").rglob("*.py"))
+    return {full_name(path, root).removesuffix(".__init__"): path for path in paths}
+
+
+def graph(root: Path = ROOT, by_name: bool = True) -> Graph:
+    """The modules that each module of the package imports; by_name: by `import_module` too."""
+    known = modules(root)
+    links: Graph = {}
+    for name, path in known.items():
+        file = read(path, root)
+        taken = [(found.module, part) for found in file.imports for part in found.names or [""]]
+        targets = {f"{m}.{part}" if f"{m}.{part}" in known else m for m, part in taken}
+        for pattern in file.loaded if by_name else ():
+            targets |= {other for other in known if re.fullmatch(pattern, other)}
+        links[name] = targets & known.keys()
+    return links
+
+
+def rooms(root: Path = ROOT) -> dict[str, Graph]:
+    """For each package, its rooms, and who of them imports whom.
+
+    The rooms of a package are its folders and its modules. All that is in a folder, at whatever
+    depth, imports and is imported as that folder.
+    """
+    known, links = modules(root), graph(root)
+    inside = {n: n if p.name != "__init__.py" else f"{n}.__init__" for n, p in known.items()}
+    houses: dict[str, Graph] = {}
+    for house in (name for name in known if inside[name] != name):
+        depth = house.count(".") + 2
+        room = {
+            name: ".".join(full.split(".")[:depth])
+            for name, full in inside.items()
+            if full.startswith(f"{house}.")
+        }
+        houses[house] = {own: set() for own in room.values()}
+        for name, own in room.items():
+            houses[house][own] |= {room[other] for other in links[name] if other in room} - {own}
+    return houses
+
+
+def circle(links: Mapping[str, set[str]]) -> list[str]:
+    """A circle of a graph, its first node again at the end; empty if there is none."""
+    done: set[str] = set()
+    for start in links:
+        path: list[str] = []
+        open_ = [iter([start])]
+        while open_:
+            if (node := next(open_[-1], None)) is None:
+                open_.pop()
+                done |= set(path[-1:])
+                del path[-1:]
+            elif node in path:
+                return [*path[path.index(node) :], node]
+            elif node not in done:
+                path.append(node)
+                open_.append(iter(sorted(links[node])))
+    return []
+
+
+def circles(links: Mapping[str, set[str]]) -> list[list[str]]:
+    """The sets of two nodes or more that all reach each other, each as large as can be."""
+    reached = {node: _reached(links, node) for node in links}
+    found: list[list[str]] = []
+    for node in links:
+        own = sorted({other for other in reached[node] if node in reached[other]} | {node})
+        if len(own) > 1 and own not in found:
+            found.append(own)
+    return found
+
+
+def _reached(links: Mapping[str, set[str]], start: str) -> set[str]:
+    """The nodes to which a way of one link or more leads from `start`."""
+    seen: set[str] = set()
+    open_ = [*links[start]]
+    while open_:
+        if (node := open_.pop()) not in seen:
+            seen.add(node)
+            open_ += links[node]
+    return seen

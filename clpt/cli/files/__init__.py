@@ -1,0 +1,1 @@
+"""The files of pictures that commands write, go on from and show."""

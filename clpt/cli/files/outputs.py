@@ -1,0 +1,135 @@
+"""The files that `clpt render` writes."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import tempfile
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+from ... import __version__, images
+from ...cluster.cluster_renderer import ClusterRenderer
+from ...device import disk_cache
+from ...errors import ClptError, SceneError
+from ...render.film import film_file, layer_channels
+from ...render.film.denoised_picture import DenoisedPicture
+from ...render.film.host_picture import HostPicture
+from ..opening.makers import AnyRenderer, OfDevices
+from ..options.grading import Grading
+from .standard_output import is_standard
+from .targets import FILM
+
+Film = AnyRenderer | HostPicture  # what pictures are taken of
+Source = Film | DenoisedPicture
+
+
+def metadata(renderer: AnyRenderer, scene: Path, seconds: float) -> dict[str, str | int | float]:
+    """Return the metadata of an .exr: how it was made. spp is the mean over all pixels.
+
+    seconds: of this session; those of former ones are added.
+    """
+    plan, devices = renderer.scene, ""
+    if isinstance(renderer, ClusterRenderer):
+        pictured: OfDevices = renderer.developed()
+        devices = "; ".join(sorted({record.kind for record in renderer.workers.values()}))
+    else:
+        pictured = renderer
+    samples = max(counts.samples for counts in pictured.counts)
+    return {
+        "software": f"clpt {__version__}",
+        "scene": os.fsencode(scene).decode("utf-8", "replace"),
+        "mode": plan.film.mode,
+        "integrator": plan.integrator.kind,
+        "sampler": plan.sampler.kind,
+        "seed": plan.seed,
+        "spp": samples / pictured.wavefronts[0].paths.pixels,
+        "device": devices or " and ".join(on.info.label for on in pictured.devices),
+        "seconds": round(seconds + renderer.former_seconds, 3),
+    }
+
+
+def write_all(
+    paths: tuple[Path, ...],
+    film: Film,
+    stats: dict[str, str | int | float],
+    grading: Grading,
+    tell: Callable[[str], None],
+) -> None:
+    """Write the picture so far to every path, denoised where that was asked for; tell of each.
+
+    A picture that cannot be written goes to another folder, and if that fails too the film does.
+    Raises SceneError at the end, which says where it is.
+    """
+    failures = []
+    source: Source = film
+    if film.denoise is not None and any(path.suffix.lower() != FILM for path in paths):
+        try:
+            source = DenoisedPicture(film)
+            stats = {**stats, "denoised": source.text}
+        except ClptError as error:  # the picture is worth more
+            tell(f"clpt: warning: not denoised: {error}")
+    for path in paths:
+        try:
+            write(path, source, stats, grading)
+            name = "standard output" if is_standard(path) else path
+            tell(f"{name}  {stats['spp']:.4g} spp, {stats['seconds']:.1f} s")
+        except FAILURES as error:
+            failures.append(f"{failure(path, error)}; {_rescue(path, source, stats, grading)}")
+    if failures:
+        raise SceneError("; ".join(failures))
+
+
+FAILURES = (ClptError, OSError, MemoryError)  # of writing a file
+
+
+def _rescue(
+    path: Path, source: Source, stats: dict[str, str | int | float], grading: Grading
+) -> str:
+    """Write a picture, or else its film, where there is room for it; return what to say."""
+    label = f"{path.stem}-{secrets.token_hex(4)}"
+    folders = Path(tempfile.gettempdir()), disk_cache.folder()
+    for folder in folders:
+        other = folder / f"{label}{path.suffix}"
+        with suppress(*FAILURES):
+            write(other, source, stats, grading)
+            return f"the picture is in {other}"
+    for folder in folders:
+        other = folder / f"{label}{FILM}"
+        with suppress(*FAILURES):
+            film_file.write(other, source.saved_film())
+            return f"the film is in {other}, of which clpt merge makes the picture"
+    return f"nor can it in {' or '.join(map(str, folders))}"
+
+
+def failure(path: Path, error: Exception) -> str:
+    """Return what to say of a file that cannot be written: it names the file."""
+    if isinstance(error, SceneError):
+        return str(error)
+    why = str(error) or "memory has run out"  # which a MemoryError does not say
+    return f"{path}: cannot be written: {why}"
+
+
+def write(
+    path: Path, source: Source, stats: dict[str, str | int | float], grading: Grading
+) -> None:
+    """Write the picture so far, or the film. Raises SceneError, OSError."""
+    form = source.form
+    if path.suffix.lower() == FILM:
+        saved = source.saved_film(held=True)
+        if not saved.film.taken:
+            raise SceneError("no pass has come to its end: there is no film yet", file=path)
+        film_file.write(path, saved)
+    elif form.bands and path.suffix.lower() == ".npy":
+        images.write_npy(path, source.image())
+    elif path.suffix.lower() == ".exr":
+        layer_channels.write_layers(path, source, names=grading.names, metadata=stats)
+    else:
+        picture = source.colours() if form.bands else source.image()
+        if path.suffix.lower() == ".png":
+            picture = images.straight(picture)
+        images.write(
+            path, picture, metadata=stats, space=form.output_space, exposure=grading.exposure,
+            tone=grading.tone, view=grading.view,
+        )  # fmt: skip

@@ -1,0 +1,238 @@
+"""Options that say from where a scene is seen, which part of the picture, and what surrounds it."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from ... import images, transforms
+from ...errors import SceneError
+from ...formats.meshes import framing
+from ...scene import Scene
+from ...scene.lights import Envmap
+from ...view.navigation import upright
+from .records import Command, with_options
+
+NEAREST, FARTHEST = 1e-3, 1e6  # of an orbit, in distances that frame the scene
+# The scene's up from +y, by its axis and sign; the front is +z where up is +y, -y where it is +z.
+UPS = {
+    (0, 1): transforms.rotate([0.0, 0.0, 1.0], -90.0),
+    (0, -1): transforms.rotate([0.0, 0.0, 1.0], 90.0),
+    (1, 1): transforms.IDENTITY,
+    (1, -1): transforms.rotate([0.0, 0.0, 1.0], 180.0),
+    (2, 1): framing.Z_UP,
+    (2, -1): transforms.rotate([1.0, 0.0, 0.0], -90.0),
+}
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """Where a camera stands that looks at the middle of a scene.
+
+    azimuth [degrees]: 0 is in front, 90 on the right; elevation [degrees]: 90 is above; distance:
+    in those that frame the whole scene.
+    """
+
+    azimuth: float
+    elevation: float
+    distance: float = 1.0
+
+
+@dataclass(frozen=True)
+class Span:
+    """Columns or rows of a picture: the first one and the end.
+
+    Each is a number of pixels and False, or a share of the picture [percent] and True.
+    """
+
+    first: tuple[float, bool]
+    end: tuple[float, bool]
+
+    def of(self, size: int) -> tuple[int, int]:
+        """Return the first pixel and how many there are, of `size`. Raises click.BadParameter."""
+        first, end = (
+            round(size * number / 100.0) if share else int(number)
+            for number, share in (self.first, self.end)
+        )
+        if not first < end <= size:
+            message = f"{first}:{end} is no part of the picture's {size} pixels"
+            raise click.BadParameter(message, param_hint="--crop")
+        return first, end - first
+
+
+@dataclass(frozen=True)
+class Composition:
+    """From where a scene is seen, which part of the picture, and the image that surrounds it.
+
+    env_rotation: of the image about the vertical [degrees].
+    """
+
+    camera: Orbit | None = None
+    crop: tuple[Span, Span] | None = None
+    env: Path | None = None
+    env_rotation: float | None = None
+
+
+class CameraType(click.ParamType):
+    """AZIMUTH,ELEVATION[,DISTANCE], returned as an Orbit, or a camera's name."""
+
+    name = "AZ,EL[,DIST]|NAME"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Orbit | str:
+        if isinstance(value, Orbit):
+            return value
+        text = str(value).strip()
+        try:
+            numbers = [float(part) for part in text.split(",")]
+        except ValueError:
+            numbers = []
+        if len(numbers) < 2:
+            if not text:
+                self.fail("give degrees such as 45,20, or a camera's number or name", param, ctx)
+            return text
+        if len(numbers) > 3 or not all(map(math.isfinite, numbers)):
+            self.fail(f"{text!r} does not look like 45,20 or 45,20,1.5", param, ctx)
+        orbit = Orbit(*numbers)
+        if abs(orbit.elevation) > 90.0:
+            self.fail(f"the elevation is -90 to 90 degrees, not {orbit.elevation:g}", param, ctx)
+        if not NEAREST <= orbit.distance <= FARTHEST:
+            limits = f"{NEAREST:g} to {FARTHEST:g}"
+            self.fail(f"the distance is {limits}, not {orbit.distance:g}; 1 frames all", param, ctx)
+        return orbit
+
+
+class CropType(click.ParamType):
+    """X0:X1,Y0:Y1 in pixels or percent; returned as two Spans."""
+
+    name = "X0:X1,Y0:Y1"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[Span, Span]:
+        if isinstance(value, tuple):
+            return value
+        number = r"(?:(\d{1,9}(?:\.\d{1,9})?)(%?))?"
+        found = re.fullmatch(rf"{number}:{number},{number}:{number}", str(value).replace(" ", ""))
+        if not found:
+            message = f"{value!r} does not look like 100:200,50:150 or 25%:75%,0%:50%"
+            self.fail(message, param, ctx)
+        ends = [
+            (float(text or default), bool(share) or not text)
+            for text, share, default in zip(
+                found.groups()[::2], found.groups()[1::2], ("0", "100") * 2, strict=True
+            )
+        ]
+        if any(not share and number != int(number) for number, share in ends):
+            self.fail(f"{value!r}: pixels are whole numbers", param, ctx)
+        return Span(*ends[:2]), Span(*ends[2:])
+
+
+def _named(ctx: click.Context, _: Any, value: Orbit | str | None) -> Orbit | None:
+    """Keep an orbit; a name is the scene's variable `camera`, as loaders know it."""
+    if not isinstance(value, str):
+        return value
+    variables = ctx.params["variables"]
+    if "camera" in variables:
+        raise click.BadParameter("-D camera= says it already", param_hint="--camera")
+    variables["camera"] = value
+    return None
+
+
+_OPTIONS = (
+    click.option(
+        "--camera", type=CameraType(), callback=_named,
+        help="See the whole scene from there: degrees to the right of its front, degrees above "
+        "the ground, and how far, where 1 frames it. Or one of the cameras of a glTF or .xml "
+        "file, by its number or name; of `render` all: each, to {scene}.{camera}.exr.",
+    ),
+    click.option(
+        "--crop", type=CropType(),
+        help="Render this part of the picture only: pixels from the upper left, such as "
+        "100:200,50:150, or 25%:75%,:50%.",
+    ),
+    click.option(
+        "--env", type=click.Path(path_type=Path), metavar="FILE",
+        help="Surround the scene with this image, such as an .hdr or .exr, in the place of its "
+        "sky, and of the light and the ground that bare meshes get.",
+    ),
+    click.option(
+        "--env-rotation", type=click.FloatRange(-360.0, 360.0), metavar="DEGREES",
+        help="Turn that image about the vertical, as the azimuth of --camera turns.",
+    ),
+)  # fmt: skip
+
+
+def composition_options(command: Command) -> Command:
+    """Give a command the options of which `Composition` is the record."""
+    return with_options(command, _OPTIONS)
+
+
+def composed(scene: Scene, composition: Composition) -> Scene:
+    """Return the scene as these options want it. Raises click.BadParameter, SceneError."""
+    camera, env, rotation = composition.camera, composition.env, composition.env_rotation
+    if env is None and rotation is not None:
+        raise click.BadParameter("there is no --env to turn", param_hint="--env-rotation")
+    if camera is not None or env is not None:
+        up = up_of(scene)
+        if camera is not None:
+            scene = dataclasses.replace(scene, camera=_orbiting(scene, camera, up))
+        if env is not None:
+            scene = _surrounded(scene, env, up, rotation or 0.0)
+    if composition.crop is not None:
+        film, (columns, rows) = scene.film, composition.crop
+        (x, width), (y, height) = columns.of(film.width), rows.of(film.height)
+        film = dataclasses.replace(film, crop=(x, y, width, height))
+        scene = dataclasses.replace(scene, film=film)
+    return scene
+
+
+def up_of(scene: Scene) -> transforms.Matrix:
+    """Return the rotation (4, 4) that takes +y to the scene's up, and +z to its front.
+
+    Formats of objects have their own; of other scenes up is the axis nearest to the camera's up.
+    Raises SceneError for a camera without any.
+    """
+    if "studio" in scene.extra:
+        return framing.up_of(scene.extra["format"])
+    try:
+        up = upright(scene.camera)
+    except np.linalg.LinAlgError:
+        raise SceneError("flattens space: its up is not known", where="camera") from None
+    axis = int(np.argmax(np.abs(up)))
+    return UPS[axis, int(np.sign(up[axis]))]
+
+
+def _own_shapes(scene: Scene) -> list[Any]:
+    """Return the shapes of the scene's file, without those of the studio."""
+    return scene.shapes[: len(scene.shapes) - scene.extra.get("studio", {}).get("shapes", 0)]
+
+
+def _orbiting(scene: Scene, orbit: Orbit, up: transforms.Matrix) -> Any:
+    """Return a camera on the orbit. Raises SceneError where the scene is too large."""
+    azimuth, elevation = math.radians(orbit.azimuth), math.radians(orbit.elevation)
+    aside, ahead = math.sin(azimuth), math.cos(azimuth)
+    from_ = (math.cos(elevation) * aside, math.sin(elevation), math.cos(elevation) * ahead)
+    top = (-math.sin(elevation) * aside, math.cos(elevation), -math.sin(elevation) * ahead)
+    return framing.framing_camera(
+        _own_shapes(scene), up, from_=from_, top=top, distance=orbit.distance
+    )
+
+
+def _surrounded(scene: Scene, image: Path, up: transforms.Matrix, rotation: float) -> Scene:
+    """Return the scene in an image, without its own surroundings and without the studio's light."""
+    images.check_input(image)
+    studio = scene.extra.get("studio", {})
+    lights = scene.lights[: len(scene.lights) - studio.get("lights", 0)]
+    turned = up @ transforms.rotate([0.0, 1.0, 0.0], rotation)
+    around = Envmap(image=str(image), to_world=turned)
+    return dataclasses.replace(
+        scene,
+        shapes=_own_shapes(scene),
+        lights=[light for light in lights if light.reach != "infinite"] + [around],
+        extra=scene.extra | ({"studio": {**studio, "shapes": 0, "lights": 0}} if studio else {}),
+    )

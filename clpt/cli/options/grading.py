@@ -1,0 +1,79 @@
+"""Options that say how light becomes the colours of a .png."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import click
+
+from ...colour.tones import TONES
+from ...colour.view import DEFAULT_CONFIG, View
+from ...render.film.layer_channels import SETS
+from .records import Command, with_options
+
+
+@dataclass(frozen=True)
+class Grading:
+    """How files say a picture.
+
+    exposure [stops]; tone: a curve of clpt.colour.tones; view: of OpenColorIO, instead; names: of
+    channels of an .exr, a set of clpt.render.film.layer_channels.SETS.
+    """
+
+    exposure: float = 0.0
+    tone: str = "none"
+    view: View | None = None
+    names: str = SETS[0]
+
+
+@dataclass(frozen=True)
+class GradingOptions:
+    """What the options of `grading_options` and `names_option` say."""
+
+    exposure: float
+    tone: str | None
+    view: str | None
+    display: str | None
+    look: str | None
+    ocio: str
+    names: str = SETS[0]
+
+    @cached_property
+    def grading(self) -> Grading:
+        """How files say a picture. Raises SceneError, click.UsageError."""
+        if not (self.view or self.display or self.look):
+            if self.ocio != DEFAULT_CONFIG:
+                raise click.UsageError("--ocio needs --view or --display")
+            return Grading(self.exposure, self.tone or "none", names=self.names)
+        if self.tone is not None:
+            raise click.UsageError("a view has its own tone curve; leave out --tone")
+        seen = View(self.view, display=self.display, look=self.look, config=self.ocio)
+        return Grading(self.exposure, view=seen, names=self.names)
+
+
+_OPTIONS = (
+    click.option("--exposure", type=float, default=0.0, help="Brighten .png by this many stops."),
+    click.option(
+        "--tone", type=click.Choice([*TONES]), help="Tone curve of .png.  [default: none]"
+    ),
+    click.option(
+        "--view", metavar="NAME", help="Make .png by this view of OpenColorIO: clpt[colour]."
+    ),
+    click.option("--display", metavar="NAME", help="The display of the view."),
+    click.option("--look", metavar="NAME", help="A look before the view."),
+    click.option(
+        "--ocio", metavar="CONFIG", default=DEFAULT_CONFIG, show_default=True,
+        help="Where views are from: a config.ocio, ocio://NAME, or $OCIO.",
+    ),
+)  # fmt: skip
+
+names_option = click.option(
+    "--names", type=click.Choice(SETS), default=SETS[0], show_default=True,
+    help="What .exr files call layers: depth.Z, or ViewLayer.Denoising Depth.Z.",
+)  # fmt: skip
+
+
+def grading_options(command: Command) -> Command:
+    """Give a command the options of which `GradingOptions` is the record."""
+    return with_options(command, _OPTIONS)

@@ -1,0 +1,62 @@
+"""The options of the commands that load a scene: its variables, and what the load may take."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Callable
+from typing import Any
+
+import click
+
+from ... import budget
+from .records import Command, with_options
+from .scene_variables import scene_variables
+
+
+class Bytes(click.ParamType):
+    """A number of bytes, such as 500M or 2G."""
+
+    name = "SIZE"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        form, text = r"(\d{1,15}(?:\.\d+)?)\s*([KMGT]?)i?B?", str(value).strip()
+        match = re.fullmatch(form, text, re.IGNORECASE)
+        if match is None:
+            self.fail(f"{value!r} is no size in memory; write 500M or 2G", param, ctx)
+        return int(float(match[1]) * 1024 ** " KMGT".index(match[2].upper() or " "))
+
+
+def _limit(name: str) -> Callable[[Any, Any, Any], None]:
+    """Return what makes the value of an option a limit of all loads of the command."""
+
+    def set_limit(_: Any, __: Any, value: Any) -> None:
+        budget.set_usual(dataclasses.replace(budget.usual, **{name: value}))
+
+    return set_limit
+
+
+_OPTIONS = (
+    scene_variables,
+    click.option(
+        "--load-memory", type=Bytes(), metavar="SIZE", expose_value=False,
+        callback=_limit("memory"),
+        help="Memory that reading the scene may take, such as 8G, if you trust its files.  "
+        "[default: half the free, and what fits the size of its files]",
+    ),
+    click.option(
+        "--load-seconds", type=click.FloatRange(0.0, min_open=True), metavar="SECONDS",
+        expose_value=False, callback=_limit("seconds"),
+        help=f"Time that it may take.  [default: {budget.SECONDS:g}]",
+    ),
+    click.option(
+        "--load-parts", type=click.IntRange(1), metavar="N", expose_value=False,
+        callback=_limit("parts"), help="Elements, shapes and instances that it may have.  "
+        "[default: what fits the size of its files]",
+    ),
+)  # fmt: skip
+
+
+def loading_options(command: Command) -> Command:
+    """Give a command the parameter `variables`, and options that set what loads may take."""
+    return with_options(command, _OPTIONS)

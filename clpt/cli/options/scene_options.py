@@ -1,0 +1,164 @@
+"""Options that say what is rendered, and by what: of `clpt render`, `view`, `warm` and others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, get_args
+
+import click
+
+from ...bvh.layouts import LAYOUTS, Quality
+from ...denoise.needs import METHODS
+from ...formats import load
+from ...formats.missing import Missing
+from ...scene import Scene, kinds
+from ...scene.layers import LAYERS
+from ...spectra import spaces
+from .changes import SceneChanges, changed
+from .composition import composition_options
+from .loading_options import Bytes, loading_options
+from .records import Command, with_options
+from .values import LightPaths, Names, SensorName, Size, White
+
+
+@dataclass(frozen=True)
+class Loading:
+    """How a scene's file is read: see `clpt.load`."""
+
+    variables: dict[str, Any]
+    missing_textures: Missing = "error"
+
+    def read(self, file: Path, progress: Callable[[float, str], None] | None = None) -> Scene:
+        """Return the scene of a file. Raises SceneError."""
+        return load(
+            file, progress=progress, missing_textures=self.missing_textures, **self.variables
+        )
+
+
+@dataclass(frozen=True)
+class Machine:
+    """Devices of this machine, by what --device says, and the cores that one may use.
+
+    profiling: whether stages are timed.
+    """
+
+    device: str | None = None
+    threads: int | None = None
+    profiling: bool = False
+
+
+@dataclass(frozen=True)
+class Build:
+    """How a renderer is built: see `RenderOptions`."""
+
+    layout: str | None = None
+    tree_quality: Quality = "high"
+    texture_budget: int | None = None
+
+
+@dataclass(frozen=True)
+class SceneOptions:
+    """What is rendered and by what, as the options of `scene_options` say it."""
+
+    loading: Loading
+    changes: SceneChanges
+    machine: Machine
+    build: Build
+
+    @property
+    def made(self) -> dict[str, Any]:
+        """The options of renderers, by their names there."""
+        return {**vars(self.build), "denoise": self.changes.denoise}
+
+    def scene(self, file: Path, progress: Callable[[float, str], None] | None = None) -> Scene:
+        """Return the scene of a file, changed. Raises SceneError, click.BadParameter."""
+        return changed(self.loading.read(file, progress), self.changes)
+
+
+denoise_option = click.option(
+    "--denoise", type=click.Choice(METHODS), is_flag=False, flag_value=METHODS[0],
+    help="Take noise away: oidn is Open Image Denoise of clpt[denoise]; statistical needs nothing. "
+    f"The noisy picture is kept as a layer of .exr.  [default: none; alone: {METHODS[0]}]",
+)  # fmt: skip
+
+_OPTIONS = (
+    click.option(
+        "--mode", type=click.Choice(["spectral", "rgb"]), help="Whether light is spectra or RGB."
+    ),
+    click.option("--size", type=Size(), help="Size of the picture."),
+    click.option(
+        "--device", metavar="NAME-OR-INDEX",
+        help="Where to render, see `clpt devices`: one, or 0,2, all, gpu (all GPUs).",
+    ),
+    click.option("--threads", type=click.IntRange(1), help="Cores of a CPU to use, at most."),
+    click.option(
+        "--bvh", "layout", type=click.Choice([*LAYOUTS]),
+        help="Acceleration structure of the triangles.",
+    ),
+    click.option(
+        "--tree-quality", type=click.Choice(get_args(Quality)), default="high",
+        help="fast: built sooner, a little slower to trace.",
+    ),
+    click.option(
+        "--integrator", metavar="NAME", help=f"One of {', '.join(kinds('integrator'))}."
+    ),
+    click.option(
+        "--sampler", type=click.Choice([*kinds("sampler")]),
+        help="Where random numbers come from.",
+    ),
+    click.option(
+        "--max-depth", type=click.IntRange(-1), help="Longest path, at most 4000; -1: no limit."
+    ),
+    click.option(
+        "--light-paths", type=LightPaths(),
+        help="Of path and vcm: paths from lights for each sample, for caustics. Of path, 0: none; "
+        "auto: some where something is sharp and a light is small.",
+    ),
+    click.option(
+        "--guiding", is_flag=True, default=None,
+        help="Of path: learn first where light comes from, for rooms that are lit through a door.",
+    ),
+    click.option(
+        "--radius", type=click.FloatRange(0.0),
+        help="Of vcm: where photons are gathered in the first pass [m]; 0: as suits the picture.",
+    ),
+    click.option(
+        "--sensor", type=SensorName(), help="cie1931, cie1964 or a file of three curves."
+    ),
+    click.option(
+        "--white-balance", type=White(), help="What becomes white: none, D65, 3200 or x,y."
+    ),
+    click.option(
+        "--output-space", type=click.Choice(spaces.SPACES), help="Colour space of the picture."
+    ),
+    click.option(
+        "--bands", type=click.IntRange(0), help="Bands of a spectral picture, for .npy and .exr."
+    ),
+    click.option("--lambda-min", type=float, help="Shortest wavelength of the light [nm]."),
+    click.option(
+        "--lambda-max", type=float, help="Longest wavelength; fluorescence needs 300 to 830."
+    ),
+    click.option(
+        "--layers", type=Names(LAYERS), metavar="NAME,..",
+        help=f"Pictures beside the picture, for .exr: {', '.join(LAYERS)}.",
+    ),
+    click.option(
+        "--alpha", is_flag=True, default=None, help="Leave the sky out, and write what is covered."
+    ),
+    loading_options,
+    click.option(
+        "--texture-budget", type=Bytes(), metavar="SIZE",
+        help="Memory for images, such as 500M; larger ones are halved.  [default: half the free]",
+    ),
+    click.option(
+        "--missing-textures", type=click.Choice(get_args(Missing)), default="error",
+        help="grey: go on with grey where an image is not there.",
+    ),
+)  # fmt: skip
+
+
+def scene_options(command: Command) -> Command:
+    """Give a command the options of which `SceneOptions` is the record."""
+    return with_options(composition_options(command), _OPTIONS)

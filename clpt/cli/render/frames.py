@@ -1,0 +1,296 @@
+"""`clpt render --frames`: an animation, frame by frame, over devices."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ... import __version__, images
+from ...errors import ClusterError, SceneError
+from ...render.analysis.checks import check
+from ...scene import Scene
+from ...scene.fingerprint import fingerprint
+from ..files import outputs, targets
+from ..opening.devices import choose_devices, share_compilers
+from ..opening.makers import AnyRenderer, Maker, cluster_makers, device_makers
+from ..options.changes import changed
+from ..printing.display import Display, clock
+from ..process.stopping import STATUS, stops
+from . import video
+from .frame_values import expanded, has_number, numbered, varies
+from .passes import End, render_samples
+from .refused import refusals
+from .settings import Job
+
+KEPT = (".exr", ".png")  # formats that keep a frame's fingerprint
+LOOK = 0.1  # seconds between two looks at signals
+
+
+@dataclass(frozen=True)
+class _Frames:
+    """What is rendered for each frame of a job; outputs: names with a place for its number."""
+
+    job: Job
+    numbers: range
+    outputs: tuple[Path, ...]
+
+    @classmethod
+    def of(cls, job: Job) -> _Frames:
+        """Return the frames of a job. Raises click.UsageError, SceneError."""
+        numbers, scene = job.animation.frames or range(0), job.scene
+        if not varies(job.options.loading.variables) and not has_number(scene):
+            raise click.UsageError(
+                "all frames would be the same: let a variable depend on them, as -D 'time={time}', "
+                "or give a scene of each frame, as scene.####.json"
+            )
+        named = numbered(scene, numbers[0]) if has_number(scene) else scene
+        outputs = job.output.paths or targets.default(named)
+        if not job.output.paths and job.animation.video is None:
+            outputs = outputs[:1]  # .exr
+        frames = cls(job, numbers, outputs)
+        if job.animation.video is not None:
+            if not frames.pictures:
+                raise click.UsageError("--video is made of .png: add -o NAME.png")
+            video.check(job.animation.video)
+        targets.checked(frames.targets(numbers[0]))
+        return frames
+
+    @property
+    def pictures(self) -> list[Path]:
+        """The .png files of the first path that is one, of all frames."""
+        found = [path for path in self.outputs if path.suffix.lower() == ".png"]
+        return [numbered(path, frame) for path in found[:1] for frame in self.numbers]
+
+    def file(self, frame: int) -> Path:
+        """Return the scene file of a frame."""
+        scene = self.job.scene
+        return numbered(scene, frame) if has_number(scene) else scene
+
+    def targets(self, frame: int) -> tuple[Path, ...]:
+        """Return the files of a frame's picture."""
+        return tuple(numbered(path, frame) for path in self.outputs)
+
+    def load(self, frame: int) -> tuple[Scene, str]:
+        """Return a frame's scene, and the fingerprint of all that decides its picture."""
+        loading, changes = self.job.options.loading, self.job.options.changes
+        values = expanded(loading.variables, frame, self.job.animation.fps)
+        scene = changed(replace(loading, variables=values).read(self.file(frame)), changes)
+        check(scene)
+        decides = {
+            "scene": fingerprint(scene).digest, "spp": self.job.until.end(scene),
+            "noise": scene.noise, "time": self.job.until.limit,
+            "grading": repr(self.job.graded.grading), "version": __version__,
+            "denoise": changes.denoise,
+        }  # fmt: skip
+        return scene, hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
+
+    def is_complete(self, frame: int, digest: str) -> bool:
+        """Whether a frame's files are there, and of this fingerprint."""
+        paths = self.targets(frame)
+        kept = [_fingerprint_of(path) for path in paths if path.suffix.lower() in KEPT]
+        return bool(kept) and set(kept) == {digest} and all(path.is_file() for path in paths)
+
+
+def render_frames(job: Job, shown: Display) -> int:
+    """Render frames that are not complete; return the exit status."""
+    frames = _Frames.of(job)
+    with ExitStack() as resources, stops() as stopped:
+        makers = _makers(job, len(frames.numbers), shown, resources)
+        _FrameLoop(frames, makers, shown, stopped).run()
+        makers[0].report()
+        if stopped:
+            for maker in makers:
+                maker.stop()
+            return STATUS + stopped[0]
+    film, fps = job.animation.video, job.animation.fps
+    if film is not None:
+        with shown.phase(f"writing {film}"):
+            video.write(film, frames.pictures, fps)
+        count = len(frames.numbers)
+        shown.note(f"{film}  {count} frames, {count / fps:.3g} s")
+    return 0
+
+
+def _makers(job: Job, frames: int, shown: Display, resources: ExitStack) -> Sequence[Maker]:
+    """Return who renders frames: devices, or the workers of a cluster."""
+    if job.workers.cluster is not None:
+        together = 1 if job.until.limit is not None else frames  # its time is a frame's own
+        several = cluster_makers(job.workers, job.options, together, shown)
+        return resources.enter_context(several)
+    devices = choose_devices(job.options.machine)
+    share_compilers(devices, job.options.machine, resources)
+    return device_makers(devices, job.options, frames)
+
+
+class _FrameLoop:
+    """Threads that take frames, one for each maker, and one that reads scenes ahead."""
+
+    def __init__(
+        self,
+        frames: _Frames,
+        makers: Sequence[Maker],
+        shown: Display,
+        stopped: Sequence[int],
+    ):
+        self.plan, self.makers, self.shown, self.stopped = frames, [*makers], shown, stopped
+        self.errors: list[BaseException] = []
+        self._left = deque(frames.numbers)
+        self._ahead: deque[tuple[int, Future[tuple[Scene, str]]]] = deque()
+        self._lock = threading.Lock()
+        self._done = self._rendered = 0
+        self._seconds = 0.0
+        self._began = time.perf_counter()
+
+    def run(self) -> None:
+        """Render all frames. Raises what a thread raised."""
+        with ThreadPoolExecutor(1) as reader:
+            while (self._left or self._ahead) and not (self.errors or self.stopped):
+                threads = [
+                    threading.Thread(target=self._work, args=(maker, reader), daemon=True)
+                    for maker in self.makers
+                ]
+                for thread in threads:
+                    thread.start()
+                for thread in threads:
+                    while thread.is_alive():
+                        thread.join(LOOK)
+            for _, scene in self._ahead:
+                scene.cancel()
+        if self.errors:
+            raise self.errors[0]
+
+    def _take(self, reader: ThreadPoolExecutor) -> tuple[int, Future[tuple[Scene, str]]] | None:
+        """The next frame, whose scene is being read, and none after an end."""
+        with self._lock:
+            if self.errors or self.stopped:
+                return None
+            while self._left and len(self._ahead) <= len(self.makers):
+                frame = self._left.popleft()
+                self._ahead.append((frame, reader.submit(self.plan.load, frame)))
+            return self._ahead.popleft() if self._ahead else None
+
+    def _work(self, maker: Maker, reader: ThreadPoolExecutor) -> None:
+        """Let a maker render frames, till none is left."""
+        renderer: AnyRenderer | None = None
+        try:
+            while (taken := self._take(reader)) is not None:
+                frame, scene = taken
+                try:
+                    renderer = self._frame(frame, *scene.result(), maker, renderer)
+                except (SceneError, ClusterError, OSError, click.ClickException):
+                    raise
+                except Exception as error:
+                    if not self._lose(maker, error, taken):
+                        raise
+                    return
+        except BaseException as error:
+            self.errors.append(error)
+        finally:
+            maker.frame = math.inf
+            if renderer is not None:
+                renderer.close()
+
+    def _lose(
+        self,
+        lost: Maker,
+        error: BaseException,
+        taken: tuple[int, Future[tuple[Scene, str]]],
+    ) -> bool:
+        """Leave a maker out, of which others get the frame; return whether there are others."""
+        with self._lock:
+            self.makers = [maker for maker in self.makers if maker is not lost]
+            self._ahead.appendleft(taken)
+        what = f"{lost.name} failed and is left out, others do its part: {error}"
+        if self.makers:
+            self.shown.note(f"clpt: warning: {what}")
+        return bool(self.makers)
+
+    def _frame(
+        self,
+        frame: int,
+        scene: Scene,
+        digest: str,
+        maker: Maker,
+        renderer: AnyRenderer | None,
+    ) -> AnyRenderer | None:
+        """Render a frame unless it is complete; return the renderer for the next one."""
+        plan = self.plan
+        if plan.is_complete(frame, digest):
+            self._tell(frame, "is complete", 0.0)
+            return renderer
+        stale = [path for path in plan.targets(frame) if path.is_file()]
+        if any(_fingerprint_of(path) not in (None, digest) for path in stale):
+            self.shown.note(f"frame {frame}: the scene or an option has changed since {stale[0]}")
+        maker.frame = frame
+        renderer = _showing(scene, maker, renderer, self.shown)
+        began, until = time.perf_counter(), plan.job.until
+        end = End(until.end(scene), until.limit, scene.noise, self.stopped)
+        seconds = maker.pass_seconds(scene.noise is not None)
+        render_samples(renderer, end, maker.look, pass_seconds=seconds)
+        if self.stopped:
+            return renderer  # what it has so far is no frame
+        if not any(counts.samples for counts in renderer.counts):
+            message = "in so short a time there was no sample"
+            raise click.BadParameter(message, param_hint="--time")
+        seconds = time.perf_counter() - began
+        stats = outputs.metadata(renderer, plan.file(frame), seconds)
+        stats |= {"frame": frame, "fingerprint": digest}
+        grading, paths = plan.job.graded.grading, plan.targets(frame)
+        outputs.write_all(paths, renderer, stats, grading, lambda text: None)
+        bad = "".join(f", {text}" for text in refusals(renderer))
+        done = f"{paths[0]}  {stats['spp']:.4g} spp, {seconds:.1f} s{bad}"
+        self._tell(frame, done, time.perf_counter() - began)
+        return renderer
+
+    def _tell(self, frame: int, what: str, seconds: float) -> None:
+        """Say that a frame is done, and how long the rest takes."""
+        with self._lock:
+            self._done += 1
+            self._rendered += seconds > 0.0
+            left = len(self.plan.numbers) - self._done
+            passed = time.perf_counter() - self._began
+            rest = f"; {clock(passed / self._rendered * left)} left" if self._rendered else ""
+            number = f"{self._done} of {len(self.plan.numbers)}"
+        self.shown.note(f"frame {frame} ({number}): {what}{rest if left else ''}")
+
+
+def _showing(
+    scene: Scene, maker: Maker, renderer: AnyRenderer | None, shown: Display
+) -> AnyRenderer:
+    """Return a renderer of a scene: the one that there is, if it can take the scene."""
+    if renderer is not None:
+        try:
+            renderer.update(scene=scene)
+            return renderer
+        except SceneError:  # a film of another form
+            renderer.close()
+    for warning in scene.warnings:
+        shown.note(f"clpt: warning: {warning}")
+    return maker.make(scene, shown)
+
+
+def _fingerprint_of(path: Path) -> str | None:
+    """The fingerprint that a frame's file keeps; None without, or where it cannot be read."""
+    read: Callable[[Path], Mapping[str, Any]] = images.attributes
+    if path.suffix.lower() == ".png":
+        read = images.png_text
+    try:
+        if path.suffix.lower() not in KEPT or not path.is_file():
+            return None
+        images.read_stored(path)  # all of it: a file may be cut off
+        found = read(path).get("fingerprint")
+    except (SceneError, OSError, RuntimeError, ValueError, SyntaxError):
+        return None
+    return found if isinstance(found, str) else None

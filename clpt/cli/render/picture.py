@@ -1,0 +1,224 @@
+"""A picture of one scene, by devices of this machine or by workers, and all files of it."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from ...errors import ClusterError
+from ...render.film.saved_film import SavedFilm
+from ...render.progress import Progress
+from ...scene import Scene
+from ..files import checkpoints, outputs, targets
+from ..opening.makers import AnyRenderer, DeviceMaker, Maker, cluster_makers, device_makers
+from ..opening.scenes import open_scene, read_scene
+from ..printing.display import Display
+from ..process.stopping import STATUS, stops
+from . import report
+from .passes import End, render_samples
+from .refused import refusals
+from .settings import Job
+from .so_far import PictureSoFar
+from .tev_viewer import showing
+
+
+def render_picture(job: Job, shown: Display) -> int:
+    """Render the picture of a scene and write its files; return the exit status.
+
+    Raises what the render raises, after the picture so far and the film are written.
+    """
+    began = time.perf_counter()
+    targets.checked(job.targets)
+    former = _Former.find(job, shown.note)
+    with ExitStack() as resources:
+        opened = _open(job, former, shown, resources)
+        renderer = opened.maker.make(opened.scene, shown, job.until.first)
+        resources.callback(renderer.close)
+        end = former.go_on(renderer, job.until.end(opened.scene), shown.note)
+        opened.tell_before(job.verbose)
+        picture = _Picture(job, renderer, former, shown)
+        limit = job.until.limit
+        shown.limit = None if limit is None else max(began + limit - picture.ready, 0.0)
+        viewer = showing(job.tev, job.scene.name, renderer, shown.note)
+        with stops() as stopped, viewer as show_picture:
+            ends = End(end, shown.limit, renderer.scene.noise, stopped)
+            picture.render(opened.maker, ends, show_picture)
+            picture.finish(bool(stopped))
+        opened.tell_after(job.verbose)
+        if stopped:
+            opened.maker.stop()
+            return STATUS + stopped[0]
+    return 0
+
+
+@dataclass(frozen=True)
+class _Former:
+    """The film that a render goes on from, None to begin anew, and the file of its checkpoints."""
+
+    path: Path
+    film: SavedFilm | None
+
+    @classmethod
+    def find(cls, job: Job, note: Callable[[str], None]) -> _Former:
+        """Return what there is of a picture, and is not to be left alone. Raises SceneError."""
+        path = checkpoints.path_of(job.scene, job.targets)
+        return cls(path, checkpoints.find(path, job.resuming.resume, note))
+
+    def check(self, job: Job, scene: Scene) -> None:
+        """Raise SceneError where the render cannot take its samples, or not go on."""
+        checkpoints.check_range(scene, job.until.numbers)
+        if self.film is not None:
+            gaps = job.workers.cluster is not None and scene.noise is None
+            first, end = job.until.numbers or (0, None)
+            checkpoints.check(self.film, self.path, scene, first, end, gaps=gaps)
+
+    def go_on(
+        self, renderer: AnyRenderer, end: int | None, note: Callable[[str], None]
+    ) -> int | None:
+        """Give the film to a renderer; return the end of its samples, see `Until.end`."""
+        if self.film is None:
+            return end
+        checkpoints.go_on(renderer, self.film, self.path, note)
+        taken = self.film.film.taken  # workers take what is missing before its last sample too
+        return max(end, taken[-1][1]) if end and taken else end
+
+
+@dataclass(frozen=True)
+class _Opened:
+    """A scene and its maker; devices: the maker, if it is of this machine; loading [s]."""
+
+    scene: Scene
+    maker: Maker
+    devices: DeviceMaker | None = None
+    loading: float = 0.0
+
+    def tell_before(self, verbose: int) -> None:
+        """Print what the devices have made of the scene."""
+        if verbose and self.devices is not None:
+            report.before(self.devices.renderer, self.loading)
+
+    def tell_after(self, verbose: int) -> None:
+        """Print what the devices have done."""
+        if verbose and self.devices is not None:
+            report.after(self.devices.renderer)
+
+
+def _open(job: Job, former: _Former, shown: Display, resources: ExitStack) -> _Opened:
+    """Return the scene, checked, and what renders it; resources: get what is to be closed."""
+
+    def accept(scene: Scene) -> None:
+        former.check(job, scene)
+
+    if job.workers.cluster is not None:
+        scene = read_scene(job.scene, job.options, shown, accept)
+        (workers,) = resources.enter_context(cluster_makers(job.workers, job.options, 1, shown))
+        return _Opened(scene, workers)
+    found = open_scene(job.scene, job.options, shown, resources, accept)
+    (devices,) = device_makers(found.devices, job.options, 1)
+    return _Opened(found.scene, devices, devices, found.loading)
+
+
+class _Picture:
+    """What is written of a render: pictures and films so far, and those of its end.
+
+    ready: when it began [s of time.perf_counter].
+    """
+
+    def __init__(self, job: Job, renderer: AnyRenderer, former: _Former, shown: Display):
+        self._job, self._renderer, self._shown = job, renderer, shown
+        self.ready = time.perf_counter()
+        period, every, note = job.resuming.period, job.output.every, shown.note
+        going_on, grading = former.film is not None, job.graded.grading
+        self._writer = checkpoints.Checkpoints(
+            renderer, former.path, period, going_on, job.targets, note
+        )
+        self._so_far = PictureSoFar(every, job.targets, renderer, self._stats, grading, note)
+        self._adaptive = renderer.scene.noise is not None or (
+            former.film is not None and bool(former.film.adaptive)
+        )
+
+    def render(self, maker: Maker, end: End, show_picture: Callable[[], None]) -> None:
+        """Render until the end, and write now and then; show_picture: called after each pass."""
+        seconds = maker.pass_seconds(
+            self._adaptive, self._job.resuming.period, self._job.output.every
+        )
+        single = math.isinf(seconds)  # a pass, whose film is whole at any time
+
+        def after_pass() -> None:
+            self._after_pass()
+            show_picture()
+
+        def show(progress: Progress) -> None:
+            maker.look(progress)
+            if single:
+                after_pass()
+            self._shown.show(progress)
+
+        def ended() -> None:
+            maker.report()
+            if single:
+                self._renderer.hold()
+
+        with self._rescuing(ended), self._shown.rendering():
+            render_samples(self._renderer, end, show, after_pass, pass_seconds=seconds)
+        ended()
+
+    def finish(self, stopped: bool) -> None:
+        """Write the picture, and the film if it stays. Raises ClusterError without a sample."""
+        self._writer.save(stopped)
+        if self._job.workers.cluster is not None and not self._has_samples:
+            raise ClusterError("no worker sent anything in this time")
+        share = self._write()
+        self._writer.finish(stopped)
+        self._warn(share)
+
+    def _warn(self, share: float) -> None:
+        """Note pixels without a sample, and samples that the film refused."""
+        few = [f"only {share:.1%} of the pixels have a sample; others are black"] * (share < 1.0)
+        for text in [*few, *refusals(self._renderer)]:
+            self._shown.note(f"clpt: warning: {text}")
+
+    @property
+    def _has_samples(self) -> bool:
+        return any(counts.samples for counts in self._renderer.counts)
+
+    def _stats(self) -> dict[str, str | int | float]:
+        seconds = time.perf_counter() - self.ready
+        return outputs.metadata(self._renderer, self._job.scene, seconds)
+
+    def _after_pass(self) -> None:
+        self._writer.after_pass()
+        if self._has_samples:
+            self._so_far.after_pass()
+
+    def _write(self) -> float:
+        """Write the files of the picture; return the samples of a pixel in the mean."""
+        job, stats = self._job, self._stats()
+        outputs.write_all(job.targets, self._renderer, stats, job.graded.grading, self._shown.note)
+        return float(stats["spp"])
+
+    @contextmanager
+    def _rescuing(self, ended: Callable[[], None]) -> Iterator[None]:
+        """Write the film and the picture so far, where they can be read, if it fails inside."""
+
+        def write_film() -> None:
+            self._writer.save(False, failed=True)
+
+        def write_picture() -> None:
+            if self._has_samples:
+                self._warn(self._write())
+
+        try:
+            yield
+        except Exception:
+            for step in ended, write_film, write_picture:
+                try:
+                    step()
+                except outputs.FAILURES as error:
+                    self._shown.note(f"clpt: warning: {error}")
+            self._writer.finish(True)
+            raise

@@ -1,0 +1,78 @@
+"""What `clpt render --verbose` prints on stderr."""
+
+from __future__ import annotations
+
+import click
+
+from ...cluster.multi_renderer import MultiRenderer
+from ..opening.makers import OfDevices
+
+
+def before(renderer: OfDevices, loading: float) -> None:
+    """Print what was made of the scene, and the time; loading: seconds for its file."""
+    first, stats = renderer.wavefronts[0], renderer.stats
+    for on in renderer.devices:
+        _line("device", on.info.label)
+    parts = [f"{stats.triangles:,} triangles"]
+    if stats.instances:
+        seen = f"{stats.triangles_instanced:,} triangles seen"
+        parts += [f"{stats.instances:,} instances", seen]
+    if stats.analytic:
+        parts.append(f"{stats.analytic:,} shapes as they are")
+    _line("geometry", ", ".join(parts))
+    _line("lights", f"{stats.lights:,}")
+    if stats.reason:
+        paths = f", {stats.light_paths:g} light paths a sample" if stats.light_paths else ""
+        _line("integrator", f"{stats.integrator}{paths}: {stats.reason}")
+    if stats.light_paths_end:
+        left = "what follows is left to paths from the camera"
+        _line("light paths end", f"at {', '.join(stats.light_paths_end)}; {left}")
+    if stats.photons:
+        disk = f"within {stats.photon_radius:.3g} m at first"
+        _line("photons", f"up to {stats.photons:,} a pass, {_bytes(stats.photon_memory)}; {disk}")
+    for name, size in stats.trees.items():
+        layout = f"{first.scene.strategy.layout}, " if name == "triangles" else ""
+        _line(f"tree {name}", layout + _bytes(size))
+    for name, size in sorted(stats.tables.items(), key=lambda item: -item[1]):
+        _line(f"table {name}", _bytes(size))
+    _line("paths", f"{first.paths.slots:,} in flight, {first.lanes} to a work-item")
+    _line("device memory", _bytes(stats.memory))
+    others = stats.programs - stats.programs_cached
+    kept = f"{stats.programs_cached} from clpt's cache, {others} from the driver or its cache"
+    _line("programs", f"{stats.programs} in {stats.seconds['programs']:.2f} s: {kept}")
+    _line("seconds to load", f"{loading:.2f}")
+    for name in ("lower", "trees", "ready"):
+        _line(
+            f"seconds {'until ' if name == 'ready' else 'for '}{name}", f"{stats.seconds[name]:.2f}"
+        )
+
+
+def after(renderer: OfDevices) -> None:
+    """Print the time of the first sample, what each device did, and each stage of the first."""
+    if isinstance(renderer, MultiRenderer):
+        for one in renderer.shares:
+            lost = f", failed: {one.failure}" if one.failure else ""
+            _line(f"share {one.share:.1%}", f"{one.rate * 1e-6:.3g} Mpaths/s, {one.name}{lost}")
+    _line("seconds until a sample", f"{renderer.stats.seconds.get('first_sample', 0.0):.2f}")
+    if renderer.scene.noise is not None:
+        samples = renderer.film.get()[..., 3]
+        done = 1.0 - renderer.active
+        _line("noise", f"below {renderer.scene.noise:g} in {done:.1%} of the pixels")
+        _line(
+            "samples",
+            f"{samples.mean():.1f} in the mean, {samples.min():.0f} to {samples.max():.0f}",
+        )
+    for wavefront in renderer.wavefronts:
+        timings = wavefront.timings.collect()
+        whole = sum(timing.seconds for timing in timings.values())
+        for name, timing in timings.items():
+            share = timing.seconds / max(whole, 1e-9)
+            _line(f"stage {name}", f"{timing.seconds:.3f} s, {share:.0%}, {timing.calls:,} calls")
+
+
+def _line(what: str, text: str) -> None:
+    click.echo(f"{what:<24} {text}", err=True)
+
+
+def _bytes(n: int) -> str:
+    return f"{n / 2**20:.1f} MiB" if n >= 2**20 else f"{n / 2**10:.1f} KiB"

@@ -1,0 +1,276 @@
+"""The options of `clpt render` alone, and the records of what they say."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ... import tev
+from ...scene import Scene
+from ..files.standard_output import FORMATS
+from ..files.targets import default
+from ..options.changes import Sampling
+from ..options.grading import GradingOptions
+from ..options.records import Command, with_options
+from ..options.scene_options import SceneOptions
+from ..options.workers import Workers
+from .frame_values import Frames
+
+
+class SampleRange(click.ParamType):
+    """FIRST:END, numbers of samples without the last; returned as two numbers."""
+
+    name = "FIRST:END"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[int, int]:
+        from ...render.renderer import MOST_SAMPLES  # here: help needs no OpenCL
+
+        found = re.fullmatch(r"(\d{1,10}):(\d{1,10})", str(value).strip())
+        if not found or not int(found[1]) < int(found[2]) <= MOST_SAMPLES:
+            self.fail(f"{value!r} is no range of samples such as 0:1024", param, ctx)
+        return int(found[1]), int(found[2])
+
+
+class Duration(click.ParamType):
+    """A time such as 30s, 5m, 1h30m or 2.5; returned in seconds."""
+
+    name = "TIME"
+    least = 1e-6
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> float:
+        text = str(value).strip().lower()
+        number = r"(\d+(?:\.\d+)?)"
+        found = re.fullmatch(rf"(?:{number}h)?(?:{number}m)?(?:{number}s?)?", text)
+        if not text or not found:
+            self.fail(f"{value!r} does not look like 30s, 5m or 1h30m", param, ctx)
+        hours, minutes, rest = (float(n or 0) for n in found.groups())
+        seconds = 3600 * hours + 60 * minutes + rest
+        if not self.least <= seconds < 1e9:
+            self.fail(f"{value!r} is no time to render in", param, ctx)
+        return seconds
+
+
+class Period(Duration):
+    """A time, or 0."""
+
+    least = 0.0
+
+
+class Address(click.ParamType):
+    """HOST, HOST:PORT or :PORT."""
+
+    name = "HOST:PORT"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        if not isinstance(value, str):
+            return value
+        try:
+            return tev.address(value)
+        except ValueError as error:
+            self.fail(f"{value!r} is no address of a viewer: {error}", param, ctx)
+
+
+@dataclass(frozen=True)
+class Output:
+    """The files of the picture, and how often they are written while it is rendered [s]."""
+
+    paths: tuple[Path, ...]
+    every: float | None
+
+
+@dataclass(frozen=True)
+class Until:
+    """When a render ends: by its samples and noise, a time [s], or the numbers of its samples."""
+
+    sampling: Sampling
+    limit: float | None
+    numbers: tuple[int, int] | None
+
+    def check(self) -> None:
+        """Raise click.UsageError for options that say different things."""
+        if self.numbers and (self.sampling.spp or self.sampling.noise):
+            message = "--samples says how many there are; leave out --spp and --noise"
+            raise click.UsageError(message)
+
+    @property
+    def first(self) -> int:
+        """The number of the first sample."""
+        return self.numbers[0] if self.numbers else 0
+
+    def end(self, scene: Scene) -> int | None:
+        """Return the end of the samples, None where the limit or the noise ends the render."""
+        if self.numbers:
+            return self.numbers[1]
+        free = self.limit is not None or self.sampling.noise
+        return self.sampling.spp if free else scene.spp
+
+
+@dataclass(frozen=True)
+class Resuming:
+    """How often the film is saved [s], and whether the render goes on from one."""
+
+    period: float | None
+    resume: bool | None
+
+
+@dataclass(frozen=True)
+class Animation:
+    """Frames, None for a picture that stands; how many a second, and the file of their video."""
+
+    frames: range | None
+    fps: float
+    video: Path | None
+
+    def check(self, output: Output, until: Until, resuming: Resuming) -> None:
+        """Raise click.UsageError for options that do not go together."""
+        if self.frames is None:
+            if self.video is not None:
+                raise click.UsageError("--video needs --frames")
+            return
+        if until.numbers or resuming.period is not None or resuming.resume is not None:
+            raise click.UsageError("frames go on by themselves: leave out what saves one picture")
+        if output.every is not None:
+            raise click.UsageError("each frame is written when it is complete: leave out --every")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """What the options of `clpt render` say: how scenes are rendered, by what, and what is told.
+
+    tev: host and port of a viewer; verbose: whether figures are printed.
+    """
+
+    output: Output
+    until: Until
+    resuming: Resuming
+    animation: Animation
+    options: SceneOptions
+    workers: Workers
+    graded: GradingOptions
+    tev: tuple[str, int] | None
+    verbose: int
+    quiet: bool
+
+    def check(self) -> None:
+        """Raise click.UsageError for options that do not go together, SceneError for a view."""
+        animated, _ = self.animation.frames is not None, self.graded.grading
+        if self.tev is not None and (animated or self.workers.cluster is not None):
+            message = "--tev shows one picture of this machine: not with these options yet"
+            raise click.UsageError(message)
+        self.animation.check(self.output, self.until, self.resuming)
+        self.until.check()
+
+    def of(self, scene: Path) -> Job:
+        """Return what is rendered of a scene."""
+        machine = replace(self.options.machine, profiling=bool(self.verbose))
+        options = replace(self.options, machine=machine)
+        return Job(scene=scene, **(vars(self) | {"options": options}))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Job(Settings):
+    """What is rendered of one scene; camera: which of several, as its number."""
+
+    scene: Path
+    camera: str | None = None
+
+    @property
+    def targets(self) -> tuple[Path, ...]:
+        """The files of the picture."""
+        return self.output.paths or default(self.scene)
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """All files that are written."""
+        video = self.animation.video
+        return self.targets if video is None else (*self.targets, video)
+
+    def named(self, old: str, new: str) -> Job:
+        """Return the job with `new` for `old` in the names of its files."""
+
+        def name(path: Path) -> Path:
+            return Path(str(path).replace(old, new))
+
+        output, animation = self.output, self.animation
+        output = replace(output, paths=tuple(map(name, output.paths)))
+        if animation.video is not None:
+            animation = replace(animation, video=name(animation.video))
+        return replace(self, output=output, animation=animation)
+
+    def with_variables(self, variables: dict[str, Any]) -> Job:
+        """Return the job with other values of the scene's variables."""
+        loading = replace(self.options.loading, variables=variables)
+        return replace(self, options=replace(self.options, loading=loading))
+
+
+_OUTPUT = (
+    click.option(
+        "-o", "--output", "paths", multiple=True,
+        type=click.Path(path_type=Path, allow_dash=True),
+        help="Where to write: .exr .png .hdr .pfm .npy, or - for the standard output; may be given "
+        "several times; {scene} is the scene's name, {camera} that of --camera all.  "
+        "[default: {scene}.exr and {scene}.png]",
+    ),
+    click.option(
+        "--format", "form", type=click.Choice(FORMATS),
+        help="Of the picture of -o -.  [default: png]",
+    ),
+    click.option(
+        "--every", type=Duration(),
+        help="How often to write the picture so far, from the first sample of all pixels on.",
+    ),
+)  # fmt: skip
+_UNTIL = (
+    click.option("--spp", type=click.IntRange(1, 2**31 - 1), help="Samples per pixel."),
+    click.option(
+        "--noise", type=click.FloatRange(0.0), metavar="SHARE",
+        help="Stop sampling pixels with less noise, such as 0.02 of their light, after --denoise "
+        "if that is given; 0: never.",
+    ),
+    click.option("--time", "limit", type=Duration(), help="Stop after 30s, 5m, 1h30m."),
+    click.option(
+        "--samples", "numbers", type=SampleRange(),
+        help="Take samples of these numbers only, END without: -o a.film, for `clpt merge`.",
+    ),
+)  # fmt: skip
+_RESUMING = (
+    click.option(
+        "--checkpoint", "period", type=Period(),
+        help="How often to save what there is beside the picture, as NAME.resume.exr, and keep "
+        "that file; 0: never.  [default: 5m, after ten minutes; removed at the end]",
+    ),
+    click.option(
+        "--resume/--no-resume", default=None,
+        help="Go on from NAME.resume.exr, which must be there; or leave it alone.  "
+        "[default: go on if it is there]",
+    ),
+)  # fmt: skip
+_ANIMATION = (
+    click.option(
+        "--frames", type=Frames(),
+        help="Render an animation: 1:240, with the last one. Complete frames stay.",
+    ),
+    click.option(
+        "--fps", type=click.FloatRange(0.0, min_open=True), default=24.0, show_default=True,
+        help="Frames a second, of {time} and of the video.",
+    ),
+    click.option("--video", type=click.Path(path_type=Path), help="Write the frames as .mp4 too."),
+)  # fmt: skip
+_SEED = click.option(
+    "--seed", type=click.IntRange(0, 2**31 - 1), help="Seed of the random numbers."
+)
+
+
+tev_option = click.option(
+    "--tev", type=Address(), is_flag=False, flag_value=tev.HOST,
+    help="Show the picture in tev or HDRView while it is rendered.  [default: 127.0.0.1:14158]",
+)  # fmt: skip
+
+
+def picture_options(command: Command) -> Command:
+    """Give a command the options of which the records of this module are made, and the seed."""
+    return with_options(command, (*_OUTPUT, *_UNTIL, *_RESUMING, _SEED, *_ANIMATION))

@@ -1,0 +1,110 @@
+"""A video of frames that are image files, by the ffmpeg of the package imageio-ffmpeg.
+
+The package's own writer does not tell whether ffmpeg came to its end, so it is not used.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import tempfile
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+
+from ... import images, output_files
+from ...errors import SceneError
+from ..process.extras import extra
+from ..process.stopping import stops
+
+LOOK = 0.02  # seconds between two looks at ffmpeg
+FORMATS = (".mp4", ".mov", ".mkv", ".webm")
+QUALITY = {"libx264": ["-crf", "16"], "libvpx-vp9": ["-crf", "24", "-b:v", "0"]}
+# Even sides, which chroma of half the size needs, and colours as screens for Rec. 709 expect.
+FILTER = (
+    "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv,"
+    "setparams=color_primaries=bt709:color_trc=iec61966-2-1:colorspace=bt709:range=tv"
+)
+
+
+def check(path: Path) -> None:
+    """Raise SceneError for a video that cannot be written, ClptError without the package."""
+    if path.suffix.lower() not in FORMATS:
+        raise SceneError(f"a video is one of {' '.join(FORMATS)}", file=path)
+    try:
+        output_files.check_writable(path)
+    except OSError as error:
+        raise SceneError(f"cannot be written: {error}", file=path) from error
+    with extra("video", "--video"):
+        import imageio_ffmpeg  # noqa: F401
+
+
+def write(path: Path, frames: Sequence[Path], fps: float) -> None:
+    """Write .png files of one size as a video. Raises SceneError."""
+    with extra("video", "--video"):
+        from imageio_ffmpeg import get_ffmpeg_exe
+    try:
+        with output_files.replacing(path) as partial:
+            _encode(get_ffmpeg_exe(), partial, frames, fps)
+    except OSError as error:
+        raise SceneError(f"cannot be written: {error}", file=path) from error
+
+
+def _encode(ffmpeg: str, path: Path, frames: Sequence[Path], fps: float) -> None:
+    """Let ffmpeg write a file. Raises OSError, with what ffmpeg says, unless it could.
+
+    A signal raises KeyboardInterrupt when ffmpeg is gone: one without an owner would write on.
+    """
+    height, width = _read(frames[0]).shape[:2]
+    rate = str(Fraction(fps).limit_denominator())
+    codec = "libvpx-vp9" if path.suffix.lower() == ".webm" else "libx264"
+    command = [
+        ffmpeg, "-y", "-v", "error", "-xerror", "-f", "rawvideo", "-pix_fmt", "rgb24",
+        "-s", f"{width}x{height}", "-r", rate, "-i", "-", "-an", "-vcodec", codec,
+        "-pix_fmt", "yuv420p", *QUALITY[codec], "-vf", FILTER, str(path),
+    ]  # fmt: skip
+    with (
+        stops() as stopped,
+        tempfile.TemporaryFile() as said,
+        subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=said,
+            start_new_session=True,  # Ctrl-C is for this process
+        ) as process,
+    ):  # fmt: skip
+        assert process.stdin is not None
+        try:
+            for frame in frames:
+                pixels = _read(frame)
+                if pixels.shape[:2] != (height, width):
+                    raise SceneError("frames of a video have one size", file=frame)
+                process.stdin.write(pixels.tobytes())
+                if stopped:
+                    break
+            process.stdin.close()
+        except BrokenPipeError:  # it ended, and says why
+            with suppress(OSError):
+                process.stdin.close()
+        except BaseException:
+            process.kill()
+            raise
+        while process.poll() is None and not stopped:
+            time.sleep(LOOK)
+        if stopped:
+            process.kill()
+            process.wait()
+            raise KeyboardInterrupt(*stopped)
+        if process.returncode:
+            said.seek(0)
+            lines = said.read().decode("utf-8", "replace").strip().splitlines()
+            raise OSError(lines[-1] if lines else f"ffmpeg ended with status {process.returncode}")
+
+
+def _read(path: Path) -> np.ndarray:
+    """A .png as (h, w, 3) uint8: what is transparent is over black."""
+    values = images.read_stored(path).values
+    if values.shape[2] == 4:
+        values = (values[..., :3].astype(np.uint16) * values[..., 3:] // 255).astype(np.uint8)
+    return np.repeat(values, 3, axis=2) if values.shape[2] == 1 else values

@@ -1,0 +1,142 @@
+"""The page of `clpt view`: its server, its session, and their end."""
+
+from __future__ import annotations
+
+import os
+import time
+import webbrowser
+from contextlib import ExitStack
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ...cluster.multi_renderer import MultiRenderer
+from ...formats import locate
+from ...scene import Scene
+from ...view.access import is_loopback
+from ...view.commands import OF_VIEW
+from ...view.pictures import Display
+from ...view.saving import Folder
+from ...view.server import Server
+from ...view.session import Session, Source
+from ...view.views import load as load_view
+from ..files import outputs, targets
+from ..opening.devices import kill_compilers
+from ..opening.scenes import Opened, open_scene
+from ..opening.workers import connected
+from ..options.grading import Grading
+from ..options.scene_options import SceneOptions
+from ..printing.display import Display as Progress
+from ..printing.display import display
+from ..process.extras import extra
+from ..process.stopping import STATUS, stops
+from .settings import Listening, Settings
+
+CLOSE_SECONDS = 3.0  # in which a session ends that waits for no compiler
+
+
+def show(scene: Path, settings: Settings) -> int:
+    """Show a scene until a signal comes; return the exit status. Raises what its session does."""
+    file = locate(scene)
+    begins = load_view(settings.opened) if settings.opened is not None else None
+    looked_at = _display(settings)
+    with ExitStack() as resources:
+        server = _server(settings.listening, resources)
+        shown = display(settings.quiet, None)
+        opened = open_scene(file, settings.options, shown, resources)
+        where, make = _renderers(settings, opened, shown, resources)
+        session = Session(
+            opened.scene,
+            opened.devices[0],
+            server,
+            folder=_folder(file, settings),
+            source=_source(file, settings.options),
+            display=looked_at,
+            where=where,
+            make=make,
+            **vars(settings.options.build),
+        )
+        resources.callback(session.close)
+        if begins is not None:
+            session.post(begins, server.message)
+        server.show(session)
+        session.start()
+        return _attend(session, opened)
+
+
+def _display(settings: Settings) -> Display:
+    """Return how the picture is shown at first. Raises SceneError, click.UsageError."""
+    grading = settings.graded.grading
+    tone = OF_VIEW if grading.view else grading.tone
+    return Display(grading.exposure, tone, grading.view)
+
+
+def _server(listening: Listening, resources: ExitStack) -> Server:
+    """Return the page's server, and open the page; resources: get what closes it."""
+    server = Server(listening.host, listening.port)
+    resources.callback(server.close)
+    click.echo(server.address)
+    if not is_loopback(listening.host):
+        warning = f"other machines can reach {listening.host}, and read along"
+        click.echo(f"clpt: warning: {warning}", err=True)
+    if not listening.no_browser:
+        webbrowser.open(server.address)
+    return server
+
+
+def _renderers(
+    settings: Settings, opened: Opened, shown: Progress, resources: ExitStack
+) -> tuple[str, Any]:
+    """Return who renders, for people, and what makes renderers, None for a `Renderer`."""
+    device = opened.devices[0]
+    if settings.workers.cluster is not None:
+        with extra("cluster", "clpt view --cluster"):
+            from ...cluster.steered import SteeredCluster
+        workers = connected(settings.workers, settings.options.machine, shown)
+        client = resources.enter_context(workers)
+        return settings.workers.cluster, partial(SteeredCluster, client=client, device=device)
+    several = partial(MultiRenderer, devices=opened.devices) if len(opened.devices) > 1 else None
+    return " and ".join(one.info.label for one in opened.devices), several
+
+
+def _folder(file: Path, settings: Settings) -> Folder:
+    """Return what writes files of the page."""
+
+    def write_exr(path: Path, renderer: Any, seconds: float) -> None:
+        if settings.workers.cluster is not None:
+            renderer = renderer.developed()
+        outputs.write(path, renderer, outputs.metadata(renderer, file, seconds), Grading())
+
+    return Folder(settings.folder, targets.name_of(file), write_exr)
+
+
+def _source(file: Path, options: SceneOptions) -> Source:
+    """Return what reads the scene's file again."""
+
+    def stamp() -> Any:
+        try:
+            found = file.stat()
+        except OSError:  # it is being replaced
+            return None
+        return found.st_mtime_ns, found.st_size
+
+    def read() -> Scene:
+        return options.scene(file)
+
+    return Source(stamp, read)
+
+
+def _attend(session: Session, opened: Opened) -> int:
+    """Wait until a signal ends the session, or a fault, which is raised; return the status."""
+    with stops() as stopped:
+        while not stopped and session.error is None:
+            time.sleep(0.05)
+    if session.error is not None:
+        raise session.error
+    status = STATUS + stopped[0]
+    kill_compilers(opened.devices[:1])
+    if not session.close(CLOSE_SECONDS):
+        os._exit(status)  # a driver compiles; nothing else ends it
+    return status

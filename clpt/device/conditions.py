@@ -1,0 +1,301 @@
+"""Conditions of the preprocessor: which branches of `#if` a text takes, as far as it tells itself.
+
+A name that the text does not define is 0, as in C, unless compilers or their options may define it:
+what a condition that depends on such a name comes to is open, and it stays for the compiler.
+"""
+
+from __future__ import annotations
+
+import operator
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import lru_cache
+
+from .text_rows import Row, renamed
+
+OUTSIDE = re.compile(r"_|cl_|CL_|FP_FAST_|NOT_INLINED$")  # what compilers and their options define
+_TOKEN = re.compile(
+    r"\s*(?:(?P<number>(?:0[xX][0-9a-fA-F]+|\d+)(?![\w.]))|(?P<name>[A-Za-z_]\w*)"
+    r"|(?P<sign>&&|\|\||<<|>>|[<>=!]=|[-+*/%<>!~&|^?:(),]))"
+)
+_NAME = re.compile(r"[A-Za-z_]")
+_DEEPEST = 64  # macros whose values name macros
+
+Tokens = tuple[str, ...]
+Known = int | None  # None: open
+
+_BINARY: tuple[dict[str, Callable[[int, int], int]], ...] = (  # from the loosest to the tightest
+    {"|": operator.or_},
+    {"^": operator.xor},
+    {"&": operator.and_},
+    {"==": operator.eq, "!=": operator.ne},
+    {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge},
+    {"<<": operator.lshift, ">>": operator.rshift},
+    {"+": operator.add, "-": operator.sub},
+    {"*": operator.mul, "/": lambda a, b: _quotient(a, b), "%": lambda a, b: _remainder(a, b)},
+)
+_UNARY: dict[str, Callable[[int], int]] = {
+    "!": operator.not_, "-": operator.neg, "+": operator.pos, "~": operator.invert,
+}  # fmt: skip
+
+
+class Macros:
+    """The macros of a text up to some row of it: defined, not defined, or open."""
+
+    def __init__(self, defines: Mapping[str, str]):
+        """defines: each with its value; the name may have arguments."""
+        self._values: dict[str, str | None] = {}  # None: not a value for conditions
+        self._open: set[str] = set()
+        for name, value in defines.items():
+            self.define(name, value, sure=True)
+
+    def define(self, head: str, value: str, sure: bool) -> None:
+        """Note a `#define`; head: its name and arguments; sure: whether it is in no open branch."""
+        name, has_arguments, _ = head.partition("(")
+        self._note(name, sure)
+        self._values[name] = None if has_arguments else value
+
+    def undefine(self, name: str, sure: bool) -> None:
+        """Note an `#undef`."""
+        self._note(name, sure)
+        self._values.pop(name, None)
+
+    def _note(self, name: str, sure: bool) -> None:
+        if sure:
+            self._open.discard(name)
+        else:
+            self._open.add(name)
+
+    def value(self, directive: str, condition: str) -> Known:
+        """Return what the condition of a directive comes to, None where it is open."""
+        tokens = _condition(directive, condition)
+        if tokens is None:
+            return None
+        found: list[str] = []
+        self._expand(tokens, found, 0)
+        return _value(tuple(found))
+
+    def _expand(self, tokens: Tokens, found: list[str], depth: int) -> None:
+        """Append tokens with values in the place of names, but for those that are open."""
+        rest = iter(tokens)
+        for token in rest:
+            if not _NAME.match(token):
+                found.append(token)
+            elif token == "defined":
+                name = next(rest, "")
+                if name == "(":
+                    name = next(rest, "")
+                    next(rest, "")
+                found.append(self._defined(name))
+            elif (value := self._known_value(token)) is None:
+                found.append(token)
+            elif (inner := _tokens(value)) is None or depth == _DEEPEST:
+                found.append("open")
+            else:
+                self._expand(inner, found, depth + 1)
+
+    def _known_value(self, name: str) -> str | None:
+        """The value of a macro, "0" of what is none; None if it is open, or has arguments."""
+        if name in self._open:
+            return None
+        if name in self._values:
+            return self._values[name]
+        return None if OUTSIDE.match(name) else "0"
+
+    def _defined(self, name: str) -> str:
+        if name in self._open:
+            return "open"
+        if name in self._values:
+            return "1"
+        return "open" if OUTSIDE.match(name) else "0"
+
+
+class _Chain:
+    """An `#if` with its other branches.
+
+    stays: whether a row of it does, since compilers decide; start: where that is among the kept.
+    """
+
+    def __init__(self, lives: bool, sure: bool, start: int):
+        self.outer, self.start, self.stays = (lives, sure), start, False
+        self._ended = not lives
+
+    def branch(self, row: Row, macros: Macros) -> tuple[bool, Row | None]:
+        """Return whether the rows behind this one may be taken, and what stays in its place."""
+        if self._ended:
+            return False, None
+        known = macros.value(row.directive, row.argument)
+        if known == 0:
+            return False, None
+        if known is None:
+            row = row if self.stays else renamed(row, row.directive.removeprefix("el"))
+            self.stays = True
+            return True, row
+        self._ended = True
+        if row.directive == "elif":
+            row = Row(row.number, "#else", "#else", row.lines, "else")
+        return True, row if self.stays else None
+
+
+_CONDITIONS = {
+    "if": "{}", "ifdef": "defined {}", "ifndef": "!defined {}", "elif": "{}", "else": "1",
+}  # fmt: skip
+OPENING = ("if", "ifdef", "ifndef")
+BRANCHING = (*_CONDITIONS, "endif")
+
+
+def taken(rows: Iterable[Row | Sequence[Row]], macros: Macros) -> tuple[Row, ...]:
+    """Return the rows that conditions leave, and note the macros that these define.
+
+    rows: those that are no directives in groups.
+    What is open stays, without the branches that are not taken in any case; where nothing is left
+    in its branches it goes too. Every `#if` has its end among the rows.
+    """
+    kept: list[Row] = []
+    chains: list[_Chain] = []
+    lives = sure = True
+    for row in rows:
+        if not isinstance(row, Row):
+            if lives:
+                kept += row
+            continue
+        directive = row.directive
+        if directive == "endif" and chains:
+            chain = chains.pop()
+            lives, sure = chain.outer
+            if all(map(_says_nothing, kept[chain.start :])):
+                del kept[chain.start :]
+            elif chain.stays:
+                kept.append(row)
+        elif directive in OPENING or (directive in _CONDITIONS and chains):
+            if directive in OPENING:
+                chains.append(_Chain(lives, sure, len(kept)))
+            lives, left = chains[-1].branch(row, macros)
+            sure = chains[-1].outer[1] and not chains[-1].stays
+            kept += [left] if left else []
+        elif lives:
+            kept.append(row)
+            if directive == "define":
+                macros.define(*row.macro, sure)
+            elif directive == "undef":
+                macros.undefine(row.argument, sure)
+    return tuple(kept)
+
+
+def _says_nothing(row: Row) -> bool:
+    return row.directive in BRANCHING or not row.text.strip()
+
+
+@lru_cache(maxsize=4096)
+def _condition(directive: str, argument: str) -> Tokens | None:
+    return _tokens(_CONDITIONS[directive].format(argument))
+
+
+@lru_cache(maxsize=4096)
+def _tokens(text: str) -> Tokens | None:
+    """The tokens of an expression; None if it has others than those of a condition."""
+    found, at, text = [], 0, text.strip()
+    while at < len(text):
+        match = _TOKEN.match(text, at)
+        if match is None:
+            return None
+        found.append(match[match.lastgroup or 0])
+        at = match.end()
+    return tuple(found)
+
+
+@lru_cache(maxsize=4096)
+def _value(tokens: Tokens) -> Known:
+    """What an expression of numbers and open names comes to; None too if it is none."""
+    try:
+        reader = _Expression(tokens)
+        found = reader.choice()
+        return found if reader.ended else None
+    except (ValueError, ZeroDivisionError, IndexError, OverflowError):
+        return None  # which the compiler tells
+
+
+class _Expression:
+    """A reader of an expression, by descent from operator to operator."""
+
+    def __init__(self, tokens: Tokens):
+        self._tokens, self._at = tokens, 0
+
+    @property
+    def ended(self) -> bool:
+        return self._at == len(self._tokens)
+
+    def choice(self) -> Known:
+        """condition ? a : b, or what stands before the question mark."""
+        condition = self._either()
+        if not self._take("?"):
+            return condition
+        yes = self.choice()
+        self._expect(":")
+        no = self.choice()
+        return None if condition is None else yes if condition else no
+
+    def _either(self) -> Known:
+        found = self._both()
+        while self._take("||"):
+            other = self._both()
+            known = (found, other)
+            found = 1 if any(known) else None if None in known else 0
+        return found
+
+    def _both(self) -> Known:
+        found = self._binary(0)
+        while self._take("&&"):
+            other = self._binary(0)
+            known = (found, other)
+            found = 0 if 0 in known else None if None in known else 1
+        return found
+
+    def _binary(self, level: int) -> Known:
+        if level == len(_BINARY):
+            return self._unary()
+        found = self._binary(level + 1)
+        while not self.ended and (apply := _BINARY[level].get(self._tokens[self._at])):
+            self._at += 1
+            other = self._binary(level + 1)
+            found = None if found is None or other is None else int(apply(found, other))
+        return found
+
+    def _unary(self) -> Known:
+        token = self._tokens[self._at]
+        self._at += 1
+        if apply := _UNARY.get(token):
+            value = self._unary()
+            return None if value is None else int(apply(value))
+        if token == "(":
+            value = self.choice()
+            self._expect(")")
+            return value
+        if token[0].isdigit():
+            return int(token, 8 if token.isdigit() and token[0] == "0" else 0)
+        if not (token[0].isalpha() or token[0] == "_"):
+            raise ValueError(token)
+        if self._take("("):  # arguments of an open name, such as __has_builtin
+            depth = 1
+            while depth:
+                depth += {"(": 1, ")": -1}.get(self._tokens[self._at], 0)
+                self._at += 1
+        return None
+
+    def _take(self, token: str) -> bool:
+        found = not self.ended and self._tokens[self._at] == token
+        self._at += found
+        return found
+
+    def _expect(self, token: str) -> None:
+        if not self._take(token):
+            raise ValueError(f"no {token}")
+
+
+def _quotient(a: int, b: int) -> int:
+    """a / b as C has it: towards 0."""
+    return abs(a) // abs(b) * (1 if (a < 0) == (b < 0) else -1)
+
+
+def _remainder(a: int, b: int) -> int:
+    return a - b * _quotient(a, b)

@@ -1,0 +1,217 @@
+"""Definitions of a kernel text: what each names, so that those that nobody names are left out.
+
+A definition is a function, a type, a constant or a macro. Everything else stays, and so does what
+it names: kernels, pragmas, and what is not recognised.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Iterable, Sequence, Set
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+from .conditions import BRANCHING, OPENING
+from .text_rows import Row, joined, rows_of
+
+_WORD = re.compile(r"[A-Za-z_]\w*")
+_PASTED = re.compile(r"(?<![.\w])(?<!->)(\w*)\s*##\s*(\w*)")  # but for members
+_FUNCTION = re.compile(  # types, a name, arguments without brackets, and a body or nothing
+    r"\s*(?:[A-Za-z_]\w*[\s*]+)+?(?P<name>[A-Za-z_]\w*)\s*\([^()]*\)\s*(?:\{.*\}|;)\s*\Z", re.DOTALL
+)
+_TYPE = re.compile(r"\s*typedef\b[^()]*?(?P<name>[A-Za-z_]\w*)\s*;\s*\Z", re.DOTALL)
+_MADE_TYPE = re.compile(r"\s*typedef\s+\w+\([^()]*\)\s+(?P<name>[A-Za-z_]\w*)\s*;\s*\Z")
+_CONSTANT = re.compile(
+    r"\s*(?:static\s+)?(?:constant|__constant)\b[^=;\[\](){}]*?(?P<name>[A-Za-z_]\w*)\s*"
+    r"(?:\[[^\]]*\]\s*)*=[^;]*;\s*\Z",
+    re.DOTALL,
+)
+_KERNEL = re.compile(r"\b(?:__)?kernel\b")
+
+
+@dataclass(eq=False)
+class Definition:
+    """Rows of a text that stay or go together.
+
+    names: what they define, none for what always stays.
+    """
+
+    rows: Sequence[Row]
+    names: frozenset[str]
+
+    @cached_property
+    def words(self) -> frozenset[str]:
+        """What the rows name."""
+        return frozenset(_WORD.findall("\n".join([row.code for row in self.rows])))
+
+    @cached_property
+    def pasted(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Beginnings and endings of names that macros of the rows paste together."""
+        beginnings, endings = set[str](), set[str]()
+        for row in self.rows:
+            if "##" in row.code:
+                arguments = {"", *_WORD.findall(row.macro[0])}
+                for begin, end in _PASTED.findall(row.code):
+                    beginnings |= {begin} - arguments
+                    endings |= {end} - arguments
+        return tuple(beginnings), tuple(endings)
+
+    @cached_property
+    def printed(self) -> tuple[Row, ...]:
+        """The rows, those that follow one another as one."""
+        return joined(self.rows)
+
+
+@dataclass(frozen=True, eq=False)
+class Paragraph:
+    """Definitions without a blank row between them, and the comments in front of them.
+
+    apart: whether a blank row is in front of it.
+    """
+
+    comments: tuple[Row, ...]
+    definitions: tuple[Definition, ...]
+    apart: bool
+
+    def left(self, stay: Set[Definition]) -> tuple[list[Row], bool]:
+        """Return its rows without definitions that do not stay, and whether it is apart."""
+        own = [row for one in self.definitions if one in stay for row in one.printed]
+        return [*self.comments, *own] if own else [], self.apart
+
+
+@lru_cache(maxsize=2048)
+def paragraphs(rows: tuple[Row, ...]) -> tuple[Paragraph, ...]:
+    """Return the paragraphs of rows between two includes; comments without any are left out."""
+    found: list[Paragraph] = []
+    comments: list[Row] = []
+    definitions: list[Definition] = []
+    apart, at = False, 0
+    while at < len(rows):
+        if rows[at].code.strip():
+            definition, at = _definition(rows, at)
+            definitions.append(definition)
+            continue
+        if definitions:
+            found.append(Paragraph(tuple(comments), tuple(definitions), apart))
+            comments, definitions, apart = [], [], False
+        if rows[at].text.strip():
+            comments.append(rows[at])
+        elif not comments:
+            apart = True
+        at += 1
+    if definitions:
+        found.append(Paragraph(tuple(comments), tuple(definitions), apart))
+    return tuple(found)
+
+
+@lru_cache(maxsize=2048)
+def whole(rows: tuple[Row, ...]) -> tuple[Paragraph, ...]:
+    """Return rows as one paragraph of which nothing may go."""
+    return (Paragraph((), (Definition(rows, frozenset()),), False),) if rows else ()
+
+
+def macro(head: str, value: str) -> Definition:
+    """Return the definition of a macro; head: its name, and its arguments."""
+    return _definition(rows_of(f"#define {head} {value}"), 0)[0]
+
+
+def _definition(rows: Sequence[Row], at: int) -> tuple[Definition, int]:
+    """The definition that begins at a row, and the row behind it."""
+    first = rows[at]
+    if first.directive in OPENING:
+        return _open_conditional(rows, at)
+    if first.directive:
+        names = frozenset()
+        if first.directive in ("define", "undef"):
+            names = frozenset(_WORD.findall(first.argument)[:1])
+        return Definition((first,), names), at + 1
+    end = _end(rows, at)
+    own = rows[at:end]
+    return Definition(own, _name("\n".join(row.code for row in own))), end
+
+
+def _end(rows: Sequence[Row], at: int) -> int:
+    """The row behind what begins at a row: where brackets are closed, and a ; or } is the last."""
+    depth, before = 0, []
+    for number in range(at, len(rows)):
+        row = rows[number]
+        if row.directive:
+            if row.directive in OPENING:
+                before.append(depth)
+            elif row.directive == "endif" and before:
+                before.pop()
+            elif row.directive in BRANCHING and before:
+                depth = before[-1]
+            continue
+        code = row.code
+        depth += code.count("{") + code.count("(") - code.count("}") - code.count(")")
+        if depth <= 0 and not before and code.rstrip().endswith((";", "}")):
+            return number + 1
+    return len(rows)
+
+
+def _open_conditional(rows: Sequence[Row], at: int) -> tuple[Definition, int]:
+    """An `#if` that compilers decide, to its `#endif`: one definition of all that is in it."""
+    depth, end = 0, at
+    while end < len(rows):
+        depth += (rows[end].directive in OPENING) - (rows[end].directive == "endif")
+        end += 1
+        if depth == 0:
+            break
+    names: set[str] = set()
+    inner, stays = at + 1, False
+    while inner < end - 1:
+        row = rows[inner]
+        if not row.code.strip() or row.directive in BRANCHING:
+            inner += 1
+            continue
+        definition, inner = _definition(rows[:end], inner)
+        stays = stays or not definition.names
+        names |= definition.names
+    return Definition(rows[at:end], frozenset() if stays else frozenset(names)), end
+
+
+def _name(code: str) -> frozenset[str]:
+    """The name that code defines; none where it is not recognised, or where there are several."""
+    code = code.strip()
+    for pattern in (_FUNCTION, _TYPE, _MADE_TYPE, _CONSTANT):
+        match = pattern.match(code)
+        if match and _is_one(code) and not _KERNEL.search(code, 0, match.start("name")):
+            return frozenset((match["name"],))
+    return frozenset()
+
+
+def _is_one(code: str) -> bool:
+    """Whether code ends where its first bracket is closed, or at its first ; outside of one."""
+    depth = 0
+    for match in re.finditer(r"[{};]", code):
+        depth += {"{": 1, "}": -1}.get(match[0], 0)
+        if depth == 0 and (match[0] == ";" or not code.endswith(";")):
+            return match.end() == len(code)
+    return False
+
+
+def named(definitions: Iterable[Definition]) -> set[Definition]:
+    """Return those that stay: what has no name of its own, and what these name in turn."""
+    by_name: dict[str, list[Definition]] = defaultdict(list)
+    pending: list[Definition] = []
+    for definition in definitions:
+        for name in definition.names:
+            by_name[name].append(definition)
+        if not definition.names:
+            pending.append(definition)
+    unseen, found = set(by_name), set[Definition]()
+    while pending:
+        definition = pending.pop()
+        if definition in found:
+            continue
+        found.add(definition)
+        new = definition.words & unseen
+        beginnings, endings = definition.pasted
+        if beginnings or endings:
+            new |= {n for n in unseen if n.startswith(beginnings) or n.endswith(endings)}
+        unseen -= new
+        for name in new:
+            pending += by_name[name]
+    return found

@@ -1,0 +1,172 @@
+"""Shapes as rows of parameters, their areas and boxes.
+
+A rectangle has a row and triangles: rays meet its triangles, light is sampled on it as a whole.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clpt import transforms
+from clpt.errors import SceneError
+from clpt.geometry.shape_records import ANALYTIC, ONE_OF, RECORDS, ROWS
+from clpt.geometry.shapes import Points, Words, placement, where
+from clpt.geometry.triangles import triangle_areas, triangulate
+from clpt.scene import shapes
+from clpt.scene.shapes import Shape
+
+UNEVEN = 1e-5  # relative difference of lengths or cosine of axes from which a sphere is none
+
+PADDING = 1e-6  # of the size of an analytic shape, for what float32 rounds in its kernel
+
+
+def row(shape: Shape) -> Words:
+    """Return the words of a rectangle, sphere, disk or cylinder in `geometry`, placed.
+
+    Of spheres, those of one around the origin with radius 1 before `to_world`; of curves, what
+    their pieces share but for where they are.
+
+    Raises SceneError for a singular transform, or one after which it is no such shape any more.
+    """
+    matrix = placement(shape)
+    record = ROWS[ONE_OF.get(shape.kind, shape.kind)]
+    if isinstance(shape, shapes.Sphere):
+        radius = _positive(shape.radius, "radius", shape)
+        values = _sphere(shape, matrix, _three(shape.center, "center", shape), radius)
+    elif isinstance(shape, shapes.Spheres):
+        values = _sphere(shape, matrix, np.zeros(3), 1.0)
+    elif isinstance(shape, shapes.Curves):
+        nothing = {m.name: np.zeros(3 if m.type == "vec3" else 1) for m in record.members}
+        values = {**nothing, "side": _side(shape), "scale": _even_axes(matrix[:3, :3], shape)[1]}
+    elif isinstance(shape, shapes.Cylinder):
+        values = _cylinder(shape, matrix)
+    else:
+        s, t, center = matrix[:3, 0], matrix[:3, 1], matrix[:3, 3]
+        values = {"center": center, "s": s, "t": t, "n": facing(shape)}
+    flat = np.concatenate([np.ravel(values[m.name]) for m in record.members])
+    return flat.astype(np.float32).view(np.uint32)
+
+
+def member(kind: str, name: str) -> int:
+    """Return the place of a member in a kind's row, in words."""
+    return next(m.word for m in ROWS[kind].members if m.name == name)
+
+
+def _side(shape: Shape) -> float:
+    return -1.0 if shape.flip_normals else 1.0
+
+
+def facing(shape: Shape) -> NDArray[np.float64]:
+    """Return where the front of a rectangle or disk faces in the world, (3,) of unit length."""
+    return _side(shape) * transforms.transform_normals(placement(shape), [0.0, 0.0, 1.0])
+
+
+def _sphere(
+    shape: Shape, matrix: NDArray[np.float64], center: NDArray[np.float64], radius: float
+) -> dict[str, ArrayLike]:
+    axes, scale = _even_axes(matrix[:3, :3], shape)
+    return {
+        "center": transforms.transform_points(matrix, center),
+        "radius": radius * scale,
+        "side": _side(shape),
+        "x": axes[:, 0],
+        "y": axes[:, 1],
+        "z": axes[:, 2],
+    }
+
+
+def _cylinder(shape: shapes.Cylinder, matrix: NDArray[np.float64]) -> dict[str, ArrayLike]:
+    radius = _positive(shape.radius, "radius", shape)
+    p0, p1 = _three(shape.p0, "p0", shape), _three(shape.p1, "p1", shape)
+    length = np.linalg.norm(p1 - p0)
+    if not length > 0.0:
+        raise SceneError("p0 and p1 coincide", where=where(shape))
+    frame = np.column_stack([*across((p1 - p0) / length), p1 - p0])
+    placed = matrix[:3, :3] @ frame
+    stretch = np.linalg.norm(placed[:, 2]) / np.linalg.norm(placed[:, 0])
+    axes, scale = _even_axes(placed / [1.0, 1.0, stretch], shape)
+    return {
+        "p0": transforms.transform_points(matrix, p0),
+        "axis": placed[:, 2],
+        "radius": radius * scale,
+        "side": _side(shape),
+        "x": axes[:, 0],
+        "y": axes[:, 1],
+    }
+
+
+def across(n: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return two unit axes across a unit vector (Duff et al. 2017)."""
+    sign = np.copysign(1.0, n[2])
+    a = -1.0 / (sign + n[2])
+    b = n[0] * n[1] * a
+    s = np.array([1.0 + sign * n[0] ** 2 * a, sign * b, -sign * n[0]])
+    return s, np.array([b, sign + n[1] ** 2 * a, -n[1]])
+
+
+def _even_axes(linear: NDArray[np.float64], shape: Shape) -> tuple[NDArray[np.float64], float]:
+    """The unit columns of a matrix that scales evenly, and its scale."""
+    lengths = np.linalg.norm(linear, axis=0)
+    axes = linear / lengths
+    uneven = np.ptp(lengths) > UNEVEN * lengths.max()
+    if uneven or np.abs(axes.T @ axes - np.eye(3)).max() > UNEVEN:
+        raise SceneError(
+            f"its transform stretches or shears it, and then it is no {shape.kind}; "
+            "use a mesh for that",
+            where=where(shape),
+        )
+    return axes, float(lengths[0])
+
+
+def area(shape: Shape) -> float:
+    """Return the area of a shape in world space [m^2]."""
+    if shape.kind not in RECORDS:
+        vertices, faces, _, _ = triangulate(shape)
+        return float(triangle_areas(vertices, faces).sum())
+    row_ = members_of(shape)
+    if shape.kind == "sphere":
+        return float(4.0 * np.pi * row_["radius"] ** 2)
+    if shape.kind == "cylinder":
+        return float(2.0 * np.pi * row_["radius"] * np.linalg.norm(row_["axis"]))
+    parallelogram = float(np.linalg.norm(np.cross(row_["s"], row_["t"])))
+    return (np.pi if shape.kind == "disk" else 4.0) * parallelogram
+
+
+def bounds(shape: Shape) -> tuple[Points, Points]:
+    """Return the corners (3,) float32 of a box around the shape [m]."""
+    if shape.kind not in ANALYTIC or isinstance(shape, shapes.Curves):
+        vertices = triangulate(shape)[0]
+        return vertices.min(axis=0), vertices.max(axis=0)
+    row_ = members_of(shape)
+    if shape.kind == "sphere":
+        ends, reach = row_["center"][None], np.full(3, row_["radius"])
+    elif shape.kind == "disk":
+        ends, reach = row_["center"][None], np.hypot(row_["s"], row_["t"])
+    else:
+        ends = np.stack([row_["p0"], row_["p0"] + row_["axis"]])
+        reach = row_["radius"] * np.hypot(row_["x"], row_["y"])
+    lo, hi = ends.min(axis=0) - reach, ends.max(axis=0) + reach
+    pad = PADDING * max(np.ptp([lo, hi], axis=0).max(), np.abs([lo, hi]).max())
+    return (lo - pad).astype(np.float32), (hi + pad).astype(np.float32)
+
+
+def members_of(shape: Shape) -> dict[str, NDArray[np.float64]]:
+    """Return the members of a shape's row by name, as float64."""
+    record = RECORDS[shape.kind]
+    values = row(shape).view(record.dtype)[0]
+    return {m.name: np.asarray(values[m.name], np.float64) for m in record.members}
+
+
+def _three(value: ArrayLike, name: str, shape: Shape) -> NDArray[np.float64]:
+    values = np.asarray(value, np.float64)
+    if values.shape != (3,) or not np.isfinite(values).all():
+        message = f"{name} must be three finite numbers, found {value!r}"
+        raise SceneError(message, where=where(shape))
+    return values
+
+
+def _positive(value: float, name: str, shape: Shape) -> float:
+    if not (np.isfinite(value) and value > 0.0):
+        raise SceneError(f"{name} must be above zero, found {value}", where=where(shape))
+    return float(value)

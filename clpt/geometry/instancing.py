@@ -1,0 +1,301 @@
+"""Groups and their instances, on their way to the device.
+
+What rays meet as triangles stays one copy for all instances of its group. The rest is placed as so
+many ordinary shapes: lights, analytic shapes, and what is instanced only once.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import transforms
+from clpt.arrays import on_host
+from clpt.errors import SceneError
+from clpt.geometry import analytic, shape_records, shapes
+from clpt.geometry.tessellate import keeps_its_kind, tessellate
+from clpt.geometry.tubes import Tubes, as_tubes
+from clpt.records import INSTANCE
+from clpt.scene.shapes import Curves, Group, Instance, Shape
+
+Matrices = NDArray[np.floating]
+CELLS = 16  # columns along a side, see `outline`
+FEW = 16  # instances of curves up to which each has its own, as tubes would take more memory
+ROUNDING = 4e-6  # of its coordinates, by which a box is larger than what float32 makes of it
+POINTS = 1 << 20  # that are transformed at once
+
+
+@dataclass(frozen=True)
+class Placed:
+    """An ordinary shape, and which of the scene's shapes it is or belongs to."""
+
+    shape: Shape
+    number: int
+
+
+@dataclass(frozen=True)
+class Prototype:
+    """Shapes of triangles that several instances share.
+
+    to_world: (k, 4, 4) float64, of each instance; numbers: (k,), which of the scene's shapes it is;
+    moves: it is a shape of its own, which moves.
+    """
+
+    shapes: tuple[Shape, ...]
+    to_world: Matrices
+    numbers: NDArray[np.int32]
+    moves: bool = False
+
+
+@dataclass(frozen=True)
+class Shared:
+    """A prototype as the device has it.
+
+    rows: (k,) of INSTANCE.dtype; boxes: (k, 2, 3) float32 in the world; triangles: their number;
+    middle: (3,) of the group's box, where its triangles have their origin; keys: rows of each
+    vertex.
+    """
+
+    rows: NDArray[Any]
+    boxes: NDArray[np.float32]
+    triangles: int
+    centre: NDArray[np.float64]
+    keys: int = 1
+
+
+@dataclass(frozen=True)
+class Instances:
+    """All instances of a scene.
+
+    rows: (k,) of INSTANCE.dtype; boxes: (k, 2, 3) float32; prototypes: (k,), what each places;
+    triangles, middles: of each prototype; keys: rows that each of its vertices has, one a time.
+    """
+
+    rows: NDArray[Any]
+    boxes: NDArray[np.float32]
+    prototypes: NDArray[np.intp]
+    triangles: tuple[int, ...]
+    centres: tuple[NDArray[np.float64], ...]
+    keys: tuple[int, ...] = ()
+
+
+def concatenated(parts: Sequence[Shared]) -> Instances:
+    """Return the instances of all prototypes, one after the other."""
+    return Instances(
+        np.concatenate([np.zeros(0, INSTANCE.dtype), *(part.rows for part in parts)]),
+        np.concatenate([np.zeros((0, 2, 3), np.float32), *(part.boxes for part in parts)]),
+        np.repeat(np.arange(len(parts)), [len(part.rows) for part in parts]),
+        tuple(part.triangles for part in parts),
+        tuple(part.centre for part in parts),
+        tuple(part.keys for part in parts),
+    )
+
+
+def distinct(things: Iterable[Shape]) -> Iterator[Shape]:
+    """Yield every shape that a scene has, those of its groups once and where the group has them."""
+    seen: set[int] = set()
+    for thing in things:
+        if not isinstance(thing, Instance):
+            yield thing
+        elif id(thing.group) not in seen:
+            seen.add(id(thing.group))
+            yield from thing.group.shapes
+
+
+def sort(
+    things: Sequence[Shape], warnings: list[str], moving: Collection[int] = ()
+) -> tuple[list[Placed], list[Prototype]]:
+    """Return the shapes that are lowered as they are, and those that are shared.
+
+    moving: indices of those that move. Their triangles are instances, each with its own.
+    A sphere or tube that an instance stretches becomes a mesh; a line about it goes to `warnings`.
+    Raises SceneError for an instance whose transform is singular, a projection, or stretches many
+    spheres.
+    """
+    placed: list[Placed] = []
+    prototypes: list[Prototype] = []
+    groups: dict[int, tuple[Group, list[int]]] = {}
+    for number, given in enumerate(things):
+        thing = _met_as(given)
+        if isinstance(thing, Instance):
+            groups.setdefault(id(thing.group), (thing.group, []))[1].append(number)
+        elif number in moving and thing.kind not in shape_records.ANALYTIC:
+            prototypes.append(_alone(thing, number))
+        else:
+            placed.append(Placed(thing, number))
+    for group, numbers in groups.values():
+        to_world = matrices([things[number] for number in numbers])
+        shared = []
+        for given in group.shapes:
+            shape = _met_as(given, to_world)
+            whole = Prototype((shape,), to_world, np.array(numbers, np.int32))
+            if shape.kind in shape_records.ANALYTIC:
+                placed += _analytic(shape, whole, prototypes, warnings, moving)
+            elif shape.emission is not None or len(numbers) == 1:
+                placed += _own(_copies(shape, whole), prototypes, moving)
+            else:
+                shared.append(shape)
+        if shared:
+            prototypes.append(dataclasses.replace(whole, shapes=tuple(shared)))
+    return placed, prototypes
+
+
+def _met_as(shape: Shape, to_world: Matrices | None = None) -> Shape:
+    """A shape as rays meet it: tubes for curves that shine, deform, are stretched or often placed.
+
+    to_world: of the instances of a group, (k, 4, 4).
+    """
+    if not isinstance(shape, Curves) or isinstance(shape, Tubes):
+        return shape
+    placed = np.eye(4)[None] if to_world is None else to_world
+    still = shape.emission is None and shape.deformation is None
+    if (
+        still
+        and len(placed) <= FEW
+        and all(keeps_its_kind(copy) for copy in _placed(shape, placed))
+    ):
+        return shape
+    return as_tubes(shape)
+
+
+def matrices(instances: Sequence[Shape]) -> Matrices:
+    """Return the transforms of instances, (k, 4, 4), checked all at once. Raises as `sort` does."""
+    try:
+        found = np.stack([np.asarray(on_host(one.to_world), np.float64) for one in instances])
+        affine = found.shape[1:] == (4, 4) and (found[:, 3] == transforms.IDENTITY[3]).all()
+        linear = found[:, :3, :3]
+        with np.errstate(all="ignore"):
+            lengths = np.linalg.norm(linear, axis=1)
+            volume = np.abs(np.linalg.det(linear)) / lengths.prod(axis=1)
+        if affine and np.isfinite(found).all() and (volume >= transforms.SINGULAR_BELOW).all():
+            return found
+    except (TypeError, ValueError, IndexError):
+        pass
+    return np.stack([shapes.placement(one) for one in instances])  # tells which one is wrong
+
+
+def _copies(shape: Shape, whole: Prototype) -> list[Placed]:
+    """The shape once for every instance."""
+    copies = _placed(shape, whole.to_world)
+    return [Placed(copy, int(number)) for copy, number in zip(copies, whole.numbers, strict=True)]
+
+
+def _placed(shape: Shape, to_world: Matrices) -> list[Shape]:
+    """A shape under each of the transforms, which its own goes before."""
+    own = shapes.placement(shape)
+    return [dataclasses.replace(shape, to_world=matrix @ own) for matrix in to_world]
+
+
+def _alone(shape: Shape, number: int) -> Prototype:
+    """A shape that moves by itself."""
+    return Prototype((shape,), np.eye(4)[None], np.array([number], np.int32), moves=True)
+
+
+def _own(
+    copies: list[Placed], prototypes: list[Prototype], moving: Collection[int]
+) -> list[Placed]:
+    """The copies that are still; those that move become prototypes."""
+    prototypes += [_alone(one.shape, one.number) for one in copies if one.number in moving]
+    return [one for one in copies if one.number not in moving]
+
+
+def _analytic(
+    shape: Any,
+    whole: Prototype,
+    prototypes: list[Prototype],
+    warnings: list[str],
+    moving: Collection[int],
+) -> list[Placed]:
+    """An analytic shape for every instance; where it is stretched, as triangles."""
+    copies = _copies(shape, whole)
+    stretched = np.array([not keeps_its_kind(copy.shape) for copy in copies])
+    if not stretched.any():
+        return copies
+    count = int(stretched.sum())
+    if shape.kind in shape_records.ONE_OF:
+        analytic.row(next(copy.shape for copy, bad in zip(copies, stretched, strict=True) if bad))
+    warnings.append(
+        f"{shapes.where(shape)}: {count} of {len(copies)} instances stretch it; "
+        "they are met as triangles"
+    )
+    kept = [copy for copy, bad in zip(copies, stretched, strict=True) if not bad]
+    mesh = tessellate(shape)
+    others = Prototype((mesh,), whole.to_world[stretched], whole.numbers[stretched])
+    if shape.emission is not None or count == 1:
+        return kept + _own(_copies(mesh, others), prototypes, moving)
+    prototypes.append(others)
+    return kept
+
+
+def centred(vertices: shapes.Points) -> tuple[shapes.Points, NDArray[np.float64]]:
+    """Return vertices (n, 3) float32 about the middle of their box, and that (3,)."""
+    centre = ((vertices.min(axis=0) + vertices.max(axis=0)) * np.float32(0.5)).astype(np.float64)
+    return (vertices - centre).astype(np.float32), centre
+
+
+def place(
+    to_world: Matrices, numbers: NDArray[np.int32], points: shapes.Points, centre: Matrices
+) -> tuple[NDArray[Any], NDArray[np.float32]]:
+    """Return a row of INSTANCE and a box (2, 3) float32 in the world per instance.
+
+    to_world, numbers: as of a Prototype; outline_, middle: of its vertices, see `outline` and
+    `centred`. Of the rows, nodes, leaves and prim are 0. Raises SceneError where float32 does not
+    reach.
+    """
+    linear = to_world[:, :3, :3]
+    rows = np.zeros(len(linear), INSTANCE.dtype)
+    rows["number"] = numbers
+    rows["origin"] = linear @ centre + to_world[:, :3, 3]
+    with np.errstate(all="ignore"):  # looked at below
+        to_local = np.linalg.inv(linear).astype(np.float32)
+        for i, name in enumerate("xyz"):
+            rows[name] = to_local[:, i]
+        seen = to_local.astype(np.float64)  # what rays are turned by
+        seen[~(np.abs(np.linalg.det(seen)) > 0.0)] = np.nan
+        boxes = _boxes(points, np.linalg.inv(seen), rows)
+    wrong = ~np.isfinite(boxes).all(axis=(1, 2))
+    if wrong.any():
+        where = f"shapes[{numbers[np.argmax(wrong)]}]"
+        raise SceneError("its transform moves a group out of float32", where=where)
+    return rows, boxes
+
+
+def _boxes(points: shapes.Points, linear: Matrices, rows: NDArray[Any]) -> NDArray[np.float32]:
+    """A box (2, 3) around points under each matrix, a little larger than what rays meet."""
+    boxes = np.empty((len(rows), 2, 3))
+    step = max(1, POINTS // len(points))
+    columns = np.ascontiguousarray(points.T, np.float64)
+    for i in range(0, len(rows), step):
+        for axis in range(3):
+            moved = linear[i : i + step, axis] @ columns
+            boxes[i : i + step, :, axis] = np.stack([moved.min(axis=1), moved.max(axis=1)], axis=1)
+    origin = rows["origin"].astype(np.float64)[:, None]
+    pad = ROUNDING * (np.abs(boxes).max(axis=(1, 2)) + np.abs(origin).max(axis=(1, 2)))
+    boxes += origin
+    boxes[:, 0] -= pad[:, None]
+    boxes[:, 1] += pad[:, None]
+    return boxes.astype(np.float32)
+
+
+def hull_points(vertices: shapes.Points, cells: int = CELLS) -> shapes.Points:
+    """Return points (p, 3) whose hull holds the vertices and is little larger, p at most 8 cells^2.
+
+    They are the corners of a box around the vertices in each column of a grid.
+    """
+    if len(vertices) <= 8:
+        return vertices
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    size = np.where(high > low, high - low, 1.0)
+    cell = np.minimum((vertices - low) / size * cells, cells - 1).astype(np.int64)
+    columns, index = np.unique(cell[:, 0] * cells + cell[:, 1], return_inverse=True)
+    lows = np.full((len(columns), 3), np.inf, np.float32)
+    highs = np.full((len(columns), 3), -np.inf, np.float32)
+    np.minimum.at(lows, index, vertices)
+    np.maximum.at(highs, index, vertices)
+    corners = [[(lows, highs)[bit >> axis & 1][:, axis] for axis in range(3)] for bit in range(8)]
+    return np.concatenate([np.column_stack(corner) for corner in corners])

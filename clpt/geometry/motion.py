@@ -1,0 +1,283 @@
+"""What of a scene moves while its shutter is open, and boxes around the ways of it."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import transforms
+from clpt.errors import SceneError
+from clpt.geometry import shapes, triangles
+from clpt.scene import Scene
+from clpt.scene.cameras import Camera, Matrix, Orthographic
+from clpt.scene.lights import Light
+from clpt.scene.motion import Keys, Shutter, arc, decomposed, rotation, slerp
+from clpt.scene.shapes import Cylinder, Group, Instance, Shape, Sphere
+
+LOOKS = 33  # even times at which it is looked what is around a light
+TURN = 0.1  # [rad] of a rotation that a box is looked at again
+ROUNDING = 4e-6  # of its coordinates, by which a box is larger than what float32 makes of it
+EVEN = 1e-5  # relative difference of scales from which a motion stretches
+
+ROUND = (Sphere, Cylinder)
+AT_ONCE = Shutter(0.0, 0.0)
+
+Boxes = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Motions:
+    """What moves while the shutter of a scene is open.
+
+    shapes, lamps: keys by index in the scene's shapes and lights; camera: its keys, or None;
+    deforming: for shapes and instances with points that move by themselves, by index, the times
+    between which they do so linearly, from when the shutter opens to when it closes.
+    """
+
+    shutter: Shutter
+    shapes: Mapping[int, Keys]
+    lamps: Mapping[int, Keys]
+    camera: Keys | None
+    deforming: Mapping[int, tuple[float, ...]]
+
+    @classmethod
+    def of(cls, scene: Scene) -> Motions:
+        """Return the motions of a scene of which `at_rest` has made still what does not move."""
+        of_shapes = {i: s.motion for i, s in enumerate(scene.shapes) if s.motion is not None}
+        of_lamps = {i: s.motion for i, s in enumerate(scene.lights) if s.motion is not None}
+        shutter = scene.camera.shutter or AT_ONCE
+        deforming = {i: _times(s, shutter) for i, s in enumerate(scene.shapes) if _deforms(s)}
+        return cls(shutter, of_shapes, of_lamps, scene.camera.motion, deforming)
+
+    def __bool__(self) -> bool:
+        return bool(self.shapes or self.lamps or self.camera or self.deforming)
+
+    @property
+    def moving(self) -> frozenset[int]:
+        """The indices of shapes and instances that move or deform."""
+        return frozenset({*self.shapes, *self.deforming})
+
+    @property
+    def scales(self) -> bool:
+        """Whether something is scaled, or mirrored, while it moves."""
+        every = [*self.shapes.values(), *self.lamps.values(), self.camera]
+        return any(keys is not None and not is_rigid(keys) for keys in every)
+
+    def looks(self) -> tuple[float, ...]:
+        """Return times from when the shutter opens to when it closes; one if nothing moves."""
+        if not self:
+            return (self.shutter.open,)
+        keys = [*self.shapes.values(), *self.lamps.values(), self.camera]
+        times = {t for one in keys if one is not None for t in one.times}
+        times |= {t for own in self.deforming.values() for t in own}
+        inner = {t for t in times if self.shutter.open < t < self.shutter.close}
+        even = np.linspace(self.shutter.open, self.shutter.close, LOOKS).tolist()
+        return tuple(sorted({*inner, *even}))
+
+    def halfway(self, keys: Keys | None, point: NDArray[Any]) -> NDArray[np.float64]:
+        """Return where a point (3,) is in the middle of the time in which the shutter is open."""
+        point = np.asarray(point, np.float64)
+        if keys is None:
+            return point
+        matrix = keys.at((self.shutter.open + self.shutter.close) / 2.0)
+        return np.asarray(transforms.transform_points(matrix, point), np.float64)
+
+    def swept(self, number: int, boxes: NDArray[Any]) -> Boxes:
+        """Return boxes (n, 2, 3) around those of one of the scene's shapes while it moves."""
+        return swept(self.shapes[number], corners(boxes), self.shutter)
+
+
+def at_rest(scene: Scene) -> Scene:
+    """Return a scene in which only that has keys that moves while the shutter is open.
+
+    What else has some is put where it is when the shutter opens; a scene without keys is returned
+    as it is. Raises SceneError for keys on a shape of a group, and on lights that cannot move.
+    """
+    changes: dict[str, Any] = {}
+    things = (*scene.shapes, *scene.lights, scene.camera)
+    if not all(isinstance(thing, (Shape, Light, Camera)) for thing in things):
+        return scene  # which is refused
+    shutter = scene.camera.shutter or AT_ONCE
+    if not isinstance(shutter, Shutter):
+        raise SceneError(f"must be a Shutter, not {shutter!r}", where="camera.shutter")
+    for i, shape in enumerate(scene.shapes):
+        for inner in getattr(getattr(shape, "group", None), "shapes", ()):
+            if inner.motion is not None:
+                message = "a shape of a group cannot move in it: give `motion` to its instance"
+                raise SceneError(message, where=shapes.where(inner))
+        _check(shape, f"shapes[{i}]")
+        if getattr(shape.emission, "motion", None) is not None:
+            message = "an area light moves with its shape: give `motion` to that"
+            raise SceneError(message, where=shapes.where(shape))
+    for i, light in enumerate(scene.lights):
+        _check(light, f"lights[{i}]")
+    _check(scene.camera, "camera")
+    bent: list[Any] = _undeformed(scene.shapes, shutter)
+    if any(new is not old for new, old in zip(bent, scene.shapes, strict=True)):
+        changes["shapes"] = bent
+    lists: tuple[tuple[str, Sequence[Any]], ...] = (("shapes", bent), ("lights", scene.lights))
+    for name, parts in lists:
+        if any(part.motion is not None for part in parts):
+            changes[name] = [_rest(part, shutter) for part in parts]
+    camera = _rest(scene.camera, shutter)
+    if camera is not scene.camera:
+        changes["camera"] = camera
+    return replace(scene, **changes) if changes else scene
+
+
+def _members(shape: Any) -> tuple[Any, ...]:
+    """A shape, or those that an instance places."""
+    return tuple(getattr(getattr(shape, "group", None), "shapes", (shape,)))
+
+
+def _deforms(shape: Any) -> bool:
+    return any(getattr(one, "deformation", None) is not None for one in _members(shape))
+
+
+def _times(shape: Any, shutter: Shutter) -> tuple[float, ...]:
+    """The times between which all points of a shape or instance move linearly."""
+    found = [getattr(one, "deformation", None) for one in _members(shape)]
+    return tuple(sorted({t for one in found if one is not None for t in one.while_open(shutter)}))
+
+
+def _undeformed(things: Sequence[Shape], shutter: Shutter) -> list[Shape]:
+    """Shapes and instances, of which those have deformations whose points move while it is open."""
+    groups: dict[int, Group] = {}
+    made: list[Shape] = []
+    for thing in things:
+        if not _deforms(thing):
+            made.append(thing)
+        elif isinstance(thing, Instance):
+            group = thing.group
+            if id(group) not in groups:
+                inner = tuple(_opening(one, shutter) for one in group.shapes)
+                groups[id(group)] = replace(group, shapes=inner)
+            made.append(replace(thing, group=groups[id(group)]))
+        else:
+            made.append(_opening(thing, shutter))
+    return made
+
+
+def _opening(shape: Any, shutter: Shutter) -> Any:
+    """A shape with its points where they are when the shutter opens; what stands still then has no
+    deformation. Raises SceneError for one that is not of the shape's points."""
+    given = getattr(shape, "deformation", None)
+    if given is None:
+        return shape
+    triangles.check_deformation(shape)
+    still = len(given.while_open(shutter)) == 1
+    if not still and shape.emission is not None and shape.kind == "spheres":
+        message = "spheres that emit light cannot deform: leave one of the two out"
+        raise SceneError(message, where=f"{shapes.where(shape)}.deformation")
+    changes = {} if still else {"deformation": given}
+    return replace(triangles.at_time(shape, shutter.open), **changes)
+
+
+def _check(thing: Any, where: str) -> None:
+    if not isinstance(thing.motion, (Keys, type(None))):
+        raise SceneError(f"must be Keys, not {thing.motion!r}", where=f"{where}.motion")
+
+
+def _rest(thing: Any, shutter: Shutter) -> Any:
+    """A shape, light or camera without keys, if it does not move while the shutter is open."""
+    if thing.motion is None or _moves(thing.motion, shutter):
+        return thing
+    matrix = thing.motion.at(shutter.open)
+    angular = isinstance(thing, Camera) and not isinstance(thing, (Matrix, Orthographic))
+    if angular and not _keeps_lengths(matrix):  # which its `to_world` must
+        return replace(thing, motion=Keys((0.0, 1.0), (matrix, matrix)))
+    if isinstance(thing, Matrix):
+        return replace(thing, motion=None, view=thing.view @ transforms.inverse(matrix))
+    if isinstance(thing, ROUND) and not is_even(thing.motion):
+        still = replace(thing, motion=None)  # which an instance may stretch
+        return Instance(group=Group((still,), thing.kind), to_world=matrix, name=thing.name)
+    if hasattr(thing, "to_world"):
+        return replace(thing, motion=None, to_world=matrix @ np.asarray(thing.to_world))
+    changes: dict[str, Any] = {"motion": None}
+    if hasattr(thing, "position"):
+        changes["position"] = tuple(transforms.transform_points(matrix, thing.position))
+    if hasattr(thing, "direction"):
+        changes["direction"] = tuple(transforms.transform_vectors(matrix, thing.direction))
+    return replace(thing, **changes)
+
+
+def _keeps_lengths(matrix: NDArray[np.float64]) -> bool:
+    linear = matrix[:3, :3]
+    return np.allclose(linear.T @ linear, np.eye(3), atol=1e-6)
+
+
+def _moves(keys: Keys, shutter: Shutter) -> bool:
+    """Whether what has keys is elsewhere at some time while the shutter is open."""
+    times = [t for t in keys.times if shutter.open < t < shutter.close]
+    found = [keys.at(t) for t in (shutter.open, *times, shutter.close)]
+    return any(not np.array_equal(matrix, found[0]) for matrix in found)
+
+
+def check(scene: Scene, motions: Motions) -> None:
+    """Raise SceneError for lights that move as they cannot."""
+    for i, keys in motions.lamps.items():
+        if not is_rigid(keys):
+            message = "a light may be moved and turned, not scaled or mirrored"
+            raise SceneError(message, where=f"lights[{i}].motion")
+    for i, keys in motions.shapes.items():
+        shape: Any = scene.shapes[i]
+        inner = getattr(getattr(shape, "group", None), "shapes", (shape,))
+        if any(one.emission is not None for one in inner) and not is_even(keys):
+            message = "a shape that emits light may be scaled evenly, not stretched"
+            raise SceneError(message, where=f"{shapes.where(shape)}.motion")
+
+
+def is_rigid(keys: Keys) -> bool:
+    """Whether keys neither scale nor mirror."""
+    parts = (decomposed(matrix)[2] for matrix in keys.transforms)
+    return all(np.allclose(part, np.eye(3), atol=1e-6) for part in parts)
+
+
+def is_even(keys: Keys) -> bool:
+    """Whether keys keep angles."""
+    parts = (decomposed(matrix)[2] for matrix in keys.transforms)
+    return all(np.allclose(p, p[0, 0] * np.eye(3), atol=EVEN * abs(p[0, 0])) for p in parts)
+
+
+def corners(boxes: NDArray[Any]) -> NDArray[np.float64]:
+    """Return the corners (n, 8, 3) of boxes (n, 2, 3)."""
+    index = np.array([[bit >> axis & 1 for axis in range(3)] for bit in range(8)])
+    return np.asarray(boxes, np.float64)[:, index, np.arange(3)]
+
+
+def swept(keys: Keys, points: NDArray[np.float64], shutter: Shutter) -> Boxes:
+    """Return boxes (n, 2, 3) around the hulls of points (n, p, 3) that move while it is open.
+
+    Between two looks a point leaves their chord by at most h^2 / 8 of its second derivative, by
+    which the boxes are larger.
+    """
+    low = np.full((len(points), 3), np.inf)
+    high = -low
+    grown = np.zeros((len(points), 1))
+    times = [t for t in keys.times if shutter.open < t < shutter.close]
+    ends = [shutter.open, *times, shutter.close]
+    for begin, end in itertools.pairwise(ends):
+        (t0, q0, s0), (t1, q1, s1) = (decomposed(keys.at(t)) for t in (begin, end))
+        angle = 2.0 * arc(q0, q1)[1]
+        steps = max(2, math.ceil(angle / TURN))
+        for i in range(steps + 1):
+            a = i / steps
+            linear = rotation(slerp(q0, q1, a)) @ (s0 + a * (s1 - s0))
+            moved = points @ linear.T + (t0 + a * (t1 - t0))
+            low = np.minimum(low, moved.min(axis=1))
+            high = np.maximum(high, moved.max(axis=1))
+        reach, shorter = (np.linalg.norm(points @ s, axis=2).max(axis=1) for s in (s0, s1))
+        reach = np.maximum(reach, shorter)[:, None]
+        grows = np.linalg.norm(points @ (s1 - s0), axis=2).max(axis=1)[:, None]
+        chord = (angle * angle * reach + 2.0 * angle * grows) / (8.0 * steps * steps)
+        grown = np.maximum(grown, chord)
+    size = np.maximum(np.abs(low), np.abs(high)).max(axis=1, keepdims=True)
+    origin = np.linalg.norm(keys.transforms[:, :3, 3], axis=1).max()
+    pad = grown + ROUNDING * (size + origin + np.abs(points).max(axis=(1, 2))[:, None])
+    return np.stack([low - pad, high + pad], axis=1).astype(np.float32)

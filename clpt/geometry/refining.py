@@ -1,0 +1,187 @@
+"""Meshes that lowering makes finer: Loop subdivision, and displacement by an image.
+
+Vertices at one place count as one, so that nothing tears where texture coordinates have a seam.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.errors import SceneError
+from clpt.scene import subdivision
+from clpt.scene.pixels import pixels
+from clpt.scene.shapes import Mesh
+from clpt.scene.textures import Bitmap
+
+Floats = NDArray[np.float64]
+Whole = NDArray[np.int64]
+Parts = tuple[Any, Any, Any, Any]
+DEEPEST = 10
+MOST_TRIANGLES = 1 << 25
+
+
+def is_refined(mesh: Mesh) -> bool:
+    """Return whether a mesh becomes finer than its arrays."""
+    return mesh.subdivision > 0 or mesh.displacement is not None
+
+
+def refined(mesh: Mesh, parts: Parts, name: str) -> Parts:
+    """Return vertices, faces, normals and uvs of a finer mesh, from those of its arrays.
+
+    name: for messages. Raises SceneError for what cannot be subdivided or displaced, and for a mesh
+    that gets too large.
+    """
+    _check(mesh, name)
+    vertices, faces, normals, uvs = parts
+    points, faces = vertices.astype(np.float64), faces.astype(np.int64)
+    smooth = None if normals is None else normals.astype(np.float64)
+    uvs = None if uvs is None else uvs.astype(np.float64)
+    if mesh.subdivision:
+        points, faces, smooth, uvs = _subdivided(points, faces, uvs, mesh.subdivision, name)
+    if mesh.displacement is not None:
+        points, faces, smooth, uvs = _displaced(mesh, (points, faces, smooth, uvs), name)
+    made = (None if one is None else one.astype(np.float32) for one in (points, smooth, uvs))
+    vertices, normals, uvs = made
+    return vertices, faces.astype(np.uint32), normals, uvs
+
+
+def _check(mesh: Mesh, name: str) -> None:
+    if not 0 <= mesh.subdivision <= DEEPEST:
+        message = f"subdivision must be 0 to {DEEPEST}, not {mesh.subdivision}"
+        raise SceneError(message, where=name)
+    if mesh.attributes or mesh.tangents is not None:
+        message = "a mesh that is subdivided or displaced has no attributes and no tangents"
+        raise SceneError(message, where=name)
+    if mesh.displacement is None:
+        return
+    image: Any = mesh.displacement
+    if mesh.uvs is None or not isinstance(image, Bitmap) or image.mapping != "uv":
+        message = "displacement needs uvs, and a bitmap that is laid out by them"
+        raise SceneError(message, where=name)
+    if not (math.isfinite(mesh.displacement_scale) and mesh.displacement_edge > 0.0):
+        message = "displacement_scale must be finite, and displacement_edge above 0"
+        raise SceneError(message, where=name)
+
+
+def _welded(points: Floats, faces: Whole) -> tuple[Floats, Whole, Whole]:
+    """The places (k, 3) of vertices, faces of these, and which place each vertex has."""
+    places, inverse = np.unique(points, axis=0, return_inverse=True)
+    inverse = inverse.reshape(-1)
+    return places, inverse[faces], inverse
+
+
+def _halved(faces: Whole, count: int) -> tuple[Whole, Whole]:
+    """The edges (e, 2) of faces, and the four faces of each; a new vertex stands behind `count`."""
+    halves = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    low, high = halves.min(axis=1), halves.max(axis=1)
+    keys, inverse = np.unique(low * count + high, return_inverse=True)
+    ab, bc, ca = inverse.reshape(3, -1) + count
+    a, b, c = faces.T
+    four = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+    finer = np.stack([np.stack(corners, axis=1) for corners in four], axis=1).reshape(-1, 3)
+    return np.stack([keys // count, keys % count], axis=1), finer
+
+
+def _grown(values: Floats, edges: Whole) -> Floats:
+    return np.concatenate([values, values[edges].mean(axis=1)])
+
+
+def _subdivided(
+    points: Floats, faces: Whole, uvs: Floats | None, levels: int, name: str
+) -> tuple[Floats, Whole, Floats, Floats | None]:
+    """Points and normals of the limit surface; uvs are linear on each triangle."""
+    places, welded, _ = _welded(points, faces)
+    whole = (np.roll(welded, 1, axis=1) != welded).all(axis=1)
+    welded, faces = welded[whole], faces[whole]
+    try:
+        limit, finer, normals = subdivision.loop(places, welded, levels)
+    except SceneError as error:
+        raise SceneError(error.message, where=name) from None
+    count = len(points)
+    for _ in range(levels):
+        edges, faces = _halved(faces, count)
+        uvs = None if uvs is None else _grown(uvs, edges)
+        count += len(edges)
+    own = np.zeros(count, np.int64)
+    own[faces.reshape(-1)] = finer.reshape(-1)
+    return limit[own], faces, normals[own], uvs
+
+
+def _displaced(mesh: Mesh, parts: Parts, name: str) -> Parts:
+    """Edges no longer than `displacement_edge` in the world, moved along smooth normals."""
+    points, faces, normals, uvs = parts
+    linear = np.asarray(mesh.to_world, np.float64)[:3, :3]
+    ends = points[faces] @ linear.T
+    longest = np.linalg.norm(ends - np.roll(ends, 1, axis=1), axis=2).max(initial=0.0)
+    levels = max(math.ceil(math.log2(max(longest, 1e-30) / mesh.displacement_edge)), 0)
+    if len(faces) * 4.0**levels > MOST_TRIANGLES:
+        message = f"edges of {mesh.displacement_edge:g} m make more than {MOST_TRIANGLES:,} "
+        raise SceneError(message + "triangles; raise displacement_edge", where=name)
+    if normals is None:
+        places, welded, own = _welded(points, faces)
+        normals = _smooth(places, welded)[own]
+    for _ in range(levels):
+        edges, faces = _halved(faces, len(points))
+        points, normals, uvs = (_grown(one, edges) for one in (points, normals, uvs))
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = normals / np.where(length > 0.0, length, 1.0)
+    image: Any = mesh.displacement
+    moved = points + mesh.displacement_scale * heights(image, uvs)[:, None] * normals
+    _, welded, own = _welded(points, faces)
+    shares = np.bincount(own)
+    mean = np.stack([np.bincount(own, moved[:, i]) / shares for i in range(3)], axis=1)
+    return mean[own], faces, _smooth(mean, welded)[own], uvs
+
+
+def _smooth(points: Floats, faces: Whole) -> Floats:
+    """Unit normals of vertices: of the triangles around them, by their areas."""
+    a, b, c = (points[faces[:, i]] for i in range(3))
+    crosses = np.cross(b - a, c - a)
+    total = np.zeros_like(points)
+    for corner in faces.T:
+        for axis in range(3):
+            total[:, axis] += np.bincount(corner, crosses[:, axis], len(points))
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    return total / np.where(length > 0.0, length, 1.0)
+
+
+def heights(image: Bitmap, uvs: Floats) -> Floats:
+    """Return what an image says at uvs (n, 2), as kernels/texture/bitmap.cl reads numbers: (n,)."""
+    values = pixels(image, "real")[..., 0].astype(np.float64)
+    to_uv = np.asarray(image.to_uv, np.float64)
+    x, y = ((np.c_[uvs, np.ones(len(uvs))] @ to_uv.T)[:, :2] * [1.0, -1.0] + [0.0, 1.0]).T
+    x, y = x * values.shape[1], y * values.shape[0]
+    if image.filter == "nearest":
+        return _texel(image, values, np.floor(y), np.floor(x))
+    x, y = x - 0.5, y - 0.5
+    i, j = np.floor(x), np.floor(y)
+    total = np.zeros(len(uvs))
+    for dx in (0, 1):
+        for dy in (0, 1):
+            weight = np.abs(1 - dx - (x - i)) * np.abs(1 - dy - (y - j))
+            total += weight * _texel(image, values, j + dy, i + dx)
+    return total
+
+
+def _texel(image: Bitmap, values: Floats, row: Floats, column: Floats) -> Floats:
+    """Values of texels, also of those that lie beyond the image."""
+    height, width = values.shape
+    y, down = _wrapped(row, height, image.wrap_v or image.wrap)
+    x, along = _wrapped(column, width, image.wrap)
+    return np.where(down & along, values[y, x], 0.0)
+
+
+def _wrapped(index: Floats, size: int, wrap: str) -> tuple[Whole, NDArray[np.bool_]]:
+    """Columns or rows within an image, and whether there is something."""
+    whole = index.astype(np.int64)
+    there = (whole >= 0) & (whole < size) if wrap == "zero" else np.ones(len(whole), bool)
+    if wrap == "repeat":
+        return whole % size, there
+    if wrap == "mirror":
+        turn = whole % (2 * size)
+        return np.where(turn < size, turn, 2 * size - 1 - turn), there
+    return np.clip(whole, 0, size - 1), there

@@ -1,0 +1,47 @@
+"""What every shape has: a name for messages, what its geometry follows from, and its transform."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import transforms
+from clpt.arrays import on_host
+from clpt.errors import SceneError
+from clpt.scene.params import fields_of
+from clpt.scene.shapes import Shape
+
+Points = NDArray[np.float32]
+Faces = NDArray[np.uint32]
+Words = NDArray[np.uint32]
+
+
+def where(shape: Shape) -> str:
+    """Return how a message names the shape."""
+    kind = "curves" if shape.kind == "tubes" else shape.kind  # see `tubes`
+    return f"{kind} {shape.name!r}" if shape.name else kind
+
+
+def geometry(shape: Shape) -> tuple[Any, ...]:
+    """Return all that the triangles of a shape follow from: its fields but for the surface."""
+    own = fields_of(shape)
+    return type(shape), *(own[name] for name in own if name not in ("material", "emission"))
+
+
+def placement(shape: Shape) -> NDArray[np.float64]:
+    """Return a shape's transform. Raises SceneError if it is singular, or no affine 4x4 matrix."""
+    try:
+        matrix = np.asarray(on_host(shape.to_world), np.float64)
+    except (TypeError, ValueError) as error:
+        raise SceneError(f"to_world is not a matrix: {error}", where=where(shape)) from error
+    if matrix.shape != (4, 4):
+        raise SceneError(f"to_world must be (4, 4), found {matrix.shape}", where=where(shape))
+    if transforms.is_singular(matrix):
+        raise SceneError(
+            "its transform is singular: it flattens space or is not finite", where=where(shape)
+        )
+    if not transforms.is_affine(matrix):
+        raise SceneError("its transform is a projection, not affine", where=where(shape))
+    return matrix

@@ -1,0 +1,129 @@
+"""What shapes enclose: how often they wind around a point, their boxes, areas and volumes.
+
+A closed boundary fills the whole sphere of directions around a point inside, 4 pi, and on balance
+nothing of it around a point outside. cached: keeps what a function made of what it was given, such
+as the triangles of a shape; None: nothing is kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import transforms
+from clpt.geometry import analytic, shapes, spheres
+from clpt.geometry.tessellate import keeps_its_kind, tessellate
+from clpt.geometry.triangles import counted, triangulate
+from clpt.scene.shapes import Cylinder, Disk, Mesh, Shape, Sphere, Spheres
+
+Triangles = tuple[NDArray[np.float32], NDArray[np.uint32]]
+AROUND = 96  # corners of what stands for a disk
+CHUNK = 1 << 18  # triangles that are summed at a time
+
+
+def box(shape: Shape, cached: Callable[..., Any] | None) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return the lowest and the highest corner of a shape's box."""
+    if isinstance(shape, Sphere) and keeps_its_kind(shape):
+        return analytic.bounds(shape)
+    if isinstance(shape, Spheres):
+        centers, radii = balls(shape)
+        return (centers - radii[:, None]).min(axis=0), (centers + radii[:, None]).max(axis=0)
+    vertices, faces = triangles_of(shape, cached)
+    if not len(faces):
+        return np.full(3, np.inf), np.full(3, -np.inf)
+    return vertices.min(axis=0), vertices.max(axis=0)
+
+
+def winding(shape: Shape, p: NDArray[np.float64], cached: Callable[..., Any] | None) -> float:
+    """Return how often a shape winds around a point.
+
+    It is 1 inside of a shape that is closed and faces outward.
+    """
+    side = -1.0 if shape.flip_normals else 1.0
+    if isinstance(shape, Sphere) and keeps_its_kind(shape):
+        members = analytic.members_of(shape)
+        return side * float(np.linalg.norm(p - members["center"]) < members["radius"])
+    if isinstance(shape, Spheres):
+        centers, radii = balls(shape)
+        return side * float((np.linalg.norm(p - centers, axis=1) < radii).sum())
+    return winding_number(*triangles_of(shape, cached), p)
+
+
+def areas(
+    shape: Shape, cached: Callable[..., Any] | None, to_world: NDArray[np.float64] | None = None
+) -> NDArray[np.float64]:
+    """Return the sum of a shape's areas along their normals, and of the areas alone (4,) [m^2].
+
+    to_world: what takes it where it is meant, after its own transform; None: nothing does.
+    """
+    if isinstance(shape, Spheres):
+        return np.array([0.0, 0.0, 0.0, 4.0 * np.pi * float((balls(shape)[1] ** 2).sum())])
+    vertices, faces = triangles_of(shape, cached)
+    points = np.asarray(vertices, np.float64)
+    if to_world is not None:
+        points = transforms.transform_points(to_world, points)
+    a, b, c = np.moveaxis(points[faces], 1, 0)
+    n = np.cross(b - a, c - a) / 2.0
+    return np.array([*n.sum(axis=0), np.linalg.norm(n, axis=1).sum()])
+
+
+def volume(shape: Shape, cached: Callable[..., Any] | None) -> float:
+    """Return what a shape encloses [m^3], below 0 of one that faces inward."""
+    if isinstance(shape, Spheres):
+        return (-1.0 if shape.flip_normals else 1.0) * 4.2 * float((balls(shape)[1] ** 3).sum())
+    vertices, faces = triangles_of(shape, cached)
+    a, b, c = np.moveaxis(np.asarray(vertices, np.float64)[faces], 1, 0)
+    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
+
+
+def winding_number(vertices: NDArray[Any], faces: NDArray[Any], p: NDArray[np.float64]) -> float:
+    """Return how often triangles wind around a point; those that face away count as 1 in all.
+
+    vertices (n, 3), faces (m, 3), p (3,). Van Oosterom and Strackee 1983, equation 8.
+    """
+    total = 0.0
+    corners = np.asarray(vertices, np.float64) - p
+    for first in range(0, len(faces), CHUNK):
+        a, b, c = np.moveaxis(corners[faces[first : first + CHUNK]], 1, 0)
+        la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+        volume = np.einsum("ij,ij->i", a, np.cross(b, c))
+        dots = (np.einsum("ij,ij->i", *pair) for pair in ((a, b), (b, c), (c, a)))
+        ab, bc, ca = dots
+        total += 2.0 * float(np.arctan2(volume, la * lb * lc + ab * lc + bc * la + ca * lb).sum())
+    return total / (4.0 * np.pi)
+
+
+def balls(shape: Spheres) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return centres and radii of many spheres, in the world."""
+    rows = np.asarray(spheres.balls(shape), np.float64)
+    return rows[:, :3], np.abs(rows[:, 3])
+
+
+def triangles_of(shape: Shape, cached: Callable[..., Any] | None = None) -> Triangles:
+    """Return the triangles of a shape in the world, or those that stand for it."""
+    if isinstance(shape, Disk):
+        shape = _fan(shape)
+    elif isinstance(shape, Cylinder | Sphere):
+        shape = tessellate(shape)
+    elif cached is not None:
+        vertices, faces, *_ = cached(counted, shape, by=shapes.geometry(shape))
+        return vertices, faces
+    vertices, faces, *_ = triangulate(shape)
+    return vertices, faces
+
+
+def _fan(disk: Disk) -> Mesh:
+    """A disk as triangles about its middle."""
+    angle = 2.0 * np.pi * np.arange(AROUND) / AROUND
+    rim = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(AROUND)])
+    i = np.arange(AROUND)
+    faces = np.column_stack([np.zeros(AROUND, int), 1 + i, 1 + (i + 1) % AROUND])
+    return Mesh(
+        vertices=np.concatenate([np.zeros((1, 3)), rim]).astype(np.float32),
+        faces=faces.astype(np.uint32),
+        to_world=disk.to_world,
+        flip_normals=disk.flip_normals,
+    )

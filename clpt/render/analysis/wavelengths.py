@@ -1,0 +1,185 @@
+"""How the camera draws wavelengths: a density over those to which its film responds.
+
+Visible importance, in closed form, is good where lights are smooth and the sensor is an eye. For
+line spectra, cameras beyond the visible and films of bands the density is tabulated instead, from
+the sensor and the scene's lights. All are unbiased; they differ in noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clpt import spectra, spectral_exr
+from clpt.render.analysis.colour import sensor
+from clpt.render.analysis.index import SceneIndex
+from clpt.scene.integrators import Film
+from clpt.scene.materials import Material
+from clpt.scene.params import params
+from clpt.spectra import RGB, RGBIlluminant, Spectrum
+from clpt.spectra.reradiation import Reradiation
+from clpt.spectra.spectrum import d65, gridded
+
+Values = NDArray[np.float64]
+
+STEP = 1.0  # [nm] at most, between the nodes of a table
+LIGHTS, SENSOR = 0.5, 0.45  # shares of a table; the rest is even, so that nothing is left out
+WORTH = 2.2  # times that the second moment must fall for a table, which costs time, to be taken
+GUIDES = 1024  # kernels/spectrum/density.cl
+
+
+@dataclass(frozen=True)
+class Density:
+    """Of the camera's wavelengths between lo and hi [nm]; zero outside.
+
+    values: its nodes (n + 1,) at equal distances, linear between them, whose integral is 1; None
+    for visible importance, which needs no table.
+    """
+
+    lo: float
+    hi: float
+    values: Values | None = None
+
+    def pdf(self, lambdas: ArrayLike) -> Values:
+        """The density [1/nm] at `lambdas`."""
+        if self.values is None:
+            return spectra.wavelength_pdf(lambdas, self.lo, self.hi)
+        return np.interp(np.asarray(lambdas, np.float64), self.nodes, self.values, 0.0, 0.0)
+
+    @property
+    def nodes(self) -> Values:
+        """Where the values of a table stand [nm]."""
+        count = 2 if self.values is None else len(self.values)
+        return np.linspace(self.lo, self.hi, count)
+
+    def words(self) -> NDArray[np.float32]:
+        """The table as kernels/spectrum/density.cl reads it: n, lo, step, sums, values, guide.
+
+        A sum (n + 1) is the share of what lies below a node; the guide (GUIDES + 1) the cells in
+        which equal shares begin, so that a search begins near its end.
+        """
+        if self.values is None:
+            raise ValueError("visible importance has no table")
+        step = (self.hi - self.lo) / (len(self.values) - 1)
+        cells = (self.values[1:] + self.values[:-1]) / 2.0 * step
+        sums = np.concatenate([[0.0], np.cumsum(cells)])
+        sums = np.minimum(sums, 1.0).astype(np.float32)
+        shares = np.arange(GUIDES + 1) / GUIDES
+        guide = np.clip(np.searchsorted(sums, shares, "right") - 1, 0, len(cells) - 1)
+        head = [len(cells), self.lo, step]
+        return np.concatenate([head, sums, self.values, guide]).astype(np.float32)
+
+
+def density(index: SceneIndex) -> Density:
+    """The density that suits a scene in spectral mode, or the one that its film asks for."""
+    film = index.scene.film
+    lo, hi = _support(film)
+    visible = Density(lo, hi)
+    nodes = np.linspace(lo, hi, int(np.ceil((hi - lo) / STEP - 1e-9)) + 1)
+    if film.wavelengths == "visible":
+        return Density(lo, hi, _normalised(visible.pdf(nodes), nodes)) if film.bands else visible
+    response = np.ones_like(nodes) if film.bands else np.abs(sensor(film).sample(nodes)).sum(axis=1)
+    glow = _glow(index, nodes)
+    emitted = [(gridded(light, nodes) + glow(light)) * response for light in emissions(index)]
+    emitted = [light for light in emitted if light.any()]
+    shares = [(1.0 - LIGHTS - SENSOR, np.ones_like(nodes))]
+    shares += [(SENSOR, response)] if response.any() else []
+    shares += [(LIGHTS / len(emitted), light) for light in emitted]
+    mixed = np.sum([share * _normalised(values, nodes) for share, values in shares], axis=0)
+    table = Density(lo, hi, _normalised(mixed, nodes))
+    if film.wavelengths == "auto" and not film.bands:
+        gains = [_second_moment(visible, nodes, light) for light in emitted or [response]]
+        costs = [_second_moment(table, nodes, light) for light in emitted or [response]]
+        if all(gain < WORTH * cost for gain, cost in zip(gains, costs, strict=True)):
+            return visible
+    return table
+
+
+def _support(film: Film) -> tuple[float, float]:
+    """The range [nm] within the film's to which it responds, between whole steps."""
+    if film.bands:
+        return film.lambda_min, film.lambda_max
+    nodes = np.append(np.arange(film.lambda_min, film.lambda_max, STEP), film.lambda_max)
+    seen = np.flatnonzero(sensor(film).sample(nodes).any(axis=1))
+    if not len(seen):
+        return film.lambda_min, film.lambda_max
+    return float(nodes[max(seen[0] - 1, 0)]), float(nodes[min(seen[-1] + 1, len(nodes) - 1)])
+
+
+def _second_moment(density: Density, nodes: Values, light: Values) -> float:
+    """Of one wavelength's estimate of the integral of `light` (n,), given at nodes."""
+    return _integral(light**2 / density.pdf(nodes), nodes)
+
+
+def _integral(values: Values, nodes: Values) -> float:
+    """Of what is linear between nodes."""
+    return float(((values[1:] + values[:-1]) / 2.0) @ np.diff(nodes))
+
+
+def _normalised(values: Values, nodes: Values) -> Values:
+    return values / _integral(values, nodes)
+
+
+def _glow(index: SceneIndex, nodes: Values) -> Callable[[Spectrum], Values]:
+    """What fluorescent materials give out at nodes [nm] under a light: all of them together."""
+    film = index.scene.film
+    cells = int(np.ceil((film.lambda_max - film.lambda_min) / STEP - 1e-9))
+    into = np.linspace(film.lambda_min, film.lambda_max, cells + 1)
+    found = {id(m): m for shape in index.shapes for m in _fluorescent(shape.material)}
+    for medium in (part for one in index.media for part in getattr(one, "parts", (one,))):
+        given = [getattr(one, "reradiation", None) for one in medium.phase.leaves]
+        found |= {id(m): m for m in (*given, getattr(medium, "dye", None)) if m is not None}
+    whole = np.zeros((len(nodes), len(into)))
+    for matrix in found.values():
+        whole += (into[1] - into[0]) * matrix.sample(nodes[:, None], into[None, :])
+    return lambda light: whole @ gridded(light, into)
+
+
+def _fluorescent(material: Any) -> Iterator[Reradiation]:
+    """What a material, and those inside it, give out at other wavelengths."""
+    declared = params(type(material)) if isinstance(material, Material) else {}
+    for name in declared:
+        value = getattr(material, name)
+        if isinstance(value, Reradiation):
+            yield value
+        elif isinstance(value, Material):
+            yield from _fluorescent(value)
+
+
+def emissions(index: SceneIndex) -> Iterator[Spectrum]:
+    """What the lights of a scene emit; an image of colours stands for D65."""
+    scene = index.scene
+    sources: list[Any] = [
+        *scene.lights,
+        *(shape.emission for shape in index.shapes),
+        scene.integrator,
+    ]
+    for source in sources:
+        if source is None:
+            continue
+        declared = params(type(source))
+        if "image" in declared and declared["image"].role == "host":
+            yield _mean(source.image, f"{source.kind}.image")
+        for name, param in declared.items():
+            if param.role == "emission":
+                yield _emitted(getattr(source, name))
+    yield from (medium.light for medium in index.emitting if medium.light is not None)
+
+
+def _emitted(value: Any) -> Spectrum:
+    """An emission as a spectrum, of a texture its mean."""
+    if getattr(value, "is_texture", False):
+        return _mean(getattr(value, "image", None), f"{value.kind}.image")
+    return RGBIlluminant(value.r, value.g, value.b) if isinstance(value, RGB) else value
+
+
+def _mean(image: Any, where: str) -> Spectrum:
+    """The mean light of an image of spectra; any other stands for D65."""
+    found = spectral_exr.find(image, emissive=True, where=where)
+    if found is None:
+        return d65()
+    return found.spectrum(np.nan_to_num(found.values.mean(axis=(0, 1), dtype=np.float64)))

@@ -1,0 +1,180 @@
+"""Media as words: what a path knows its medium by, see kernels/media/medium.cl."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.render.analysis.index import SceneIndex
+from clpt.render.contract.parameter_words import SPECTRUM_WORDS
+from clpt.render.lowering import grids
+from clpt.render.lowering.encoder import Encoder
+from clpt.render.lowering.lights.brick_lights import BrickLights
+from clpt.render.lowering.lights.lights import LightRows
+from clpt.render.lowering.materials.material_words import MaterialWords
+from clpt.render.lowering.tables import Words, as_words
+from clpt.scene.media import Dyed, Grid, Lattice, Medium, Mixture, Phase
+from clpt.scene.shapes import Shape
+from clpt.spectra import Constant, Spectrum
+
+MOST_AIMS = 8  # lamps near which flights end, see kernels/media/equiangular.cl
+FLIES = 0x40000000  # in a medium's word: the stage `flight` takes rays through it
+BYTES = 0x10000000  # which has 8 bits for each number
+GRID = 0x20000000  # a density on a grid multiplies its coefficients
+DYED = 0x04000000  # with a dye that gives out light
+SEALED = 0x08000000  # no shadow ray leaves it, see clpt.render.analysis.sealed
+
+
+def medium_aims(lights: LightRows) -> NDArray[np.float32]:
+    """Return the places of the lamps that flights through media may end near.
+
+    (n, 4) float32: x, y, z [m], and the sum of the shares of those up to it; n is 0, 1 or
+    MOST_AIMS, so that kernels do not change with the number of lamps. The lamps of most power are
+    taken, each in its middle; the share is that of its power.
+    """
+    places, powers, row = [], [], 0
+    for bounds in lights.bounds:
+        power = lights.power[row : row + len(bounds)]
+        row += len(bounds)
+        if bounds.placed.all() and power.sum() > 0.0:
+            places.append(np.average((bounds.low + bounds.high) / 2.0, axis=0, weights=power))
+            powers.append(power.sum())
+    if not places:
+        return np.zeros((0, 4), np.float32)
+    first = np.argsort(-np.array(powers), kind="stable")[:MOST_AIMS]
+    sums = np.cumsum(np.array(powers)[first])
+    rows = np.column_stack([np.array(places)[first], sums / sums[-1]]).astype(np.float32)
+    count = 1 if len(rows) == 1 else MOST_AIMS
+    return np.concatenate([rows, np.repeat(rows[-1:], count - len(rows), axis=0)])
+
+
+class MediumWords:
+    """Makes the words of media, each once."""
+
+    def __init__(
+        self,
+        index: SceneIndex,
+        encoder: Encoder,
+        materials: MaterialWords,
+        sealed: frozenset[Medium] = frozenset(),
+    ):
+        self._index, self._encoder, self._materials = index, encoder, materials
+        self._sealed = sealed
+        self._words: dict[Medium, int] = {}
+        self.lights: list[BrickLights] = []  # of media whose words are made
+        self._row = len(index.scene.lights)  # in `lights`, of the next brick
+        self._has_media = bool(index.media)  # not of an integrator that sees none
+
+    def word(self, medium: Medium | None) -> int:
+        """Return the word of a medium, 0 of None."""
+        if medium is None or not self._has_media:
+            return 0
+        if medium not in self._words:
+            self._words[medium] = self._new_word(medium)
+        return self._words[medium]
+
+    def of_shapes(self, shapes: Iterable[Shape]) -> NDArray[np.uint32]:
+        """Return the words of shapes' insides and outsides (2 n,), () where there are no media."""
+        if not self._has_media:
+            return np.zeros(0, np.uint32)
+        sides = [self.word(side) for s in shapes for side in (s.interior, s.exterior)]
+        return np.array(sides, np.uint32)
+
+    def _new_word(self, medium: Medium) -> int:
+        spectral = self._index.spectral
+        absorbs, scatters = medium.coefficients(spectral)
+        phases = medium.collisions(spectral) if medium.scatters else ()
+        rows = []
+        if self._index.emitting:
+            light = medium.light or Constant(0.0)
+            rows.append(self._encoder.named_words("medium", "light", light, "emission")[0])
+        rows += self._part_words(phases, (absorbs, scatters))
+        mixture = self._mixture_words(medium)
+        word = FLIES | (SEALED if medium in self._sealed else 0)
+        if isinstance(medium, Dyed) and medium.glows and spectral:
+            word |= DYED
+        if isinstance(medium, Lattice):
+            rows.append(grids.row(medium, self._encoder))
+            word |= GRID | (BYTES if getattr(medium, "bits", 16) == 8 else 0)
+        before = 2 + (SPECTRUM_WORDS if self._index.emitting else 0)
+        word |= before + self._encoder.store.size("materials")
+        if isinstance(medium, Lattice) and self._index.grids.emissive:
+            rows.append(self._glow(medium, word, absorbs))
+        if isinstance(medium, Lattice) and self._index.grids.tinted:
+            rows.append(self._tint(medium, "albedo_grid"))
+        if isinstance(medium, Lattice) and self._index.grids.coloured:
+            rows.append(self._tint(medium, "colour_grid"))
+        rows += mixture
+        self._encoder.store.append("materials", np.concatenate(rows))
+        return word
+
+    def _part_words(
+        self, phases: tuple[Phase, ...], coefficients: tuple[Spectrum, Spectrum]
+    ) -> list[Words]:
+        """The word of the first phase function, 0 of none, and those of the coefficients."""
+        first = self._materials.phase(phases[0]) if phases else 0
+        words = [np.array([first], np.uint32)]
+        for name, value in zip(("absorption", "scattering"), coefficients, strict=True):
+            words.append(self._encoder.named_words("medium", name, value, "coefficient")[0])
+        return words
+
+    def _mixture_words(self, medium: Medium) -> list[Words]:
+        """What stands behind all: where the shares of parts begin, 0 for nowhere, and the parts."""
+        count, spectral = self._index.grids.mixed, self._index.spectral
+        if not isinstance(medium, Mixture):
+            return [np.zeros(1, np.uint32)] if count and isinstance(medium, Lattice) else []
+        first = self._encoder.store.append("images", grids.shares(medium, self._encoder, count))
+        words = [np.array([1 + first], np.uint32)]
+        for part, coefficients in zip(medium.parts, medium.of_parts(spectral), strict=True):
+            phases = part.collisions(spectral) if part.scatters else ()
+            words += self._part_words(phases, coefficients)
+        for _ in range(count - len(medium.parts)):
+            words += self._part_words((), (Constant(0.0), Constant(0.0)))
+        return words
+
+    def _tint(self, medium: Lattice, name: str) -> Words:
+        """What stands behind that: where the colours of its bricks begin, 0 for nowhere."""
+        colours = getattr(medium, name, None)
+        if not isinstance(medium, Grid) or colours is None:
+            return np.zeros(1, np.uint32)
+        given = (medium.density, colours, self._index.spectral)
+        first = self._encoder.store.append("images", self._encoder.cache(grids.colours, *given))
+        apart = name == "albedo_grid" and not medium.albedo_with_density
+        return np.array([-first if apart else first], np.int32).view(np.uint32)
+
+    def _glow(self, medium: Lattice, word: int, absorbs: Spectrum) -> Words:
+        """What stands behind the row of a grid: what its bricks emit, and which lights they are."""
+        words = np.zeros(grids.GLOW_WORDS, np.uint32)
+        light: Any = medium.light
+        store = self._encoder.store
+        if light is None:
+            return words
+        if not isinstance(medium, Grid):  # none of its bricks is a light
+            rows = np.full(np.prod(grids.brick_counts(medium.size)), -1, np.int32)
+            words[0] = store.append("images", rows.view(np.uint32))
+            return words
+        rgb = np.asarray(absorbs.to_rgb("unbounded"), float)
+        source, table = medium.emission_grid, None
+        if medium.temperature is not None:
+            source = medium.temperature
+            table = grids.black_bodies(medium, light.kelvin)
+            words[1] = 2 if medium.normalised else 1
+            words[4] = store.append_floats("distributions", table[:, 1:])
+            words[3], words[5] = as_words([medium.brightness, (len(table) - 1) / light.kelvin])
+            table = np.stack([table[:, 0], table[:, 1:].mean(axis=1)], axis=1)
+        else:
+            rgb = rgb * np.asarray(light.to_rgb("emission"), float)
+        if source is not None:
+            words[2] = store.append("images", self._encoder.cache(grids.bricks, source))
+        glow = grids.glow(medium, max(float(rgb.mean()), 1e-30), table)
+        bright = glow.brightest()
+        rows = np.zeros(np.prod(grids.brick_counts(medium.size)), np.int32)
+        rows[glow.numbers] = -1
+        rows[bright.numbers] = 1 + self._row + np.arange(len(bright.numbers))
+        words[0] = store.append("images", rows.view(np.uint32))
+        self._row += len(bright.numbers)
+        self.lights.append(BrickLights(word, bright))
+        return words

@@ -1,0 +1,60 @@
+"""The numbers of a bitmap's image."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import images, spectra, spectral_exr
+from clpt.arrays import on_host
+from clpt.errors import SceneError
+from clpt.scene.textures import Bitmap
+from clpt.spectral_exr import SpectralImage
+
+Floats = NDArray[np.float32]
+
+
+def spectral_image(texture: Any, role: str) -> SpectralImage | None:
+    """Return a texture's image if it is a bitmap of spectra, in the role of a parameter."""
+    if not isinstance(texture, Bitmap):
+        return None
+    return spectral_exr.find(texture.image, emissive=role == "emission", where="bitmap.image")
+
+
+def pixels(texture: Bitmap, role: str) -> Floats:
+    """Return a bitmap's image, (h, w, 1 or 3) float32, top row first; for "real" (h, w, 1).
+
+    role: "reflectance", "emission", "index" or "real"; of spectra it chooses the colour that stands
+    for them. Raises SceneError if it cannot be read or is no image.
+    """
+    spectral = spectral_image(texture, role)
+    image = texture.image if spectral is None else spectral.to_rgb()
+    if isinstance(image, (str, Path)):
+        image = images.read_stored(image).decoded(not texture.raw)
+    image = np.asarray(on_host(image))
+    image = image[..., None] if image.ndim == 2 else image
+    if image.dtype == np.uint8 and image.ndim == 3:
+        image = images.Stored(image, encoded=True).decoded(not texture.raw)
+    if image.dtype.kind != "f":
+        wanted = "must be a path or an array of floats or of bytes"
+        raise SceneError(wanted, where="bitmap.image")
+    if image.ndim != 3 or image.shape[2] not in (1, 3, 4) or image.size == 0:
+        wanted = "must be (h, w) or (h, w, 1, 3 or 4) and not empty"
+        raise SceneError(f"{wanted}, not {image.shape}", where="bitmap.image")
+    chosen = channel(image, texture.channel) if role == "real" else image[..., :3]
+    return np.nan_to_num(chosen.astype(np.float32))
+
+
+def channel(image: NDArray[Any], name: str) -> NDArray[Any]:
+    """The channel (h, w, 1) that stands for a number, of (h, w, 1, 3 or 4); a is 1 if missing."""
+    count = image.shape[2]
+    if name == "a":
+        return image[..., 3:] if count == 4 else np.ones_like(image[..., :1])
+    if count == 1:
+        return image
+    if name == "luminance":
+        return spectra.luminance(image[..., :3])[..., None]
+    return image[..., "rgb".index(name), None]

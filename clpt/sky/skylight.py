@@ -1,0 +1,410 @@
+"""Radiance of the sky: sunlight scattered once along each ray, and all further orders.
+
+Light scattered once is integrated along each ray. What comes after is a field of its own: at
+heights and sun angles around the observer, its moments in spherical harmonics up to DEGREE, which
+are all that air needs and most of what haze does. It is found order by order on rays from those
+places. The ground reflects evenly. Lengths are in km, radiance is per irradiance of the sun above
+the air [1/sr]. How far that is from walks of light: docs/sky.md, tests/sky.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.sky import atmosphere
+from clpt.sky.atmosphere import TOP
+from clpt.spectra.air import DEPOLARISED, EARTH, LAMBDAS, Atmosphere, densities
+
+Floats = NDArray[np.float64]
+
+DEGREE = 5  # of the harmonics
+HEIGHTS = np.array([0, 0.5, 1.5, 3, 6, 10, 16, 23, 32, 45, 60, 99.0])  # [km]
+AROUND, BETWEEN = 15.0, 2.5  # sun angles: on either side of the observer's, apart [degrees]
+DUSK, AT_DUSK = 89.0, 1.25  # from what sun angle light falls off fast; apart from there [degrees]
+SIDE_ANGLES, TURNS = 6, 6  # directions at a place: above and below its horizon, around
+FAR_NODES, VIEW_NODES = 8, 24  # of a ray's part: from places of the field, from the observer
+COARSE = np.array([360, 390, 420, 460, 500, 550, 575, 603, 640, 700, 830.0])  # [nm], of the field
+HAZY = 12.0  # below, haze counts in the field [km]
+CORNERS = ((0, 0), (0, 1), (1, 0), (1, 1))  # of a cell
+PIECE = 4096  # points that are worked on at a time
+ORDERS, ENOUGH = 24, 1e-3  # at most; the share of an order at which they end
+
+
+class Air(NamedTuple):
+    """Optical depths straight up (3, n) of what extincts and (2, n) of what scatters, the moments
+    of both phase functions (2, DEGREE + 1), and g of the aerosol."""
+
+    extinct: Floats
+    scatter: Floats
+    moments: Floats
+    asymmetry: float
+
+
+def air(given: Atmosphere, lambdas: Floats) -> Air:
+    """The air at wavelengths."""
+    extinct, gamma = given.depths(lambdas), DEPOLARISED
+    rayleigh = np.zeros(DEGREE + 1)
+    rayleigh[0], rayleigh[2] = 1.0, (1.0 - gamma) / (10.0 * (1.0 + 2.0 * gamma))
+    moments = np.stack([rayleigh, given.asymmetry ** np.arange(DEGREE + 1)])
+    scatter = np.stack([extinct[0], given.aerosol_albedo * extinct[1]])
+    return Air(extinct, scatter, moments, given.asymmetry)
+
+
+class Rays(NamedTuple):
+    """Points on rays, those of a ray one after the other.
+
+    ray (m,): whose; t (m,): how far [km]; weight (m,): the length that it stands for [km]; first:
+    of each ray; columns (3, m): from its start; ground (n,): where a ray meets the ground, or -1;
+    below (3, n): columns to there.
+    """
+
+    ray: NDArray[np.int64]
+    t: Floats
+    weight: Floats
+    columns: Floats
+    ground: Floats
+    below: Floats
+
+
+def rays(radius: Floats, mu: Floats, count: int, after: Floats | None = None) -> Rays:
+    """Points on rays from radii (n,) [km] with cosines (n,) to the vertical there.
+
+    They are dense near a ray's lowest point. after (n,): where it begins to count, of rays that
+    go up.
+    """
+    lowest = np.maximum(radius * np.sqrt(np.maximum(1.0 - mu * mu, 0.0)), 0.0)
+    down = mu < 0.0
+    hits = down & (lowest < EARTH)
+    turn = np.where(down, -radius * mu, 0.0)
+    ground = np.where(hits, turn - np.sqrt(np.maximum(EARTH**2 - lowest**2, 0.0)), -1.0)
+    end = np.where(down, turn + np.sqrt(TOP**2 - lowest**2), atmosphere.to_top(radius, mu))
+    low = np.where(hits, np.maximum(ground, 0.0), turn)
+    low = low if after is None else np.maximum(low, after)
+    x, w = np.polynomial.legendre.leggauss(count)
+    u, w = (0.5 + 0.5 * x)[None], (0.5 * w)[None]
+    rise, fall = np.where(hits, 0.0, np.maximum(end - low, 0.0)), np.where(down, low, 0.0)
+    t = np.concatenate(
+        [low[:, None] - fall[:, None] * u[:, ::-1] ** 3, low[:, None] + rise[:, None] * u**3], 1
+    )
+    weight = 3.0 * np.concatenate(
+        [fall[:, None] * (w * u * u)[:, ::-1], rise[:, None] * (w * u * u)], 1
+    )
+    ray, at = np.nonzero(weight > 0.0)
+    t, weight = t[ray, at], weight[ray, at]
+    start = atmosphere.columns(radius, np.abs(mu))
+    r, cosine = _along(radius[ray], mu[ray], t)
+    there = atmosphere.columns(r, np.abs(cosine))
+    middle = np.zeros_like(start)
+    passing = down & ~hits
+    middle[:, passing] = 2.0 * atmosphere.columns(lowest[passing], np.zeros(int(passing.sum())))
+    rising = cosine >= 0.0
+    found = np.where(
+        down[ray],
+        np.where(rising, middle[:, ray] - there, there) - start[:, ray],
+        start[:, ray] - there,
+    )
+    slope = np.sqrt(np.maximum(1.0 - (lowest / EARTH) ** 2, 0.0))
+    below = np.where(hits, atmosphere.columns(np.full_like(slope, EARTH), slope) - start, 0.0)
+    return Rays(ray, t, weight, np.maximum(found, 0.0), ground, np.maximum(below, 0.0))
+
+
+def _along(radius: Floats, mu: Floats, t: Floats) -> tuple[Floats, Floats]:
+    """Radius and cosine to the vertical at a distance on rays."""
+    r = np.sqrt(np.maximum(radius * radius + t * t + 2.0 * radius * mu * t, EARTH**2))
+    return r, np.clip((radius * mu + t) / r, -1.0, 1.0)
+
+
+def harmonics(mu: Floats, turn: Floats) -> Floats:
+    """Real spherical harmonics, even in the turn from the sun, (k, ...) of cosines (...).
+
+    They are ordered by degree, then by order from 0.
+    """
+    s = np.sqrt(np.maximum(1.0 - mu * mu, 0.0))
+    legendre: dict[tuple[int, int], Floats] = {(0, 0): np.ones_like(mu)}
+    for m in range(DEGREE + 1):
+        if m:
+            legendre[m, m] = (2 * m - 1) * s * legendre[m - 1, m - 1]
+        if m < DEGREE:
+            legendre[m + 1, m] = (2 * m + 1) * mu * legendre[m, m]
+        for n in range(m + 2, DEGREE + 1):
+            above = (2 * n - 1) * mu * legendre[n - 1, m] - (n + m - 1) * legendre[n - 2, m]
+            legendre[n, m] = above / (n - m)
+    cosines = [np.ones_like(mu), turn]
+    for _ in range(2, DEGREE + 1):
+        cosines.append(2.0 * turn * cosines[-1] - cosines[-2])
+    out = []
+    for n in range(DEGREE + 1):
+        for m in range(n + 1):
+            ratio = np.prod(np.arange(n - m + 1, n + m + 1, dtype=np.float64))
+            norm = np.sqrt((2 * n + 1) / (4.0 * np.pi) / ratio * (2.0 if m else 1.0))
+            out.append(norm * legendre[n, m] * cosines[m])
+    return np.stack(out)
+
+
+DEGREES = np.array([n for n in range(DEGREE + 1) for _ in range(n + 1)])  # of each harmonic
+
+
+class Places(NamedTuple):
+    """What the points of rays see: height [km], cosine of the sun to the vertical, the ray's own
+    and of its turn from the sun, and of the ray to the sun, each (m,)."""
+
+    height: Floats
+    sun: Floats
+    mu: Floats
+    turn: Floats
+    angle: Floats
+
+
+def places(radius: Floats, sun: Floats, mu: Floats, turn: Floats, t: Floats) -> Places:
+    """Of points (m,): of their ray's start radius, sun and direction, at a distance t."""
+    across, side = np.sqrt(1.0 - np.minimum(mu * mu, 1.0)), np.sqrt(1.0 - np.minimum(sun * sun, 1))
+    angle = np.clip(mu * sun + across * side * turn, -1.0, 1.0)
+    r, own = _along(radius, mu, t)
+    there = np.clip((radius * sun + t * angle) / r, -1.0, 1.0)
+    below = np.sqrt(np.maximum(1.0 - own * own, 0.0) * np.maximum(1.0 - there * there, 0.0))
+    turned = np.where(below > 1e-9, (angle - own * there) / np.maximum(below, 1e-9), 1.0)
+    return Places(r - EARTH, there, own, np.clip(turned, -1.0, 1.0), angle)
+
+
+def once(a: Air, way: Rays, at: Places, count: int) -> Floats:
+    """Sunlight scattered once into rays, (count, n) [1/sr]."""
+    toward, seen = atmosphere.sun_columns(at.height + EARTH, at.sun)
+    out = np.zeros((count, a.extinct.shape[1]))
+    kept = np.flatnonzero(seen)
+    if not len(kept):
+        return out
+    depth = (way.columns + toward)[:, kept].T @ a.extinct
+    dense = densities(at.height[kept]) * way.weight[kept]
+    angle = at.angle[kept]
+    haze = atmosphere.aerosol_phase(angle, a.asymmetry)
+    phases = dense[:2] * np.stack([atmosphere.rayleigh_phase(angle), haze])
+    _add(out, way.ray[kept], np.exp(-depth) * (phases.T @ a.scatter))
+    return out
+
+
+def _add(out: Floats, ray: NDArray[np.int64], values: Floats) -> None:
+    """Add up values (m, n) at the points of each ray."""
+    first = np.flatnonzero(np.diff(ray, prepend=-1))
+    out[ray[first]] += np.add.reduceat(values, first, axis=0)
+
+
+class Plan(NamedTuple):
+    """How some points on rays see a field, all float32: the cells' corners and their shares, 4 of
+    (m,); harmonics: those that count; look (m, 1, harmonics): by a phase function; weights (m, n):
+    what reaches a ray's start.
+    """
+
+    ray: NDArray[np.int64]
+    corners: list[NDArray[np.int64]]
+    shares: list[NDArray[np.float32]]
+    harmonics: NDArray[np.int64]
+    look: NDArray[np.float32]
+    weights: NDArray[np.float32]
+
+
+def plans(a: Air, angles: Floats, way: Rays, at: Places) -> list[Plan]:
+    """How points on rays see a field of sun angles: by the air, and low down by haze."""
+    dense = densities(at.height)[:2] * way.weight
+    h, x = _between(HEIGHTS, at.height)
+    s, y = _between(angles, np.arccos(at.sun))
+    share = np.exp(-(way.columns.T @ a.extinct))
+    look = harmonics(at.mu, at.turn)
+    made = []
+    for kind, low in enumerate((at.height < TOP, at.height < HAZY)):
+        own = np.flatnonzero(low)
+        seen = np.flatnonzero(a.moments[kind][DEGREES] != 0.0)
+        if not (len(own) and a.scatter[kind].any()):
+            continue
+        by = [
+            (i, j, x[own] if i else 1.0 - x[own], y[own] if j else 1.0 - y[own]) for i, j in CORNERS
+        ]
+        shown = (look[seen][:, own] * a.moments[kind][DEGREES[seen], None]).T[:, None]
+        made.append(
+            Plan(
+                way.ray[own],
+                [(h[own] + i) * len(angles) + s[own] + j for i, j, _, _ in by],
+                [(u * v).astype(np.float32) for _, _, u, v in by],
+                seen,
+                np.ascontiguousarray(shown, np.float32),
+                (share[own] * dense[kind, own, None] * a.scatter[kind]).astype(np.float32),
+            )
+        )
+    return made
+
+
+class Field(NamedTuple):
+    """Moments of all light that was scattered, and what falls on the ground.
+
+    angles: of the sun to the vertical [rad], ascending; moments (heights, angles, harmonics, n),
+    ground (angles, n): irradiance there.
+    """
+
+    angles: Floats
+    moments: Floats
+    ground: Floats
+
+    def scattered(self, seen: list[Plan], count: int) -> Floats:
+        """The light of this field that is scattered into rays, (count, n)."""
+        out = np.zeros((count, self.moments.shape[-1]))
+        for plan in seen:
+            flat = self.moments[:, :, plan.harmonics].astype(np.float32)
+            flat = flat.reshape(-1, *flat.shape[2:])
+            for first in range(0, len(plan.ray), PIECE):
+                own = slice(first, first + PIECE)
+                there = np.zeros((1, 1, 1), np.float32)
+                for i, w in zip(plan.corners, plan.shares, strict=True):
+                    there = there + w[own, None, None] * flat[i[own]]
+                value = np.matmul(plan.look[own], there)[:, 0] * plan.weights[own]
+                _add(out, plan.ray[own], value.astype(np.float64))
+        return np.maximum(out, 0.0)
+
+    def reflected(
+        self, a: Air, way: Rays, sun: Floats, albedo: Floats, mu: Floats, turn: Floats, r: Floats
+    ) -> Floats:
+        """Light of the ground at the end of rays; sun, mu, turn, r (n,): of their starts."""
+        hit = way.ground >= 0.0
+        out = np.zeros((len(hit), a.extinct.shape[1]))
+        if not hit.any():
+            return out
+        at = places(r[hit], sun[hit], mu[hit], turn[hit], way.ground[hit])
+        cosine = np.maximum(at.sun, 0.0)
+        toward = atmosphere.columns(np.full(len(cosine), EARTH), cosine)
+        direct = np.exp(-(toward.T @ a.extinct)) * cosine[:, None]
+        s, y = _between(self.angles, np.arccos(at.sun))
+        around = self.ground[s] * (1.0 - y)[:, None] + self.ground[s + 1] * y[:, None]
+        out[hit] = albedo / np.pi * (direct + around) * np.exp(-(way.below[:, hit].T @ a.extinct))
+        return out
+
+
+def _between(grid: Floats, x: Floats) -> tuple[NDArray[np.int64], Floats]:
+    """The cells of a grid in which values lie, and where in them, 0 to 1."""
+    i = np.clip(np.searchsorted(grid, x, "right") - 1, 0, len(grid) - 2)
+    return i, np.clip((x - grid[i]) / (grid[i + 1] - grid[i]), 0.0, 1.0)
+
+
+def field(a: Air, albedo: Floats, sun: float) -> Field:
+    """The light that was scattered once or more, around a place where the sun is at an angle [rad]
+    to the vertical; albedo (n,): of the ground."""
+    low = max(np.degrees(sun) - AROUND, 0.0)
+    high = min(np.degrees(sun) + AROUND, 180.0)
+    apart = BETWEEN if np.degrees(sun) < DUSK else AT_DUSK
+    angles = np.radians(np.linspace(low, high, int(np.ceil((high - low) / apart)) + 1))
+    x, w = np.polynomial.legendre.leggauss(SIDE_ANGLES)
+    turns = np.cos(np.pi * (np.arange(TURNS) + 0.5) / TURNS)
+    radii = np.maximum(HEIGHTS, 1e-3) + EARTH
+    horizon = -np.sqrt(1.0 - (EARTH / radii) ** 2)
+    mu = np.concatenate(
+        [
+            horizon[:, None] + (1.0 - horizon)[:, None] * (0.5 + 0.5 * x) ** 2,
+            horizon[:, None] - (1.0 + horizon)[:, None] * (0.5 + 0.5 * x) ** 2,
+        ],
+        axis=1,
+    )
+    each = w * (0.5 + 0.5 * x)
+    span = np.concatenate(
+        [(1.0 - horizon)[:, None] * each, (1.0 + horizon)[:, None] * each], axis=1
+    )
+    shape = (len(radii), len(angles), 2 * SIDE_ANGLES, TURNS)
+    one = rays(np.repeat(radii, 2 * SIDE_ANGLES), mu.ravel(), FAR_NODES)
+    number = np.arange(len(radii) * 2 * SIDE_ANGLES).reshape(len(radii), 1, -1, 1)
+    way = _spread(one, np.broadcast_to(number, shape).ravel())
+    starts = (
+        radii[:, None, None, None],
+        np.cos(angles)[:, None, None],
+        mu[:, None, :, None],
+        turns,
+    )
+    radius, suns, cosines, turned = (np.broadcast_to(v, shape).ravel() for v in starts)
+    at = places(radius[way.ray], suns[way.ray], cosines[way.ray], turned[way.ray], way.t)
+    count = radius.size
+    bands = a.extinct.shape[1]
+    single, seen = once(a, way, at, count), plans(a, angles, way, at)
+    look = harmonics(cosines, turned).reshape(-1, *shape)
+    solid = np.broadcast_to((span * 2.0 * np.pi / TURNS)[:, None, :, None], shape)
+    above = np.maximum(mu[0], 0.0)[None, :, None, None] * solid[0][..., None]
+    found = Field(
+        angles,
+        np.zeros((len(radii), len(angles), len(look), bands)),
+        np.zeros((len(angles), bands)),
+    )
+    for _ in range(ORDERS):
+        light = single + found.scattered(seen, count)
+        light += found.reflected(a, way, suns, albedo, cosines, turned, radius)
+        light = light.reshape(*shape, bands)
+        moments = np.einsum("kpsdt,psdt,psdtn->pskn", look, solid, light, optimize=True)
+        ground = (light[0] * above).sum(axis=(1, 2))
+        change = np.abs(moments - found.moments).max()
+        found = Field(angles, moments, ground)
+        if change <= ENOUGH * np.abs(moments).max():
+            break
+    return found
+
+
+def _spread(one: Rays, source: NDArray[np.int64]) -> Rays:
+    """Rays anew, those of numbers (n,) among `one`."""
+    total = len(one.ground)
+    first, each = np.searchsorted(one.ray, np.arange(total)), np.bincount(one.ray, minlength=total)
+    counts = each[source]
+    ray = np.repeat(np.arange(len(source)), counts)
+    inside = np.arange(len(ray)) - np.repeat(np.cumsum(counts) - counts, counts)
+    pick = np.repeat(first[source], counts) + inside
+    return Rays(
+        ray, one.t[pick], one.weight[pick], one.columns[:, pick],
+        one.ground[source], one.below[:, source],
+    )  # fmt: skip
+
+
+def radiance(
+    given: Atmosphere,
+    albedo: Floats,
+    sun: float,
+    height: float,
+    mu: Floats,
+    turn: Floats,
+    lambdas: Floats = LAMBDAS,
+) -> Floats:
+    """Radiance of the sky and the ground per irradiance of the sun, (n, m) [1/sr] at lambdas (m,).
+
+    albedo (m,): of the ground; sun: its angle to the vertical [rad]; height: of the observer [km];
+    mu, turn (n,): cosines of directions to the vertical, and of their turn from the sun.
+    """
+    coarse = COARSE[(lambdas.min() <= COARSE) & (lambdas.max() >= COARSE)]
+    coarse = coarse if len(coarse) > 1 and len(lambdas) > len(coarse) else lambdas
+    dim = air(given, coarse)
+    low = np.interp(coarse, lambdas, albedo)
+    found = field(dim, low, sun)
+    radius, suns = np.full(len(mu), EARTH + height), np.full(len(mu), np.cos(sun))
+    steep, which = np.unique(mu, return_inverse=True)
+    way = _spread(rays(radius[: len(steep)], steep, VIEW_NODES // 2), which)
+    at = places(radius[way.ray], suns[way.ray], mu[way.ray], turn[way.ray], way.t)
+    further = found.scattered(plans(dim, found.angles, way, at), len(mu))
+    further += found.reflected(dim, way, suns, low, mu, turn, radius)
+    fine = air(given, lambdas)
+    way = rays(radius, mu, VIEW_NODES, _shadow(radius, suns, mu, turn))
+    at = places(radius[way.ray], suns[way.ray], mu[way.ray], turn[way.ray], way.t)
+    return once(fine, way, at, len(mu)) + _refined(further, coarse, lambdas)
+
+
+def _refined(values: Floats, coarse: Floats, lambdas: Floats) -> Floats:
+    """Values (n, k) at coarse wavelengths as those (n, m) at lambdas, linear in the logarithm."""
+    if len(coarse) == len(lambdas):
+        return values
+    i, x = _between(coarse, lambdas)
+    logs = np.log(np.maximum(values, 1e-30))
+    return np.exp(logs[:, i] * (1.0 - x) + logs[:, i + 1] * x)
+
+
+def _shadow(radius: Floats, sun: Floats, mu: Floats, turn: Floats) -> Floats:
+    """Where rays that go up leave the earth's shadow, 0 for those that begin outside of it [km]."""
+    across, side = np.sqrt(1.0 - np.minimum(mu * mu, 1.0)), np.sqrt(1.0 - np.minimum(sun * sun, 1))
+    angle = mu * sun + across * side * turn
+    inside = (sun < 0.0) & (radius * side < EARTH) & (mu >= 0.0)
+    a = np.maximum(1.0 - angle * angle, 1e-12)
+    b, c = radius * (mu - sun * angle), (radius * side) ** 2 - EARTH**2
+    out = (-b + np.sqrt(np.maximum(b * b - a * c, 0.0))) / a
+    lit = radius * sun + out * angle >= 0.0  # toward the sun, beyond the shadow's end
+    out = np.where(lit, np.minimum(out, -radius * sun / np.maximum(angle, 1e-9)), out)
+    return np.where(inside, np.maximum(out, 0.0), 0.0)

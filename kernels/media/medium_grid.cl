@@ -1,0 +1,286 @@
+/* A medium whose coefficients a density multiplies, which is given at the points of a lattice and trilinear between.
+ * Bricks of 8^3 cells hold the density of their 9^3 points over the brick's highest, in 16 bits each. A ray goes from
+ * brick to brick by integer steps (Amanatides and Woo 1987), and the highest density of each bounds the extinction
+ * there. Flights are in media/grid_flight.cl; rays to lights are dimmed by ratio tracking (Novak et al. 2014).
+ *
+ * All that follows is linear in the density: one of the eight points around stands for it, each with its trilinear
+ * weight as its chance. In `materials` there stand behind a medium's coefficients: the first word in `images`, the
+ * number of bricks along x, y and z, a matrix of three rows from the world to the lattice, and the upper corner of the
+ * box there; the lower one is (1/2, 1/2, 1/2). In `images` each brick has two words: where its points begin from the
+ * first word on, and its highest density. A medium with MEDIUM_BYTES in its name has 8 bits for each number. */
+#define MEDIUM_GRID 0x20000000
+#define GRID_CELLS 8
+#define GRID_POINTS 9
+#define GRID_ROULETTE 0.05f /* what passes below this is at stake */
+
+/* A ray in the lattice, and the brick where it is. */
+typedef struct {
+    vec3 o, d, inverse;
+    real t, end; /* [m] */
+    integer first, nx, ny, nz, x, y, z;
+#if USES_BYTES
+    integer packed; /* base-2 logarithm of how many numbers a word holds */
+#endif
+} GridWalk;
+
+/* The brick of a walk: where its points begin, its highest density, where the ray leaves it and along which axis. */
+typedef struct {
+    integer points;
+    real most, exit;
+    mask across_x, across_y;
+} GridBrick;
+
+/* A number by which the random numbers of a ray are known. */
+inline natural grid_key(Scene scene, natural pixel_key, integer sample, integer vertex)
+{
+    natural key = hash_natural(as_natural(sample) + 0x9e3779b9u * scene.settings->seed);
+    return hash_natural(pixel_key + hash_natural(key + as_natural(vertex)));
+}
+
+#if USES_BYTES
+#define MEDIUM_BYTES 0x10000000
+#define grid_packed(name) sel_i(((name) & MEDIUM_BYTES) != 0, (integer)(2), (integer)(1))
+#endif
+
+/* Whether the ray from o along d, t metres long, is in the box; where it begins there. */
+inline mask grid_begin(Scene scene, integer name, vec3 o, vec3 d, real t, mask active, GridWalk *w)
+{
+    integer at = sel_i(active, MEDIUM_ROW(name) + 2 * MEDIUM_SCATTERING, (integer)(0));
+    w->first = gather_i(scene.materials, at);
+    w->nx = gather_i(scene.materials, at + 1);
+    w->ny = gather_i(scene.materials, at + 2);
+    w->nz = gather_i(scene.materials, at + 3);
+#if USES_BYTES
+    w->packed = grid_packed(name);
+#endif
+    real lo = 0.0f, hi = t;
+#define AXIS(a, n)                                                            \
+    vec4 row_##a = gather_w4(scene.materials, at + 4 + 4 * n);                \
+    real top_##a = gather_w(scene.materials, at + 16 + n);                    \
+    w->o.a = row_##a.x * o.x + row_##a.y * o.y + row_##a.z * o.z + row_##a.w; \
+    w->d.a = row_##a.x * d.x + row_##a.y * d.y + row_##a.z * d.z;             \
+    w->inverse.a = 1.0f / sel(fabs(w->d.a) > 1e-20f, w->d.a, (real)(1e-20f)); \
+    real from_##a = (0.5f - w->o.a) * w->inverse.a;                           \
+    real to_##a = (top_##a - w->o.a) * w->inverse.a;                          \
+    lo = max_r(lo, min_r(from_##a, to_##a));                                  \
+    hi = min_r(hi, max_r(from_##a, to_##a));
+    AXIS(x, 0)
+    AXIS(y, 1)
+    AXIS(z, 2)
+#undef AXIS
+    w->t = lo;
+    w->end = hi;
+    mask inside = active & (lo < hi);
+#define AXIS(a) \
+    w->a = clamp_i(to_integer(sel(inside, w->o.a + lo * w->d.a, (real)(0.0f)) * (1.0f / GRID_CELLS)), w->n##a - 1);
+    AXIS(x)
+    AXIS(y)
+    AXIS(z)
+#undef AXIS
+    return inside;
+}
+
+inline GridBrick grid_brick(Scene scene, GridWalk w, mask active)
+{
+    GridBrick b;
+    integer at = w.first + 2 * ((w.z * w.ny + w.y) * w.nx + w.x);
+    at = sel_i(active, at, (integer)(0));
+    b.points = w.first + gather_i(scene.images, at);
+    b.most = gather_w(scene.images, at + 1);
+    real end_x, end_y, end_z;
+#define AXIS(a)                                                                                      \
+    end_##a = to_real(GRID_CELLS * (w.a + sel_i(w.d.a > 0.0f, (integer)(1), (integer)(0)))) - w.o.a; \
+    end_##a = sel(fabs(w.d.a) > 1e-20f, end_##a * w.inverse.a, (real)(FAR));
+    AXIS(x)
+    AXIS(y)
+    AXIS(z)
+#undef AXIS
+    b.across_x = (end_x <= end_y) & (end_x <= end_z);
+    b.across_y = !b.across_x & (end_y <= end_z);
+    b.exit = max_r(min_r(min_r(end_x, end_y), min_r(end_z, w.end)), w.t);
+    return b;
+}
+
+/* Goes to the next brick; returns the rays that are still in the box. */
+inline mask grid_next(GridWalk *w, GridBrick b, mask active)
+{
+    mask across_z = !b.across_x & !b.across_y, inside = active & (b.exit < w->end);
+#define AXIS(a, m)                                                                                \
+    w->a += sel_i(active & (m), sel_i(w->d.a > 0.0f, (integer)(1), (integer)(-1)), (integer)(0)); \
+    inside = inside & (w->a >= 0) & (w->a < w->n##a);
+    AXIS(x, b.across_x)
+    AXIS(y, b.across_y)
+    AXIS(z, across_z)
+#undef AXIS
+    return inside;
+}
+
+/* One of the points around that at t, which `bits` choose: its number in the brick. */
+inline integer grid_corner(GridWalk w, natural bits)
+{
+    integer at = 0;
+#define AXIS(a, shift, step)                                                                                 \
+    real p_##a = clamp_r(w.o.a + w.t * w.d.a - to_real(GRID_CELLS * w.a), (real)(0.0f), (real)(GRID_CELLS)); \
+    integer c_##a = clamp_i(to_integer(p_##a), (integer)(GRID_CELLS - 1));                                   \
+    real u_##a = (to_real(as_integer((bits >> shift) & 1023u)) + 0.5f) * (1.0f / 1024.0f);                   \
+    at += step * (c_##a + sel_i(u_##a < p_##a - to_real(c_##a), (integer)(1), (integer)(0)));
+    AXIS(x, 0u, 1)
+    AXIS(y, 10u, GRID_POINTS)
+    AXIS(z, 20u, GRID_POINTS * GRID_POINTS)
+#undef AXIS
+    return at;
+}
+
+/* The density there over the brick's highest. */
+inline real brick_density(Scene scene, GridWalk w, GridBrick b, mask active, natural bits)
+{
+    integer at = grid_corner(w, bits);
+#if USES_BYTES
+    mask small = w.packed == 2;
+    integer word = gather_i(scene.images, sel_i(active, b.points + (at >> w.packed), (integer)(0)));
+    integer place = sel_i(small, (at & 3) << 3, (at & 1) << 4), most = sel_i(small, (integer)(0xff), (integer)(0xffff));
+    return to_real((word >> place) & most) / to_real(most);
+#else
+    integer word = gather_i(scene.images, sel_i(active, b.points + (at >> 1), (integer)(0)));
+    return to_real((word >> ((at & 1) << 4)) & 0xffff) * (1.0f / 65535.0f);
+#endif
+}
+
+inline real grid_length(natural bits) { return -log_r(1.0f - unit_interval(bits)); }
+
+#if GRIDS_TINTED || GRIDS_COLOURED
+#if GRIDS_EMIT
+#define GRID_ALBEDO (2 * MEDIUM_SCATTERING + 25) /* words from a medium's row: behind media/medium_grid_light.cl's */
+#else
+#define GRID_ALBEDO (2 * MEDIUM_SCATTERING + 19)
+#endif
+#if GRIDS_TINTED
+#define GRID_COLOUR (GRID_ALBEDO + 1)
+#else
+#define GRID_COLOUR GRID_ALBEDO
+#endif
+/* The colour at the point that `bits` choose, of those that word `at` of a medium's row tells; 1 where there are none.
+ * In `images` each brick has a word, where its points begin from the first one on, and a point three: a colour, or the
+ * coefficients of its curve. The word is below 0 where colours and density are trilinear each by itself: these bits
+ * choose the density's point, and others that of the colour. Else it is their product that is trilinear. */
+inline Spectrum grid_tint(Scene scene, integer name, int at, GridWalk w, mask active, natural bits, Wavelengths lambdas)
+{
+    integer first = gather_i(scene.materials, sel_i(active, MEDIUM_ROW(name) + at, (integer)(0)));
+    active = active & (first != 0);
+    bits = sel_n(first < 0, hash_natural(bits ^ 0x94d049bbu), bits);
+    first = sel_i(first < 0, -first, first);
+    integer brick = (w.z * w.ny + w.y) * w.nx + w.x;
+    integer points = first + gather_i(scene.images, sel_i(active, first + brick, (integer)(0)));
+    integer point = sel_i(active, points + 3 * grid_corner(w, bits), (integer)(0));
+    vec4 words = v4(gather_w(scene.images, point), gather_w(scene.images, point + 1),
+                    gather_w(scene.images, point + 2), (real)(1.0f));
+    return spectrum_sel(active, spectrum_constant(words, lambdas), spectrum_of(1.0f));
+}
+#endif
+
+#if GRIDS_MIXED
+#if GRIDS_COLOURED
+#define GRID_MIXED (GRID_COLOUR + 1)
+#elif GRIDS_TINTED
+#define GRID_MIXED (GRID_ALBEDO + 1)
+#elif GRIDS_EMIT
+#define GRID_MIXED (2 * MEDIUM_SCATTERING + 25) /* as GRID_ALBEDO */
+#else
+#define GRID_MIXED (2 * MEDIUM_SCATTERING + 19)
+#endif
+/* Of a mixture word GRID_MIXED of its row is 1 + the first word of its shares in `images`, 0 of what is none. These are
+ * for each brick where its points begin from there, and for each point the density of GRIDS_MIXED parts over that of
+ * the bricks. Behind that word there stand for each part the word of its phase function and its coefficients. The
+ * mixture's own coefficients, times the density of its bricks, are at all wavelengths at least those of all parts. */
+inline integer grid_shares(Scene scene, integer name, GridWalk w, mask active, natural bits)
+{
+    integer first = gather_i(scene.materials, sel_i(active, MEDIUM_ROW(name) + GRID_MIXED, (integer)(0))) - 1;
+    active = active & (first >= 0);
+    integer brick = (w.z * w.ny + w.y) * w.nx + w.x;
+    integer points = first + gather_i(scene.images, sel_i(active, first + brick, (integer)(0)));
+    return sel_i(active, points + GRIDS_MIXED * grid_corner(w, bits), (integer)(0));
+}
+
+/* A part of a mixture at the point whose shares stand at word `shares` of `images`, where the density of the bricks is
+ * 1. Lanes without shares have any medium. */
+inline Medium grid_part(Scene scene, integer name, int part, integer shares, Wavelengths lambdas)
+{
+    integer row = MEDIUM_ROW(name) + GRID_MIXED + 2 + part * (1 + 2 * MEDIUM_SCATTERING);
+    Medium m = medium_load(scene, sel_i(shares != 0, row + 1, (integer)(0)), lambdas);
+    real share = gather_w(scene.images, sel_i(shares != 0, shares + part, (integer)(0)));
+    m.sigma_s = spectrum_scale(m.sigma_s, share);
+    m.sigma_t = spectrum_scale(m.sigma_t, share);
+    return m;
+}
+#endif
+
+/* The medium at the point that `bits` choose, where its density is 1: albedo and extinction may have colours there.
+ * These are at most 1, so that the highest density of a brick bounds the extinction at all wavelengths. */
+#define GRIDS_VARY (GRIDS_COLOURED || GRIDS_MIXED) /* their extinction has other colours from point to point */
+inline Medium grid_medium(Scene scene, integer name, Medium m, GridWalk w, mask active, natural bits,
+                          Wavelengths lambdas)
+{
+#if GRIDS_COLOURED
+    Spectrum colour = grid_tint(scene, name, GRID_COLOUR, w, active, bits, lambdas);
+    m.sigma_s = spectrum_mul(m.sigma_s, colour);
+    m.sigma_t = spectrum_mul(m.sigma_t, colour);
+#endif
+#if GRIDS_TINTED
+    m.sigma_s = spectrum_mul(m.sigma_s, grid_tint(scene, name, GRID_ALBEDO, w, active, bits, lambdas));
+#endif
+#if GRIDS_MIXED
+    integer shares = grid_shares(scene, name, w, active, bits);
+    if (any(shares != 0)) {
+        Medium whole = grid_part(scene, name, 0, shares, lambdas);
+        for (int i = 1; i < GRIDS_MIXED; i++) {
+            Medium part = grid_part(scene, name, i, shares, lambdas);
+            whole.sigma_s = spectrum_add(whole.sigma_s, part.sigma_s);
+            whole.sigma_t = spectrum_add(whole.sigma_t, part.sigma_t);
+        }
+        m.sigma_s = spectrum_sel(shares != 0, whole.sigma_s, m.sigma_s);
+        m.sigma_t = spectrum_sel(shares != 0, whole.sigma_t, m.sigma_t);
+    }
+#endif
+    return m;
+}
+
+/* How much of the light passes t metres from o along d through the medium `name`: an estimate. */
+inline Spectrum grid_transmittance(Scene scene, integer name, Medium m, vec3 o, vec3 d, real t, natural key,
+                                   mask active, Wavelengths lambdas)
+{
+    GridWalk w;
+    active = grid_begin(scene, name, o, d, t, active, &w);
+    real most = max_r(spectrum_max(m.sigma_t), (real)(1e-30f)), inverse = 1.0f / most;
+    Spectrum passes = spectrum_of(1.0f);
+#if !GRIDS_VARY
+    Spectrum share = spectrum_scale(m.sigma_t, inverse);
+#endif
+    natural count = 1u, bits = hash_natural(key);
+    real left = grid_length(bits) * inverse;
+    while (any(active)) {
+        GridBrick b = grid_brick(scene, w, active);
+        real thick = b.most * (b.exit - w.t);
+        mask meets = active & (thick > left);
+        w.t = sel(active, sel(meets, min_r(w.t + left / max_r(b.most, (real)(1e-30f)), b.exit), b.exit), w.t);
+        left -= sel(active, thick, (real)(0.0f));
+        if (any(meets)) {
+            bits = hash_natural(key + count * 0x9e3779b9u);
+            natural more = hash_natural(bits ^ 0x68bc21ebu);
+            real density = brick_density(scene, w, b, meets, more);
+#if GRIDS_VARY
+            Spectrum share = grid_medium(scene, name, m, w, meets, more, lambdas).sigma_t;
+            share = spectrum_scale(share, inverse);
+#endif
+            Spectrum kept = spectrum_sub(spectrum_of(1.0f), spectrum_scale(share, density));
+            passes = spectrum_sel(meets, spectrum_mul(passes, kept), passes);
+            mask staked = meets & (spectrum_max(passes) < GRID_ROULETTE);
+            mask won = staked & (unit_interval(hash_natural(more ^ 0x2f6e2b1u)) < 0.25f);
+            passes = spectrum_sel(staked, spectrum_scale(passes, sel(won, (real)(4.0f), (real)(0.0f))), passes);
+            active = active & (spectrum_max(passes) > 0.0f);
+            left = sel(meets, grid_length(bits) * inverse, left);
+            count += sel_n(meets, (natural)(1u), (natural)(0u));
+        }
+        active = sel_i(meets, active, grid_next(&w, b, active & !meets));
+    }
+    return passes;
+}

@@ -1,0 +1,89 @@
+"""clpt's own declarations of built-in functions: those that its texts call, with a second try."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+import pyopencl as cl
+import pytest
+
+import clpt
+from clpt import device as dev
+from clpt.device import declarations, native_programs
+from clpt.render.lowering.scene import Lowered, lower
+from clpt.scene import Film, Scene, lights, materials, shapes
+from clpt.scene.cameras import Perspective
+from tests.front_end import CLANG, OURS, errors
+from tests.test_other_compilers import builders
+from tests.together.builds import Way, layouts, texts
+
+needs_clang = pytest.mark.skipif(CLANG is None, reason="clang is not installed")
+
+
+def check(given: Iterable[str]) -> None:
+    found = errors([declarations.declared() + text for text in given], functions=OURS)
+    assert found
+    for error in found:
+        assert not error, error[:3000]
+
+
+def texts_of(lowered: Lowered) -> list[str]:
+    """All programs of a scene, as CPUs get them."""
+    made: list[str] = []
+    for layout in layouts(lowered.features):
+        for lanes in (1, 8):
+            for form in ("stages", "loop", "film"):
+                made += texts(lowered.features, Way(layout, lanes, form))
+    return list(dict.fromkeys(made))
+
+
+@needs_clang
+def test_builders() -> None:
+    check(builders())
+
+
+@needs_clang
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+def test_a_scene(scenes: Path, mode: str) -> None:
+    scene = clpt.load(scenes / "cornell.xml")
+    check(texts_of(lower(dataclasses.replace(scene, film=Film(width=4, height=4, mode=mode)))))
+
+
+@needs_clang
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+def test_every_material(mode: str) -> None:
+    row: list = [shapes.Rectangle(material=cls()) for cls in materials.LEAVES]
+    row += [shapes.Sphere(emission=lights.Area()), shapes.Disk(material=materials.Mask())]
+    film = Film(width=4, height=4, mode=mode)
+    scene = Scene(camera=Perspective(), shapes=row, lights=[lights.Constant()], film=film)
+    check(texts_of(lower(scene)))
+
+
+@pytest.mark.parametrize(("value", "tries"), [("sqrt(16.0f)", 1), ("fdim(9.0f, 5.0f)", 2)])
+def test_what_is_not_declared_is_tried_with_the_header(value: str, tries: int) -> None:
+    on = dev.Device.open(dev.choose().info)
+    if "portable computing" not in on.info.platform.casefold():
+        tries = 1
+    made = []
+
+    def build(text: str, flags: list[str]) -> cl.Program:
+        made.append(flags)
+        return native_programs.build(on.context, on.info.cl_device, text, flags)
+
+    text = f"kernel void given(global float *out) {{ out[0] = {value}; }}"
+    program = declarations.built(on, text, ["-cl-std=CL1.2"], build)
+    assert len(made) == tries
+    out, found = cl.Buffer(on.context, cl.mem_flags.READ_WRITE, 4), np.empty(1, np.float32)
+    program.given(on.queue, (1,), (1,), out)
+    cl.enqueue_copy(on.queue, found, out)
+    assert found[0] == 4.0
+
+
+def test_no_macro_is_left() -> None:
+    text = declarations.declared()
+    left = {line.split()[1].partition("(")[0] for line in text.splitlines() if "#define" in line}
+    assert left == {line.split()[1] for line in text.splitlines() if "#undef" in line}

@@ -1,0 +1,68 @@
+"""A device that says it is a GPU gets the forms for GPUs: the picture is the same."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import clpt
+from clpt import device as dev
+from clpt import transforms as tf
+from clpt.render.wavefront.path_buffers import MOST_SLOTS, UNIT_SLOTS, default_slots
+from clpt.scene import materials as m
+from clpt.scene.integrators import Integrator, ParticleTracer, Vcm
+from clpt.scene.integrators import Path as PathIntegrator
+from clpt.scene.shapes import Rectangle, Sphere
+from tests.pictures.support import with_film
+from tests.pictures.transport.test_hybrid import corner, lamp
+
+INTEGRATORS = (PathIntegrator(light_paths=2), Vcm(), ParticleTracer())
+
+
+@pytest.fixture(scope="module")
+def gpu() -> dev.Device:
+    """The device of all tests in disguise: with two compute units, and enough memory."""
+    on = dev.choose()
+    changes = {"kind": "gpu", "compute_units": 2}
+    return dev.Device(on.context, on.queue, dataclasses.replace(on.info, **changes))
+
+
+def test_forms(gpu: dev.Device, scenes: Path) -> None:
+    """One lane, queues that are appended to, compressed nodes; in all but a few pixels the same."""
+    scene = with_film(clpt.load(scenes / "instances.xml"), mode="rgb")
+    renderer = clpt.Renderer(scene, gpu, queued=True)  # one kind: it would not be asked for
+    front = renderer.wavefronts[0]
+    slots, strategy = front.paths.slots, front.scene.strategy
+    assert (front.lanes, strategy.layout, strategy.queued) == (1, "compact", True)
+    assert UNIT_SLOTS < slots <= 2 * UNIT_SLOTS  # whole pictures
+    renderer.run(2)
+    image, plain = renderer.image(), clpt.render(scene, 2, slots=slots)
+    off = np.abs(image - plain).max(axis=2) > 1e-3 * (1e-2 + np.abs(plain).max(axis=2))
+    assert off.mean() < 0.005
+    np.testing.assert_allclose(image.mean(), plain.mean(), rtol=2e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("integrator", INTEGRATORS, ids=lambda one: one.kind)
+def test_forms_of_light_paths(gpu: dev.Device, integrator: Integrator) -> None:
+    """The same of a caustic, seen and in a mirror."""
+    ball = Sphere(center=(0.1, 0.45, 0.2), radius=0.4, material=m.Dielectric(int_ior=1.5))
+    plate = tf.translate([-0.9, 0.5, -0.2]) @ tf.rotate([0, 1, 0], 60) @ tf.scale(0.5)
+    mirror = Rectangle(to_world=plate, material=m.TwoSided(front=m.Conductor()))
+    scene = dataclasses.replace(corner({}, lamp(0.1, 250.0), ball, mirror), integrator=integrator)
+    renderer = clpt.Renderer(scene, gpu, layout="compact", queued=True)
+    front = renderer.wavefronts[0]
+    assert front.lanes == 1 and front.scene.strategy.queued
+    renderer.run(8)
+    image, plain = renderer.image(), clpt.render(scene, 8)
+    off = np.abs(image - plain).max(axis=2) > 1e-2 * (1e-2 + np.abs(plain).max(axis=2))
+    assert off.mean() < 0.02
+    np.testing.assert_allclose(image.mean(), plain.mean(), rtol=2e-3)
+
+
+def test_slots_grow_with_the_device(gpu: dev.Device) -> None:
+    units = [dataclasses.replace(gpu.info, compute_units=n) for n in (1, 20, 10_000)]
+    assert [*map(default_slots, units)] == [UNIT_SLOTS, 20 * UNIT_SLOTS, MOST_SLOTS]

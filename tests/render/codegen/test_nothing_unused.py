@@ -1,0 +1,117 @@
+"""What is left out of programs: no more than compilers would leave out, and no less than promised."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import clpt
+from clpt import device
+from clpt.device import definitions, source
+from clpt.render.codegen import flags, programs
+from clpt.render.contract.features import Features
+from clpt.render.lowering.scene import lower
+from tests.front_end import CLANG, compiled
+
+ROOT = Path(__file__).resolve().parents[3]
+AVX512 = ("-target", "x86_64-linux-gnu", "-mavx2", "-mavx512f", "-mavx512dq", "-mavx512vl")
+
+
+def features_of(name: str, mode: str) -> Features:
+    scene = clpt.load(ROOT / name)
+    film = dataclasses.replace(scene.film, mode=mode)
+    return lower(dataclasses.replace(scene, film=film)).features
+
+
+def made(features: Features, lanes: int) -> dict[str, device.Source]:
+    found = programs.film_sources(features, "wide8")
+    for number, own in enumerate(features.passes):
+        texts = programs.sources(own, "wide8", lanes, queued=True)
+        found |= {f"{number} {name}": text for name, text in texts.items()}
+    programs.loop_sources.cache_clear()
+    return found | {f"loop {n}": t for n, t in programs.loop_sources(features, "wide8", lanes).items()}
+
+
+@pytest.fixture
+def keep_everything(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
+    """From its call on, texts have all conditions and all definitions."""
+
+    def all_rows(rows, macros):
+        return tuple(row for one in rows for row in (one if isinstance(one, list) else [one]))
+
+    def keep() -> None:
+        monkeypatch.setattr(source, "taken", all_rows)
+        monkeypatch.setattr(source, "paragraphs", definitions.whole)
+
+    return keep
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CLANG is None, reason="clang is not installed")
+@pytest.mark.parametrize("lanes", [1, 8])
+@pytest.mark.parametrize(
+    ("name", "mode"),
+    [
+        ("scenes/cornell_box/scene.json", "spectral"),
+        ("scenes/glass_caustics/scene.json", "rgb"),
+        ("scenes/god_rays/scene.json", "spectral"),
+        ("tests/scenes/textures.xml", "rgb"),
+        ("tests/scenes/instances.xml", "spectral"),
+    ],
+)
+def test_compilers_get_the_same_program(
+    name: str, mode: str, lanes: int, keep_everything: Callable[[], None]
+) -> None:
+    features = features_of(name, mode)
+    short = made(features, lanes)
+    keep_everything()
+    whole = made(features, lanes)
+    assert short.keys() == whole.keys()
+    for name, text in short.items():
+        assert text.text.count("\n") < whole[name].text.count("\n") / 1.5
+        one, other = (compiled(found.text, *AVX512) for found in (text, whole[name]))
+        assert one == other, name
+
+
+@pytest.mark.parametrize("lanes", [1, 8, 16])
+@pytest.mark.parametrize("name", ["scenes/cornell_box/scene.json", "scenes/god_rays/scene.json"])
+def test_only_compilers_are_asked(name: str, lanes: int) -> None:
+    """No condition is left that a text decides by itself: all name what compilers define, or what
+    follows from that, such as NATIVE_GATHER."""
+    own = {*flags.SCENE, *flags.MATERIAL, "QUEUED", "PART", "SHADES_BOTH", "SPECTRUM_SIZE"}
+    for program, text in made(features_of(name, "spectral"), lanes).items():
+        for condition in re.findall(r"^#(?:el)?if\w* (.*)", text.text, re.MULTILINE):
+            assert own.isdisjoint(re.findall(r"\w+", condition)), (program, condition)
+
+
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+def test_a_mean_takes_few_lines(mode: str) -> None:
+    text = programs.film_sources(features_of("scenes/cornell_box/scene.json", mode), "wide8")
+    rows = text["accumulate"].text.splitlines()
+    assert len(rows) < 300
+    assert not re.search(r"\b(?:load|store)_(?:path|hit|shadow)_", text["accumulate"].text)
+
+
+def test_rows_are_at_their_lines() -> None:
+    """A row of a kernel file is the row of the file that a compiler names."""
+    texts = programs.sources(features_of("scenes/god_rays/scene.json", "rgb"), "wide8", 8, queued=False)
+    files: dict[str, list[str]] = {}
+    compared = 0
+    for text in texts.values():
+        file, line = "", 0
+        for row in text.text.splitlines():
+            told = re.match(r'#line (\d+)(?: "([^"]*)")?', row)
+            line = int(told[1]) if told else line + 1
+            if told:
+                file, line = told[2] or file, line - 1
+            elif file.startswith("kernels/") and row and not row.startswith("#"):
+                if file not in files:
+                    path = device.kernels_folder().parent / file
+                    files[file] = path.read_text("utf-8").splitlines()
+                assert row.removeprefix("static ") == files[file][line - 1], (file, line)
+                compared += 1
+    assert compared > 1000
