@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from ..errors import KernelBuildError
+from ..records import constant_files
 from .conditions import OPENING, Macros, taken
 from .definitions import Paragraph, macro, named, paragraphs, whole
 from .text_rows import Row, rows_of
@@ -103,7 +104,7 @@ def assemble(
     *,
     library: bool = False,
 ) -> Source:
-    """Return the text of `root` with its includes in place, each file once, and what it needs alone.
+    """Return the text of `root` with its includes, each file once, and what it needs alone.
 
     root: a path under the kernels folder ("stage/shade.cl") or the name of a virtual file.
     virtual: name -> generated text, a Part, or the names of files that stand for it, includable by
@@ -111,20 +112,22 @@ def assemble(
     defines: written as `#define` lines at the top.
     library: whether another text will name what this one defines.
 
+    The constants of clpt.records are virtual files of all texts.
+
     What an `#if` leaves out is not in the text, nor is the `#if`, but for those that ask for what
     compilers define (`conditions.OUTSIDE`). Functions, types, constants and macros that nothing in
     the text names are left out too, unless it is a library or they are of a Part. So programs that
     differ by nothing else are built once.
 
-    A `#line` before every part, and where rows are left out of a file, lets a compiler name our file
-    and line; generated files are numbered as they stand in the text. Includes are resolved before
-    the preprocessor runs, so they have to stand outside of `#if`.
+    A `#line` before every part, and where rows are left out of a file, lets a compiler name our
+    file and line; generated files are numbered as they stand in the text. Includes are resolved
+    before the preprocessor runs, so they have to stand outside of `#if`.
 
     Raises KernelBuildError for an include that names nothing, or that stands inside an `#if`, and
     for an `#if` without its end.
     """
     given = {name: str(value) for name, value in (defines or {}).items()}
-    assembly = _Assembly(root, virtual or {}, given, library)
+    assembly = _Assembly(root, {**constant_files(), **(virtual or {})}, given, library)
     assembly.add(root, None, 0)
     return assembly.source()
 

@@ -24,7 +24,7 @@ from clpt.geometry import (
 )
 from clpt.geometry.instancing import Instances, Placed, Prototype
 from clpt.geometry.motion import Motions
-from clpt.records import SHAPE
+from clpt.records import SHAPE, SHAPE_BITS
 from clpt.render.analysis.index import SceneIndex
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.materials.material_words import MaterialWords
@@ -34,8 +34,6 @@ from clpt.scene.shapes import Shape
 
 LEAST_RADIUS = 1e-12  # of a sphere around a scene [m]
 SWEPT_CELLS = 4  # of the hull of what moves, see `instancing.hull_points`
-SHAPE_NORMALS, SHAPE_UVS, SHAPE_TWO_SIDED, SHAPE_ONE_LIGHT, SHAPE_MANY = 1, 2, 4, 8, 16
-SHAPE_TANGENTS, SHAPE_DEFORMS = 32, 64
 
 Triangles = tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.uint32]]
 
@@ -195,7 +193,7 @@ class _Builder:
         row["number"], row["light"] = one.number, -1
         front, back, two_sided = self.materials.sides(shape)
         row["front"], row["back"] = np.array([front, back], np.uint32).view(np.int32)
-        row["flags"] = SHAPE_TWO_SIDED if two_sided else 0
+        row["flags"] = SHAPE_BITS["two_sided"] if two_sided else 0
         self.owners.append((row, shape, self.vertex_count, self.face_count))
         if shape.kind not in shape_records.ANALYTIC:
             corners = self._add_triangles(shape, row, times)
@@ -229,7 +227,7 @@ class _Builder:
         times: at which they have rows, for what belongs to something that deforms.
         """
         row["prim"] = self.single_count + sum(map(len, self.many))
-        row["flags"] |= SHAPE_MANY
+        row["flags"] |= SHAPE_BITS["many"]
         store, by = self.encoder.store, shapes.geometry(shape)
         if times:
             keyed = self.encoder.cache(spheres.keyed, shape, times, by=(*by, times))
@@ -268,7 +266,7 @@ class _Builder:
         """Append a shape's triangles; return their vertices, faces and uvs."""
         by = shapes.geometry(shape)
         if times:
-            row["flags"] |= SHAPE_DEFORMS
+            row["flags"] |= SHAPE_BITS["deforms"]
             self.keys[self.vertex_count] = len(times)
             made = self.encoder.cache(triangles.keyed, shape, times, by=(*by, times))
         else:
@@ -276,14 +274,14 @@ class _Builder:
         vertices, faces, normals, uvs, flat = made
         self.flat += flat
         row["prim"] = self.face_count
-        row["flags"] |= SHAPE_NORMALS if normals is not None else 0
-        row["flags"] |= SHAPE_UVS if uvs is not None else 0
+        row["flags"] |= SHAPE_BITS["normals"] if normals is not None else 0
+        row["flags"] |= SHAPE_BITS["uvs"] if uvs is not None else 0
         zeros = np.zeros_like(vertices)
         self.encoder.store.append_floats("normals", zeros if normals is None else normals)
         self.encoder.store.append_floats("uvs", zeros[:, :2] if uvs is None else uvs)
         self.normals |= normals is not None
         if getattr(shape, "tangents", None) is not None and not times:
-            row["flags"] |= SHAPE_TANGENTS
+            row["flags"] |= SHAPE_BITS["tangents"]
             own = (*shapes.geometry(shape), shape.tangents)
             along = self.encoder.cache(triangles.tangents, shape, by=own)
             self.tangents.append((self.vertex_count, along))

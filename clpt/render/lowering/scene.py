@@ -14,6 +14,7 @@ from clpt.geometry import shape_records, shapes
 from clpt.geometry.instancing import Instances
 from clpt.geometry.motion import at_rest, corners, swept
 from clpt.geometry.refining import is_refined
+from clpt.records import SHAPE_BITS
 from clpt.render.analysis import cameras, open_boundaries
 from clpt.render.analysis.bodies import matter_of
 from clpt.render.analysis.checks import check
@@ -40,7 +41,6 @@ from clpt.render.lowering.device_arrays import is_table
 from clpt.render.lowering.device_grids import DeviceGrid
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.geometry import (
-    SHAPE_ONE_LIGHT,
     Emitter,
     Geometry,
     lower_geometry,
@@ -325,7 +325,7 @@ def _lower_lights(
     for emitter, first, whole in zip(geometry.emitters, lights.first, lights.whole, strict=True):
         row = geometry.rows[emitter.shape_row]
         row["light"] = first
-        row["flags"] |= SHAPE_ONE_LIGHT if whole else 0
+        row["flags"] |= SHAPE_BITS["one_light"] if whole else 0
     return lights
 
 

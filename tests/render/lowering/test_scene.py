@@ -9,10 +9,9 @@ import pytest
 
 import clpt
 from clpt.errors import SceneError
-from clpt.records import SETTINGS, SHAPE, TABLES
+from clpt.records import SETTINGS, SHAPE, SHAPE_BITS, TABLES
 from clpt.render.contract.parameter_words import MIXTURE
 from clpt.render.lowering import geometry
-from clpt.render.lowering.geometry import SHAPE_NORMALS, SHAPE_TWO_SIDED, SHAPE_UVS
 from clpt.render.lowering.scene import lower
 from clpt.render.lowering.settings import DEEPEST
 from clpt.scene import Film, Scene
@@ -61,8 +60,8 @@ def test_triangles_of_all_shapes_are_joined() -> None:
     assert made.faces.max() == len(made.vertices) - 1
     table = rows(made)
     assert table["prim"].tolist()[:3] == [0, 2, 3]
-    assert table["flags"][1] & SHAPE_NORMALS and table["flags"][1] & SHAPE_UVS
-    assert not table["flags"][0] & SHAPE_NORMALS
+    assert table["flags"][1] & SHAPE_BITS["normals"] and table["flags"][1] & SHAPE_BITS["uvs"]
+    assert not table["flags"][0] & SHAPE_BITS["normals"]
     assert table["kind"].tolist() == [0, 0, 0, 1]
     assert len(made.boxes) == 1
     assert table["number"].tolist() == [0, 2, 3, 1]  # which shape of the scene it was
@@ -77,7 +76,7 @@ def test_materials_are_put_in_once() -> None:
 def test_sides() -> None:
     red, blue = m.Diffuse(reflectance=(1, 0, 0)), m.Diffuse(reflectance=(0, 0, 1))
     made = rows(lower(scene(Rectangle(material=m.TwoSided(front=red, back=blue)))))
-    assert made["flags"][0] & SHAPE_TWO_SIDED
+    assert made["flags"][0] & SHAPE_BITS["two_sided"]
     assert made["front"][0] != made["back"][0]
     same = rows(lower(scene(Rectangle(material=m.TwoSided(front=red)))))
     assert same["front"][0] == same["back"][0]

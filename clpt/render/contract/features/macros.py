@@ -15,12 +15,12 @@ Value = str | int | None  # None: the macro is not defined
 _Get = TypeVar("_Get", bound=Callable[..., Any])
 
 
-def flag(name: str, default: Any = False) -> Any:
+def flag(name: str, default: object = False) -> Any:
     """Declare a field whose macro is defined where it is neither False nor 0."""
     return dataclasses.field(default=default, metadata={"macro": (name, True)})
 
 
-def number(name: str, default: Any = 0) -> Any:
+def number(name: str, default: object = 0) -> Any:
     """Declare a field whose macro is defined even where it is 0, but not where it is None."""
     return dataclasses.field(default=default, metadata={"macro": (name, False)})
 
@@ -43,13 +43,13 @@ def said(record: Any) -> Iterator[tuple[str, Value]]:
             yield _value(field.metadata["macro"], own)
         elif dataclasses.is_dataclass(own) and not isinstance(own, type):
             yield from said(own)
-    for name, member in vars(type(record)).items():
-        named = getattr(getattr(member, "fget", None), "macro", None)
-        if named is not None:
-            yield _value(named, getattr(record, name))
+    for member in vars(type(record)).values():
+        get = member.fget if isinstance(member, property) else None
+        if get is not None and "macro" in vars(get):
+            yield _value(vars(get)["macro"], get(record))
 
 
-def _value(named: tuple[str, bool], own: Any) -> tuple[str, Value]:
+def _value(named: tuple[str, bool], own: Value) -> tuple[str, Value]:
     """A macro's name and value; in kernels, true is 1."""
     name, is_flag = named
     absent = not own if is_flag else own is None

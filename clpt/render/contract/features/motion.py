@@ -25,7 +25,7 @@ class MotionFeatures:
     def parts(self) -> tuple[str, ...]:
         """The names of what moves."""
         parts = (field.name for field in fields(self) if field.name not in ("scales", "row"))
-        return tuple(name for name in parts if getattr(self, name))
+        return tuple(name for name in parts if vars(self)[name])
 
     @property
     def present(self) -> bool:
