@@ -1,6 +1,6 @@
 """The command `clpt`: until everything is imported, Ctrl-C ends it without a word.
 
-This module stands outside of the package, whose import takes half a second.
+This module stands outside of the package, whose import takes its time.
 """
 
 import signal

@@ -46,7 +46,7 @@ def files(folder: Path, expected: Row) -> Iterator[Path]:
 def examine(path: Path, film: int) -> Row:
     """Return what is found out about a file; runs in a worker."""
     import clpt
-    from clpt.cli.info import summary
+    from clpt.cli.files.scene_contents import summary
 
     start = time.perf_counter()
     try:

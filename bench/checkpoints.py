@@ -45,7 +45,7 @@ def parts(renderer: clpt.Renderer, path: Path, times: int) -> dict[str, float]:
 
     def hold() -> None:
         renderer.hold()
-        renderer.wavefronts[0].stream.wait()
+        renderer.wavefront.stream.wait()
 
     hold()
     saved = renderer.saved_film(held=True)

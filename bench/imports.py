@@ -49,9 +49,11 @@ def rooms(root: Path = ROOT) -> dict[str, Graph]:
     """For each package, its rooms, and who of them imports whom.
 
     The rooms of a package are its folders and its modules. All that is in a folder, at whatever
-    depth, imports and is imported as that folder.
+    depth, imports and is imported as that folder. The front page of clpt is no room: it hands out
+    what others have.
     """
     known, links = modules(root), graph(root)
+    links["clpt"] = set()
     inside = {n: n if p.name != "__init__.py" else f"{n}.__init__" for n, p in known.items()}
     houses: dict[str, Graph] = {}
     for house in (name for name in known if inside[name] != name):

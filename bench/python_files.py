@@ -11,7 +11,7 @@ from pathlib import Path
 
 # A summary that begins so refers to its neighbour, and says nothing by itself.
 DEPENDENT = re.compile(r"(What|Of|How|Those|The same)\b")
-ARRAY = re.compile(r"^(\w+)(?:: TypeAlias)? = NDArray\[", re.MULTILINE)
+ARRAY = re.compile(r"^(\w+)(?:: TypeAlias)? = NDArray\[[\w.]+\]\s*(?:#|$)", re.MULTILINE)
 
 
 @dataclass(frozen=True)

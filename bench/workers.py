@@ -81,9 +81,7 @@ class Clpt:
         self.about = f"clpt, {info.label}, {info.version}"
 
     def render(self, spp: int, number: int) -> np.ndarray:
-        for wavefront in self.renderer.wavefronts:
-            wavefront.clear()
-        self.renderer.samples = number * spp
+        self.renderer.reset(first_sample=number * spp)
         self.renderer.run(spp)
         return self.renderer.image()
 
@@ -92,7 +90,7 @@ class Clpt:
 
         renderer = clpt.Renderer(self.scene, profiling=True, looped=False)
         renderer.run(spp)
-        (wavefront,) = renderer.wavefronts
+        wavefront = renderer.wavefront
         timings = wavefront.timings.collect()
         return {
             "milliseconds": {name: round(t.seconds * 1e3, 2) for name, t in timings.items()},

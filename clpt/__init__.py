@@ -6,49 +6,131 @@
 >>> clpt.write_image("out.exr", image)
 """
 
+import importlib
 import logging
 import os
 import sys
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
 if sys.argv[:1] == ["-m"] and "clpt" in sys.orig_argv:  # python -m clpt: Python has put the current
     # folder first, from which nothing is imported unless clpt itself is there
     _home = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
     sys.path[:1] = [path for path in sys.path[:1] if path == _home]
 
-from clpt.budget import Budget
-from clpt.cluster.multi_renderer import MultiRenderer
-from clpt.colour.view import View
-from clpt.errors import (
-    ClptError,
-    ClusterError,
-    DeviceError,
-    KernelBuildError,
-    MemoryBudgetError,
-    SceneError,
-    UnknownKindError,
-    UnusedParameterError,
-)
-from clpt.formats import load, save
-from clpt.images import read as read_image
-from clpt.images import write as write_image
-from clpt.rays import Accel, AllHits, Hits, InstancedAccel
-from clpt.render.codegen.library import kernel_source
-from clpt.render.film.denoised_picture import DenoisedPicture
-from clpt.render.film.layer_channels import write_layers
-from clpt.render.options import RenderOptions
-from clpt.render.pictures import Pictures as _Pictures
-from clpt.render.progress import Progress
-from clpt.render.renderer import Renderer, render
-from clpt.render.wavefront.film_state import FilmState
-from clpt.scene import Scene
-from clpt.spectral_exr import SpectralImage
-from clpt.spectral_exr import read as read_spectral
-from clpt.spectral_exr import write as write_spectral
-from clpt.version import VERSION as __version__
-from clpt.view.notebook import widget as _widget
+if TYPE_CHECKING:
+    from clpt.budget import Budget
+    from clpt.cluster.multi_renderer import MultiRenderer
+    from clpt.colour.view import View
+    from clpt.errors import (
+        ClptError,
+        ClusterError,
+        DeviceError,
+        KernelBuildError,
+        MemoryBudgetError,
+        SceneError,
+        UnknownKindError,
+        UnusedParameterError,
+    )
+    from clpt.formats import load, save
+    from clpt.images import read as read_image
+    from clpt.images import write as write_image
+    from clpt.rays import Accel, AllHits, Hits, InstancedAccel
+    from clpt.render.codegen.library import kernel_source
+    from clpt.render.film.denoised_picture import DenoisedPicture
+    from clpt.render.film.layer_channels import write_layers
+    from clpt.render.options import RenderOptions
+    from clpt.render.progress import Progress
+    from clpt.render.renderer import Renderer, render
+    from clpt.render.wavefront.film_state import FilmState
+    from clpt.scene import Scene
+    from clpt.spectral_exr import SpectralImage
+    from clpt.spectral_exr import read as read_spectral
+    from clpt.spectral_exr import write as write_spectral
+    from clpt.version import VERSION as __version__
 
-_Pictures.make_widget = _widget  # renderers know nothing of who shows their pictures
 logging.getLogger("clpt").addHandler(logging.NullHandler())  # quiet until the program asks
+
+_HOMES = {  # the module of each name, and what it is called there
+    "Budget": ("budget", "Budget"),
+    "MultiRenderer": ("cluster.multi_renderer", "MultiRenderer"),
+    "View": ("colour.view", "View"),
+    "ClptError": ("errors", "ClptError"),
+    "ClusterError": ("errors", "ClusterError"),
+    "DeviceError": ("errors", "DeviceError"),
+    "KernelBuildError": ("errors", "KernelBuildError"),
+    "MemoryBudgetError": ("errors", "MemoryBudgetError"),
+    "SceneError": ("errors", "SceneError"),
+    "UnknownKindError": ("errors", "UnknownKindError"),
+    "UnusedParameterError": ("errors", "UnusedParameterError"),
+    "load": ("formats", "load"),
+    "save": ("formats", "save"),
+    "read_image": ("images", "read"),
+    "write_image": ("images", "write"),
+    "Accel": ("rays", "Accel"),
+    "AllHits": ("rays", "AllHits"),
+    "Hits": ("rays", "Hits"),
+    "InstancedAccel": ("rays", "InstancedAccel"),
+    "kernel_source": ("render.codegen.library", "kernel_source"),
+    "DenoisedPicture": ("render.film.denoised_picture", "DenoisedPicture"),
+    "write_layers": ("render.film.layer_channels", "write_layers"),
+    "RenderOptions": ("render.options", "RenderOptions"),
+    "Progress": ("render.progress", "Progress"),
+    "Renderer": ("render.renderer", "Renderer"),
+    "render": ("render.renderer", "render"),
+    "FilmState": ("render.wavefront.film_state", "FilmState"),
+    "Scene": ("scene", "Scene"),
+    "SpectralImage": ("spectral_exr", "SpectralImage"),
+    "read_spectral": ("spectral_exr", "read"),
+    "write_spectral": ("spectral_exr", "write"),
+    "__version__": ("version", "VERSION"),
+}
+_SHOWN = ("MultiRenderer", "Renderer")  # renderers, whose pictures a notebook shows
+
+
+class _Front(ModuleType):
+    """The front page of clpt: what it names is imported when it is first used."""
+
+    def __getattr__(self, name: str) -> Any:
+        if name in _HOMES:
+            module, inside = _HOMES[name]
+            value = vars(importlib.import_module(f"clpt.{module}"))[inside]
+            if name in _SHOWN:
+                _give_widgets()
+        else:
+            value = _submodule(name)
+        self.__dict__[name] = value
+        return value
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        # The package clpt.render, once imported, would take the place of the function.
+        if not (name in _HOMES and isinstance(value, ModuleType)):
+            super().__setattr__(name, value)
+
+    def __dir__(self) -> list[str]:
+        return sorted({*self.__dict__, *__all__})
+
+
+def _give_widgets() -> None:
+    """Let renderers have widgets: they know nothing of who shows their pictures."""
+    from clpt.render.pictures import DevicePictures
+    from clpt.view.notebook import widget
+
+    DevicePictures.make_widget = widget
+
+
+def _submodule(name: str) -> ModuleType:
+    """Return a module of clpt, as `clpt.rays` after `import clpt`. Raises AttributeError."""
+    if not name.startswith("_"):
+        try:
+            return importlib.import_module(f"clpt.{name}")
+        except ModuleNotFoundError as error:
+            if error.name != f"clpt.{name}":
+                raise
+    raise AttributeError(f"module 'clpt' has no attribute {name!r}")
+
+
+sys.modules[__name__].__class__ = _Front
 
 __all__ = [
     "Accel",

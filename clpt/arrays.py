@@ -1,9 +1,22 @@
-"""Arrays that may lie on a device, read by who does not need OpenCL."""
+"""Types of arrays, for type checkers; and arrays that may lie on a device, without OpenCL."""
 
 from __future__ import annotations
 
 import sys
 from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+Floats32 = NDArray[np.float32]
+Integers = NDArray[np.int64]
+Words = NDArray[np.uint32]
+Bytes = NDArray[np.uint8]
+Points = NDArray[np.float32]  # (n, 3), or (n, 2) for uv
+Faces = NDArray[np.uint32]  # (n, 3)
+Image = NDArray[np.float32]  # (height, width, channels)
+Matrix = NDArray[np.float64]  # (rows, columns)
 
 
 def on_host(values: Any) -> Any:
@@ -17,3 +30,14 @@ def on_device(values: Any) -> bool:
     opencl, module = sys.modules.get("pyopencl"), sys.modules.get("pyopencl.array")
     array = module is not None and isinstance(values, module.Array)
     return array or (opencl is not None and isinstance(values, opencl.Buffer))
+
+
+def single(values: ArrayLike) -> NDArray[np.float32]:
+    """Return values as float32, infinite where they are beyond it: whoever asks looks for that."""
+    with np.errstate(over="ignore"):
+        return np.asarray(values, np.float32)
+
+
+def fits_single(values: ArrayLike) -> bool:
+    """Return whether values are finite as float32 too."""
+    return bool(np.isfinite(single(values)).all())

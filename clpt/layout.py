@@ -78,7 +78,8 @@ class Constants:
 
 def bits(prefix: str, doc: str, first: int = 1, **docs: str) -> Constants:
     """Return constants that are a bit each, from `first` on; docs: what each means."""
-    return Constants(prefix, doc, **{n: (first << i, d) for i, (n, d) in enumerate(docs.items())})
+    values = {name: (first << i, meaning) for i, (name, meaning) in enumerate(docs.items())}
+    return Constants(prefix, doc, False, **values)
 
 
 @dataclass(frozen=True)
@@ -243,21 +244,25 @@ class Record:
                 ]
                 continue
             cast = _CASTS.get(m.type, "")
+            heads = [
+                f"/* {m.doc} */\ninline {lane} load_{lower}_{m.name}(Slab s, uint at)",
+                f"inline void store_{lower}_{m.name}(Slab s, uint at, mask m, {lane} v)",
+            ]
             load, store = [], []
             for i, component in enumerate(TYPES[m.type][3]):
-                read = f"    r{component} = {cast}(slab_read(s, {m.word + i}, at));"
+                read = f"slab_read(s, {m.word + i}, at)"
                 value = f"as_real(v{component})" if cast else f"v{component}"
-                write = f"    slab_write(s, {m.word + i}, at, m, {value});"
-                guard = m.type == "spectrum" and i == 3
-                load += ["#if SPECTRUM_SIZE == 4", read, "#endif"] if guard else [read]
-                store += ["#if SPECTRUM_SIZE == 4", write, "#endif"] if guard else [write]
-            parts += [
-                f"/* {m.doc} */",
-                f"inline {lane} load_{lower}_{m.name}(Slab s, uint at)",
-                "{", f"    {lane} r;", *load, "    return r;", "}",
-                f"inline void store_{lower}_{m.name}(Slab s, uint at, mask m, {lane} v)",
-                "{", *store, "}",
-            ]  # fmt: skip
+                load.append(f"    r{component} = {f'{cast}({read})' if cast else read};")
+                store.append(f"    slab_write(s, {m.word + i}, at, m, {value});")
+            if m.words == 1:
+                bodies = [f"{{ return {load[0].partition('= ')[2]} }}", f"{{ {store[0].strip()} }}"]
+                parts += [f"{head} {body}" for head, body in zip(heads, bodies, strict=True)]
+                continue
+            if m.type == "spectrum":
+                for rows in (load, store):
+                    rows[3:] = ["#if SPECTRUM_SIZE == 4", rows[3], "#endif"]
+            parts += [heads[0], "{", f"    {lane} r;", *load, "    return r;", "}"]
+            parts += [heads[1], "{", *store, "}"]
         return "\n".join([*parts, ""])
 
 

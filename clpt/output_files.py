@@ -30,9 +30,7 @@ _looked_at: set[Path] = set()  # folders, for what was left in them
 
 
 @contextmanager
-def replacing(
-    path: str | Path, *, suffixed: bool = True, follow: bool = True
-) -> Iterator[Path]:
+def replacing(path: str | Path, *, suffixed: bool = True, follow: bool = True) -> Iterator[Path]:
     """Yield the path of a new, empty file, which takes the place of `path` afterwards.
 
     The new file is in the same folder, and its content is on the disk before the old file goes. So

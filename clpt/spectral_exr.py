@@ -19,13 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import images
+from clpt.arrays import Floats32
 from clpt.errors import SceneError
 from clpt.images import exr, exr_files
 from clpt.images.failures import check_there, reading
 from clpt.spectra import Tabulated, cie
 from clpt.spectra.spectrum import d65
-
-Array = NDArray[np.float32]
 
 RADIANCE = "W.m^-2.sr^-1.nm^-1"
 VERSION = "1.0"
@@ -54,7 +53,7 @@ class SpectralImage:
     beside that. Raises SceneError where these do not fit together.
     """
 
-    values: Array
+    values: Floats32
     lambdas: NDArray[np.float64]
     emissive: bool = False
     units: str = RADIANCE
@@ -78,7 +77,7 @@ class SpectralImage:
         object.__setattr__(self, "values", values)
         object.__setattr__(self, "lambdas", lambdas)
 
-    def to_rgb(self) -> Array:
+    def to_rgb(self) -> Floats32:
         """Linear Rec. 709 (h, w, 3) float32: reflectances under D65, light as it is; unclipped."""
         return self.values @ self._rgb_of_bands.astype(np.float32)
 
@@ -157,9 +156,9 @@ def write(
     image: SpectralImage,
     *,
     half: bool = False,
-    preview: Array | None = None,
+    preview: Floats32 | None = None,
     metadata: Mapping[str, Any] | None = None,
-    layers: Mapping[str, Array] | None = None,
+    layers: Mapping[str, Floats32] | None = None,
 ) -> None:
     """Write a spectral EXR file; what `read` gives back is the same to the bit unless `half`.
 

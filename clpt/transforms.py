@@ -7,16 +7,16 @@ w = 0, normals go through the inverse transpose.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from clpt.arrays import Matrix as Matrix
 from clpt.errors import SceneError
-
-Matrix = NDArray[np.float64]
 
 IDENTITY: Matrix = np.eye(4)
 IDENTITY.setflags(write=False)
 
 # Relative to the product of the columns' lengths, so that tiny but regular scales pass.
+LARGE = 1e150  # from where on squares are beyond float64
 SINGULAR_BELOW = 1e-12
 
 
@@ -120,6 +120,17 @@ def inverse(matrix: ArrayLike) -> Matrix:
     return np.linalg.inv(np.asarray(matrix, np.float64))
 
 
+def length(vector: ArrayLike) -> float:
+    """Return the length of a finite vector (n,), also where its square is beyond float64."""
+    vector = np.asarray(vector, np.float64)
+    size = float(np.abs(vector).max())
+    return (
+        float(np.linalg.norm(vector / size)) * size
+        if size > LARGE
+        else float(np.linalg.norm(vector))
+    )
+
+
 def is_affine(matrix: Matrix) -> bool:
     """Whether the last row of a 4x4 matrix is 0 0 0 1."""
     return bool(matrix[3].tolist() == [0.0, 0.0, 0.0, 1.0])
@@ -131,6 +142,8 @@ def is_singular(matrix: ArrayLike) -> bool:
     if not np.isfinite(matrix).all():
         return True
     linear = matrix if matrix[3, :3].any() else matrix[:3, :3]
+    size = np.abs(linear).max()
+    linear = linear / size if size > LARGE else linear
     lengths = np.linalg.norm(linear, axis=0)
     if not lengths.all() or not (matrix[3].any()):
         return True
@@ -150,10 +163,10 @@ def _triple(values: ArrayLike, what: str) -> Matrix:
 
 
 def _unit(vector: Matrix, complaint: str) -> Matrix:
-    length = float(np.linalg.norm(vector))
-    if length < 1e-12:
+    distance = length(vector)
+    if distance < 1e-12:
         raise SceneError(complaint)
-    return vector / length
+    return vector / distance
 
 
 def _check_planes(near: float, far: float, what: str, lowest: float) -> None:

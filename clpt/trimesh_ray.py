@@ -16,6 +16,7 @@ from trimesh.ray.ray_util import contains_points
 from trimesh.util import unitize
 
 from clpt import device
+from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
 from clpt.rays import Accel
 
@@ -23,9 +24,6 @@ ROUNDING = 1e-6  # of the reach, by which a ray may miss an edge and still meet 
 SAME = 1e-10  # of the reach, by which points of edges differ that are one
 CHUNK = 1 << 17  # hits compared at a time: they take 1 kB each
 GRAZING = 1e-9  # cosine below which the plane of a triangle does not locate a hit
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

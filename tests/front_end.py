@@ -59,8 +59,8 @@ def errors(
 
 def compiled(text: str, *flags: str) -> str:
     """A program in LLVM's language, before it is optimised: without functions that nobody calls."""
-    given = [word for flag in (*LANGUAGE[2:], *DRIVERS, "-disable-llvm-passes") for word in ("-Xclang", flag)]
-    command = [str(CLANG), *LANGUAGE[:2], *given, "-emit-llvm", "-S", "-w", *flags, "-o", "-", "-"]
+    given = [word for one in (*DRIVERS, "-disable-llvm-passes") for word in ("-Xclang", one)]
+    command = [str(CLANG), *LANGUAGE, *given, "-emit-llvm", "-S", "-w", *flags, "-o", "-", "-"]
     done = subprocess.run(
         command, input=text, capture_output=True, text=True, timeout=300, check=False
     )

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import ast
 import re
+import subprocess
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -51,10 +53,14 @@ MAY_IMPORT = {
 OPENCL = {"device", "bvh", "denoise", "rays", "render"}  # only these import pyopencl
 # clpt/render/<room>: arrows point down; rooms of one floor do not know each other.
 FLOORS = ({"contract"}, {"analysis"}, {"lowering", "codegen"}, {"wavefront"}, {"editing", "film"})
+# clpt/cli/<room>: the same; commands stand on top of all.
+FLOORS_OF_COMMANDS = (
+    {"process"}, {"printing", "options"}, {"opening"}, {"files"}, {"plots"}, {"render", "view"},
+)  # fmt: skip
 # What kinds share, by what a reader looks for.
 SHARED = {
     "colour", "core", "denoising", "film", "guiding", "interface", "lighting", "media", "merging",
-    "optics", "path", "spectrum", "texturing", "tracing",
+    "optics", "path", "spectrum", "steps", "surface", "texturing", "tracing",
 }  # fmt: skip
 KINDS = {"bsdf", "phase", "camera", "emission", "light", "medium", "sampler", "shape", "texture"}
 # kernels/<folder>: the folders that its files may include; generated text stands between them.
@@ -133,21 +139,24 @@ def test_imports_follow_the_direction() -> None:
     keep("a part imports only those that MAY_IMPORT lists: move what it needs down", broken())
 
 
-def test_rooms_of_render_know_only_lower_floors() -> None:
+@pytest.mark.parametrize(
+    ("part", "floors"), [("render", FLOORS), ("cli", FLOORS_OF_COMMANDS)], ids=["render", "cli"]
+)
+def test_rooms_know_only_lower_floors(part: str, floors: tuple[set[str], ...]) -> None:
     below = {
-        room: {room}.union(*FLOORS[:floor]) for floor, rooms in enumerate(FLOORS) for room in rooms
+        room: {room}.union(*floors[:floor]) for floor, rooms in enumerate(floors) for room in rooms
     }
 
     def broken() -> Iterator[str]:
         for path in modules():
             parts = path.relative_to(PACKAGE).with_suffix("").parts
-            if parts[0] != "render" or parts[1] not in below:
+            if parts[0] != part or parts[1] not in below:
                 continue
             for name, place in imports(path):
-                if name.startswith("clpt.render.") and name.split(".")[2] not in below[parts[1]]:
+                if name.startswith(f"clpt.{part}.") and name.split(".")[2] not in below[parts[1]]:
                     yield f"{place}: {parts[1]} imports {name}"
 
-    keep("a room of clpt/render imports only rooms of lower FLOORS", broken())
+    keep("a room of a part imports only rooms of lower floors", broken())
 
 
 def test_a_circle_is_found() -> None:
@@ -225,17 +234,35 @@ def test_public_names() -> None:
     assert clpt.__all__ == sorted(clpt.__all__)
     assert len(set(clpt.__all__)) == len(clpt.__all__)
     tree = ast.parse((PACKAGE / "__init__.py").read_text(encoding="utf-8"))
-    imported = {
-        alias.asname or alias.name
-        for node in tree.body
-        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("clpt")
+    imported = {  # where their types are read
+        alias.asname or alias.name: (node.module.removeprefix("clpt."), alias.name)
+        for top in tree.body
+        if isinstance(top, ast.If)
+        for node in top.body
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("clpt.")
         for alias in node.names
-        if not (alias.asname or alias.name).startswith("_")
     }
-    assert set(clpt.__all__) == imported | {"__version__"}
+    assert set(clpt.__all__) == imported.keys() and imported == clpt._HOMES
     for name in clpt.__all__:
         assert hasattr(clpt, name)
         assert getattr(clpt, name).__doc__ or name == "__version__"
+
+
+def test_the_front_page_is_imported_as_it_is_used() -> None:
+    """`clpt.render` is the function, whoever imports the package of that name."""
+    code = """
+import sys, clpt
+assert "numpy" not in sys.modules
+from clpt.render.film import layers
+import clpt.render.options
+assert callable(clpt.render) and clpt.render is clpt.render.__globals__["render"]
+assert clpt.rays.Accel is clpt.Accel and "Scene" in dir(clpt)
+assert not hasattr(clpt, "nothing") and not hasattr(clpt, "_nothing")
+from clpt import images, render, Renderer
+assert callable(render) and images.write is clpt.write_image
+"""
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
 
 
 def test_kernel_files_begin_with_their_purpose() -> None:

@@ -9,11 +9,11 @@ import sys
 from pathlib import Path
 
 import click
+import platformdirs
 import pytest
 
 from clpt import __main__ as entry
 from clpt import cli
-from clpt.cli.process import failures
 from clpt.errors import SceneError
 
 
@@ -48,9 +48,7 @@ def test_status_and_line(failing, capsys, error, status, line):
 
 
 def test_a_fault_of_our_own_keeps_its_traceback(failing, capsys, monkeypatch, tmp_path):
-    monkeypatch.setattr(
-        failures.platformdirs, "user_log_dir", lambda *a, **k: str(tmp_path / "log")
-    )
+    monkeypatch.setattr(platformdirs, "user_log_dir", lambda *a, **k: str(tmp_path / "log"))
     failing(ZeroDivisionError("division by zero"))
     assert entry.run(["fail"]) == 1
     err = capsys.readouterr().err
@@ -73,7 +71,7 @@ import signal, sys
 import clpt_command
 class Presses:
     def find_spec(self, name, path=None, target=None):
-        if name == "clpt.images":
+        if name == "clpt.cli.process":
             signal.raise_signal(signal.SIGINT)
 sys.meta_path.insert(0, Presses())
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -88,3 +86,34 @@ def test_ctrl_c_while_everything_is_imported():
     command = [sys.executable, "-c", IMPORTING]
     done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
+
+
+def test_the_list_of_commands_has_their_own_words():
+    with click.Context(cli.cli) as context:
+        for name, words in cli.COMMANDS.items():
+            command = cli.cli.get_command(context, name)
+            assert click.Command(name, help=words).get_short_help_str(300) == words
+            assert command.get_short_help_str(300).rstrip(".") == words.rstrip("."), name
+
+
+@pytest.mark.parametrize("option", ["--help", "--version"])
+def test_what_needs_no_packages_imports_none(option):
+    code = """
+import sys
+from clpt.__main__ import run
+assert run(sys.argv[1:]) == 0
+assert not {"numpy", "pyopencl", "OpenEXR", "rich"} & sys.modules.keys()
+"""
+    done = subprocess.run([sys.executable, "-c", code, option], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_help_of_a_render_opens_no_renderer():
+    code = """
+import sys
+from clpt.__main__ import run
+assert run(["render", "--help"]) == 0 and run(["render", "nothing.json"]) == 2
+assert not {"clpt.render.renderer", "clpt.cluster", "rich"} & sys.modules.keys()
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

@@ -46,7 +46,7 @@ def spectral(path: Path) -> None:
 def checkpoint(path: Path) -> None:
     """Write one as a render does; what it could not do is an error."""
     said: list[str] = []
-    kept = film((1, 1, 10, 4, 5))
+    kept = film((1, 10, 4, 5))
     renderer = SimpleNamespace(hold=lambda: None, saved_film=lambda held: kept)
     writer = checkpoints.Checkpoints(renderer, path, 1e9, False, (), said.append)
     try:

@@ -16,6 +16,7 @@ import numpy as np
 
 from bench import machine
 from clpt.formats import volumes
+from clpt.render.analysis.bricks import CELLS, Windows
 from clpt.render.lowering import grids
 
 CLOUD = "volumes/teapot_cloud/teapot_cloud.nvdb"
@@ -27,13 +28,13 @@ CLOUD = "volumes/teapot_cloud/teapot_cloud.nvdb"
 def main(file: Path | None, path: str | None) -> None:
     assets = Path(os.environ.get("ASSETS", machine.ROOT.parent / "shared" / "assets"))
     density = np.asarray(volumes.read(file or assets / CLOUD).values)
-    most = grids.Windows(density).most
+    most = Windows(density).most
     kept = int((most > 0.0).sum())
     for bits in (16, 8):
         size = grids.bricks(density, bits).nbytes
         counts = {
             "box": density.size,
-            "stored": kept * grids.CELLS**3,
+            "stored": kept * CELLS**3,
             "dense": int((density > 0.0).sum()),
         }
         row = {

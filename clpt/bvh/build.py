@@ -61,9 +61,11 @@ def choose_layout(device: Device, n_triangles: int) -> str:
 def choose_tree(device: Device) -> str:
     """Return the layout that traces fastest on the device among those that have a tree.
 
-    Measured on CPUs; for other devices the literature's choice, see bench/NOTES.md.
+    Measured on CPUs and a GPU of NVIDIA's. Elsewhere it is the literature's choice, as compilers
+    for AMD's and Intel's GPUs have too few registers for the other: see bench/NOTES.md.
     """
-    return "wide8" if device.info.is_cpu else "compact"
+    measured = device.info.is_cpu or "nvidia" in device.info.vendor.casefold()
+    return "wide8" if measured else "compact"
 
 
 def outgrows_caches(device: Device, layout: str, n_triangles: int) -> bool:

@@ -12,13 +12,32 @@ import click
 
 from .options.verbosity import verbose_option
 
-COMMANDS = (
-    "render", "view", "merge", "warm", "worker", "cluster", "devices", "info", "inspect", "kernels",
-    "mie", "lens", "bench",
-)  # fmt: skip
+COMMANDS = {  # with the first words of their help, for which nothing is imported
+    "render": "Render each SCENE: a scene file, a mesh or a folder.",
+    "view": "Show the scene file, mesh or folder SCENE in the browser, and let it be steered.",
+    "merge": "Add FILMS, of `clpt render --samples FIRST:END -o NAME.film`, and write the picture.",
+    "warm": "Compile the programs of SCENES into the caches, and render nothing.",
+    "worker": "Render for the scheduler at ADDRESS, such as tls://192.168.1.5:8786, until it ends.",
+    "cluster": "Render on several machines; see also `clpt worker`.",
+    "devices": "List the OpenCL devices, with the one that would be used and why.",
+    "info": "Show what the file or folder SCENE holds, without rendering it.",
+    "inspect": "Show what the image or film FILE holds; plot the spectra of pixels, or their "
+    "channels.",
+    "kernels": "Write the OpenCL programs that render SCENE, one file each.",
+    "mie": "Make the medium of spheres of RADIUS micrometres: fog, mist, milk.",
+    "lens": "Tell of LENS: a file (.dat, .zmx, .txt) or a name of the library.",
+    "bench": "Measure rays, stages of rendering, builds and starts of an OpenCL device.",
+}
 
 
-class _Commands(click.Group):
+class _Listed(click.Group):
+    """A group whose help lists commands in their own order."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(self.commands)
+
+
+class _Commands(_Listed):
     """A group whose commands are `clpt.cli.<name>.<name>`."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -28,6 +47,10 @@ class _Commands(click.Group):
         if cmd_name not in COMMANDS:
             return None
         return getattr(importlib.import_module(f"{__name__}.{cmd_name}"), cmd_name)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        listed = {name: click.Command(name, help=text) for name, text in COMMANDS.items()}
+        _Listed(commands=listed).format_commands(ctx, formatter)
 
 
 @click.group(cls=_Commands, invoke_without_command=True)

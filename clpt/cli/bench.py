@@ -33,7 +33,7 @@ HEADINGS = ("figure", "", "unit", "±", "GB/s", "of a copy", "")
 
 @dataclass(frozen=True)
 class Subject:
-    """What is measured: see `clpt.benchmark.measure`."""
+    """Things to measure, and how often: see `clpt.benchmark.measure`."""
 
     scene: str | None
     stages: tuple[str, ...]

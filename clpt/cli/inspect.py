@@ -11,8 +11,9 @@ import click
 import numpy as np
 from rich.table import Table
 
-from .files.film_contents import film_contents, is_film
+from .files.film_contents import film_contents
 from .files.image_contents import ImageContents, Pixel, read_contents
+from .files.targets import is_film
 from .printing.console import output_console, shown
 from .process.extras import extra
 

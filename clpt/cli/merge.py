@@ -6,11 +6,10 @@ from pathlib import Path
 
 import click
 
-from .. import __version__
 from ..errors import SceneError
 from ..render.film import film_file
-from ..render.film.host_picture import HostPicture
 from ..render.film.saved_film import SavedFilm, other_devices
+from ..version import VERSION
 from .files import checkpoints, outputs
 from .files.targets import checked
 from .options.grading import GradingOptions, grading_options, names_option
@@ -52,18 +51,17 @@ def merge(
     total = added(films)
     for change in other_devices(total.sessions, total.sessions[0].device):
         note(f"clpt: warning: the films are of several classes of devices: {change}")
-    made = HostPicture(total, denoise)
     origin = total.origin.scene.values
     stats: dict[str, str | int | float] = {
-        "software": f"clpt {__version__}",
+        "software": f"clpt {VERSION}",
         "integrator": str(origin["integrator.type"]),
         "sampler": str(origin["sampler.type"]),
         "seed": int(origin["seed"] or 0),
-        "spp": float(made.samples_per_pixel().mean(dtype=float)),
+        "spp": float(total.samples_per_pixel().mean(dtype=float)),
         "films": len(films),
         "seconds": round(total.seconds, 3),
     }
-    outputs.write_all(targets, made, stats, how, note)
+    outputs.write_all(targets, total, stats, how, note, denoise)
     note(checkpoints.summary(total))
 
 

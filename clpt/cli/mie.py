@@ -23,7 +23,7 @@ DIGITS = 6  # of the table in a file
 
 @dataclass(frozen=True)
 class Drops:
-    """How large drops are, see `clpt.mie.sizes`, and their share of the volume; radius [um]."""
+    """The sizes of drops, see `clpt.mie.sizes`, and their share of the volume; radius [um]."""
 
     radius: float
     law: str

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import datetime
 import logging
 from abc import abstractmethod
@@ -15,24 +16,24 @@ from numpy.typing import NDArray
 from clpt import device as dev
 from clpt.cluster.cluster_noise import FarmTracer
 from clpt.errors import ClusterError, SceneError
-from clpt.render.film.film_keeping import FilmKeeping
+from clpt.render.contents import Contents
+from clpt.render.film.developed import Developed
+from clpt.render.film.picture_form import PictureForm
 from clpt.render.film.saved_film import (
     Origin,
-    PictureForm,
     SavedFilm,
     Session,
     classes_text,
     other_devices,
 )
-from clpt.render.pictures import Image
+from clpt.render.pictures import DevicePictures
 from clpt.render.renderer import Renderer
 from clpt.render.wavefront.adaptive import Adaptive
 from clpt.render.wavefront.film_state import FilmState, Ranges
 from clpt.render.wavefront.tracer import OnBatch, Selection
-from clpt.render.wavefront.wavefront import Counts
+from clpt.render.wavefront.wavefront import Counts, Wavefront
 from clpt.scene import Scene
 from clpt.scene.fingerprint import Plain
-from clpt.spectral_exr import SpectralImage
 from clpt.version import VERSION
 
 log = logging.getLogger(__name__)
@@ -62,13 +63,14 @@ class FilmSum:
     def taken(self) -> Ranges:
         return () if self.film is None else self.film.taken
 
-    def counts(self, films: int) -> Counts:
-        """The share of one of so many films."""
-        samples, rays, rejected, full = (value // films for value in self.totals.values())
+    @property
+    def counts(self) -> Counts:
+        """What happened; rays of both kinds as one."""
+        samples, rays, rejected, full = self.totals.values()
         return Counts(samples=samples, closest=rays, rejected=rejected, full=full)
 
 
-class ClusterFilm(FilmKeeping):
+class ClusterFilm(DevicePictures):
     """Base of a renderer whose samples come from elsewhere.
 
     device: where pictures are made, and noise is measured; options: of the renderer that does so.
@@ -81,6 +83,7 @@ class ClusterFilm(FilmKeeping):
         first_sample: int,
         options: Mapping[str, Any],
     ):
+        super().__init__()
         self.scene = scene
         self.warnings: list[str] = []
         self._device, self._options = device, options
@@ -92,7 +95,7 @@ class ClusterFilm(FilmKeeping):
         """Note that there is no film."""
         self._sum = self._whole = FilmSum()  # of all films, and of those of whole blocks
         self._held: tuple[FilmSum, Mapping[str, NDArray[Any]]] | None = None
-        self._developed: FilmState | None = None  # that the local renderer has
+        self._shown: FilmState | None = None  # that the local renderer has
         self._tracer: FarmTracer | None = None
         self._noise: Adaptive | None = None  # adds to the local renderer's film
         self._began = datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds")
@@ -115,20 +118,18 @@ class ClusterFilm(FilmKeeping):
         return self._first_sample + sum(end - first for first, end in self._sum.taken)
 
     @property
-    def active(self) -> float:
-        """The share of the pixels that would get more samples; see `Renderer.active`."""
-        return 1.0 if self._noise is None else self._noise.active
-
-    @property
     def first_sample(self) -> int:
         """The number of the first sample."""
         return self._first_sample
 
     @property
-    def counts(self) -> tuple[Counts, ...]:
-        """What has happened for all blocks that were added, of each film; see `Renderer.counts`."""
-        films = 1 if self._sum.film is None else len(self._sum.film.words)
-        return (self._sum.counts(films),) * films
+    def counts(self) -> Counts:
+        """What has happened for all blocks that were added; see `Renderer.counts`."""
+        return self._sum.counts
+
+    @property
+    def _known(self) -> Contents:
+        return Contents(self._sum.taken, self._noise, self._sessions, self._began)
 
     # ---- the film
 
@@ -154,7 +155,7 @@ class ClusterFilm(FilmKeeping):
         if len(taken) > 1:
             message = "samples are missing before the last one; add them first, without noise"
             raise SceneError(message, where="noise")
-        local = self.developed()
+        local = self.shown()
         tracer = FarmTracer(local, self._take_selection)
         begun = local.adaptively(tracer, self.denoise)
         if arrays:
@@ -170,17 +171,30 @@ class ClusterFilm(FilmKeeping):
             self._local = Renderer(self.scene, self._device, **self._options)
         return self._local
 
-    def developed(self) -> Renderer:
-        """Return a renderer on this machine that holds the film so far, for its pictures."""
+    def shown(self) -> Renderer:
+        """Return a renderer on this machine that holds the film so far."""
         local, film = self._here, self._sum.film
-        if self._developed is not film:
+        if self._shown is not film:
             local.reset()
             if film is not None:
                 local.merge(film)
-            self._developed = film
-        for one in local.wavefronts:
-            one.counts = self._sum.counts(len(local.wavefronts))
+            self._shown = film
         return local
+
+    @property
+    def device(self) -> dev.Device:  # type: ignore[override]
+        """The device of this machine where pictures are made for screens, and noise is measured."""
+        return self._here.device
+
+    @property
+    def devices(self) -> tuple[dev.Device, ...]:
+        """That device, once it is in use."""
+        return () if self._local is None else self._local.devices
+
+    @property
+    def wavefront(self) -> Wavefront:
+        """What has the picture so far, for screens."""
+        return self.shown().wavefront
 
     # ---- saved films
 
@@ -206,8 +220,7 @@ class ClusterFilm(FilmKeeping):
         adaptive = {} if self._noise is None or held else self._noise.arrays()
         films, arrays = self._held if held and self._held else (self._sum, adaptive)
         state = self._empty() if films.film is None else films.film
-        number = len(state.words)
-        counts = tuple(dict(vars(films.counts(number))) for _ in range(number))
+        counts = dict(vars(films.counts))
         seconds = [self._seconds_rendered] + [0.0] * len(self._classes)  # each second once
         sessions = [
             Session(self._began, took, VERSION, device)
@@ -231,10 +244,8 @@ class ClusterFilm(FilmKeeping):
         own, film, former = self._empty().arrays, saved.film, (self._sum, self._whole)
         if any(own[name].shape != array.shape for name, array in film.arrays.items()):
             raise SceneError("the film has another form than this scene's")
-        totals = dict.fromkeys(self._sum.totals, 0)
-        for one in (Counts(**counts) for counts in saved.counts):
-            for name in totals:
-                totals[name] += getattr(one, name)
+        counts = Counts(**saved.counts)
+        totals = {name: getattr(counts, name) for name in self._sum.totals}
         self._begin_with(FilmSum(film if film.taken else None, totals))
         if saved.adaptive:
             try:
@@ -260,30 +271,11 @@ class ClusterFilm(FilmKeeping):
     # ---- pictures
 
     @property
-    def form(self) -> PictureForm:
+    def form(self) -> PictureForm:  # type: ignore[override]
         """What makes a picture of the film; see `Renderer.form`."""
-        return self._here.form
+        form = self._here.form
+        return dataclasses.replace(form, adaptive=form.adaptive or self._noise is not None)
 
-    def image(self) -> Image:
-        """The picture so far, see `Renderer.image`; made on this machine."""
-        return self.developed().image()
-
-    def colours(self) -> Image:
-        """The picture so far in three colours, see `Renderer.colours`."""
-        return self.developed().colours()
-
-    def layers(self) -> dict[str, Image]:
-        """The layers by name, see `Renderer.layers`."""
-        return self.developed().layers()
-
-    def halves(self) -> tuple[Image, Image]:
-        """The pictures of the even and of the odd samples, see `Renderer.halves`."""
-        return self.developed().halves()
-
-    def spectral_image(self) -> SpectralImage:
-        """The picture so far of a film with bands, see `Renderer.spectral_image`."""
-        return self.developed().spectral_image()
-
-    def samples_per_pixel(self) -> Image:
-        """How many samples each pixel has, (h, w) float32."""
-        return self.developed().samples_per_pixel()
+    def developed(self, *words: str) -> Developed:
+        """Return the pictures of the film as it is now, which then stay; see `Pictures`."""
+        return Developed(self._sum.film or self._empty(), self.form)

@@ -19,7 +19,7 @@ class FarmTracer(Tracer):
     """
 
     def __init__(self, local: Renderer, take: Take):
-        super().__init__(local.wavefronts[0])
+        super().__init__(local.wavefront)
         self._local, self._take = local, take
         self._added: FilmState | None = None  # since `gather`
 

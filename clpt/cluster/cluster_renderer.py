@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import tempfile
-import threading
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,21 +17,23 @@ from clpt.cluster.cluster_film import ClusterFilm, FilmSum
 from clpt.cluster.farm import Farm, Film
 from clpt.denoise import needs
 from clpt.errors import ClusterError, SceneError
+from clpt.render.contract.features import Features
+from clpt.render.editing.scene_edit import MaterialKey
+from clpt.render.film_renderer import Watch
+from clpt.render.locking import synchronized
 from clpt.render.options import check_options, check_scene
 from clpt.render.progress import Progress
-from clpt.render.renderer import MOST_SAMPLES
-from clpt.render.wavefront import adaptive
+from clpt.render.stats import RenderStats
 from clpt.render.wavefront.film_state import FilmState, Ranges, join_ranges
 from clpt.render.wavefront.tracer import OnBatch, Selection
 from clpt.scene import Scene
+from clpt.scene.cameras import Camera
+from clpt.scene.materials import Material
 
 if TYPE_CHECKING:
     from distributed import Client
 
-TELL_SECONDS = 0.2  # between calls of `progress`
 NO_WORKER_SECONDS = 300.0  # without any worker, until the render ends
-
-OnProgress = Callable[[Progress], bool | None]
 
 
 class ClusterRenderer(ClusterFilm):
@@ -47,8 +47,9 @@ class ClusterRenderer(ClusterFilm):
     options: halves, layout, queued, looped, slots, texture_budget, tree_quality, denoise, as of
     `Renderer`.
 
-    The film is added up here, and is kept whatever happens to the cluster. It may be used by one
-    thread; `cancel` from any. warnings: for people.
+    The film is added up here, and is kept whatever happens to the cluster. At a stop workers send
+    what they have; the next run renders what is missing, but with noise no number is used again. It
+    may be used by one thread; `cancel` from any. warnings: for people.
 
     Raises TypeError for what is no scene or option, SceneError for a scene that cannot be written,
     or has materials that are not clpt's own.
@@ -66,6 +67,7 @@ class ClusterRenderer(ClusterFilm):
         beside: ClusterRenderer | None = None,
         **options: Any,
     ):
+        options = {name: value for name, value in options.items() if value is not None}
         check_scene(scene)
         check_options(scene, options)
         self.denoise = options.pop("denoise", None)
@@ -78,7 +80,6 @@ class ClusterRenderer(ClusterFilm):
         self.farm = Farm(client, mixed=mixed, patience=patience)
         if beside is not None:
             self.farm.known.agreed = beside.farm.known.agreed
-        self._stop = threading.Event()
         self._error: ClusterError | None = None
         self._pack()
 
@@ -102,6 +103,12 @@ class ClusterRenderer(ClusterFilm):
         return dict(self.farm.known.records)
 
     @property
+    def device_text(self) -> str:
+        """The classes of the workers' devices, for people."""
+        kinds = {record.kind for record in self.workers.values()}
+        return "; ".join(sorted(kinds)) or super().device_text
+
+    @property
     def refused(self) -> dict[str, str]:
         """Why workers take no part, by their addresses."""
         return dict(self.farm.known.refused)
@@ -111,46 +118,41 @@ class ClusterRenderer(ClusterFilm):
         """How many workers are gone."""
         return self.farm.known.lost
 
-    def run(
-        self, samples: int, progress: OnProgress | None = None, *, noise: float | None = None
-    ) -> bool:
-        """Add samples to every pixel and wait; returns whether all were added.
+    @property
+    def _features(self) -> Features:
+        return self._here.wavefront.features
 
-        noise: leave pixels as soon as the noise around them is as low; see `Renderer.run`. Noise is
-        measured on this machine; pixels and numbers of samples are those of one `Renderer`, if its
-        device is of the class of the workers'.
-        progress: called several times a second; if it returns False the run stops soon, as after
-        `cancel`: workers send what they have. Samples that are missing then are rendered by the
-        next run, but for runs with noise, which use no number again. What it raises is raised when
-        workers have sent what they have.
+    @property
+    def _pixels(self) -> int:
+        return self._here.wavefront.paths.pixels
+
+    def _add_samples(self, first: int, end: int, noise: float | None, watch: Watch) -> bool:
+        """Add samples to all pixels, or to those with noise; return whether all were added.
+
+        Noise is measured on this machine; pixels and numbers of samples are those of one
+        `Renderer`, if its device is of the class of the workers'. At a stop workers send what they
+        have. Samples that are missing then are rendered by the next run, but for runs with noise,
+        which use no number again.
 
         Raises ClusterError when the scheduler is gone, no worker is left or fit, or a block fails
-        again and again; the film keeps what was done. Raises SceneError for noise that makes no
-        sense with the scene, and for too many samples.
+        again and again; the film keeps what was done.
         """
-        taken = self._sum.taken
-        first = taken[-1][1] if taken else self._first_sample
-        if samples < 1 or self.samples + samples > MOST_SAMPLES:
-            raise SceneError(f"cannot add {samples} samples", where="samples")
-        if noise is not None:
-            noise = adaptive.checked(noise, self._here.wavefronts[0].features)
-        if self._stop.is_set():
-            self._stop.clear()
-            return False
-        ticker = _Ticker(self, progress, self.samples + samples, self._seconds_rendered)
-        self._error = None
-        try:
-            if noise is None and self._noise is None:
-                finished = self._run_all(samples, ticker)
-            else:
-                finished = self._run_adaptively(first, first + samples, noise, ticker)
-            ticker(at_once=True)
-        finally:
-            self._stop.clear()
-        if ticker.raised is not None:
-            raise ticker.raised
-        if self._error is not None:
-            raise self._error
+
+        def tick() -> bool:
+            self._note_classes(self.farm.known.classes)
+            return watch()
+
+        samples = end - first
+        if noise is None and self._noise is None:
+            finished = self._run_all(samples, tick)
+        else:
+            taken = self._sum.taken
+            first = taken[-1][1] if taken else self._first_sample
+            finished = self._run_adaptively(first, first + samples, noise, tick)
+        tick()
+        error, self._error = self._error, None
+        if error is not None and watch.raised is None:
+            raise error
         return finished
 
     def _run_all(self, samples: int, tick: Callable[[], bool]) -> bool:
@@ -162,7 +164,7 @@ class ClusterRenderer(ClusterFilm):
             if gap >= left:
                 break
             end, left = max(after, end), left - gap
-        return self._take(Selection("all", 1), 1, (start, end + left), taken, self._add, tick)
+        return self._ask(Selection("all", 1), 1, (start, end + left), taken, self._add, tick)
 
     def _add(self, film: Film) -> None:
         nothing_cut = self._whole is self._sum
@@ -180,7 +182,7 @@ class ClusterRenderer(ClusterFilm):
         try:
             if noise is not None:
                 return self._noise.run(end, noise, lambda _: tick())
-            every = Selection("all", self._here.wavefronts[0].paths.pixels)
+            every = Selection("all", self._here.wavefront.paths.pixels)
             finished = self._tracer.add(every, first, end, lambda _: tick())
             if finished:
                 self._noise.skip(end)
@@ -190,7 +192,7 @@ class ClusterRenderer(ClusterFilm):
             taken = join_ranges(self._sum.taken, ((first, end),))
             film = dataclasses.replace(self._here.film_state(), taken=taken)
             self._sum = self._whole = FilmSum(film, self._sum.totals)
-            self._developed = film
+            self._shown = film
 
     def _take_selection(
         self, selection: Selection, first: int, end: int, add: Callable[[FilmState], None],
@@ -200,10 +202,10 @@ class ClusterRenderer(ClusterFilm):
             self._sum = self._sum.counting(film.counts)
             add(film.state)
 
-        pixels = self._here.wavefronts[0].paths.pixels
-        return self._take(selection, pixels, (first, end), (), note, lambda: on_batch(None))
+        pixels = self._here.wavefront.paths.pixels
+        return self._ask(selection, pixels, (first, end), (), note, lambda: on_batch(None))
 
-    def _take(
+    def _ask(
         self, selection: Selection, pixels: int, samples: tuple[int, int], taken: Ranges,
         add: Callable[[Film], None], tick: Callable[[], bool],
     ) -> bool:  # fmt: skip
@@ -214,29 +216,32 @@ class ClusterRenderer(ClusterFilm):
             self._error = error
             return False
 
-    def _note(self, seconds: float) -> None:
-        """Note how long the film has been rendered, and by which classes of devices."""
-        self._seconds_rendered = seconds
-        self._note_classes(self.farm.known.classes)
-
-    def _so_far(self, total: int, seconds: float) -> Progress:
-        totals, samples = self._sum.totals, float(self.samples - self._first_sample)
+    def _so_far(self, end: int, seconds: float) -> Progress:
         if self._noise is not None:
-            samples = totals["samples"] / (self.scene.film.width * self.scene.film.height)
-        return Progress(samples, total, totals["samples"], totals["rays"], seconds, self.active)
+            return super()._so_far(end, seconds)
+        samples, counts = float(self.samples - self._first_sample), self.counts
+        return Progress(samples, end, counts.samples, counts.rays, seconds)
 
-    def cancel(self) -> None:
-        """Let the run, or else the next one, stop soon and return False."""
-        self._stop.set()
-
-    def update(self, *, scene: Scene) -> None:
-        """Render another scene from now on, and begin at the first sample again.
+    @synchronized
+    def update(
+        self,
+        *,
+        camera: Camera | None = None,
+        materials: Mapping[MaterialKey, Material] | None = None,
+        scene: Scene | None = None,
+    ) -> None:
+        """Render another scene from now on, or another camera; begin at the first sample again.
 
         What is known of the workers stays; they open the scene at the next run. Raises as
-        `ClusterRenderer` does.
+        `ClusterRenderer` does, and SceneError for materials alone.
         """
-        check_scene(scene)
-        scene = needs.prepared(scene, self.denoise)
+        if materials is not None:
+            raise SceneError("give the whole scene", where="materials")
+        if scene is not None:
+            check_scene(scene)
+        scene = needs.prepared(self.scene if scene is None else scene, self.denoise)
+        if camera is not None:
+            scene = dataclasses.replace(scene, camera=camera)
         former, self.scene = self._folder, scene
         self._pack()
         former.cleanup()
@@ -245,8 +250,13 @@ class ClusterRenderer(ClusterFilm):
                 self._local.update(scene=scene)
             except SceneError:  # a film of another form
                 self._local.close()
-                self._local = None
+                self._local = self._resolve = None
         self._begin_anew()
+
+    @property
+    def stats(self) -> RenderStats:
+        """Figures of this machine's part; see `Renderer.stats`."""
+        return self._here.stats
 
     def close(self) -> None:
         """Give back what this machine holds; workers keep the scene until another needs room."""
@@ -254,40 +264,3 @@ class ClusterRenderer(ClusterFilm):
         if self._local is not None:
             self._local.close()
             self._local = None
-
-    def __enter__(self) -> ClusterRenderer:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
-
-
-class _Ticker:
-    """Called while workers render: returns whether they go on.
-
-    total: samples at the end; before: seconds rendered till now. raised: what `progress` raised.
-    """
-
-    def __init__(
-        self, renderer: ClusterRenderer, progress: OnProgress | None, total: int, before: float
-    ):
-        self._renderer, self._progress, self._total = renderer, progress, total
-        self._before, self._began = before, time.perf_counter()
-        self._shown = 0.0
-        self.raised: BaseException | None = None
-
-    def __call__(self, *, at_once: bool = False) -> bool:
-        """Tell of the progress if that is due, or at once."""
-        renderer, seconds = self._renderer, time.perf_counter() - self._began
-        renderer._note(self._before + seconds)
-        goes_on = self.raised is None and not renderer._stop.is_set()
-        if not goes_on or self._progress is None:
-            return goes_on
-        if not at_once and seconds - self._shown < TELL_SECONDS:
-            return True
-        self._shown = seconds
-        try:
-            return self._progress(renderer._so_far(self._total, seconds)) is not False
-        except BaseException as error:
-            self.raised = error
-            return False

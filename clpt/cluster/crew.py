@@ -53,7 +53,7 @@ class Crew:
         self._lock = threading.RLock()
         self._changed = threading.Condition(self._lock)  # only threads of devices wait for it
         self._threads = Threads()
-        self._past = [Counts() for _ in self.workers[0].past]  # of devices that failed
+        self._past = Counts()  # of devices that failed
 
     @property
     def first(self) -> DeviceWorker:
@@ -68,12 +68,12 @@ class Crew:
         return bool(self.lost) or not (self.keeper is None or self.keeper in self.workers)
 
     @property
-    def counts(self) -> tuple[Counts, ...]:
-        """What all devices together have done so far, of each film."""
+    def counts(self) -> Counts:
+        """What all devices together have done so far."""
         total = self._past
         for worker in self.workers:
-            total = [added(*pair) for pair in zip(total, worker.counts, strict=True)]
-        return tuple(total)
+            total = added(total, worker.counts)
+        return total
 
     @property
     def ranges(self) -> Ranges:
@@ -86,7 +86,7 @@ class Crew:
     @property
     def whole(self) -> Selection:
         """Samples of all pixels."""
-        return Selection("all", self.first.renderer.wavefronts[0].paths.pixels)
+        return Selection("all", self.first.renderer.wavefront.paths.pixels)
 
     def run(self, selection: Selection, ranges: Ranges, tick: Callable[[], bool]) -> bool:
         """Add ranges of a selection's samples; return whether it was not stopped.
@@ -135,15 +135,15 @@ class Crew:
         """Let later renders sample every pixel, after selections of some."""
         for worker in list(self.workers):
             try:
-                use_all_pixels(worker.renderer.wavefronts[0])
+                use_all_pixels(worker.renderer.wavefront)
             except Exception as error:
                 self.drop(worker, error)
 
     def clear_counts(self) -> None:
         """Count from zero, but for what films on devices have."""
-        self._past = [Counts() for _ in self._past]
+        self._past = Counts()
         for worker in self.workers:
-            worker.past = [Counts() for _ in worker.past]
+            worker.past = Counts()
 
     def drop(self, worker: DeviceWorker, error: BaseException) -> None:
         """Leave a device out from now on."""
@@ -156,7 +156,7 @@ class Crew:
                 self._threads.over = True
             else:
                 self.lost += worker.unsaved
-            self._past = [added(*pair) for pair in zip(self._past, worker.past, strict=True)]
+            self._past = added(self._past, worker.past)
             self._tell()
         others = "others do its part" if self.workers else "no other is left"
         log.warning("%s failed and is left out, %s: %s", worker.name, others, error)

@@ -89,13 +89,13 @@ class DeviceWorker:
         self.unsaved_seconds = 0.0
         self.shows = False
         self.paths, self.rate = 0, 0.0
-        self.past = [Counts() for _ in renderer.wavefronts]  # before the film was emptied
+        self.past = Counts()  # before the film was emptied
         self._selection: Selection | None = None
 
     @property
-    def counts(self) -> list[Counts]:
-        """What has happened so far, of each film."""
-        return [added(*pair) for pair in zip(self.past, self.renderer.counts, strict=True)]
+    def counts(self) -> Counts:
+        """What has happened so far."""
+        return added(self.past, self.renderer.counts)
 
     @property
     def ranges(self) -> Ranges:
@@ -107,12 +107,11 @@ class DeviceWorker:
 
     def do(self, selection: Selection, first: int, end: int, on_batch: OnBatch) -> bool:
         """Add samples first to end - 1 to the film; return whether it was not stopped."""
-        wavefronts = self.renderer.wavefronts
+        wavefront = self.renderer.wavefront
         if selection is not self._selection:
-            for wavefront in wavefronts:
-                selection.prepare(wavefront)
+            selection.prepare(wavefront)
         self._selection = selection
-        return all(selection.add(wavefront, first, end, on_batch) for wavefront in wavefronts)
+        return selection.add(wavefront, first, end, on_batch)
 
     def take(self) -> FilmState:
         """Return the film, and empty it."""
@@ -122,8 +121,7 @@ class DeviceWorker:
 
     def hold(self) -> None:
         """Keep a copy of the film on the device, for `held`. Raises MemoryBudgetError."""
-        for wavefront in self.renderer.wavefronts:
-            wavefront.film.hold()
+        self.renderer.wavefront.film.hold()
 
     def held(self) -> FilmState:
         """Return what the film was at the last `hold`."""
@@ -132,8 +130,7 @@ class DeviceWorker:
     def clear(self) -> None:
         """Empty the film."""
         self.past = self.counts
-        for wavefront in self.renderer.wavefronts:
-            wavefront.clear()
+        self.renderer.wavefront.clear()
         self.unsaved, self.unsaved_seconds, self.shows = [], 0.0, False
 
     def show(self, state: FilmState) -> None:

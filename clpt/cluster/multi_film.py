@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import logging
-from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -16,13 +15,13 @@ from clpt.cluster.device_worker import DeviceWorker
 from clpt.cluster.multi_noise import AdaptiveCrew
 from clpt.errors import ClusterError, DeviceError, MemoryBudgetError, SceneError
 from clpt.render.contents import Change, Contents
-from clpt.render.film.film_keeping import FilmKeeping
-from clpt.render.film.saved_film import Origin, PictureForm, SavedFilm, Session
+from clpt.render.film.picture_form import PictureForm
+from clpt.render.film.saved_film import Origin, SavedFilm
 from clpt.render.locking import synchronized
-from clpt.render.pictures import Image, Pictures
+from clpt.render.pictures import DevicePictures
 from clpt.render.wavefront.adaptive import Adaptive
 from clpt.render.wavefront.film_state import FilmState
-from clpt.render.wavefront.wavefront import Counts, Wavefront
+from clpt.render.wavefront.wavefront import Wavefront
 
 log = logging.getLogger(__name__)
 
@@ -34,7 +33,7 @@ class _Held:
     """A film that is held where it is: copies on devices, and what is on the host.
 
     workers: that have a copy of what only they have; saved: the rest, None without; so_far: of the
-    film, see `Renderer.progress_so_far`.
+    film, see `FilmRenderer._progress_so_far`.
     """
 
     workers: list[DeviceWorker]
@@ -51,31 +50,19 @@ class _Held:
         return dataclasses.replace(total, taken=self.so_far["taken"])
 
 
-class MultiFilm(FilmKeeping, Pictures):
+class MultiFilm(DevicePictures):
     """Base of renderers on several devices.
 
     The first device stands for all: its film then holds the whole picture, and its renderer knows
     what was taken.
     """
 
-    _first_sample: int
     _crew: Crew
 
     def __init__(self) -> None:
         super().__init__()
         self._noise: AdaptiveCrew | None = None
-        self._telling = False  # whether devices are at work
         self._held: SavedFilm | _Held | None = None
-        self._seconds_rendered = 0.0  # since the film was empty, or gone on with
-
-    @property
-    def _sessions(self) -> tuple[Session, ...]:  # type: ignore[override]
-        return self._known.sessions
-
-    @property
-    @abstractmethod
-    def counts(self) -> tuple[Counts, ...]:
-        """What has happened so far, of each film."""
 
     @synchronized
     def film_state(self) -> FilmState:
@@ -110,38 +97,17 @@ class MultiFilm(FilmKeeping, Pictures):
 
     @property
     @synchronized
-    def wavefronts(self) -> list[Wavefront]:  # type: ignore[override]
-        """Those of the first device, whose films then hold the picture of all."""
-        return self._on_first(lambda first: first.renderer.wavefronts)
-
-    def image(self) -> Image:
-        """The picture so far of all devices; see `Renderer.image`."""
-        return self._on_first(lambda first: first.renderer.image())
-
-    def colours(self) -> Image:
-        """The picture so far in three colours, (h, w, 3) float32, also of a film with bands."""
-        return self._on_first(lambda first: first.renderer.colours())
-
-    def layers(self) -> dict[str, Image]:
-        """The layers by name; see `Renderer.layers`."""
-        return self._on_first(lambda first: first.renderer.layers())
-
-    def halves(self) -> tuple[Image, Image]:
-        """Return the pictures of the even and of the odd samples; see `Renderer.halves`."""
-        return self._on_first(lambda first: first.renderer.halves())
+    def wavefront(self) -> Wavefront:
+        """That of the first device, whose film then holds the picture of all."""
+        return self._on_first(lambda first: first.renderer.wavefront)
 
     # ---- saved films
 
     @property
-    def form(self) -> PictureForm:
+    def form(self) -> PictureForm:  # type: ignore[override]
         """What makes a picture of the film; see `Renderer.form`."""
-        return self._crew.first.renderer.form
-
-    @property
-    def first_sample(self) -> int:
-        """The number of the first sample of the film, or of the first one to come."""
-        taken = self._known.taken
-        return taken[0][0] if taken else self._first_sample
+        form = self._crew.first.renderer.form
+        return dataclasses.replace(form, adaptive=form.adaptive or self._noise is not None)
 
     def origin(self) -> Origin:
         """Return what the samples are of. Raises SceneError for a scene that cannot be read."""
@@ -163,7 +129,7 @@ class MultiFilm(FilmKeeping, Pictures):
                 raise ClusterError("a device has failed: others do its part first")
             for worker in workers:
                 worker.hold()
-            self._held = _Held(workers, saved, self._so_far(crew.first))
+            self._held = _Held(workers, saved, self._so_far_on(crew.first))
         except MemoryBudgetError:
             raise
         except Exception as error:
@@ -183,19 +149,13 @@ class MultiFilm(FilmKeeping, Pictures):
                 self._held = self._read(self._held)
             return self._held
         state, so_far = self._on_first(
-            lambda first: (first.renderer.film_state(), self._so_far(first))
+            lambda first: (first.renderer.film_state(), self._so_far_on(first))
         )
         return self._film_with(dataclasses.replace(state, taken=self.contents.taken), so_far)
 
-    def _so_far(self, first: DeviceWorker) -> dict[str, Any]:
-        """What changes while samples are taken, but for the film's words."""
-        renderer, now = first.renderer, self.contents
-        renderer._contents = dataclasses.replace(
-            renderer.contents, taken=now.taken, adaptive=self._adaptive, sessions=now.sessions
-        )
-        renderer._seconds_rendered = self._seconds_rendered
-        counts = tuple(dict(vars(one)) for one in self.counts)
-        return {**renderer.progress_so_far(), "counts": counts}
+    def _so_far_on(self, first: DeviceWorker) -> dict[str, Any]:
+        """What a saved film has beside its words and origin; first: the device that it is of."""
+        return self._progress_so_far(first.renderer.device_class())
 
     def _film_with(self, state: FilmState, so_far: Mapping[str, Any]) -> SavedFilm:
         others = {name: value for name, value in so_far.items() if name != "taken"}

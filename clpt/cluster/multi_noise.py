@@ -88,7 +88,7 @@ class AdaptiveCrew:
             try:
                 first.show(self.base)
                 renderer = first.renderer
-                tracer = _AdaptiveTracer(renderer.wavefronts[0], self)
+                tracer = _AdaptiveTracer(renderer.wavefront, self)
                 begun = renderer.adaptively(tracer, renderer.denoise)
                 if self._arrays:
                     begun.restore(self._arrays)

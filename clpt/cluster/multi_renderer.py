@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -21,13 +20,13 @@ from clpt.cluster.multi_film import MultiFilm
 from clpt.cluster.multi_noise import CrewTracer
 from clpt.errors import DeviceError
 from clpt.render.contents import Contents
+from clpt.render.contract.features import Features
 from clpt.render.editing.scene_edit import MaterialKey, ShapeKey
-from clpt.render.locking import Stop, healing, synchronized
+from clpt.render.film_renderer import Watch
+from clpt.render.locking import healing, synchronized
 from clpt.render.options import RenderOptions, check_options, check_scene
-from clpt.render.progress import Progress
-from clpt.render.renderer import next_range, texture_budget_of
+from clpt.render.renderer import texture_budget_of
 from clpt.render.stats import RenderStats
-from clpt.render.wavefront import adaptive
 from clpt.render.wavefront.film_state import FilmState, join_ranges
 from clpt.render.wavefront.tracer import Tracer
 from clpt.render.wavefront.wavefront import Counts
@@ -78,7 +77,6 @@ class MultiRenderer(MultiFilm):
         **options: Unpack[RenderOptions],
     ):
         super().__init__()
-        self._start = time.perf_counter()
         check_scene(scene)
         check_options(scene, options)
         if options.pop("queue", None) is not None:
@@ -88,7 +86,6 @@ class MultiRenderer(MultiFilm):
         self._first_sample = options.pop("first_sample", 0) or 0
         if options.get("texture_budget") is None:
             options["texture_budget"] = min(texture_budget_of(device) for device in chosen)
-        self._stop = Stop()
         shared, warnings = Once(), list[str]()
 
         def make(device: dev.Device) -> SharingRenderer:
@@ -105,7 +102,6 @@ class MultiRenderer(MultiFilm):
         self._crew = Crew(workers, self._stop)
         self._lost_at_first = warnings
         self.denoise = options.get("denoise")
-        self._seconds: dict[str, float] = {}
 
     # ---- what stands for all devices
 
@@ -146,7 +142,7 @@ class MultiRenderer(MultiFilm):
         )
 
     @property
-    def warnings(self) -> list[str]:
+    def warnings(self) -> list[str]:  # type: ignore[override]
         """Of the scene, and of devices that failed."""
         crew = self._crew
         failed = [f"{worker.name} failed and is left out: {error}" for worker, error in crew.failed]
@@ -154,8 +150,8 @@ class MultiRenderer(MultiFilm):
         return [*of_scene, *self._lost_at_first, *failed]
 
     @property
-    def counts(self) -> tuple[Counts, ...]:
-        """What has happened so far, of each film; see `Renderer.counts`."""
+    def counts(self) -> Counts:
+        """What has happened so far; see `Renderer.counts`."""
         return self._crew.counts
 
     @property
@@ -164,17 +160,6 @@ class MultiRenderer(MultiFilm):
         stats = self._crew.first.renderer.stats
         return dataclasses.replace(stats, seconds={**stats.seconds, **self._seconds})
 
-    @property
-    def samples(self) -> int:
-        """The number of the next sample; see `Renderer.samples`."""
-        taken = self._known.taken
-        return taken[-1][1] if taken else self._first_sample
-
-    @property
-    def active(self) -> float:
-        """The share of the pixels that would get more samples; see `Renderer.active`."""
-        return 1.0 if self._noise is None else self._noise.adaptive.active
-
     # ---- rendering
 
     @synchronized
@@ -182,31 +167,24 @@ class MultiRenderer(MultiFilm):
         """Run every kernel of `run` once on each device; see `Renderer.prepare`."""
         self._on_each(lambda renderer: renderer.prepare())
 
-    @synchronized
-    def run(
-        self,
-        samples: int,
-        progress: Callable[[Progress], bool | None] | None = None,
-        *,
-        noise: float | None = None,
-    ) -> bool:
-        """Add samples to every pixel and wait; see `Renderer.run`.
+    @property
+    def _features(self) -> Features:
+        return self._crew.first.renderer.wavefront.features
 
-        progress is called in this thread; it cannot ask for the picture. Raises ClusterError too,
-        when the last device has failed: `film_state` then has the samples that were saved.
+    @property
+    def _pixels(self) -> int:
+        return self._crew.whole.pixels
+
+    def _add_samples(self, first: int, end: int, noise: float | None, watch: Watch) -> bool:
+        """Add samples to all pixels, or to those with noise; return whether all were added.
+
+        Raises ClusterError too, when the last device has failed: `film_state` then has the samples
+        that were saved.
         """
-        first, end = next_range(self.samples, samples)
-        if self._stop.is_set():  # before it began: nothing is taken
-            self._stop.clear()
-            return False
         base: FilmState | None = None  # that adaptive sampling begins over
-        if noise is not None:
-            noise = adaptive.checked(noise, self._crew.first.renderer.wavefronts[0].features)
-            if self._noise is None:
-                base = self.film_state()
-        raised: list[BaseException] = []
-        tick = self._ticker(end, progress, raised)
-        now, began = self.contents, time.perf_counter()
+        if noise is not None and self._noise is None:
+            base = self.film_state()
+        now = self.contents
         plain = noise is None and self._noise is None
         more = dataclasses.replace(now, taken=join_ranges(now.taken, ((first, end),)))
 
@@ -218,32 +196,21 @@ class MultiRenderer(MultiFilm):
                 return now if self._noise is None else more
             raise error  # cells of some devices may be in no film
 
-        try:
-            with self.change("run", finish):
-                if plain:
-                    finished = self._crew.run(self._crew.whole, ((first, end),), tick)
-                    self._contents = dataclasses.replace(now, taken=self._crew.ranges)
-                else:
-                    if self._noise is None:
-                        assert base is not None, "it begins with this run"
-                        self._noise = self._adaptively(base, {})
-                    finished = self._noise.run((first, end, noise), tick)
-                    self._contents = more
-        finally:
-            self._telling = False
-            self._stop.clear()
-            self._seconds_rendered += time.perf_counter() - began
-        if raised:
-            raise raised.pop()
+        with self.change("run", finish):
+            if plain:
+                finished = self._crew.run(self._crew.whole, ((first, end),), watch)
+                self._contents = dataclasses.replace(now, taken=self._crew.ranges)
+            else:
+                if self._noise is None:
+                    assert base is not None, "it begins with this run"
+                    self._noise = self._adaptively(base, {})
+                finished = self._noise.run((first, end, noise), watch)
+                self._contents = more
         return finished
 
     def tracer(self) -> Tracer:
         """Return what adds selections of samples to the films of all devices."""
-        return CrewTracer(self._crew.first.renderer.wavefronts[0], self._crew)
-
-    def cancel(self) -> None:
-        """Let the `run` of another thread, or else the next one, stop soon and return False."""
-        self._stop.set()
+        return CrewTracer(self._crew.first.renderer.wavefront, self._crew)
 
     @healing
     def reset(self, *, seed: int | None = None, first_sample: int | None = None) -> None:
@@ -301,43 +268,7 @@ class MultiRenderer(MultiFilm):
                 worker.renderer.close()
             self._crew.workers, self._noise = [], None
 
-    def __enter__(self) -> MultiRenderer:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
-
     # ---- inside
-
-    def _ticker(
-        self,
-        end: int,
-        progress: Callable[[Progress], bool | None] | None,
-        raised: list[BaseException],
-    ) -> Callable[[], bool]:
-        """Return what is called while devices work: it returns whether they go on."""
-        began = time.perf_counter()
-        pixels = self._crew.whole.pixels
-
-        def tick() -> bool:
-            counts = self._crew.counts
-            paths, rays = sum(c.samples for c in counts), sum(c.rays for c in counts)
-            now = time.perf_counter()
-            if paths:
-                self._seconds.setdefault("first_sample", now - self._start)
-            if raised or self._stop.is_set() or progress is None:
-                return not raised and not self._stop.is_set()
-            self._telling = True
-            try:
-                so_far = Progress(paths / pixels, end, paths, rays, now - began, self.active)
-                return progress(so_far) is not False
-            except BaseException as error:
-                raised.append(error)
-                return False
-            finally:
-                self._telling = False
-
-        return tick
 
     def _on_each(self, action: Callable[[SharingRenderer], Any]) -> None:
         """Do something on every device at once; drop those that fail, unless all do.

@@ -31,7 +31,7 @@ from clpt.version import VERSION as VERSION_OF_CLPT
 
 log = logging.getLogger(__name__)
 
-VERSION = 2  # of what client and worker say to each other
+VERSION = 3  # of what client and worker say to each other
 OPTIONS = ("halves", "layout", "queued", "looped", "slots", "texture_budget", "tree_quality")
 MOST_OPEN = 2  # jobs of a worker, each with its memory on the device
 ENDS = np.dtype("<u4")  # of cells, where they travel
@@ -77,7 +77,7 @@ class _Job:
         """
         began, renderer = time.perf_counter(), self.renderer
         renderer.reset(first_sample=0 if packed else first)
-        before = [replace(counts) for counts in renderer.counts]
+        before = renderer.counts
         if packed != self._packed:
             self._selection = None if packed is None else unpack_selection(packed)
             self._packed = packed
@@ -88,13 +88,13 @@ class _Job:
         else:
             whole = self._tracer.add(self._selection, first, end, lambda _: wanted())
         state = replace(renderer.film_state(), taken=((first, end),))
-        pairs = list(zip(before, renderer.counts, strict=True))
+        after = renderer.counts
         return {
             **state_to_arrays(state),
             "whole": whole,
             "seconds": time.perf_counter() - began,
             **{
-                name: sum(getattr(b, name) - getattr(a, name) for a, b in pairs)
+                name: getattr(after, name) - getattr(before, name)
                 for name in ("samples", "rays", "rejected", "full")
             },
         }

@@ -8,11 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from clpt.arrays import Floats32
 from clpt.errors import UnknownKindError
-
-Colours = NDArray[np.float32]
 
 LARGEST = np.float32(1e18)  # its square is finite
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # of Rec. 709
@@ -31,22 +29,22 @@ AGX_GAMMA = 2.2
 NEUTRAL_F90, NEUTRAL_START, NEUTRAL_DESATURATION = 0.04, 0.8 - 0.04, 0.15
 
 
-def none(c: Colours) -> Colours:
+def none(c: Floats32) -> Floats32:
     """The light as it is."""
     return c
 
 
-def reinhard(c: Colours) -> Colours:
+def reinhard(c: Floats32) -> Floats32:
     """Reinhard et al. 2002, "Photographic Tone Reproduction", eq. 3, of the luminance."""
     return c / (1 + c @ LUMINANCE)[..., None]
 
 
-def aces(c: Colours) -> Colours:
+def aces(c: Floats32) -> Floats32:
     """The rational fit to the curve of ACES by Narkowicz 2015."""
     return np.clip(c * (2.51 * c + 0.03) / (c * (2.43 * c + 0.59) + 0.14), 0, 1)
 
 
-def agx(c: Colours) -> Colours:
+def agx(c: Floats32) -> Floats32:
     """AgX (Sobotka 2022) with its first, base look; saturated light turns white as film does."""
     low, high = AGX_STOPS
     inset = AGX_KEPT * c + (c @ AGX_WEIGHTS)[..., None]
@@ -71,7 +69,7 @@ def agx_scales() -> tuple[float, float]:
     return below, above
 
 
-def neutral(c: Colours) -> Colours:
+def neutral(c: Floats32) -> Floats32:
     """Khronos PBR Neutral (2024): base colours under white light are shown as they are."""
     least = c.min(axis=-1, keepdims=True)
     f90 = NEUTRAL_F90
@@ -84,7 +82,7 @@ def neutral(c: Colours) -> Colours:
     return np.where(peak < NEUTRAL_START, c, pressed + (new - pressed) * white)
 
 
-TONES: dict[str, Callable[[Colours], Colours]] = {
+TONES: dict[str, Callable[[Floats32], Floats32]] = {
     "none": none, "reinhard": reinhard, "aces": aces, "agx": agx, "neutral": neutral,
 }  # fmt: skip
 
@@ -95,7 +93,7 @@ def check_tone(tone: str) -> None:
         raise UnknownKindError("tone curve", tone, TONES)
 
 
-def apply(colours: Colours, tone: str) -> Colours:
+def apply(colours: Floats32, tone: str) -> Floats32:
     """Return colours (..., 3) float32 of linear Rec. 709 under a curve, linear, white is 1.
 
     Without a curve they stay as they are; else what is negative or no number is black. Raises

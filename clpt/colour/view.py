@@ -10,11 +10,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from clpt.arrays import Floats32
 from clpt.errors import SceneError, UnknownKindError
-
-Array = NDArray[np.float32]
 
 DEFAULT_CONFIG = "ocio://default"  # the config for computer graphics that comes with OpenColorIO
 REC709 = "Linear Rec.709 (sRGB)"  # of OpenColorIO's own config
@@ -32,7 +30,7 @@ class Table:
     the ends of an axis, NEAR, and 0.
     """
 
-    values: Array
+    values: Floats32
     bounds: tuple[float, float, float, float]
 
 
@@ -76,7 +74,7 @@ class View:
         look = "" if self.look is None else f", look={self.look!r}"
         return f"View({self.name!r}, display={self.display!r}{look}, config={self.config!r})"
 
-    def codes(self, colours: Array) -> Array:
+    def codes(self, colours: Floats32) -> Floats32:
         """Return the codes (..., 3) float32 that a display gets for linear Rec. 709 (..., 3).
 
         What is no number is black. 0 and 1 are the least and the largest code.
@@ -84,7 +82,7 @@ class View:
         known = np.nan_to_num(colours, nan=0.0, posinf=HIGHEST, neginf=0.0)
         return np.clip(self._unclipped(known.astype(np.float32)), 0.0, 1.0)
 
-    def _unclipped(self, colours: Array) -> Array:
+    def _unclipped(self, colours: Floats32) -> Floats32:
         codes = colours.copy()
         for processor in self._processors:
             processor.applyRGB(codes.reshape(-1))

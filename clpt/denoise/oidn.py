@@ -6,11 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from clpt.arrays import Image
 from clpt.errors import DeviceError, SceneError
-
-Image = NDArray[np.float32]
 
 GREY = 0.18  # what the mean of logarithms of luminance becomes, as Open Image Denoise has it
 DARKEST = 1e-8  # that counts in this mean

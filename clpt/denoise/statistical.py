@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import device
-
-Image = NDArray[np.float32]
+from clpt.arrays import Image
 
 # What was tried is in bench/NOTES.md.
 SCALE = 0.2  # of the mean light, from which statistics are those of logarithms

@@ -206,7 +206,7 @@ def _tokens(text: str) -> Tokens | None:
 
 @lru_cache(maxsize=4096)
 def _value(tokens: Tokens) -> Known:
-    """What an expression of numbers and open names comes to; None too if it is none."""
+    """Return the value of an expression of numbers and open names; None if it is open or faulty."""
     try:
         reader = _Expression(tokens)
         found = reader.choice()

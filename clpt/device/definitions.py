@@ -42,7 +42,7 @@ class Definition:
 
     @cached_property
     def words(self) -> frozenset[str]:
-        """What the rows name."""
+        """All names in the rows."""
         return frozenset(_WORD.findall("\n".join([row.code for row in self.rows])))
 
     @cached_property
@@ -122,7 +122,7 @@ def _definition(rows: Sequence[Row], at: int) -> tuple[Definition, int]:
     if first.directive in OPENING:
         return _open_conditional(rows, at)
     if first.directive:
-        names = frozenset()
+        names: frozenset[str] = frozenset()
         if first.directive in ("define", "undef"):
             names = frozenset(_WORD.findall(first.argument)[:1])
         return Definition((first,), names), at + 1

@@ -18,6 +18,8 @@ _ADVICE = {
         "the device was reset or removed: open it again in a new process; if that fails too, the "
         "system's log may tell why",
     ),
+    -9999: "a kernel read or wrote beyond its buffers, as NVIDIA's driver says by this number: a "
+    "fault of clpt or of the compiler, which to report; go on in a new process",
     _code.EXEC_STATUS_ERROR_FOR_EVENTS_IN_WAIT_LIST: "a command or an event that it waits for "
     "failed before it: look at that one",
 }  # fmt: skip

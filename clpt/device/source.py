@@ -46,8 +46,9 @@ class Source:
         """
         file, line = None, None
         for text in self.text.splitlines()[: row - 1]:
-            if told := _LINE.match(text):
-                file, line = told[2].removeprefix("kernels/") if told[2] else file, int(told[1])
+            if directive := _LINE.match(text):
+                file = directive[2].removeprefix("kernels/") if directive[2] else file
+                line = int(directive[1])
             elif line is not None:
                 line += 1
         return file, line
@@ -104,7 +105,7 @@ def assemble(
     *,
     library: bool = False,
 ) -> Source:
-    """Return the text of `root` with its includes, each file once, and what it needs alone.
+    """Return the text of `root` with its includes in place, each file once, and nothing unused.
 
     root: a path under the kernels folder ("stage/shade.cl") or the name of a virtual file.
     virtual: name -> generated text, a Part, or the names of files that stand for it, includable by
@@ -116,8 +117,8 @@ def assemble(
 
     What an `#if` leaves out is not in the text, nor is the `#if`, but for those that ask for what
     compilers define (`conditions.OUTSIDE`). Functions, types, constants and macros that nothing in
-    the text names are left out too, unless it is a library or they are of a Part. So programs that
-    differ by nothing else are built once.
+    the text names are left out too, unless it is a library, or they are of a Part that pastes names
+    together. So programs that differ by nothing else are built once.
 
     A `#line` before every part, and where rows are left out of a file, lets a compiler name our
     file and line; generated files are numbered as they stand in the text. Includes are resolved
@@ -142,7 +143,7 @@ def _text(folder: Path, name: str) -> str:
 
 
 class _BadRow(Exception):
-    """What is wrong with a row of a file, and its number."""
+    """A fault in a row of a file, with the row's number."""
 
     def __init__(self, line: int, message: str):
         super().__init__(message)
@@ -151,7 +152,7 @@ class _BadRow(Exception):
 
 @dataclass
 class _Piece:
-    """What a file has up to an include or its end: directives, and groups of other rows."""
+    """A part of a file, up to an include or its end: directives, and groups of other rows."""
 
     rows: list[Row | list[Row]]
     include: Row | None = None
@@ -165,9 +166,11 @@ def _pieces(text: str, first: int) -> tuple[_Piece, ...]:
     for row in rows_of(text, first):
         rows = found[-1].rows
         if not row.directive:
-            if not (rows and isinstance(rows[-1], list)):
-                rows.append([])
-            rows[-1].append(row)
+            last = rows[-1] if rows else None
+            if isinstance(last, list):
+                last.append(row)
+            else:
+                rows.append([row])
             continue
         if row.directive in OPENING:
             openings.append(row.number)
@@ -221,7 +224,8 @@ class _Assembly:
             pieces = _pieces(part.text, part.line)
         except _BadRow as error:
             self._fail(part.file, error.line, str(error))
-        keeps_all = self.library or isinstance(self.virtual.get(name), Part)
+        is_pasted = isinstance(self.virtual.get(name), Part) and "##" in part.text
+        keeps_all = self.library or is_pasted
         generated = name.startswith(_GENERATED)
         file = _File(part.file, generated)
         for number, piece in enumerate(pieces):

@@ -15,13 +15,13 @@ _DEFINE = re.compile(r"(\w+(?:\([^)]*\))?)\s*(.*)", re.DOTALL)
 _WITHIN = "\0"  # ends a row whose comment goes on
 
 
-@dataclass(eq=False, slots=True)  # not frozen: there are ten thousand, and that takes thrice as long
+@dataclass(eq=False, slots=True)  # not frozen, which takes thrice as long: there are ten thousand
 class Row:
     """A row, and those that a comment or a backslash at its end joins to it.
 
-    number: of its first line; text: its lines as they stand; lines: how many; code: the text without
-    comments; directive, argument: what stands behind `#`, "" where there is none; macro: the name of
-    a `#define` with its arguments, and the value.
+    number: of its first line; text: its lines as they stand; lines: how many; code: the text
+    without comments; directive, argument: what stands behind `#`, "" where there is none; macro:
+    the name of a `#define` with its arguments, and the value.
     """
 
     number: int
@@ -90,4 +90,3 @@ def renamed(row: Row, directive: str) -> Row:
     text = row.text.replace(row.directive, directive, 1)
     code = row.code.replace(row.directive, directive, 1)
     return replace(row, text=text, code=code, directive=directive)
-

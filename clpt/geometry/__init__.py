@@ -1,1 +1,1 @@
-"""Algorithms on plain arrays of points and corners."""
+"""Shapes as triangles, boxes and instances, and algorithms on them: numpy alone."""

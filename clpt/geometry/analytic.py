@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt import transforms
+from clpt.arrays import Points, Words, fits_single, single
 from clpt.errors import SceneError
 from clpt.geometry.shape_records import ANALYTIC, ONE_OF, RECORDS, ROWS
-from clpt.geometry.shapes import Points, Words, placement, where
+from clpt.geometry.shapes import placement, where
 from clpt.geometry.triangles import triangle_areas, triangulate
 from clpt.scene import shapes
 from clpt.scene.shapes import Shape
@@ -45,7 +46,7 @@ def row(shape: Shape) -> Words:
         s, t, center = matrix[:3, 0], matrix[:3, 1], matrix[:3, 3]
         values = {"center": center, "s": s, "t": t, "n": facing(shape)}
     flat = np.concatenate([np.ravel(values[m.name]) for m in record.members])
-    return flat.astype(np.float32).view(np.uint32)
+    return _single(flat, shape).view(np.uint32)
 
 
 def member(kind: str, name: str) -> int:
@@ -148,7 +149,7 @@ def bounds(shape: Shape) -> tuple[Points, Points]:
         reach = row_["radius"] * np.hypot(row_["x"], row_["y"])
     lo, hi = ends.min(axis=0) - reach, ends.max(axis=0) + reach
     pad = PADDING * max(np.ptp([lo, hi], axis=0).max(), np.abs([lo, hi]).max())
-    return (lo - pad).astype(np.float32), (hi + pad).astype(np.float32)
+    return _single(lo - pad, shape), _single(hi + pad, shape)
 
 
 def members_of(shape: Shape) -> dict[str, NDArray[np.float64]]:
@@ -158,9 +159,17 @@ def members_of(shape: Shape) -> dict[str, NDArray[np.float64]]:
     return {m.name: np.asarray(values[m.name], np.float64) for m in record.members}
 
 
+def _single(values: NDArray[np.float64], shape: Shape) -> Points:
+    made = single(values)
+    if not np.isfinite(made).all():
+        message = "it is too large or too far away: coordinates are float32, up to 3.4e38 m"
+        raise SceneError(message, where=where(shape))
+    return made
+
+
 def _three(value: ArrayLike, name: str, shape: Shape) -> NDArray[np.float64]:
     values = np.asarray(value, np.float64)
-    if values.shape != (3,) or not np.isfinite(values).all():
+    if values.shape != (3,) or not fits_single(values):
         message = f"{name} must be three finite numbers, found {value!r}"
         raise SceneError(message, where=where(shape))
     return values

@@ -13,14 +13,11 @@ from itertools import permutations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from clpt.arrays import on_host
+from clpt.arrays import Floats, Integers, on_host
 from clpt.errors import SceneError
 from clpt.scene.shapes import SdfGrid
 
-Floats = NDArray[np.float64]
-Whole = NDArray[np.int64]
 MOST_PIECES = 16
 MOST_POINTS = 1 << 26  # at which distances are computed: corners of all pieces, cell by cell
 AT_ONCE = 1 << 21  # of them
@@ -78,7 +75,7 @@ def _checked(shape: SdfGrid, name: str) -> Floats:
     return values
 
 
-def _crossed(values: Floats) -> Whole:
+def _crossed(values: Floats) -> Integers:
     """The cells (n, 3) whose corners have distances of both signs; 0 counts as outside."""
     inside = values < 0.0
     count = np.zeros(np.array(values.shape) - 1, np.int8)
@@ -88,7 +85,7 @@ def _crossed(values: Floats) -> Whole:
     return np.argwhere((count > 0) & (count < 8))
 
 
-def _distance(values: Floats, cells: Whole, at: Floats) -> Floats:
+def _distance(values: Floats, cells: Integers, at: Floats) -> Floats:
     """The trilinear distance (n,) of cells (n, 3) at places (n, 3), 0 to 1 inside of them."""
     total = np.zeros(len(cells))
     for corner in CORNERS:
@@ -97,7 +94,7 @@ def _distance(values: Floats, cells: Whole, at: Floats) -> Floats:
     return total
 
 
-def _gradient(values: Floats, cells: Whole, at: Floats) -> Floats:
+def _gradient(values: Floats, cells: Integers, at: Floats) -> Floats:
     """Its gradient (n, 3), by cells."""
     total = np.zeros((len(cells), 3))
     for corner in CORNERS:
@@ -109,7 +106,7 @@ def _gradient(values: Floats, cells: Whole, at: Floats) -> Floats:
     return total
 
 
-def _march(values: Floats, cells: Whole, pieces: int) -> tuple[Floats, Whole]:
+def _march(values: Floats, cells: Integers, pieces: int) -> tuple[Floats, Integers]:
     """Vertices (n, 3) [cells] and faces (m, 3)."""
     fine = np.array(values.shape) * pieces
     step = max(AT_ONCE // (pieces + 1) ** 3, 1)
@@ -143,8 +140,8 @@ def _march(values: Floats, cells: Whole, pieces: int) -> tuple[Floats, Whole]:
 
 
 def _tetrahedra(
-    values: Floats, cells: Whole, first: int, pieces: int
-) -> tuple[Whole, Whole, Floats, Floats]:
+    values: Floats, cells: Integers, first: int, pieces: int
+) -> tuple[Integers, Integers, Floats, Floats]:
     """The tetrahedra of cells (k, 3) that the surface goes through.
 
     Their corners (n, 4, 3) on the fine grid; the cell of each, counted from `first`; where its
@@ -189,7 +186,7 @@ def _cases() -> list[tuple[int, list[tuple[int, ...]]]]:
 
 
 def _zeros(
-    values: Floats, cells: Whole, a: Floats, b: Floats, at_a: Floats, at_b: Floats
+    values: Floats, cells: Integers, a: Floats, b: Floats, at_a: Floats, at_b: Floats
 ) -> Floats:
     """Where the trilinear distance is zero between a and b (n, 3): halving, then a secant."""
     low, high, f_low, f_high = np.zeros(len(a)), np.ones(len(a)), at_a, at_b
@@ -204,8 +201,8 @@ def _zeros(
 
 
 def _outward(
-    points: Floats, faces: Whole, corners: Whole, inside: Any, owner: Whole, pieces: int
-) -> Whole:
+    points: Floats, faces: Integers, corners: Integers, inside: Any, owner: Integers, pieces: int
+) -> Integers:
     """The faces, turned to the corners of their tetrahedra that are outside."""
     a, b, c = (points[faces[:, i]] for i in range(3))
     weights = np.where(inside[owner], -1.0, 0.0)

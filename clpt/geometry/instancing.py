@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
-from clpt.arrays import on_host
+from clpt.arrays import Points, on_host, single
 from clpt.errors import SceneError
 from clpt.geometry import analytic, shape_records, shapes
 from clpt.geometry.tessellate import keeps_its_kind, tessellate
 from clpt.geometry.tubes import Tubes, as_tubes
 from clpt.records import INSTANCE
-from clpt.scene.shapes import Curves, Group, Instance, Shape
+from clpt.scene.shapes import Curves, Cylinder, Group, Instance, Shape, Sphere
 
 Matrices = NDArray[np.floating]
 CELLS = 16  # columns along a side, see `outline`
@@ -217,7 +217,7 @@ def _analytic(
     if not stretched.any():
         return copies
     count = int(stretched.sum())
-    if shape.kind in shape_records.ONE_OF:
+    if not isinstance(shape, (Sphere, Cylinder)):  # nor can it become triangles: tell why
         analytic.row(next(copy.shape for copy, bad in zip(copies, stretched, strict=True) if bad))
     warnings.append(
         f"{shapes.where(shape)}: {count} of {len(copies)} instances stretch it; "
@@ -232,14 +232,14 @@ def _analytic(
     return kept
 
 
-def centred(vertices: shapes.Points) -> tuple[shapes.Points, NDArray[np.float64]]:
+def centred(vertices: Points) -> tuple[Points, NDArray[np.float64]]:
     """Return vertices (n, 3) float32 about the middle of their box, and that (3,)."""
     centre = ((vertices.min(axis=0) + vertices.max(axis=0)) * np.float32(0.5)).astype(np.float64)
     return (vertices - centre).astype(np.float32), centre
 
 
 def place(
-    to_world: Matrices, numbers: NDArray[np.int32], points: shapes.Points, centre: Matrices
+    to_world: Matrices, numbers: NDArray[np.int32], points: Points, centre: Matrices
 ) -> tuple[NDArray[Any], NDArray[np.float32]]:
     """Return a row of INSTANCE and a box (2, 3) float32 in the world per instance.
 
@@ -250,7 +250,7 @@ def place(
     linear = to_world[:, :3, :3]
     rows = np.zeros(len(linear), INSTANCE.dtype)
     rows["number"] = numbers
-    rows["origin"] = linear @ centre + to_world[:, :3, 3]
+    rows["origin"] = single(linear @ centre + to_world[:, :3, 3])
     with np.errstate(all="ignore"):  # looked at below
         to_local = np.linalg.inv(linear).astype(np.float32)
         for i, name in enumerate("xyz"):
@@ -265,7 +265,7 @@ def place(
     return rows, boxes
 
 
-def _boxes(points: shapes.Points, linear: Matrices, rows: NDArray[Any]) -> NDArray[np.float32]:
+def _boxes(points: Points, linear: Matrices, rows: NDArray[Any]) -> NDArray[np.float32]:
     """A box (2, 3) around points under each matrix, a little larger than what rays meet."""
     boxes = np.empty((len(rows), 2, 3))
     step = max(1, POINTS // len(points))
@@ -282,7 +282,7 @@ def _boxes(points: shapes.Points, linear: Matrices, rows: NDArray[Any]) -> NDArr
     return boxes.astype(np.float32)
 
 
-def hull_points(vertices: shapes.Points, cells: int = CELLS) -> shapes.Points:
+def hull_points(vertices: Points, cells: int = CELLS) -> Points:
     """Return points (p, 3) whose hull holds the vertices and is little larger, p at most 8 cells^2.
 
     They are the corners of a box around the vertices in each column of a grid.

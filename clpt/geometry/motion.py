@@ -1,4 +1,4 @@
-"""What of a scene moves while its shutter is open, and boxes around the ways of it."""
+"""Motion of a scene while its shutter is open, and boxes around the ways of what moves."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ Boxes = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Motions:
-    """What moves while the shutter of a scene is open.
+    """The parts of a scene that move while its shutter is open.
 
     shapes, lamps: keys by index in the scene's shapes and lights; camera: its keys, or None;
     deforming: for shapes and instances with points that move by themselves, by index, the times

@@ -15,12 +15,11 @@ import mapbox_earcut
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Floats, Integers
+
 CHUNK = 1 << 18  # corners that are tested at a time: in float64 they take 200 bytes each
 CANCELLED = 1e-9  # of a polygon's triangles: a sum of their areas that has no direction
 ROUNDING = 1e-7  # of a polygon's area: a triangle that is turned over by less is a line
-
-Integers = NDArray[np.int64]
-Floats = NDArray[np.float64]
 
 
 def triangulate(

@@ -11,14 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
 from clpt.scene import subdivision
 from clpt.scene.pixels import pixels
 from clpt.scene.shapes import Mesh
 from clpt.scene.textures import Bitmap
 
-Floats = NDArray[np.float64]
-Whole = NDArray[np.int64]
 Parts = tuple[Any, Any, Any, Any]
 DEEPEST = 10
 MOST_TRIANGLES = 1 << 25
@@ -67,14 +66,14 @@ def _check(mesh: Mesh, name: str) -> None:
         raise SceneError(message, where=name)
 
 
-def _welded(points: Floats, faces: Whole) -> tuple[Floats, Whole, Whole]:
+def _welded(points: Floats, faces: Integers) -> tuple[Floats, Integers, Integers]:
     """The places (k, 3) of vertices, faces of these, and which place each vertex has."""
     places, inverse = np.unique(points, axis=0, return_inverse=True)
     inverse = inverse.reshape(-1)
     return places, inverse[faces], inverse
 
 
-def _halved(faces: Whole, count: int) -> tuple[Whole, Whole]:
+def _halved(faces: Integers, count: int) -> tuple[Integers, Integers]:
     """The edges (e, 2) of faces, and the four faces of each; a new vertex stands behind `count`."""
     halves = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     low, high = halves.min(axis=1), halves.max(axis=1)
@@ -86,13 +85,13 @@ def _halved(faces: Whole, count: int) -> tuple[Whole, Whole]:
     return np.stack([keys // count, keys % count], axis=1), finer
 
 
-def _grown(values: Floats, edges: Whole) -> Floats:
+def _grown(values: Floats, edges: Integers) -> Floats:
     return np.concatenate([values, values[edges].mean(axis=1)])
 
 
 def _subdivided(
-    points: Floats, faces: Whole, uvs: Floats | None, levels: int, name: str
-) -> tuple[Floats, Whole, Floats, Floats | None]:
+    points: Floats, faces: Integers, uvs: Floats | None, levels: int, name: str
+) -> tuple[Floats, Integers, Floats, Floats | None]:
     """Points and normals of the limit surface; uvs are linear on each triangle."""
     places, welded, _ = _welded(points, faces)
     whole = (np.roll(welded, 1, axis=1) != welded).all(axis=1)
@@ -137,7 +136,7 @@ def _displaced(mesh: Mesh, parts: Parts, name: str) -> Parts:
     return mean[own], faces, _smooth(mean, welded)[own], uvs
 
 
-def _smooth(points: Floats, faces: Whole) -> Floats:
+def _smooth(points: Floats, faces: Integers) -> Floats:
     """Unit normals of vertices: of the triangles around them, by their areas."""
     a, b, c = (points[faces[:, i]] for i in range(3))
     crosses = np.cross(b - a, c - a)
@@ -175,7 +174,7 @@ def _texel(image: Bitmap, values: Floats, row: Floats, column: Floats) -> Floats
     return np.where(down & along, values[y, x], 0.0)
 
 
-def _wrapped(index: Floats, size: int, wrap: str) -> tuple[Whole, NDArray[np.bool_]]:
+def _wrapped(index: Floats, size: int, wrap: str) -> tuple[Integers, NDArray[np.bool_]]:
     """Columns or rows within an image, and whether there is something."""
     whole = index.astype(np.int64)
     there = (whole >= 0) & (whole < size) if wrap == "zero" else np.ones(len(whole), bool)

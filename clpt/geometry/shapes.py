@@ -1,4 +1,4 @@
-"""What every shape has: a name for messages, what its geometry follows from, and its transform."""
+"""Properties of every shape: its name in messages, the source of its geometry, its transform."""
 
 from __future__ import annotations
 
@@ -8,14 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
-from clpt.arrays import on_host
+from clpt.arrays import fits_single, on_host
 from clpt.errors import SceneError
 from clpt.scene.params import fields_of
 from clpt.scene.shapes import Shape
-
-Points = NDArray[np.float32]
-Faces = NDArray[np.uint32]
-Words = NDArray[np.uint32]
 
 
 def where(shape: Shape) -> str:
@@ -42,6 +38,8 @@ def placement(shape: Shape) -> NDArray[np.float64]:
         raise SceneError(
             "its transform is singular: it flattens space or is not finite", where=where(shape)
         )
+    if not fits_single(matrix):
+        raise SceneError("its transform is beyond float32, 3.4e38", where=where(shape))
     if not transforms.is_affine(matrix):
         raise SceneError("its transform is a projection, not affine", where=where(shape))
     return matrix

@@ -14,10 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
-from clpt.arrays import on_host
+from clpt.arrays import Words, on_host, single
 from clpt.errors import SceneError
 from clpt.geometry import analytic, shapes, triangles
 from clpt.scene.shapes import Shape, Spheres
+
+FARTHEST = 1e38  # [m], of a centre or a radius: a box around them is float32
 
 Balls = NDArray[np.float32]  # (n, 4): centre and radius
 
@@ -62,12 +64,12 @@ def keyed(shape: Spheres, times: Sequence[float]) -> Balls:
     return np.stack(at_all, axis=1)
 
 
-def common(shape: Shape) -> shapes.Words:
+def common(shape: Shape) -> Words:
     """Return the row of `geometry` of all: a sphere of radius 1 before `to_world`."""
     return analytic.row(shape)
 
 
-def rows(shape: Shape, placed: Balls) -> shapes.Words:
+def rows(shape: Shape, placed: Balls) -> Words:
     """Return a row of `geometry` for each of the balls of a shape, (n, words) uint32."""
     made = np.tile(common(shape), (len(placed), 1))
     center, radius = (analytic.member("sphere", name) for name in ("center", "radius"))
@@ -98,7 +100,7 @@ def _numbers(shape: Shape, name: str) -> NDArray[np.float32]:
     """A parameter as float32 on the host."""
     value: Any = getattr(shape, name)
     try:
-        return np.asarray(on_host(value), np.float32)
+        return single(on_host(value))
     except (TypeError, ValueError) as error:
         raise SceneError(f"{name} are not numbers: {error}", where=shapes.where(shape)) from error
 
@@ -107,6 +109,7 @@ def _check(shape: Shape, placed: Balls) -> None:
     for wrong, what in (
         (~np.isfinite(placed[:, :3]).all(axis=1), "centers[{}] is not finite"),
         (~(np.isfinite(placed[:, 3]) & (placed[:, 3] > 0.0)), "radii[{}] must be above zero"),
+        (np.abs(placed).max(axis=1) > FARTHEST, "centers[{}] or its radius is too large"),
     ):
         if wrong.any():
             at = int(np.argmax(wrong))

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
-from clpt.arrays import on_host
+from clpt.arrays import Faces, Points, Words, on_host, single
 from clpt.errors import SceneError
 from clpt.geometry import distance_grids, refining
 from clpt.geometry.shape_records import ONE_OF
-from clpt.geometry.shapes import Faces, Points, Words, placement, where
+from clpt.geometry.shapes import placement, where
 from clpt.geometry.tubes import tubes
 from clpt.scene import shapes
 from clpt.scene.motion import Deformation
@@ -26,6 +26,7 @@ POINTS = {  # what a deformation moves
 }  # fmt: skip
 SUMMED = 1 << 20  # triangles whose normals are summed at a time
 
+FAR = 2.0**61  # from where on the product of two edges may be beyond float32
 LEAST_CROSS = 2.0**-75  # up to which a square is zero in float32
 CHUNK = 1 << 16  # triangles that are looked at at a time: what is made of them stays in the cache
 
@@ -46,7 +47,7 @@ _CORNER_FACES = ((0, 1, 2), (3, 0, 2))
 
 @dataclass(frozen=True)
 class Flat:
-    """How many of a shape's triangles have no area."""
+    """A count of a shape's triangles that have no area."""
 
     where: str
     count: int
@@ -180,20 +181,25 @@ def tangents(shape: shapes.Mesh) -> Points:
     return made
 
 
+def per_face(name: str) -> bool:
+    """Return whether an attribute has a value for each face, by its name."""
+    return name.startswith("face_")
+
+
 def attribute(shape: Shape, name: str) -> Points:
     """Return an attribute of a mesh, (n, 1 or 3) float32 per vertex, or per face of `triangulate`.
 
     Raises SceneError for one that has another shape, or values that are not finite.
     """
-    per_face = name.startswith("face_")
+    by_face = per_face(name)
     if shape.kind in ONE_OF:
         count = len(shape.centers)  # type: ignore[attr-defined]
-        if per_face:
+        if by_face:
             message = f"attribute {name!r}: spheres have no faces, its name must begin with vertex_"
             raise SceneError(message, where=where(shape))
     else:
         vertices, faces, _, _ = _in_world(shape)
-        count = len(faces) if per_face else len(vertices)
+        count = len(faces) if by_face else len(vertices)
     given: Any = shape.attributes[name]  # type: ignore[attr-defined]
     values = np.asarray(on_host(given), np.float32)
     values = values[:, None] if values.ndim == 1 else values
@@ -202,7 +208,7 @@ def attribute(shape: Shape, name: str) -> Points:
         raise SceneError(message, where=where(shape))
     if not np.isfinite(values).all():
         raise SceneError(f"attribute {name!r} is not finite", where=where(shape))
-    return values[_solid(vertices, faces)] if per_face else values
+    return values[_solid(vertices, faces)] if by_face else values
 
 
 def _in_world(
@@ -212,7 +218,7 @@ def _in_world(
     matrix = placement(shape)
     vertices, faces, normals, uvs = local(shape, alike)
     if not np.array_equal(matrix, transforms.IDENTITY):
-        vertices = transforms.transform_points(matrix, vertices).astype(np.float32)
+        vertices = single(transforms.transform_points(matrix, vertices))
         if not np.isfinite(vertices).all():
             raise SceneError("its transform moves vertices out of float32", where=where(shape))
         if normals is not None:
@@ -226,11 +232,16 @@ def _in_world(
 
 def _solid(vertices: Points, faces: Faces) -> NDArray[np.bool_]:
     """Which faces have a cross product whose square is not zero in float32."""
-    found = np.empty(len(faces), np.bool_)
+    found, vertices = np.empty(len(faces), np.bool_), _wide(vertices)
     for first in range(0, len(faces), CHUNK):
         crosses = _crosses(vertices, faces[first : first + CHUNK])
         found[first : first + CHUNK] = (np.abs(crosses) > LEAST_CROSS).any(axis=1)
     return found
+
+
+def _wide(vertices: NDArray[Any]) -> NDArray[Any]:
+    """Vertices of which no product is beyond their type: as float64 where they are far away."""
+    return vertices.astype(np.float64) if np.abs(vertices).max(initial=0.0) > FAR else vertices
 
 
 def _crosses(vertices: NDArray[Any], faces: Faces) -> NDArray[Any]:
@@ -242,7 +253,7 @@ def _crosses(vertices: NDArray[Any], faces: Faces) -> NDArray[Any]:
 
 def triangle_areas(vertices: Points, faces: Faces) -> NDArray[np.float64]:
     """Return the area of every triangle [m^2], (m,) float64."""
-    return 0.5 * np.linalg.norm(_crosses(vertices, faces).astype(np.float64), axis=1)
+    return 0.5 * np.linalg.norm(_crosses(_wide(vertices), faces).astype(np.float64), axis=1)
 
 
 def triangle_rows(vertices: Points, faces: Faces) -> Words:
@@ -337,7 +348,7 @@ def smooth(shape: Shape) -> bool:
 def _array(shape: Shape, name: str, columns: int, rows: int | None = None) -> Points:
     """A mesh's array as float32. Raises SceneError for a wrong shape or values not finite."""
     try:
-        values = np.asarray(on_host(getattr(shape, name)), np.float32)
+        values = single(on_host(getattr(shape, name)))
     except (TypeError, ValueError) as error:
         raise SceneError(f"{name} are not numbers: {error}", where=where(shape)) from error
     wanted = f"({'n' if rows is None else rows}, {columns})"

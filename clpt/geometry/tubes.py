@@ -14,11 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Floats, Integers, single
 from clpt.errors import SceneError
 from clpt.scene.shapes import Curves
-
-Floats = NDArray[np.float64]
-Whole = NDArray[np.int64]
 
 ERROR = 0.25  # of the radius: how far a tube's axis may be from its curve
 FINEST = 32  # most pieces of a cubic
@@ -73,7 +71,7 @@ def tubes(shape: Curves, name: str, alike: Sequence[Curves] = ()) -> tuple[Any, 
     return _around(center, slope, tangent, frames(tangent, first), v, lower, sides)
 
 
-def cubics(shape: Curves, name: str) -> tuple[Floats, Whole]:
+def cubics(shape: Curves, name: str) -> tuple[Floats, Integers]:
     """Return every piece of the curves in Bezier form, and its strand (s,).
 
     The pieces are (s, 2 or 4, 4) float64, with the radius last, before the transform. Raises
@@ -97,7 +95,7 @@ def cubics(shape: Curves, name: str) -> tuple[Floats, Whole]:
     return (TO_BEZIER @ spans if shape.basis == "bspline" else spans), strand
 
 
-def _checked(shape: Curves, name: str) -> tuple[Floats, Whole]:
+def _checked(shape: Curves, name: str) -> tuple[Floats, Integers]:
     """The points (n, 4) and the number of them in each strand."""
     try:
         points = np.asarray(shape.points, np.float64)
@@ -106,7 +104,7 @@ def _checked(shape: Curves, name: str) -> tuple[Floats, Whole]:
         raise SceneError(f"points are not numbers: {error}", where=name) from error
     if points.ndim != 2 or points.shape[1] != 4 or not len(points):
         raise SceneError(f"points must be (n, 4), found {points.shape}", where=name)
-    wrong = ~np.isfinite(points.astype(np.float32)).all(axis=1) | (points[:, 3] < 0.0)
+    wrong = ~np.isfinite(single(points)).all(axis=1) | (points[:, 3] < 0.0)
     if wrong.any():
         i = int(np.argmax(wrong))
         message = f"points[{i}] is not finite, or its radius negative: {points[i].tolist()}"
@@ -120,8 +118,8 @@ def _checked(shape: Curves, name: str) -> tuple[Floats, Whole]:
     return points, lengths.astype(np.int64)
 
 
-def _pieces(spans: Floats) -> Whole:
-    """How many straight pieces stand for each cubic: its second derivative bounds the error."""
+def _pieces(spans: Floats) -> Integers:
+    """Return how many straight pieces stand for each cubic; a second derivative bounds errors."""
     bend = spans[:, :-2, :3] - 2.0 * spans[:, 1:-1, :3] + spans[:, 2:, :3]
     most = np.linalg.norm(bend, axis=2).max(axis=1)
     allowed = ERROR * spans[:, :, 3].mean(axis=1)
@@ -133,7 +131,7 @@ def _pieces(spans: Floats) -> Whole:
         allowed = allowed * 2.0
 
 
-def _bezier(spans: Floats, span: Whole, t: Floats) -> tuple[Floats, Floats]:
+def _bezier(spans: Floats, span: Integers, t: Floats) -> tuple[Floats, Floats]:
     """The curves and their derivatives at t, (n, 4) each."""
     degree, t = spans.shape[1] - 1, t[:, None]
     points: list[Floats] = [spans[span, i] for i in range(degree + 1)]
@@ -142,7 +140,7 @@ def _bezier(spans: Floats, span: Whole, t: Floats) -> tuple[Floats, Floats]:
     return points[0] + (points[1] - points[0]) * t, degree * (points[1] - points[0])
 
 
-def _tangents(center: Floats, slope: Floats, strand: Whole) -> Floats:
+def _tangents(center: Floats, slope: Floats, strand: Integers) -> Floats:
     """Unit tangents (n, 3); where a curve stands still, that of the neighbours."""
     tangent = slope[:, :3].copy()
     length = np.linalg.norm(tangent, axis=1)
@@ -204,7 +202,7 @@ def _around(
     tangent: Floats,
     axes: tuple[Floats, Floats],
     v: Floats,
-    lower: Whole,
+    lower: Integers,
     sides: int,
 ) -> tuple[Any, Any, Any, Any]:
     """Rings around the points of the axes, and facets from those of `lower` to the next ones."""

@@ -1,4 +1,4 @@
-"""What shapes enclose: how often they wind around a point, their boxes, areas and volumes.
+"""Insides of shapes: how often a shape winds around a point; boxes, areas and volumes.
 
 A closed boundary fills the whole sphere of directions around a point inside, 4 pi, and on balance
 nothing of it around a point outside. cached: keeps what a function made of what it was given, such

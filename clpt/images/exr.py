@@ -14,14 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from clpt.arrays import Floats32, Matrix
 from clpt.errors import SceneError
 from clpt.images import exr_files
 from clpt.images.exr_channels import Choice, choose
 from clpt.images.exr_files import Header, Window, window
-from clpt.images.stored import Matrix, Stored
+from clpt.images.stored import Stored
 from clpt.spectra import spaces
-
-Array = NDArray[np.float32]
 
 HALF_MAX = 65504.0
 HALF_MIN = 2.0**-14  # from which on it has 11 bits
@@ -68,7 +67,7 @@ def matrix_of(header: Header) -> Matrix | None:
     return None if stated is None else spaces.to_rec709(stated)
 
 
-def _fits_half(pixels: Array) -> bool:
+def _fits_half(pixels: Floats32) -> bool:
     """Return whether half numbers hold the brightest finite value, at their full precision."""
     largest = float(np.max(np.abs(pixels), initial=0.0, where=np.isfinite(pixels)))
     return largest == 0.0 or HALF_MIN <= largest <= HALF_MAX
@@ -76,7 +75,7 @@ def _fits_half(pixels: Array) -> bool:
 
 def write(
     path: Path,
-    pixels: Array,
+    pixels: Floats32,
     half: bool,
     metadata: Mapping[str, Any],
     layers: Mapping[str, ArrayLike],
@@ -135,7 +134,7 @@ def _part(part: Window, of: Window) -> tuple[slice, slice]:
     return rows, slice(part[0] - of[0], part[2] - of[0])
 
 
-def _whole(plane: NDArray[Any], data: Window) -> Array:
+def _whole(plane: NDArray[Any], data: Window) -> Floats32:
     """A channel with a value for each pixel, where it is subsampled by linear interpolation."""
     made = np.asarray(plane, np.float32)
     for axis, wanted in ((0, data[3] - data[1]), (1, data[2] - data[0])):
@@ -145,7 +144,7 @@ def _whole(plane: NDArray[Any], data: Window) -> Array:
     return made
 
 
-def _finer(values: Array, times: int, axis: int) -> Array:
+def _finer(values: Floats32, times: int, axis: int) -> Floats32:
     """Values at `times` as many places along an axis, the last ones held."""
     after = np.roll(values, -1, axis)
     last = [slice(None)] * 2
@@ -168,7 +167,7 @@ def _weights(header: Header) -> NDArray[np.float64]:
     return np.asarray(matrix[1], np.float64)
 
 
-def _from_chroma(values: Array, weights: NDArray[np.float64]) -> Array:
+def _from_chroma(values: Floats32, weights: NDArray[np.float64]) -> Floats32:
     """Red, green and blue of Y, RY = (R - Y) / Y and BY = (B - Y) / Y, (h, w, 3)."""
     y, ry, by = np.moveaxis(values, 2, 0)
     red, blue = (ry + 1.0) * y, (by + 1.0) * y

@@ -13,16 +13,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from clpt import budget, output_files
+from clpt.arrays import Bytes, Floats32, Matrix
 from clpt.errors import SceneError
 from clpt.images import sizes
-from clpt.images.stored import Matrix, Stored
+from clpt.images.stored import Stored
 from clpt.spectra import spaces
-
-Array = NDArray[np.float32]
-Bytes = NDArray[np.uint8]
 
 HEADER_BYTES = 1 << 16
 RESOLUTION = re.compile(rb"([-+])([XY]) +(\d+) +([-+])([XY]) +(\d+)[ \t]*\r?\n")
@@ -36,7 +33,7 @@ class _Header:
     """The header of a Radiance picture; end: the offset of its scanlines."""
 
     format: str = RGBE
-    divide: Array = field(default_factory=lambda: np.ones(3, np.float32))
+    divide: Floats32 = field(default_factory=lambda: np.ones(3, np.float32))
     primaries: tuple[float, ...] | None = None
     aspect: float = 1.0
     gamma: float = 1.0
@@ -132,7 +129,7 @@ def _matrix(header: _Header) -> Matrix | None:
     return None if header.primaries is None else spaces.to_rec709(header.primaries)
 
 
-def _upright(values: Array, order: tuple[str, str, str, str]) -> Array:
+def _upright(values: Floats32, order: tuple[str, str, str, str]) -> Floats32:
     """Scanlines as rows from the top, pixels from the left; Y goes up and X to the right."""
     slow, slow_axis, fast, _ = order
     if slow_axis == "X":
@@ -192,7 +189,7 @@ def _old_scanline(data: bytes, at: int, row: Bytes) -> int:
     return at + 4 * (taken + width - filled)
 
 
-def write(path: Path, pixels: Array, space: str = "rec709") -> None:
+def write(path: Path, pixels: Floats32, space: str = "rec709") -> None:
     """Write (h, w, 1, 3 or 4) as flat rows of RGBE, which state their space unless it is Rec. 709.
 
     A normalised mantissa cannot look like a run-length code.

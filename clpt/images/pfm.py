@@ -11,14 +11,12 @@ import re
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from clpt import budget, output_files
+from clpt.arrays import Floats32
 from clpt.errors import SceneError
 from clpt.images import sizes
 from clpt.images.stored import Stored
-
-Array = NDArray[np.float32]
 
 HEADER = re.compile(rb"(P[Ff]|PF4)\s+(\d+)\s+(\d+)\s+([-+]?[.\deE+-]+)\s")
 HEADER_BYTES = 256
@@ -59,7 +57,7 @@ def _scale(path: Path, text: bytes) -> float:
     return scale
 
 
-def write(path: Path, pixels: Array) -> None:
+def write(path: Path, pixels: Floats32) -> None:
     """Write (h, w, 1, 3 or 4), without alpha."""
     pixels = pixels[..., :3]
     kind = "PF" if pixels.shape[2] == 3 else "Pf"

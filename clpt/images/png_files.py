@@ -15,8 +15,8 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Matrix
 from clpt.errors import SceneError
-from clpt.images.stored import Matrix
 from clpt.spectra import spaces
 
 Metadata = Mapping[str, str | int | float | tuple[float, ...]]

@@ -6,10 +6,8 @@ import logging
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from clpt import budget
+from clpt.arrays import Floats32
 from clpt.errors import SceneError
 from clpt.images import exr, hdr, npy, pfm, pillow
 from clpt.images.failures import check_there, reading
@@ -17,7 +15,6 @@ from clpt.images.stored import Stored
 
 log = logging.getLogger("clpt.images")
 
-Array = NDArray[np.float32]
 
 READERS: dict[str, Callable[[Path], Stored]] = {
     ".exr": exr.read,
@@ -29,7 +26,7 @@ READERS: dict[str, Callable[[Path], Stored]] = {
 }
 
 
-def read(path: str | Path, *, linear: bool = True) -> Array:
+def read(path: str | Path, *, linear: bool = True) -> Floats32:
     """Return an image file as (h, w, c) float32, row 0 at the top; c is 1, 3 or 4.
 
     Other counts are possible for EXR files without colours, and .npy.

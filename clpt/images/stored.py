@@ -9,11 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Floats32, Matrix
 from clpt.errors import SceneError
 from clpt.images.transfer import srgb_to_linear
-
-Array = NDArray[np.float32]
-Matrix = NDArray[np.float64]
 
 BLOCK = 1 << 22  # values that are decoded at once, so that what is between takes no memory
 
@@ -39,7 +37,7 @@ class Stored:
         """Whether its colours are others than sRGB or linear Rec. 709."""
         return self.gamma is not None or self.matrix is not None
 
-    def decoded(self, linear: bool = True) -> Array:
+    def decoded(self, linear: bool = True) -> Floats32:
         """(h, w, c) float32; linear: as linear Rec. 709, else the numbers as they are stored.
 
         Raises SceneError where memory does not suffice.
@@ -62,10 +60,10 @@ class Stored:
         """Return notes on what is left out, for values that are data if raw, else colours."""
         return self.notes if raw else (*self.notes, *self.colour_notes)
 
-    def _numbers(self) -> Array:
+    def _numbers(self) -> Floats32:
         return _SCALE[self.values] if self.values.dtype == np.uint8 else self.values
 
-    def _colours(self) -> Array:
+    def _colours(self) -> Floats32:
         if not self.encoded and self.matrix is None:
             return self._numbers()
         height, width, count = self.values.shape
@@ -76,7 +74,7 @@ class Stored:
             made[part] = self._linear(self.values[part])
         return made
 
-    def _linear(self, values: NDArray[Any]) -> Array:
+    def _linear(self, values: NDArray[Any]) -> Floats32:
         """Some rows as linear Rec. 709."""
         made = self._without_transfer(values)
         if self.matrix is not None and made.shape[2] >= 3:
@@ -84,7 +82,7 @@ class Stored:
             made = np.concatenate([colours, made[..., 3:]], axis=2)
         return made
 
-    def _without_transfer(self, values: NDArray[Any]) -> Array:
+    def _without_transfer(self, values: NDArray[Any]) -> Floats32:
         is_bytes, curve = values.dtype == np.uint8, self._curve()
         if not self.encoded:
             return _SCALE[values] if is_bytes else values
@@ -93,7 +91,7 @@ class Stored:
             made[..., 3] = _SCALE[values[..., 3]] if is_bytes else values[..., 3]
         return made
 
-    def _curve(self) -> Callable[[Array], Array]:
+    def _curve(self) -> Callable[[Floats32], Floats32]:
         if self.gamma is None:
             return srgb_to_linear
         power = np.float32(1.0 / self.gamma)

@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Floats32
 from clpt.colour import tones
 from clpt.colour.view import View
 from clpt.spectra.spaces import between
 
-Array = NDArray[np.float32]
 
-
-def srgb_to_linear(x: Array) -> Array:
+def srgb_to_linear(x: Floats32) -> Floats32:
     """The sRGB transfer decoded (IEC 61966-2-1)."""
     return _srgb_decoded(x).astype(np.float32)
 
@@ -25,7 +24,7 @@ def _srgb_decoded(x: NDArray[Any]) -> NDArray[Any]:
 
 
 @cache
-def srgb8_steps() -> Array:
+def srgb8_steps() -> Floats32:
     """The least linear value of each 8-bit sRGB code, then infinity: (257,) float32, rising."""
     exact = _srgb_decoded((np.arange(255) + 0.5) / 255.0)
     steps = exact.astype(np.float32)
@@ -33,13 +32,13 @@ def srgb8_steps() -> Array:
     return np.concatenate([[-np.inf], steps, [np.inf]]).astype(np.float32)
 
 
-def linear_to_srgb(x: Array) -> Array:
+def linear_to_srgb(x: Floats32) -> Floats32:
     """The sRGB transfer applied (IEC 61966-2-1)."""
     power = np.maximum(x, 0.0031308) ** (1 / 2.4)
     return np.where(x <= 0.0031308, 12.92 * x, 1.055 * power - 0.055).astype(np.float32)
 
 
-def to_srgb8(image: Array, exposure: float = 0.0) -> NDArray[np.uint8]:
+def to_srgb8(image: Floats32, exposure: float = 0.0) -> NDArray[np.uint8]:
     """Linear (h, w, c) as 8-bit sRGB, scaled by 2^exposure; NaN becomes black, infinity white."""
     finite = np.nan_to_num(image, nan=0.0, posinf=np.inf, neginf=0.0)
     colour, alpha = finite[..., :3], finite[..., 3:]
@@ -53,7 +52,7 @@ def to_srgb8(image: Array, exposure: float = 0.0) -> NDArray[np.uint8]:
 
 
 def to_codes(
-    image: Array, exposure: float = 0.0, tone: str = "none", view: View | None = None
+    image: Floats32, exposure: float = 0.0, tone: str = "none", view: View | None = None
 ) -> NDArray[np.uint8]:
     """Linear Rec. 709 (h, w, c), scaled by 2^exposure, as 8-bit codes of a display.
 
@@ -70,7 +69,7 @@ def to_codes(
     return np.round(codes * 255).astype(np.uint8)
 
 
-def straight(image: Array) -> Array:
+def straight(image: Floats32) -> Floats32:
     """Colours (h, w, 4) over nothing as those of what covers: divided by alpha, as a .png has them.
 
     Images of other shapes are returned as they are; so are colours where nothing covers.
@@ -81,7 +80,7 @@ def straight(image: Array) -> Array:
     return np.concatenate([image[..., :3] / np.where(alpha > 0, alpha, 1), alpha], axis=2)
 
 
-def to_rec709(pixels: Array, space: str) -> Array:
+def to_rec709(pixels: Floats32, space: str) -> Floats32:
     """Colours (h, w, 3 or 4) of a space in linear Rec. 709, white to white; alpha stays."""
     if space == "rec709" or pixels.shape[2] == 1:
         return pixels

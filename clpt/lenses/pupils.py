@@ -7,12 +7,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Floats
 from clpt.lenses.glasses import LINE_D
 from clpt.lenses.paraxial import cardinal
 from clpt.lenses.prescription import Prescription
 from clpt.lenses.tracing import Rays, trace
-
-Array = NDArray[np.float64]
 
 ZONES = 64  # rings of the film
 COARSE, FINE = (32, 16), (48, 24)  # cells of a grid over half of the pupil
@@ -20,7 +19,7 @@ ROUNDS = (COARSE, COARSE, FINE)
 WAVELENGTHS = (380.0, 480.0, LINE_D, 780.0)  # [nm], at which pupils of lenses that disperse are met
 
 
-def zones(lens: Prescription, distance: float, radius: float) -> Array:
+def zones(lens: Prescription, distance: float, radius: float) -> Floats:
     """Return an ellipse of the rear plane for each ring of the film, (ZONES, 3) [mm].
 
     The rear plane touches the last surface. `distance`: from there to the film; radius: of the film
@@ -61,7 +60,7 @@ def zones(lens: Prescription, distance: float, radius: float) -> Array:
     return rows
 
 
-def _start(lens: Prescription, distance: float, places: Array) -> tuple[Array, Array]:
+def _start(lens: Prescription, distance: float, places: Floats) -> tuple[Floats, Floats]:
     """Where to look first (n, 2): the last surface, or the exit pupil if that is smaller."""
     size = lens.surfaces[-1].semi_diameter
     low, high = np.full((len(places), 2), -size), np.full((len(places), 2), size)
@@ -76,7 +75,7 @@ def _start(lens: Prescription, distance: float, places: Array) -> tuple[Array, A
     return low, high
 
 
-def _grid(low: Array, high: Array, cells: tuple[int, int]) -> tuple[Array, Array, Array]:
+def _grid(low: Floats, high: Floats, cells: tuple[int, int]) -> tuple[Floats, Floats, Floats]:
     """Middles of cells, x and y (n, m), and their size (n, 2)."""
     step = (high - low) / np.array(cells)
     i, j = (each.ravel() for each in np.meshgrid(*(np.arange(c) + 0.5 for c in cells)))
@@ -84,7 +83,7 @@ def _grid(low: Array, high: Array, cells: tuple[int, int]) -> tuple[Array, Array
 
 
 def _seen(
-    lens: Prescription, distance: float, places: Array, x: Array, y: Array, wavelength: float
+    lens: Prescription, distance: float, places: Floats, x: Floats, y: Floats, wavelength: float
 ) -> NDArray[np.bool_]:
     o = np.zeros((*x.shape, 3))
     o[..., 0], o[..., 2] = places[:, None], lens.length + distance

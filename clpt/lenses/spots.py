@@ -6,14 +6,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from clpt.arrays import Floats
 from clpt.lenses.glasses import LINE_D
 from clpt.lenses.paraxial import cardinal
 from clpt.lenses.prescription import Prescription
 from clpt.lenses.tracing import Rays, trace
 
-Array = NDArray[np.float64]
 RINGS = 24
 
 
@@ -24,7 +23,7 @@ class Spot:
     through: part of the light into the entrance pupil that gets there.
     """
 
-    points: Array
+    points: Floats
     through: float
 
     @property
@@ -33,7 +32,7 @@ class Spot:
         return float(np.sqrt(np.mean(np.sum((self.points - self.points.mean(axis=0)) ** 2, 1))))
 
 
-def pupil_points(rings: int = RINGS) -> Array:
+def pupil_points(rings: int = RINGS) -> Floats:
     """Return points (n, 2) evenly over the unit disk: 6 i + 3 on the ring i."""
     made = []
     for i in range(rings):

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Floats
 from clpt.lenses.glasses import LINE_D
 from clpt.lenses.prescription import Prescription, Surface
 
-Array = NDArray[np.float64]
 NEWTON_STEPS = 12
 
 
@@ -21,19 +21,19 @@ NEWTON_STEPS = 12
 class Rays:
     """Rays (n, 3): places [mm] and directions of unit length; alive (n,): what was not stopped."""
 
-    o: Array
-    d: Array
+    o: Floats
+    d: Floats
     alive: NDArray[np.bool_]
 
     @staticmethod
-    def of(o: Array, d: Array) -> Rays:
+    def of(o: Floats, d: Floats) -> Rays:
         """Rays from places (n, 3) along directions (n, 3) of any length."""
         o, d = np.broadcast_arrays(np.asarray(o, np.float64), np.asarray(d, np.float64))
         length = np.linalg.norm(d, axis=1, keepdims=True)
         return Rays(o.copy(), d / length, np.ones(len(o), np.bool_))
 
 
-def sag(surface: Surface, r2: Array) -> Array:
+def sag(surface: Surface, r2: Floats) -> Floats:
     """Return how far a surface lies behind its vertex; r2: squares of distances from the axis."""
     c = surface.curvature
     root = np.sqrt(np.maximum(1.0 - (1.0 + surface.conic) * c * c * r2, 0.0))
@@ -75,7 +75,7 @@ def trace(
     return Rays(o, d, alive)
 
 
-def intersect(surface: Surface, o: Array, d: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+def intersect(surface: Surface, o: Floats, d: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
     """Return where rays meet a surface, its normals, which look towards -z, and whether they do.
 
     o, d: (n, 3), z from the vertex. The sphere's or conic's point is in closed form (Welford 1986,
@@ -105,7 +105,7 @@ def intersect(surface: Surface, o: Array, d: Array) -> tuple[Array, Array, NDArr
     return q, normal / np.linalg.norm(normal, axis=1, keepdims=True), there
 
 
-def _slope(surface: Surface, r2: Array) -> Array:
+def _slope(surface: Surface, r2: Floats) -> Floats:
     """The derivative of the sag by r, over r."""
     c = surface.curvature
     root = np.sqrt(np.maximum(1.0 - (1.0 + surface.conic) * c * c * r2, 1e-12))
@@ -115,7 +115,7 @@ def _slope(surface: Surface, r2: Array) -> Array:
     return np.asarray(slope)
 
 
-def refract(d: Array, normal: Array, ratio: float) -> tuple[Array, NDArray[np.bool_]]:
+def refract(d: Floats, normal: Floats, ratio: float) -> tuple[Floats, NDArray[np.bool_]]:
     """Return directions behind a boundary, and whether light passes; ratio: n over n' beyond."""
     cosine = -np.sum(d * normal, axis=1)
     side = np.where(cosine < 0.0, -1.0, 1.0)

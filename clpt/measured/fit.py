@@ -14,12 +14,13 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from clpt.arrays import Floats
 from clpt.errors import SceneError
 from clpt.measured.measurement import Measurement
-from clpt.measured.warp import Values, bilinear, sample, warp
+from clpt.measured.warp import bilinear, sample, warp
 
 # f(wo, wi) [1/sr] of unit directions (n, 3), z along the normal, wo to the viewer: (n, colours)
-Reflection = Callable[[Values, Values], NDArray]
+Reflection = Callable[[Floats, Floats], NDArray]
 STEPS = 64  # of the power iteration
 FEWEST = 64  # azimuths of the integral of ndf
 
@@ -65,7 +66,7 @@ def fit(
     )  # fmt: skip
 
 
-def hemispherical(measurement: Measurement) -> Values:
+def hemispherical(measurement: Measurement) -> Floats:
     """Return the share of light (colours,) that is reflected to the first viewer; at most 1.
 
     It is the mean of f cos(theta) over the density of visible normals, which light is mirrored at.
@@ -93,8 +94,8 @@ def grey() -> Measurement:
 
 
 def _over_square(
-    f: Reflection, wo: Values, turn: float, vndf: Values, ndf: Values, sigma: Values, size: int
-) -> Values:
+    f: Reflection, wo: Floats, turn: float, vndf: Floats, ndf: Floats, sigma: Floats, size: int
+) -> Floats:
     """f cos(theta) over ndf / (4 sigma), (colours, size, size), at a grid of the warped square."""
     u, v = grid(size, size)
     x, y, _ = sample(warp(vndf), u, v)
@@ -112,8 +113,8 @@ def _over_square(
 
 
 def _facets(
-    f: Reflection, m: Values, solid: Values, n: int, isotropic: bool
-) -> tuple[Values, Values]:
+    f: Reflection, m: Floats, solid: Floats, n: int, isotropic: bool
+) -> tuple[Floats, Floats]:
     """The distribution of facets [1/sr] and its projected areas, (n, n) each, at directions m.
 
     solid: solid angle over area of the square there.
@@ -145,42 +146,42 @@ def _facets(
     return ndf / flat, sigma / flat
 
 
-def grid(rows: int, columns: int) -> tuple[Values, Values]:
+def grid(rows: int, columns: int) -> tuple[Floats, Floats]:
     """Corners (rows * columns,) of cells of the unit square: x, y."""
     y, x = np.meshgrid(np.linspace(0, 1, rows), np.linspace(0, 1, columns), indexing="ij")
     return x.ravel(), y.ravel()
 
 
-def _ends(n: int) -> Values:
+def _ends(n: int) -> Floats:
     """Weights (n * n,) of the trapezoidal rule."""
     edge = np.where((np.arange(n) == 0) | (np.arange(n) == n - 1), 0.5, 1.0)
     return np.outer(edge, edge).ravel()
 
 
-def area(x: Values) -> Values:
+def area(x: Floats) -> Floats:
     """Solid angle [sr] over area of the square, at its points of that x."""
     return 2.0 * np.pi**2 * x * np.sin(0.5 * np.pi * x * x)
 
 
-def direction(x: Values, y: Values) -> Values:
+def direction(x: Floats, y: Floats) -> Floats:
     """The direction (n, 3) at points of the square."""
     return spherical(0.5 * np.pi * x * x, (2.0 * y - 1.0) * np.pi)
 
 
-def _square(w: Values) -> tuple[Values, Values]:
+def _square(w: Floats) -> tuple[Floats, Floats]:
     """The points of the square of directions (n, 3)."""
     theta = np.arctan2(np.hypot(w[:, 0], w[:, 1]), w[:, 2])
     phi = np.arctan2(w[:, 1], w[:, 0])
     return np.sqrt(theta * 2.0 / np.pi), (phi + np.pi) / (2.0 * np.pi)
 
 
-def spherical(theta: ArrayLike, phi: ArrayLike) -> Values:
+def spherical(theta: ArrayLike, phi: ArrayLike) -> Floats:
     theta, phi = np.broadcast_arrays(np.asarray(theta, float), np.asarray(phi, float))
     sine = np.sin(theta)
     return np.stack([sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)], axis=-1)
 
 
-def _turned(w: Values, phi: float) -> Values:
+def _turned(w: Floats, phi: float) -> Floats:
     """Directions (n, 3) turned about z."""
     c, s = np.cos(phi), np.sin(phi)
     return w @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt.errors import SceneError
 
-Table = NDArray[Any]  # float32
 REDUCTIONS = (1, 2, 4)  # equal parts of the azimuths of which one is stored
 AXES = {
     "ndf": "(rows, columns)", "sigma": "(rows, columns)",
@@ -39,14 +38,14 @@ class Measurement:
     numbers that are negative or not finite.
     """
 
-    phi_i: Table
-    theta_i: Table
-    ndf: Table
-    sigma: Table
-    vndf: Table
-    luminance: Table
-    spectra: Table
-    wavelengths: Table = field(default_factory=lambda: np.zeros(0, np.float32))
+    phi_i: NDArray[Any]
+    theta_i: NDArray[Any]
+    ndf: NDArray[Any]
+    sigma: NDArray[Any]
+    vndf: NDArray[Any]
+    luminance: NDArray[Any]
+    spectra: NDArray[Any]
+    wavelengths: NDArray[Any] = field(default_factory=lambda: np.zeros(0, np.float32))
     jacobian: bool = True
     description: str = ""
 
@@ -91,14 +90,14 @@ class Measurement:
         return round(2.0 * math.pi / float(self.phi_i[-1] - self.phi_i[0]))
 
 
-def _ascending(name: str, values: ArrayLike) -> Table:
+def _ascending(name: str, values: ArrayLike) -> NDArray[Any]:
     made = np.asarray(values, np.float32)
     if made.ndim != 1 or not np.isfinite(made).all() or not (np.diff(made) > 0.0).all():
         raise SceneError(f"{name!r} must be finite numbers that ascend")
     return made
 
 
-def _table(name: str, values: ArrayLike) -> Table:
+def _table(name: str, values: ArrayLike) -> NDArray[Any]:
     made = np.asarray(values, np.float32)
     if made.ndim != AXES[name].count(",") + 1:
         raise SceneError(f"{name!r} must be {AXES[name]}, not {made.shape}")

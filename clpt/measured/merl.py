@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import input_files, output_files
+from clpt.arrays import Floats
 from clpt.errors import SceneError
 from clpt.measured.fit import Reflection, area, direction, grid, spherical
-from clpt.measured.warp import Values, sample, warp
+from clpt.measured.warp import sample, warp
 
 STEPS = (90, 90, 180)  # of the published files
 SCALES = np.array([1.0, 1.15, 1.66]) / 1500.0  # of the numbers in a file [1/sr]
@@ -105,7 +106,7 @@ def filled(table: MerlTable) -> NDArray[Any]:
     return np.maximum(values, 0.0)
 
 
-def densities(values: NDArray[Any]) -> tuple[Values, Values, Values]:
+def densities(values: NDArray[Any]) -> tuple[Floats, Floats, Floats]:
     """Return tables by which light is sampled.
 
     They are angles of viewers (n,) [rad], densities over the square of halfway directions
@@ -131,8 +132,8 @@ def densities(values: NDArray[Any]) -> tuple[Values, Values, Values]:
 
 
 def _seen(
-    values: NDArray[Any], theta: float, x: Values, y: Values
-) -> tuple[Values, Values, Values]:
+    values: NDArray[Any], theta: float, x: Floats, y: Floats
+) -> tuple[Floats, Floats, Floats]:
     """At halfway directions: cosine of wi, f cos (n, 3), solid angle over area of the square."""
     wo = spherical(theta, 0.0)
     m = direction(x, y)
@@ -144,7 +145,7 @@ def _seen(
     return wi[:, 2], light * lit[:, None], solid
 
 
-def _nearest(values: NDArray[Any], m: Values, wo: Values, wi: Values) -> Values:
+def _nearest(values: NDArray[Any], m: Floats, wo: Floats, wi: Floats) -> Floats:
     """The table's nearest values (n, 3) at halfway directions m."""
     halfway = np.arctan2(np.hypot(m[:, 0], m[:, 1]), m[:, 2])
     difference = np.arctan2(np.linalg.norm(wi - wo, axis=1), np.linalg.norm(wi + wo, axis=1))
@@ -158,7 +159,7 @@ def _nearest(values: NDArray[Any], m: Values, wo: Values, wi: Values) -> Values:
     return np.asarray(values[tuple(cells)], np.float64)
 
 
-def _widest(values: Values) -> Values:
+def _widest(values: Floats) -> Floats:
     """The largest of each value and its eight neighbours; rows go around."""
     rows = np.maximum(values, np.maximum(np.roll(values, 1, 0), np.roll(values, -1, 0)))
     padded = np.pad(rows, ((0, 0), (1, 1)), "edge")

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Values = NDArray[np.float64]
+from clpt.arrays import Floats
 
 
 @dataclass(frozen=True)
@@ -22,9 +22,9 @@ class Warp:
     rows), over all rows above, in the end 1.
     """
 
-    values: Values
-    across: Values
-    down: Values
+    values: Floats
+    across: Floats
+    down: Floats
 
 
 def warp(values: ArrayLike) -> Warp:
@@ -37,12 +37,12 @@ def warp(values: ArrayLike) -> Warp:
     return Warp(given / whole[..., None], across / whole[..., None], down / whole)
 
 
-def _running(values: Values) -> Values:
+def _running(values: Floats) -> Floats:
     steps = np.cumsum(0.5 * (values[..., 1:] + values[..., :-1]), axis=-1)
     return np.concatenate([np.zeros_like(values[..., :1]), steps], axis=-1)
 
 
-def bilinear(table: Values, x: Values, y: Values) -> Values:
+def bilinear(table: Floats, x: Floats, y: Floats) -> Floats:
     """Values (..., n) of a table (..., rows, columns) at points (n,) of the unit square."""
     (column, s), (row, t) = _cell(x, table.shape[-1]), _cell(y, table.shape[-2])
     upper = table[..., row, column] * (1.0 - s) + table[..., row, column + 1] * s
@@ -50,13 +50,13 @@ def bilinear(table: Values, x: Values, y: Values) -> Values:
     return upper * (1.0 - t) + lower * t
 
 
-def _cell(x: Values, nodes: int) -> tuple[NDArray[np.int64], Values]:
+def _cell(x: Floats, nodes: int) -> tuple[NDArray[np.int64], Floats]:
     at = np.clip(x, 0.0, 1.0) * (nodes - 1)
     cell = np.minimum(at.astype(np.int64), nodes - 2)
     return cell, at - cell
 
 
-def sample(of: Warp, u: Values, v: Values) -> tuple[Values, Values, Values]:
+def sample(of: Warp, u: Floats, v: Floats) -> tuple[Floats, Floats, Floats]:
     """Take points (n,) of the unit square to x, y and their density, by one table."""
     rows, columns = of.values.shape
     row = np.clip(np.searchsorted(of.down, v, "right") - 1, 0, rows - 2)
@@ -74,12 +74,12 @@ def sample(of: Warp, u: Values, v: Values) -> tuple[Values, Values, Values]:
     return (column + s) / (columns - 1), (row + t) / (rows - 1), density
 
 
-def _linear(u: Values, a: Values, b: Values) -> Values:
+def _linear(u: Floats, a: Floats, b: Floats) -> Floats:
     """x with density proportional to a (1 - x) + b x."""
     u = np.clip(u, 0.0, 1.0)
     root = np.sqrt(a * a + u * (b * b - a * a))
     return np.where(a + root > 0.0, u * (a + b) / _above(a + root), u)
 
 
-def _above(x: Values) -> Values:
+def _above(x: Floats) -> Floats:
     return np.maximum(x, 1e-300)

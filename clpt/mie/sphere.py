@@ -7,12 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from clpt.arrays import Floats
 from clpt.errors import SceneError
 
 LARGEST = 2e4  # size parameter: 1 mm of radius at 315 nm
 BLOCK = 1 << 22  # numbers in the largest arrays that are made at a time
-
-Values = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -24,11 +23,11 @@ class Spheres:
     directions is 1.
     """
 
-    extinction: Values
-    scattering: Values
-    backscattering: Values
-    asymmetry: Values
-    phase: Values
+    extinction: Floats
+    scattering: Floats
+    backscattering: Floats
+    asymmetry: Floats
+    phase: Floats
 
 
 def spheres(size: ArrayLike, index: ArrayLike, cosines: ArrayLike = ()) -> Spheres:
@@ -65,7 +64,7 @@ def spheres(size: ArrayLike, index: ArrayLike, cosines: ArrayLike = ()) -> Spher
     return Spheres(extinction, scattering, back, asymmetry, phase)
 
 
-def _check(x: Values, m: NDArray[np.complex128], mu: Values) -> None:
+def _check(x: Floats, m: NDArray[np.complex128], mu: Floats) -> None:
     if not (np.isfinite(x) & (x > 0.0)).all():
         raise SceneError(f"a sphere of the size {x.min():g}; it must be above 0", where="size")
     if (x > LARGEST).any():
@@ -81,7 +80,7 @@ def _check(x: Values, m: NDArray[np.complex128], mu: Values) -> None:
 
 
 def _coefficients(
-    x: Values, m: NDArray[np.complex128], orders: NDArray[np.int_]
+    x: Floats, m: NDArray[np.complex128], orders: NDArray[np.int_]
 ) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
     """a_n and b_n (s, n) of the book's (4.88), from n = 1 on; those beyond a sphere's own are 0."""
     most, z = int(orders.max()), m * x
@@ -110,7 +109,7 @@ def _coefficients(
     return a, b
 
 
-def _intensity(a: NDArray, b: NDArray, mu: Values) -> Values:
+def _intensity(a: NDArray, b: NDArray, mu: Floats) -> Floats:
     """|S1|^2 + |S2|^2 (s, k) of the book's (4.74)."""
     made = np.zeros((len(a), len(mu)))
     step = max(1, BLOCK // (a.shape[1] + len(a)))
@@ -125,7 +124,7 @@ def _intensity(a: NDArray, b: NDArray, mu: Values) -> Values:
     return made
 
 
-def _angular(orders: int, mu: Values) -> tuple[Values, Values]:
+def _angular(orders: int, mu: Floats) -> tuple[Floats, Floats]:
     """pi_n and tau_n (n, k) of the book's (4.47), from n = 1 on."""
     pi, tau = np.zeros((2, orders, len(mu)))
     before, now = np.zeros_like(mu), np.ones_like(mu)

@@ -36,7 +36,10 @@ class DeviceOwner:
     def _check_open(self) -> None:
         """Raise DeviceError after `close`."""
         if self._closed:
-            raise DeviceError(f"this {type(self).__name__} is closed; make another one")
+            raise self._closed_error()
+
+    def _closed_error(self) -> DeviceError:
+        return DeviceError(f"this {type(self).__name__} is closed; make another one")
 
     def _check(self, inside: bool) -> None:
         """Raise DeviceError where it cannot be used; inside: by what one of its methods calls."""

@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import pyopencl as cl
 
 from clpt import device as dev
@@ -17,6 +16,7 @@ from clpt.errors import DeviceError, MemoryBudgetError, SceneError
 from clpt.render.analysis.bodies import matter_of
 from clpt.render.analysis.surroundings import bodies_around, media_around
 from clpt.render.contents import Change, Contents
+from clpt.render.contract.features import Features
 from clpt.render.editing import parameter_patch, rebuild
 from clpt.render.editing.blurring import between
 from clpt.render.editing.moving import Moving
@@ -29,10 +29,11 @@ from clpt.render.editing.scene_edit import (
     match_replacements,
     resolve_device_arrays,
 )
-from clpt.render.locking import Stop, healing, synchronized
+from clpt.render.film.pictures import Image
+from clpt.render.film_renderer import Watch, checked_number, checked_samples, next_range
+from clpt.render.locking import healing, synchronized
 from clpt.render.lowering.scene import Lowered, lower
 from clpt.render.options import RenderOptions, check_changes, check_options, check_scene
-from clpt.render.pictures import Image
 from clpt.render.progress import Progress
 from clpt.render.resumable import Resumable
 from clpt.render.stats import RenderStats, collect
@@ -49,7 +50,6 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-MOST_SAMPLES = 2**31 - 1
 TEXTURE_SHARE = 0.5  # of a device's free memory, for bitmaps
 
 
@@ -70,6 +70,8 @@ class Renderer(Resumable):
     makes no sense; DeviceError, MemoryBudgetError, KernelBuildError.
     """
 
+    shows_meanwhile = True
+
     def __init__(
         self,
         scene: Scene,
@@ -81,7 +83,7 @@ class Renderer(Resumable):
         super().__init__()
         check_scene(scene)
         check_options(scene, options)
-        self._stop, self._discards = Stop(), False
+        self._discards = False
         self.denoise = options.get("denoise")
         self.scene = scene = needs.prepared(scene, self.denoise)
         queue, threads = options.get("queue"), options.get("threads")
@@ -102,8 +104,9 @@ class Renderer(Resumable):
             texture_budget = texture_budget_of(device)
         self._texture_budget, self._successors = texture_budget, Successors()
         lowered = self._lower(scene)
-        self._seconds = {"lower": time.perf_counter() - self._start}
-        first = Wavefront.create(
+        self._seconds["lower"] = time.perf_counter() - self._start
+        self._wavefront: Wavefront | None = None
+        self._wavefront = first = Wavefront.create(
             device,
             lowered,
             layout=options.get("layout"),
@@ -114,15 +117,13 @@ class Renderer(Resumable):
             halves=options.get("halves", False) or needs.halves(scene, self.denoise),
             cancel_seconds=options.get("cancel_seconds"),
         )
-        self.wavefronts = [first]
-        for one in self.wavefronts:
-            one.prepare()
+        first.prepare()
         self._built = device.builds.programs - before[0], device.builds.cached - before[1]
-        self._seconds["programs"] = sum(one.program_seconds for one in self.wavefronts)
+        self._seconds["programs"] = first.program_seconds
         self._seconds["trees"] = first.scene.trees.seconds
         self._seconds["ready"] = time.perf_counter() - self._start
         self.warnings = list(lowered.warnings)
-        self._first_sample = _sample_number(options.get("first_sample", 0))
+        self._first_sample = checked_number(options.get("first_sample", 0))
         self._progress = progress
         if self.denoise is not None:
             splats = first.features.film.filter.reach > 0
@@ -141,9 +142,16 @@ class Renderer(Resumable):
         """
         now = self.contents
         with self._adding("prepare", now):
-            for wavefront in self.wavefronts:
-                wavefront.render_samples(self.samples, self.samples)
+            self.wavefront.render_samples(self.samples, self.samples)
             self._contents = now
+
+    @property
+    def wavefront(self) -> Wavefront:
+        """What renders on the device. Raises DeviceError after `close`."""
+        wavefront = self._wavefront
+        if wavefront is None:
+            raise self._closed_error()
+        return wavefront
 
     @synchronized
     def step(self, samples: int = 1, wait_for: dev.Events = None) -> cl.Event:
@@ -156,12 +164,11 @@ class Renderer(Resumable):
         Raises SceneError for a number that is none, DeviceError if the driver refuses.
         """
         first, end = next_range(self.samples, samples)
-        stream = self.wavefronts[0].stream
+        stream = self.wavefront.stream
         stream.after(wait_for)
         more = self._with(first, end)
         with self._adding("step", more, plain=True):
-            for wavefront in self.wavefronts:
-                wavefront.enqueue(first, end)
+            self.wavefront.enqueue(first, end)
             stream.flush()
             if more.adaptive is not None:
                 more.adaptive.skip(end)
@@ -177,7 +184,7 @@ class Renderer(Resumable):
         What the caller then raises is logged: in a thread of the driver nobody could catch it.
         """
         samples, start = self.samples, self._start
-        pixels = self.wavefronts[0].paths.pixels * len(self.wavefronts)
+        pixels = self.wavefront.paths.pixels
 
         def report(_: int) -> None:
             seconds = time.perf_counter() - start
@@ -188,79 +195,35 @@ class Renderer(Resumable):
 
         event.set_callback(cl.command_execution_status.COMPLETE, report)
 
-    @synchronized
-    def run(
-        self,
-        samples: int,
-        progress: Callable[[Progress], bool | None] | None = None,
-        *,
-        noise: float | None = None,
-    ) -> bool:
-        """Add samples to every pixel and wait; `self.samples` is then the next one's number.
+    @property
+    def _features(self) -> Features:
+        return self.wavefront.features
 
-        noise: leave pixels as soon as the noise around them is as low, relative to the picture,
-        such as 0.02; `samples` is then the most that a pixel gets, see
-        clpt.render.wavefront.adaptive. A renderer with `denoise` counts what is left after that.
-        progress: called every few milliseconds to seconds; if it returns False the run stops soon,
-        as after `cancel`. Returns whether it came to its end. What progress raises, or Ctrl+C at
-        any line, is raised when the paths in flight have ended. The film is whole after a stop too:
-        its pixels have fewer samples, and the numbers of those left out are not used again.
+    @property
+    def _pixels(self) -> int:
+        return self.wavefront.paths.pixels
 
-        Raises SceneError for noise that makes no sense with the scene, and for more than 2^31 - 1
-        samples.
-        """
-        start = time.perf_counter()
-        first, end = next_range(self.samples, samples)
-        raised: list[BaseException] = []
+    def _add_samples(self, first: int, end: int, noise: float | None, watch: Watch) -> bool:
+        """Add samples to all pixels, or to those with noise; return whether all were added."""
 
         def on_batch(_: Any) -> bool:
-            counts = self.counts
-            paths = sum(c.samples for c in counts)
-            if paths:
-                self._seconds.setdefault("first_sample", time.perf_counter() - self._start)
-            pixels = self.wavefronts[0].paths.pixels * len(counts)
-            seconds = time.perf_counter() - start
-            rays = sum(c.rays for c in counts)
             if self._stop.is_set() and self._discards:
                 raise _Discarded
-            if self._stop.is_set() or progress is None:
-                return not self._stop.is_set()
-            try:
-                so_far = Progress(paths / pixels, end, paths, rays, seconds, self.active)
-                if progress(so_far) is False:
-                    self._stop.set()
-            except BaseException as error:
-                raised.append(error)
-                self._stop.set()
-            return not self._stop.is_set()
+            return watch()
 
-        if self._stop.is_set():  # before it began: nothing is taken
-            self._discards = False
-            self._stop.clear()
-            return False
-        if noise is not None:
-            noise = adaptive.checked(noise, self.wavefronts[0].features)
-            if self.contents.adaptive is None:
-                begun = self.adaptively(None, self.denoise)
-                begun.skip(first)
-                self._contents = dataclasses.replace(self.contents, adaptive=begun)
+        if noise is not None and self.contents.adaptive is None:
+            begun = self.adaptively(None, self.denoise)
+            begun.skip(first)
+            self._contents = dataclasses.replace(self.contents, adaptive=begun)
         more = self._with(first, end)
-        for wavefront in self.wavefronts:
-            wavefront.leave.lower()  # that a `cancel` raised which came too late for another run
-        try:
-            with self._adding("run", more, plain=noise is None):
-                try:
-                    finished = self._render_samples(more.adaptive, first, end, noise, on_batch)
-                except _Discarded:
-                    self._contents = self._emptied()
-                    return False
-                self._contents = more
-        finally:
-            self._seconds_rendered += time.perf_counter() - start
-            self._discards = False
-            self._stop.clear()
-        if raised:
-            raise raised.pop()
+        self.wavefront.leave.lower()  # that a `cancel` raised which came too late for another run
+        with self._adding("run", more, plain=noise is None):
+            try:
+                finished = self._render_samples(more.adaptive, first, end, noise, on_batch)
+            except _Discarded:
+                self._contents = self._emptied()
+                return False
+            self._contents = more
         return finished
 
     def _render_samples(
@@ -274,7 +237,7 @@ class Renderer(Resumable):
         """Add samples to all pixels, or to those with noise; return whether all were added."""
         if noise is not None and chosen is not None:
             return chosen.run(end, noise, on_batch)
-        finished = all(one.render_samples(first, end, on_batch) for one in self.wavefronts)
+        finished = self.wavefront.render_samples(first, end, on_batch)
         if chosen is not None:
             chosen.skip(end)  # after a stop too: numbers are not used again
         return finished
@@ -291,31 +254,28 @@ class Renderer(Resumable):
         it holds that too, though some pixels may lack some of these samples; or what it held, if
         none has begun. An error of the device makes nothing whole.
         """
-        now = self.contents
-        for wavefront in self.wavefronts:
-            wavefront.begun = False
+        now, wavefront = self.contents, self.wavefront
+        wavefront.begun = False
 
         def finish(error: BaseException) -> Contents:
-            begun = any(wavefront.begun for wavefront in self.wavefronts)
+            begun = wavefront.begun
             if isinstance(error, DeviceError) and not isinstance(error, MemoryBudgetError):
                 if begun:
                     raise error
                 return now
-            for wavefront in self.wavefronts:
-                wavefront.finish()
+            wavefront.finish()
             if more.adaptive is not None:
                 more.adaptive.finish()
                 if plain and begun:
                     more.adaptive.skip(more.taken[-1][1])
-            for wavefront in self.wavefronts:
-                wavefront.refresh()
+            wavefront.refresh()
             return more if begun else now
 
         return self.change(what, finish)
 
     def tracer(self) -> Tracer:
         """Return what adds selections of samples to the film."""
-        return Tracer(self.wavefronts[0])
+        return Tracer(self.wavefront)
 
     @property
     def devices(self) -> tuple[dev.Device, ...]:
@@ -323,28 +283,23 @@ class Renderer(Resumable):
         return (self.device,)
 
     @property
-    def counts(self) -> tuple[Counts, ...]:
-        """What has happened so far, of each film: of its one film."""
-        return tuple(wavefront.counts for wavefront in self.wavefronts)
-
-    @property
-    def active(self) -> float:
-        """The share of the pixels that would get more samples, 1 but for `run` with `noise`."""
-        chosen = self._known.adaptive
-        return 1.0 if chosen is None else chosen.active
+    def counts(self) -> Counts:
+        """What has happened so far."""
+        return self.wavefront.counts
 
     def cancel(self, *, discard: bool = False) -> None:
         """Let the `run` of another thread, or else the next one, stop soon and return False.
 
-        discard: the film is of no use any more: paths in flight are left as they are, which is
-        sooner, and a run that has begun leaves the film as after `reset`. A step is not stopped.
-        It may be called from anywhere, also from a signal's handler, and waits for nothing.
+        discard: see `FilmRenderer.cancel`.
         """
-        if discard:  # in this order: who sees the flag finds the reason soon
-            for wavefront in self.wavefronts:
-                wavefront.leave.raise_()
+        if discard and self._wavefront is not None:  # who sees the flag finds the reason soon
+            self._wavefront.leave.raise_()
             self._discards = True
-        self._stop.set()
+        super().cancel()
+
+    def _rest(self) -> None:
+        self._discards = False
+        super()._rest()
 
     @healing
     def reset(
@@ -363,11 +318,11 @@ class Renderer(Resumable):
         A renderer that says it is broken is whole again then, unless it says otherwise.
         """
         if first_sample is not None:
-            first_sample = _sample_number(first_sample)
+            first_sample = checked_number(first_sample)
         if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int)):
             raise SceneError(f"must be a whole number, not {seed!r}", where="seed")
         broken = isinstance(self._contents, Change)
-        self.wavefronts[0].stream.after(wait_for)
+        self.wavefront.stream.after(wait_for)
         with self.healing("reset", lambda _: self._emptied(recover=True)):
             if seed is not None:
                 self.scene = dataclasses.replace(self.scene, seed=seed)
@@ -378,28 +333,22 @@ class Renderer(Resumable):
 
     @property
     def _last(self) -> cl.Event:
-        event = self.wavefronts[0].stream.last
+        event = self.wavefront.stream.last
         assert event is not None, "something was enqueued"
         return event
 
     def _emptied(self, *, recover: bool = False) -> Contents:
         """Enqueue that the film is empty; return what it then holds; recover: from an error at any
         line."""
-        for wavefront in self.wavefronts:
-            if recover:
-                wavefront.stream.rejoin()
-                use_all_pixels(wavefront)
-            wavefront.paths.set_seed(self.scene.seed)
-            wavefront.clear()
+        wavefront = self.wavefront
+        if recover:
+            wavefront.stream.rejoin()
+            use_all_pixels(wavefront)
+        wavefront.paths.set_seed(self.scene.seed)
+        wavefront.clear()
         self._held, self._seconds_rendered = None, 0.0
-        self.wavefronts[0].stream.flush()
+        wavefront.stream.flush()
         return Contents()
-
-    @property
-    def samples(self) -> int:
-        """The number of the next sample: of all so far, where they began at number 0."""
-        taken = self._known.taken
-        return taken[-1][1] if taken else self._first_sample
 
     @synchronized
     def merge(self, state: FilmState) -> None:
@@ -437,15 +386,9 @@ class Renderer(Resumable):
         """
         with self._lock:
             self._closed = True
-            self.wavefronts = []
+            self._wavefront = None
             self._contents = Contents()
             self._moving = self._resolve = None
-
-    def __enter__(self) -> Renderer:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
 
     @synchronized
     def update(
@@ -491,7 +434,7 @@ class Renderer(Resumable):
             scene = needs.prepared(scene, self.denoise)
         check_changes(camera, materials=materials, transforms=transforms, vertices=vertices)
         events = list(wait_for or ())
-        self.wavefronts[0].stream.after(events)
+        self.wavefront.stream.after(events)
         quick = scene is None and not (motion or self._blurred)
         moves = quick and bool(transforms or vertices)
         if moves and self._move(transforms or {}, vertices or {}):
@@ -553,7 +496,7 @@ class Renderer(Resumable):
     def _move(self, transforms: Mapping[ShapeKey, Any], vertices: Mapping[ShapeKey, Any]) -> bool:
         """Move shapes on the device, and begin at sample 0; return whether they could."""
         if self._moving is None:
-            self._moving = Moving(self.wavefronts[0].scene, self.scene)
+            self._moving = Moving(self.wavefront.scene, self.scene)
         moved, replaced = self._edit(self.scene, None, transforms, vertices)
         if self._enters_a_medium(moved):
             return False
@@ -571,7 +514,7 @@ class Renderer(Resumable):
         """Return what writes the words of parameters that differ, None if more does."""
         if self._enters_a_medium(scene):
             return None
-        found = parameter_patch.patch(self.wavefronts[0].scene, self.scene, scene)
+        found = parameter_patch.patch(self.wavefront.scene, self.scene, scene)
         if isinstance(found, str):
             log.debug("words alone do not change the scene: %s", found)
             return None
@@ -579,7 +522,7 @@ class Renderer(Resumable):
 
     def _enters_a_medium(self, scene: Scene) -> bool:
         """Whether the camera or a light of a changed scene may be in other media than before."""
-        lowered = self.wavefronts[0].scene.lowered
+        lowered = self.wavefront.scene.lowered
         if not lowered.features.media.present:
             return False
         if lowered.features.light_media and _lights_moved(self.scene, scene):
@@ -598,9 +541,9 @@ class Renderer(Resumable):
         """
         for event in events:
             dev.wait(event)
-        first = self.wavefronts[0]
+        first = self.wavefront
         lowered = self._lower(scene, first.scene.lowered)
-        take = rebuild.prepare(self.wavefronts, lowered, refit)
+        take = rebuild.prepare(first, lowered, refit)
 
         def write() -> None:
             take()
@@ -612,7 +555,7 @@ class Renderer(Resumable):
     @synchronized
     def stats(self) -> RenderStats:
         """What the render took so far: numbers of things, bytes by table and tree, seconds."""
-        return collect(self.wavefronts, *self._built, dict(self._seconds))
+        return collect(self.wavefront, *self._built, dict(self._seconds))
 
 
 def _lights_moved(former: Scene, scene: Scene) -> bool:
@@ -632,25 +575,6 @@ def _lights_moved(former: Scene, scene: Scene) -> bool:
             for name in ("to_world", "position")
         )
     )
-
-
-def next_range(first: int, samples: int) -> tuple[int, int]:
-    """Return the numbers, first and end, of so many samples from the first. Raises SceneError."""
-    return first, _sample_number(first + _whole(samples))
-
-
-def _sample_number(number: int) -> int:
-    """A sample's number. Raises SceneError for one that is too large."""
-    if number > MOST_SAMPLES:
-        raise SceneError(f"a pixel cannot have more than {MOST_SAMPLES} samples", where="samples")
-    return number
-
-
-def _whole(samples: int) -> int:
-    """A number of samples. Raises SceneError for one that is none."""
-    if isinstance(samples, bool) or not isinstance(samples, (int, np.integer)) or samples < 1:
-        raise SceneError(f"samples per pixel must be a whole number above zero, not {samples!r}")
-    return int(samples)
 
 
 def texture_budget_of(device: dev.Device) -> int:
@@ -674,7 +598,7 @@ def render(
     is denoised. Raises as `Renderer` does.
     """
     check_scene(scene)
-    spp = _whole(scene.spp if spp is None else spp)
+    spp = checked_samples(scene.spp if spp is None else spp)
     noise = scene.noise if noise is None else noise
     renderer = Renderer(dataclasses.replace(scene, spp=spp, noise=noise), device, **options)
     renderer.run(spp, progress, noise=noise)

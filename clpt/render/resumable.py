@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import logging
 from functools import cache
@@ -16,21 +15,21 @@ from clpt.render.contents import Contents
 from clpt.render.contract import custom_materials
 from clpt.render.editing.scene_edit import resolve_device_arrays
 from clpt.render.film.denoised_noise import DenoisedNoise
-from clpt.render.film.film_keeping import FilmKeeping
+from clpt.render.film.developed import Developed
 from clpt.render.film.layers import white_paper
+from clpt.render.film.picture_form import PictureForm
 from clpt.render.film.saved_film import (
     Origin,
-    PictureForm,
     SavedFilm,
-    Session,
     classes_text,
     other_devices,
 )
 from clpt.render.locking import synchronized
-from clpt.render.pictures import Pictures
+from clpt.render.pictures import DevicePictures
 from clpt.render.wavefront.adaptive import Adaptive
-from clpt.render.wavefront.film_state import FilmState, Ranges
+from clpt.render.wavefront.film_state import DIMENSIONS, FilmState, Ranges
 from clpt.render.wavefront.tracer import Tracer
+from clpt.render.wavefront.wavefront import Counts
 from clpt.scene import Scene
 from clpt.scene.fingerprint import Fingerprint, Plain, fingerprint
 from clpt.scene.integrators import PIXELWISE
@@ -42,43 +41,33 @@ log = logging.getLogger(__name__)
 TO_OUTPUT = ("to_first", "to_second", "to_third")
 
 
-class Resumable(FilmKeeping, Pictures):
-    """Base of renderers whose film can be saved.
-
-    warnings: for people; the others are the renderer's own.
-    """
-
-    warnings: list[str]
-    _first_sample: int
+class Resumable(DevicePictures):
+    """Base of renderers on a device: their film is saved, and gone on with."""
 
     def __init__(self) -> None:
         super().__init__()
         self._scene_read: tuple[Scene, Fingerprint] | None = None
         self._held: dict[str, Any] | None = None
-        self._seconds_rendered = 0.0
-
-    @property
-    def _sessions(self) -> tuple[Session, ...]:  # type: ignore[override]
-        return self._known.sessions
-
-    @property
-    def first_sample(self) -> int:
-        """The number of the first sample of the film, or of the first one to come."""
-        taken = self._known.taken
-        return taken[0][0] if taken else self._first_sample
 
     @synchronized
     def film_state(self) -> FilmState:
         """Return what the film holds, as whole numbers on the host; wait for it."""
         return self.words(self.contents.taken, held=False)
 
-    def words(self, taken: Ranges, *, held: bool) -> FilmState:
-        """Return what the film holds, or held, as `film_state` does, of samples that are taken."""
-        films = [one.film.words(held=held) for one in self.wavefronts]
-        scale = float(self.wavefronts[0].paths.settings["film_scale"])
-        words = [film.pop("words") for film in films]
-        stacked = np.stack(words) if len(words) > 1 else words[0][None]
-        return FilmState(stacked, taken=taken, scale=scale, **films[0])
+    @synchronized
+    def developed(self, *words: str) -> Developed:
+        """Return the pictures of the film as it is now, which then stay; see `Pictures`."""
+        return Developed(self.words((), held=False, names=words), self.form)
+
+    def words(self, taken: Ranges, *, held: bool, names: tuple[str, ...] = ()) -> FilmState:
+        """Return what the film holds, or held, as `film_state` does, of samples that are taken.
+
+        names: of the arrays that are wanted, all by default.
+        """
+        first = self.wavefront
+        scale = float(first.paths.settings["film_scale"])
+        arrays = first.film.words(*(names or DIMENSIONS), held=held)
+        return FilmState(taken=taken, scale=scale, **arrays)
 
     @synchronized
     def hold(self) -> None:
@@ -87,9 +76,8 @@ class Resumable(FilmKeeping, Pictures):
         So a render that is stopped in the middle of a `run` can be saved as it was before: without
         samples that some pixels have and others have not. Raises MemoryBudgetError.
         """
-        so_far, self._held = self.progress_so_far(), None
-        for one in self.wavefronts:
-            one.film.hold()
+        so_far, self._held = self._progress_so_far(self.device_class()), None
+        self.wavefront.film.hold()
         self._held = so_far
 
     @synchronized
@@ -101,7 +89,10 @@ class Resumable(FilmKeeping, Pictures):
         """
         if held and self._held is None:
             raise SceneError("no film is held; call hold() first")
-        so_far = dict(self.progress_so_far() if self._held is None or not held else self._held)
+        if held and self._held is not None:
+            so_far = dict(self._held)
+        else:
+            so_far = self._progress_so_far(self.device_class())
         state = self.words(so_far.pop("taken"), held=held)
         return SavedFilm(state, self.origin(), self.form, **so_far)
 
@@ -109,9 +100,9 @@ class Resumable(FilmKeeping, Pictures):
     def origin(self) -> Origin:
         """Return what the samples are of. Raises SceneError for a scene that cannot be read."""
         if self._scene_read is None or self._scene_read[0] is not self.scene:
-            readable = resolve_device_arrays(self.scene, self.wavefronts[0].stream.queue)
+            readable = resolve_device_arrays(self.scene, self.wavefront.stream.queue)
             self._scene_read = self.scene, fingerprint(readable)
-        first = self.wavefronts[0]
+        first = self.wavefront
         lowered, features = first.scene.lowered, first.features
         settings: dict[str, Plain] = {
             "chosen.integrator": lowered.integrator.kind,
@@ -130,7 +121,7 @@ class Resumable(FilmKeeping, Pictures):
     @synchronized
     def device_class(self) -> dict[str, Plain]:
         """Return what decides the last bits of samples: equal classes give equal films."""
-        first, info = self.wavefronts[0], self.device.info
+        first, info = self.wavefront, self.device.info
         return {
             "device": info.label,
             "driver": f"{info.version} {info.driver}",
@@ -145,13 +136,13 @@ class Resumable(FilmKeeping, Pictures):
         tracer: adds the samples; denoise: a denoiser: noise is then what it leaves. Light paths
         have their noise before. Raises SceneError where halves are wanted and not kept.
         """
-        first = self.wavefronts[0]
+        first = self.wavefront
         if denoise is None or first.features.transport.weighed:
             return Adaptive(first, tracer)
         if first.film.halves != 2:
             message = "what is left after denoising is told by even and odd samples apart"
             raise SceneError(f"{message}; give the scene `noise`, or halves=True", where="noise")
-        return Adaptive(first, tracer, DenoisedNoise(self, denoise).measure)
+        return Adaptive(first, tracer, DenoisedNoise(self, self.device, denoise).measure)
 
     @synchronized
     def restore(self, saved: SavedFilm) -> None:
@@ -172,8 +163,7 @@ class Resumable(FilmKeeping, Pictures):
 
         def put(_: BaseException | None = None) -> Contents:
             self._held, self._seconds_rendered = None, 0.0
-            for one, counts in zip(self.wavefronts, saved.counts, strict=True):
-                one.counts = dataclasses.replace(one.counts, **counts)
+            self.wavefront.counts = Counts(**saved.counts)
             self._put(saved.film)
             return restored
 
@@ -186,25 +176,13 @@ class Resumable(FilmKeeping, Pictures):
 
     def _put(self, state: FilmState) -> None:
         """Enqueue that the film holds the words of another one of its form."""
-        for one, words in zip(self.wavefronts, state.films, strict=True):
-            one.set_words(words)
-
-    def progress_so_far(self) -> dict[str, Any]:
-        """Return what changes while samples are taken, but for the film's words."""
-        now = self.contents
-        session = Session(now.began, self._seconds_rendered, VERSION, self.device_class())
-        return {
-            "taken": now.taken,
-            "counts": tuple(dict(vars(one.counts)) for one in self.wavefronts),
-            "sessions": (*now.sessions, session),
-            "adaptive": {} if now.adaptive is None else now.adaptive.arrays(),
-        }
+        self.wavefront.set_words(state.arrays)
 
     @property
     @synchronized
-    def form(self) -> PictureForm:
-        """How the film's words become a picture."""
-        first, film = self.wavefronts[0], self.scene.film
+    def form(self) -> PictureForm:  # type: ignore[override]
+        """The way from the film's words to a picture."""
+        first, film = self.wavefront, self.scene.film
         settings, features = first.paths.settings, first.features
         return PictureForm(
             tuple(tuple(float(v) for v in np.ravel(settings[name])[:3]) for name in TO_OUTPUT),
@@ -220,6 +198,7 @@ class Resumable(FilmKeeping, Pictures):
             layers=features.film.layers.names,
             paper=tuple(map(tuple, white_paper(film, features.spectra.mode).tolist())),
             names=first.scene.lowered.layer_names,
+            adaptive=self.scene.noise is not None or self._known.adaptive is not None,
         )
 
 

@@ -46,13 +46,13 @@ class RenderStats:
 
 
 def collect(
-    wavefronts: list[Wavefront], programs: int, cached: int, seconds: dict[str, float]
+    wavefront: Wavefront, programs: int, cached: int, seconds: dict[str, float]
 ) -> RenderStats:
-    """Return the figures of a render's wavefronts, which share all but film and picture.
+    """Return the figures of a render's wavefront.
 
     programs, cached: how many were built, and how many of them came from clpt's cache.
     """
-    scene, photons = wavefronts[0].scene, wavefronts[0].photons
+    scene, photons = wavefront.scene, wavefront.photons
     lowered, instances = scene.lowered, scene.lowered.instances
     of_world = len(lowered.faces) - sum(instances.triangles)
     instanced = sum(instances.triangles[prototype] for prototype in instances.prototypes.tolist())

@@ -12,14 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import budget
+from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
 
 PER_TRIANGLE = 512  # bytes of memory for each of the finest, while they are made
-Points = NDArray[np.float64]
-Faces = NDArray[np.int64]
 
 
-def loop(points: Points, faces: Faces, levels: int) -> tuple[Points, Faces, Points]:
+def loop(points: Floats, faces: Integers, levels: int) -> tuple[Floats, Integers, Floats]:
     """Subdivide `levels` times; return limit points (n, 3), faces (m, 3) and limit normals (n, 3).
 
     Raises SceneError for a mesh in which an edge has more than two triangles, or that gets too big.
@@ -34,7 +33,7 @@ def loop(points: Points, faces: Faces, levels: int) -> tuple[Points, Faces, Poin
 class _Edges:
     """The edges of a mesh: their ends (e, 2), the vertices across, and which are borders."""
 
-    def __init__(self, faces: Faces, count: int):
+    def __init__(self, faces: Integers, count: int):
         halves = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
         across = np.concatenate([faces[:, 2], faces[:, 0], faces[:, 1]])
         low, high = halves.min(axis=1), halves.max(axis=1)
@@ -54,7 +53,7 @@ class _Edges:
         self.on_border = np.zeros(count, bool)
         self.on_border[self.ends[self.border].reshape(-1)] = True
 
-    def ring(self, points: Points, borders: bool = False) -> Points:
+    def ring(self, points: Floats, borders: bool = False) -> Floats:
         """The sum of each vertex's neighbours, or of those along the border."""
         ends = self.ends[self.border] if borders else self.ends
         total = np.zeros((self.count, points.shape[1]))
@@ -70,7 +69,7 @@ def _beta(valence: Any) -> Any:
     return np.where(valence == 3, 3.0 / 16.0, 3.0 / (8.0 * np.maximum(valence, 1)))
 
 
-def _finer(points: Points, faces: Faces) -> tuple[Points, Faces]:
+def _finer(points: Floats, faces: Integers) -> tuple[Floats, Integers]:
     edges = _Edges(faces, len(points))
     beta = _beta(edges.valence)[:, None]
     inside = (1.0 - edges.valence[:, None] * beta) * points + beta * edges.ring(points)
@@ -87,7 +86,7 @@ def _finer(points: Points, faces: Faces) -> tuple[Points, Faces]:
     return np.concatenate([even, odd]), finer.reshape(-1, 3)
 
 
-def _limit(points: Points, edges: _Edges) -> Points:
+def _limit(points: Floats, edges: _Edges) -> Floats:
     """Return the limit positions of vertices."""
     gamma = 1.0 / (edges.valence + 3.0 / (8.0 * _beta(edges.valence)))
     gamma = gamma[:, None]
@@ -96,7 +95,7 @@ def _limit(points: Points, edges: _Edges) -> Points:
     return np.where(edges.on_border[:, None], border, inside)
 
 
-def _normals(points: Points, faces: Faces, edges: _Edges) -> Points:
+def _normals(points: Floats, faces: Integers, edges: _Edges) -> Floats:
     """Limit normals: the product of two tangents from the ring around each vertex."""
     start, onward = _rings(faces, edges)
     s, t = np.zeros_like(points), np.zeros_like(points)
@@ -118,7 +117,7 @@ def _normals(points: Points, faces: Faces, edges: _Edges) -> Points:
     return normals / np.where(length > 0.0, length, 1.0)
 
 
-def _rings(faces: Faces, edges: _Edges) -> tuple[NDArray[np.int64], Any]:
+def _rings(faces: Integers, edges: _Edges) -> tuple[NDArray[np.int64], Any]:
     """A neighbour (n,) that each vertex's ring begins with, and how to go on from there."""
     vertex = faces.reshape(-1)
     after, before = np.roll(faces, -1, axis=1).reshape(-1), np.roll(faces, 1, axis=1).reshape(-1)
@@ -138,7 +137,7 @@ def _rings(faces: Faces, edges: _Edges) -> tuple[NDArray[np.int64], Any]:
     return start, onward
 
 
-def _tangent_weights(edges: _Edges, position: int) -> tuple[Points, Points]:
+def _tangent_weights(edges: _Edges, position: int) -> tuple[Floats, Floats]:
     """Weights (n,) of the neighbour at a position of its vertex's ring, for two tangents."""
     n = edges.valence
     angle = 2.0 * np.pi * position / np.maximum(n, 1)
@@ -156,7 +155,7 @@ def _tangent_weights(edges: _Edges, position: int) -> tuple[Points, Points]:
     )
 
 
-def _flat_normals(points: Points, faces: Faces) -> Points:
+def _flat_normals(points: Floats, faces: Integers) -> Floats:
     """The sum of the normals of the triangles around each vertex, weighted by area."""
     a, b, c = (points[faces[:, i]] for i in range(3))
     flat = np.cross(b - a, c - a)

@@ -8,16 +8,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from clpt.arrays import Floats
 from clpt.spectra.air import DEPOLARISED, EARTH, densities
-
-Floats = NDArray[np.float64]
 
 TOP = EARTH + 100.0  # beyond, there is nothing
 NODES = 32  # of a column to the top
 
 
 def to_top(radius: Floats, cosine: Floats) -> Floats:
-    """How far the top is from points at a radius along rays with a cosine to the vertical [km]."""
+    """Return the way to the top [km] of rays from a radius, with a cosine to the vertical."""
     square = np.maximum(TOP**2 - radius**2 * (1.0 - cosine**2), 0.0)
     return np.maximum(np.sqrt(square) - radius * cosine, 0.0)
 

@@ -10,13 +10,12 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from clpt.arrays import Floats
 from clpt.scene.lights import Sky
 from clpt.sky import atmosphere, skylight
 from clpt.spectra.air import EARTH, LAMBDAS, SUNLIGHT, Atmosphere
-
-Floats = NDArray[np.float64]
 
 ROWS, COLUMNS = 48, 96  # of cells from the horizon to the zenith, or to the nadir; around
 SUN_ROWS, SUN_COLUMNS = 24, 12  # SKY_SUN_ROWS, SKY_SUN_COLUMNS

@@ -14,11 +14,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Floats
 from clpt.sky import atmosphere
 from clpt.sky.atmosphere import TOP
 from clpt.spectra.air import DEPOLARISED, EARTH, LAMBDAS, Atmosphere, densities
-
-Floats = NDArray[np.float64]
 
 DEGREE = 5  # of the harmonics
 HEIGHTS = np.array([0, 0.5, 1.5, 3, 6, 10, 16, 23, 32, 45, 60, 99.0])  # [km]
@@ -148,8 +147,11 @@ DEGREES = np.array([n for n in range(DEGREE + 1) for _ in range(n + 1)])  # of e
 
 
 class Places(NamedTuple):
-    """What the points of rays see: height [km], cosine of the sun to the vertical, the ray's own
-    and of its turn from the sun, and of the ray to the sun, each (m,)."""
+    """Points on rays, each value (m,).
+
+    height [km]; cosines: sun and mu, of the sun and of the ray to the vertical; turn: of the ray's
+    azimuth from the sun's; angle: of the ray to the sun.
+    """
 
     height: Floats
     sun: Floats
@@ -159,7 +161,7 @@ class Places(NamedTuple):
 
 
 def places(radius: Floats, sun: Floats, mu: Floats, turn: Floats, t: Floats) -> Places:
-    """Of points (m,): of their ray's start radius, sun and direction, at a distance t."""
+    """Return points (m,) at a distance t, from their rays' start radius, sun and direction."""
     across, side = np.sqrt(1.0 - np.minimum(mu * mu, 1.0)), np.sqrt(1.0 - np.minimum(sun * sun, 1))
     angle = np.clip(mu * sun + across * side * turn, -1.0, 1.0)
     r, own = _along(radius, mu, t)
@@ -192,9 +194,10 @@ def _add(out: Floats, ray: NDArray[np.int64], values: Floats) -> None:
 
 
 class Plan(NamedTuple):
-    """How some points on rays see a field, all float32: the cells' corners and their shares, 4 of
-    (m,); harmonics: those that count; look (m, 1, harmonics): by a phase function; weights (m, n):
-    what reaches a ray's start.
+    """A plan by which points on rays read a field of light, float32.
+
+    corners, shares: of the cells around the points, 4 of (m,); harmonics: those that count; look
+    (m, 1, harmonics): by a phase function; weights (m, n): the share that reaches a ray's start.
     """
 
     ray: NDArray[np.int64]
@@ -206,7 +209,7 @@ class Plan(NamedTuple):
 
 
 def plans(a: Air, angles: Floats, way: Rays, at: Places) -> list[Plan]:
-    """How points on rays see a field of sun angles: by the air, and low down by haze."""
+    """Return plans by which points on rays read a field of sun angles: for air, then for haze."""
     dense = densities(at.height)[:2] * way.weight
     h, x = _between(HEIGHTS, at.height)
     s, y = _between(angles, np.arccos(at.sun))

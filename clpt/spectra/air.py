@@ -11,11 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from clpt.arrays import Floats
 from clpt.spectra.data import table
-
-Floats = NDArray[np.float64]
 
 EARTH = 6371.0  # radius [km]
 AEROSOL_HEIGHT = 1.2  # in which its density falls to 1/e [km]

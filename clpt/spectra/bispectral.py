@@ -6,15 +6,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from clpt import text as text_files
+from clpt.arrays import Floats
 from clpt.errors import SceneError
 from clpt.spectra.files import fields_of
 from clpt.spectra.reradiation import Donaldson
 from clpt.spectra.spectrum import Tabulated, _floats
-
-Values = NDArray[np.float64]
 
 NOISE = 2.0  # standard deviations below which a measured value counts as none
 QUIET = 40.0  # [nm] on the short side of what excites it, where nothing can be but noise
@@ -59,7 +57,7 @@ def read_reradiation(path: str | Path) -> Donaldson:
     return _donaldson(path, [row[0] for row in table], into, [row[1:] for row in table])
 
 
-def _matrix(path: str | Path) -> tuple[Values, Values, Values]:
+def _matrix(path: str | Path) -> tuple[Floats, Floats, Floats]:
     """The wavelengths of the rows and of the columns, and the values, of a BFC file."""
     lines = _lines(path)
     start = next((i for i, (_, f) in enumerate(lines) if f[0].lower().startswith("r:c")), None)

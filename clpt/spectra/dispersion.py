@@ -6,12 +6,10 @@ Formulas: M. N. Polyanskiy, Dispersion formulas (refractiveindex.info/database/d
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from clpt.arrays import Floats
 from clpt.errors import SceneError
 from clpt.spectra.spectrum import Cauchy, Sellmeier, Spectrum, Tabulated
-
-Array = NDArray[np.float64]
 
 MICROMETRE = 1000.0  # [nm]
 POINTS = 2001  # at which a formula without a class of its own is tabulated
@@ -44,7 +42,7 @@ def from_formula(name: str, coefficients: list[float], ends: list[float]) -> Spe
     return Tabulated(um * MICROMETRE, _index(number, c, pairs, um), "hold")
 
 
-def _index(number: int, c: list[float], pairs: list[tuple[float, float]], um: Array) -> Array:
+def _index(number: int, c: list[float], pairs: list[tuple[float, float]], um: Floats) -> Floats:
     """Index by the formulas 3 to 9 at wavelengths [um]; zero where a square is negative."""
     l2 = um**2
     if number == 5:
@@ -67,7 +65,7 @@ def _index(number: int, c: list[float], pairs: list[tuple[float, float]], um: Ar
     return np.sqrt(np.maximum(squared, 0.0))
 
 
-def _fourth(c: list[float], um: Array) -> Array:
+def _fourth(c: list[float], um: Floats) -> Floats:
     total = c[0] + c[1] * um ** c[2] / (um**2 - c[3] ** c[4])
     total = total + c[5] * um ** c[6] / (um**2 - c[7] ** c[8])
     return sum((b * um**p for b, p in zip(c[9::2], c[10::2], strict=False)), total)

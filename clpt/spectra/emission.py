@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from clpt.arrays import Floats
 from clpt.errors import SceneError, UnknownKindError
 from clpt.spectra import cie, data
-from clpt.spectra.spectrum import Constant, Samples, Spectrum, with_luminance_one
+from clpt.spectra.spectrum import Constant, Spectrum, with_luminance_one
 
 # CODATA 2018, exact: Planck [J s], light [m/s], Boltzmann [J/K].
 PLANCK, LIGHT, BOLTZMANN = 6.62607015e-34, 299792458.0, 1.380649e-23
@@ -38,7 +39,7 @@ class Blackbody(Spectrum):
         if self.normalised and not planck(cie.GRID, self.kelvin).max() > 1e-30:
             raise SceneError(f"a black body of {self.kelvin} K is dark and cannot be normalised")
 
-    def sample(self, lambdas: ArrayLike) -> Samples:
+    def sample(self, lambdas: ArrayLike) -> Floats:
         values = self.scale * planck(lambdas, self.kelvin)
         if not self.normalised:
             return values
@@ -82,12 +83,12 @@ class Lines(Spectrum):
             raise SceneError(f"the width of lines is a whole number of nm, not {self.width:g}")
 
     @property
-    def knots(self) -> tuple[Samples, Samples]:
+    def knots(self) -> tuple[Floats, Floats]:
         """The feet and the tops of its lines."""
         at = np.unique(np.add.outer(self.wavelengths, [-self.width, 0.0, self.width]))
         return at, self.sample(at)
 
-    def sample(self, lambdas: ArrayLike) -> Samples:
+    def sample(self, lambdas: ArrayLike) -> Floats:
         off = np.abs(np.asarray(lambdas, np.float64)[..., None] - np.array(self.wavelengths))
         shape = np.maximum(1.0 - off / self.width, 0.0) / self.width
         return self.scale * (shape * np.array(self.powers)).sum(axis=-1)
@@ -110,7 +111,7 @@ class LED(Spectrum):
             raise SceneError(f"an LED's peak and width must be positive: {self.peak}, {self.width}")
         _check_scale(self.scale)
 
-    def sample(self, lambdas: ArrayLike) -> Samples:
+    def sample(self, lambdas: ArrayLike) -> Floats:
         g = np.exp(-(((np.asarray(lambdas, np.float64) - self.peak) / self.width) ** 2))
         return self.scale * (g + 2.0 * g**5) / 3.0
 
@@ -127,11 +128,11 @@ class Illuminant(Spectrum):
             raise UnknownKindError("illuminant", self.name, illuminants())
         _check_scale(self.scale)
 
-    def sample(self, lambdas: ArrayLike) -> Samples:
+    def sample(self, lambdas: ArrayLike) -> Floats:
         return self.scale * _of_luminance_one(self.name).sample(lambdas)
 
     @property
-    def knots(self) -> tuple[Samples, Samples] | None:
+    def knots(self) -> tuple[Floats, Floats] | None:
         """Wavelengths and values of the table or the lines that the illuminant stands for."""
         known = _of_luminance_one(self.name).knots
         return None if known is None else (known[0], self.scale * known[1])
@@ -173,7 +174,7 @@ def _check_scale(scale: float) -> None:
         raise SceneError(f"a lamp's scale cannot be {scale:g}")
 
 
-def planck(lambdas: ArrayLike, kelvin: ArrayLike) -> Samples:
+def planck(lambdas: ArrayLike, kelvin: ArrayLike) -> Floats:
     """Radiance [W m^-2 sr^-1 nm^-1] of a black body at wavelengths [nm]."""
     metres = np.asarray(lambdas, np.float64) * 1e-9
     exponent = PLANCK * LIGHT / (metres * BOLTZMANN * np.asarray(kelvin, np.float64))

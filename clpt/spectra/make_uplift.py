@@ -9,20 +9,18 @@ that colour, by damped Gauss-Newton steps on the difference in CIELAB (Jakob and
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from clpt.arrays import Floats
 from clpt.spectra import cie
 from clpt.spectra.data import ROOT
 from clpt.spectra.spectrum import d65
 from clpt.spectra.upsampling import NODES, QUANTUM, node_colours, shrinkage, to_unit
 
-Array = NDArray[np.float64]
-
 STEP = 2  # [nm] of the quadrature; at 5 nm it alone costs 0.2 in Delta E for steep spectra
 ITERATIONS = 10  # a layer, from its neighbour's solution
 
 
-def hat_weights() -> tuple[Array, Array]:
+def hat_weights() -> tuple[Floats, Floats]:
     """Unit coordinates (m,) and XYZ weights (m, 3) of reflectances given every STEP nm."""
     coarse = cie.GRID[::STEP]
     hats = np.array([np.interp(cie.GRID, coarse, row) for row in np.eye(coarse.size)])
@@ -31,7 +29,7 @@ def hat_weights() -> tuple[Array, Array]:
     )
 
 
-def lab(xyz: Array) -> tuple[Array, Array]:
+def lab(xyz: Floats) -> tuple[Floats, Floats]:
     """CIELAB under D65 of XYZ (n, 3), and its Jacobian (n, 3, 3)."""
     relative = np.maximum(xyz / cie.D65_WHITE, 0.0)
     dark = relative < (6.0 / 29.0) ** 3
@@ -43,14 +41,14 @@ def lab(xyz: Array) -> tuple[Array, Array]:
     return f @ mix.T - [16.0, 0.0, 0.0], mix * df[:, None, :]
 
 
-def gauss_newton(rgb: Array, start: Array, iterations: int) -> Array:
+def gauss_newton(rgb: Floats, start: Floats, iterations: int) -> Floats:
     """Coefficients (n, 3) over the unit coordinate, improved from `start`, for colours (n, 3)."""
     unit, weights = hat_weights()
     powers = unit[:, None] ** [2, 1, 0]
     slopes = np.concatenate([weights * powers[:, j : j + 1] for j in range(3)], axis=1)
     target = lab(cie.rgb_to_xyz(rgb))[0]
 
-    def cost_at(c: Array) -> tuple[Array, Array, Array]:
+    def cost_at(c: Floats) -> tuple[Floats, Floats, Floats]:
         x = c @ powers.T
         inverse = 1.0 / np.sqrt(1.0 + x * x)
         error, jacobian = lab((0.5 + 0.5 * x * inverse) @ weights)
@@ -74,7 +72,7 @@ def gauss_newton(rgb: Array, start: Array, iterations: int) -> Array:
     return c
 
 
-def fit() -> Array:
+def fit() -> Floats:
     """Coefficients (3, NODES, NODES, NODES, 3) at `node_colours()`, from the middle layers out."""
     colours = node_colours()
     table = np.zeros(colours.shape)

@@ -16,11 +16,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from clpt.arrays import Matrix
 from clpt.errors import SceneError
 from clpt.spectra import cie
 from clpt.spectra.spectrum import Spectrum, Tabulated, d65, extremes, gridded
-
-Matrix = NDArray[np.float64]
 
 STEP = 5.0  # [nm] between the wavelengths at which a matrix is tabulated
 GRID = np.arange(250.0, 900.0 + STEP, STEP)  # [nm], those of a Fluorophore

@@ -12,13 +12,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from clpt.arrays import Matrix
 from clpt.errors import SceneError, UnknownKindError
 from clpt.spectra import cie, data, files, upsampling
 from clpt.spectra.spectrum import Spectrum, Tabulated, d65
 
-Matrix = NDArray[np.float64]
 Rows = tuple[tuple[float, ...], ...]
 
 OBSERVERS = {f"cie{year}": year for year in cie.OBSERVERS}

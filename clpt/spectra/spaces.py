@@ -7,13 +7,13 @@ Y = 1. Spaces whose white is D65 take it as tabulated, so that grey under D65 st
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from clpt.arrays import Matrix
 from clpt.errors import SceneError, UnknownKindError
 from clpt.spectra import cie
 from clpt.spectra.emission import Blackbody
 
-Matrix = NDArray[np.float64]
 Chromaticities = tuple[tuple[float, float], ...]
 
 D60_ACES = (0.32168, 0.33767)  # the white of ACES (SMPTE ST 2065-1), near D60

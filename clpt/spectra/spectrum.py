@@ -16,12 +16,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from clpt.arrays import Floats
 from clpt.errors import SceneError
 from clpt.spectra import cie, data, upsampling
 
 Role = Literal["reflectance", "unbounded", "emission"]
 Outside = Literal["zero", "hold"]
-Samples = NDArray[np.float64]
 
 SHORTEST, LONGEST = 200.0, 2000.0  # [nm], the ends of the widest range that a film can have
 WIDEST = np.arange(SHORTEST, LONGEST + 0.5)  # that range, whole nanometres
@@ -31,11 +31,11 @@ class Spectrum(ABC):
     """A function of the wavelength."""
 
     @abstractmethod
-    def sample(self, lambdas: ArrayLike) -> Samples:
+    def sample(self, lambdas: ArrayLike) -> Floats:
         """Values at `lambdas` [nm], of the same shape, float64."""
 
     @property
-    def knots(self) -> tuple[Samples, Samples] | None:
+    def knots(self) -> tuple[Floats, Floats] | None:
         """Wavelengths [nm] and values (n,) of a spectrum that is linear between them; else None.
 
         The wavelengths ascend; where one stands twice is a step. The first and the last value hold
@@ -43,7 +43,7 @@ class Spectrum(ABC):
         """
         return None
 
-    def to_rgb(self, role: Role = "reflectance") -> Samples:
+    def to_rgb(self, role: Role = "reflectance") -> Floats:
         """Linear Rec.709 stand-in (3,) float64 for the given role; never negative."""
         values = gridded(self, cie.GRID)
         if role == "emission":
@@ -58,10 +58,10 @@ class Constant(Spectrum):
 
     value: float
 
-    def sample(self, lambdas: ArrayLike) -> Samples:
+    def sample(self, lambdas: ArrayLike) -> Floats:
         return np.full(np.shape(lambdas), self.value, np.float64)
 
-    def to_rgb(self, role: Role = "reflectance") -> Samples:
+    def to_rgb(self, role: Role = "reflectance") -> Floats:
         """(value, value, value), but as emission the colour of the equal-energy spectrum."""
         return super().to_rgb(role) if role == "emission" else np.full(3, float(self.value))
 
@@ -96,14 +96,14 @@ class Tabulated(Spectrum):
             raise SceneError(f"outside its points a spectrum is zero or holds, not {outside!r}")
 
     @property
-    def knots(self) -> tuple[Samples, Samples]:
+    def knots(self) -> tuple[Floats, Floats]:
         """Its points, and a step at each end if it is zero outside."""
         lambdas, values = np.array(self.lambdas), np.array(self.values)
         if self.outside == "hold":
             return lambdas, values
         return np.pad(lambdas, 1, "edge"), np.pad(values, 1)
 
-    def sample(self, lambdas: ArrayLike) -> Samples:
+    def sample(self, lambdas: ArrayLike) -> Floats:
         end = 0.0 if self.outside == "zero" else None
         lambdas = np.asarray(lambdas, np.float64)
         return np.asarray(np.interp(lambdas, self.lambdas, self.values, end, end))
@@ -117,7 +117,7 @@ class _Colour(Spectrum):
     g: float
     b: float
 
-    def to_rgb(self, role: Role = "reflectance") -> Samples:
+    def to_rgb(self, role: Role = "reflectance") -> Floats:
         """The colour itself, whatever the role."""
         return np.array([self.r, self.g, self.b], np.float64)
 
@@ -126,7 +126,7 @@ class _Colour(Spectrum):
 class RGB(_Colour):
     """A reflectance in [0, 1] (clipped), made a smooth spectrum by `uplift`."""
 
-    def sample(self, lambdas: ArrayLike) -> Samples:
+    def sample(self, lambdas: ArrayLike) -> Floats:
         return upsampling.evaluate(upsampling.uplift(self.to_rgb()), lambdas)
 
 
@@ -134,7 +134,7 @@ class RGB(_Colour):
 class RGBUnbounded(_Colour):
     """A colour that may exceed 1, such as an index or an extinction coefficient."""
 
-    def sample(self, lambdas: ArrayLike) -> Samples:
+    def sample(self, lambdas: ArrayLike) -> Floats:
         scale, coefficients = upsampling.unbounded(self.to_rgb())
         return scale * upsampling.evaluate(coefficients, lambdas)
 
@@ -143,7 +143,7 @@ class RGBUnbounded(_Colour):
 class RGBIlluminant(RGBUnbounded):
     """Emission of that colour: an unbounded spectrum times D65, (1, 1, 1) having luminance 1."""
 
-    def sample(self, lambdas: ArrayLike) -> Samples:
+    def sample(self, lambdas: ArrayLike) -> Floats:
         return super().sample(lambdas) * d65().sample(lambdas)
 
 
@@ -163,7 +163,7 @@ class Sellmeier(Spectrum):
                 f"Sellmeier's formula needs as many b as c, found {len(self.b)} and {len(self.c)}"
             )
 
-    def sample(self, lambdas: ArrayLike) -> Samples:
+    def sample(self, lambdas: ArrayLike) -> Floats:
         squared = (np.asarray(lambdas, np.float64)[..., None] * 1e-3) ** 2
         terms = np.array(self.b) * squared / (squared - np.array(self.c))
         # Beyond a resonance the formula turns negative; there is no glass to describe there.
@@ -178,7 +178,7 @@ class Cauchy(Spectrum):
     b: float = 0.0
     c: float = 0.0
 
-    def sample(self, lambdas: ArrayLike) -> Samples:
+    def sample(self, lambdas: ArrayLike) -> Floats:
         inverse = (np.asarray(lambdas, np.float64) * 1e-3) ** -2.0
         return self.a + (self.b + self.c * inverse) * inverse
 
@@ -243,7 +243,7 @@ def primaries() -> tuple[Tabulated, Tabulated, Tabulated]:
     return red, green, blue
 
 
-def with_luminance_one(rows: Samples) -> Tabulated:
+def with_luminance_one(rows: Floats) -> Tabulated:
     """Emission from (wavelength [nm], relative power) rows (n, 2), scaled to luminance 1."""
     on_observer = np.interp(cie.GRID, rows[:, 0], rows[:, 1], 0.0, 0.0)
     return Tabulated(rows[:, 0], rows[:, 1] / cie.spectrum_to_xyz(on_observer)[1])
@@ -261,7 +261,7 @@ def on_grid(spectrum: Spectrum, lo: float, hi: float, step: float = 1.0) -> NDAr
     return gridded(spectrum, grid).astype(np.float32)
 
 
-def gridded(spectrum: Spectrum, grid: Samples) -> Samples:
+def gridded(spectrum: Spectrum, grid: Floats) -> Floats:
     """The spectrum at the nodes of an even grid (n,) [nm], float64; linear between, it keeps power.
 
     A spectrum of `knots` that are not all nodes is averaged around each node, see `hat_means`:
@@ -277,7 +277,7 @@ def gridded(spectrum: Spectrum, grid: Samples) -> Samples:
     return hat_means(at, values, grid)
 
 
-def hat_means(at: Samples, values: Samples, grid: Samples) -> Samples:
+def hat_means(at: Floats, values: Floats, grid: Floats) -> Floats:
     """Means around the nodes of an even grid (n,), of what is linear between the points `at` (m,).
 
     Weights fall linearly to 0 at the next nodes ("hats"). So the integral of what is linear between

@@ -17,9 +17,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from clpt.arrays import Floats
 from clpt.spectra.data import ROOT
-
-Array = NDArray[np.float64]
 
 NODES = 40
 QUANTUM = 1.0 / 2048.0  # of the table's values, which are stored as differences along each axis
@@ -29,30 +28,30 @@ EDGE = 1e-4  # the outermost layers, in place of black and white
 CHUNK = 1 << 15  # colours at a time, so that the gathered corners stay in the cache
 
 
-def to_unit(lambdas: ArrayLike) -> Array:
+def to_unit(lambdas: ArrayLike) -> Floats:
     """Wavelengths [nm] to the coordinate of the fit, [-1, 1] over 360 to 830 nm."""
     return (np.asarray(lambdas, np.float64) - CENTRE) / HALF_WIDTH
 
 
-def shrinkage(rgb: ArrayLike) -> Array:
+def shrinkage(rgb: ArrayLike) -> Floats:
     """sqrt(m (1 - m)) for the mean m of the components (..., 3); a grey has x = (m - 1/2) / it."""
     r, g, b = np.moveaxis(np.asarray(rgb, np.float64), -1, 0)
     mean = np.clip((r + g + b) / 3.0, DARKEST, 1.0 - DARKEST)
     return np.sqrt(mean * (1.0 - mean))
 
 
-def node_values() -> Array:
+def node_values() -> Floats:
     """Values of the largest component at the layers (NODES,), dense near white and near black."""
     x = _smoothstep(np.linspace(0.0, 1.0, NODES) ** 1.1)
     return np.clip(0.3 * x + 0.7 * _smoothstep(x), EDGE, 1.0 - EDGE)
 
 
-def node_ratios() -> Array:
+def node_ratios() -> Floats:
     """Ratios of the other components (NODES,), dense near saturated colours and greys."""
     return _smoothstep(np.linspace(0.0, 1.0, NODES)) ** 1.3
 
 
-def node_colours() -> Array:
+def node_colours() -> Floats:
     """The colours fitted (3, NODES, NODES, NODES, 3): [largest, its value, ratio, ratio, rgb]."""
     value, first, second = np.meshgrid(node_values(), node_ratios(), node_ratios(), indexing="ij")
     shape = np.stack([value, value * first, value * second], axis=-1)
@@ -96,7 +95,7 @@ def unbounded(rgb: ArrayLike) -> tuple[NDArray[np.float32], NDArray[np.float32]]
     return scale.reshape(colours.shape[:-1]), coefficients.reshape(colours.shape)
 
 
-def evaluate(coefficients: ArrayLike, lambdas: ArrayLike) -> Array:
+def evaluate(coefficients: ArrayLike, lambdas: ArrayLike) -> Floats:
     """Reflectances of coefficients (..., 3) at `lambdas` [nm], float64 in [0, 1].
 
     Their shape is that of the colours and then that of the wavelengths, which may be one number.
@@ -117,7 +116,7 @@ def _table() -> NDArray[np.float32]:
     return np.ascontiguousarray(steps.reshape(3, -1).T) * np.float32(QUANTUM)
 
 
-def _smoothstep(x: Array) -> Array:
+def _smoothstep(x: Floats) -> Floats:
     return x * x * (3.0 - 2.0 * x)
 
 
@@ -131,7 +130,7 @@ def _half_table() -> NDArray[np.float32]:
     return np.ascontiguousarray((low + t * (high - low)).reshape(-1, 3))
 
 
-def _look_up(rgb: Array, *, half: bool = False) -> Array:
+def _look_up(rgb: Floats, *, half: bool = False) -> Floats:
     """Coefficients (n, 3) of colours (n, 3); `half`: the largest component of each is 1/2 or 0."""
     r, g, b = rgb.T
     largest = np.where((b > r) & (b > g), 2, (g > r).astype(np.int64))

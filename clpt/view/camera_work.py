@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from clpt.arrays import Floats
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera, Perspective, ThinLens
 from clpt.scene.params import params
@@ -32,8 +33,8 @@ class CameraWork:
     scene: Scene
     _first: Scene
     _loop: RenderLoop
-    _pivot: navigation.Vector
-    _up: navigation.Vector
+    _pivot: Floats
+    _up: Floats
     _aimed: bool  # the pivot lies on a surface
 
     def post(self, request: Request, reply: Reply) -> None: ...

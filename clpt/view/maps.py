@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import images
+from clpt.arrays import Bytes, Image
 from clpt.render.film.layer_preview import viewable
 from clpt.scene.layers import LAYERS
 
@@ -26,9 +27,6 @@ LEAST_ERROR, MOST_ERROR = 0.001, 1.0  # relative, the ends of the scale
 WINDOW = 9  # pixels of a side: over so many differences the error is a mean, by a tent
 DARK = 0.01  # of the picture's mean: what is darker counts as if it were as bright
 
-Film = NDArray[np.float32]
-Bytes = NDArray[np.uint8]
-
 
 @dataclass(frozen=True)
 class Legend:
@@ -44,7 +42,7 @@ def layer(name: str, values: NDArray[np.float32]) -> Bytes:
     return images.to_srgb8(viewable(name, values))
 
 
-def samples(film: Film) -> tuple[Bytes, Legend]:
+def samples(film: Image) -> tuple[Bytes, Legend]:
     """Return a map of the samples of each pixel, (h, w, 3) uint8."""
     count = film[..., 3]
     low, high = float(count.min()), max(float(count.max()), 1.0)
@@ -60,17 +58,17 @@ class ErrorMap:
     """
 
     def __init__(self) -> None:
-        self._films: list[Film] = []  # two at most, the newer one with twice as many samples
+        self._films: list[Image] = []  # two at most, the newer one with twice as many samples
 
     def wants(self, samples: float) -> bool:
         """Return whether the film of so many samples is to be noted."""
         return not self._films or samples >= 2.0 * float(self._films[-1][..., 3].mean())
 
-    def note(self, film: Film) -> None:
+    def note(self, film: Image) -> None:
         """Note a film (h, w, 4), to compare later ones with."""
         self._films = [*self._films[-1:], film]
 
-    def of(self, film: Film) -> NDArray[np.float64] | None:
+    def of(self, film: Image) -> NDArray[np.float64] | None:
         """Return the relative standard error of each pixel (h, w); None before there are films.
 
         It is a mean over the pixels around it, whose brightness it is relative to.
@@ -92,7 +90,7 @@ class ErrorMap:
         level = _around(brightness) + DARK * brightness.mean()
         return np.sqrt(variance) / np.maximum(level, 1e-30)
 
-    def shown(self, film: Film) -> tuple[Bytes, Legend] | None:
+    def shown(self, film: Image) -> tuple[Bytes, Legend] | None:
         """Return the error as colours on a logarithmic scale, (h, w, 3) uint8."""
         error = self.of(film)
         if error is None:

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
+from clpt.arrays import Floats
 from clpt.scene.cameras import Camera, Matrix, Orthographic, Perspective
-
-Vector = NDArray[np.float64]
 
 FARTHEST = 1e12  # [m] from the origin, as of vertices
 POLE = math.radians(2.0)  # nearest to the pole that a turn ends
@@ -23,10 +22,10 @@ _EYE_TO_CAMERA = np.diag([-1.0, 1.0, -1.0, 1.0])  # OpenGL's eye space looks alo
 class Pose:
     """Where a camera is: a point, and unit vectors (3,) to its left, up and forward."""
 
-    origin: Vector
-    left: Vector
-    up: Vector
-    forward: Vector
+    origin: Floats
+    left: Floats
+    up: Floats
+    forward: Floats
 
 
 def pose(camera: Camera) -> Pose:
@@ -58,7 +57,7 @@ def moved(camera: Camera, motion: NDArray[np.float64]) -> Camera:
     return dataclasses.replace(camera, to_world=motion @ np.asarray(camera.to_world, float))
 
 
-def upright(camera: Camera) -> Vector:
+def upright(camera: Camera) -> Floats:
     """Return the axis of the world that is nearest to the camera's own up, (3,)."""
     up = pose(camera).up
     axis = int(np.argmax(np.abs(up)))
@@ -79,14 +78,14 @@ def half_height(camera: Camera, aspect: float) -> float:
     return 1.0
 
 
-def orbit(camera: Camera, pivot: Vector, up: Vector, dx: float, dy: float) -> Camera:
+def orbit(camera: Camera, pivot: Floats, up: Floats, dx: float, dy: float) -> Camera:
     """Turn about a point by a drag of (dx, dy) heights of the picture, half a turn each."""
     turn = _turn(pose(camera), up, math.pi * dx, -math.pi * dy)
     around = transforms.translate(pivot) @ turn @ transforms.translate(-pivot)
     return moved(camera, around)
 
 
-def look(camera: Camera, up: Vector, dx: float, dy: float, aspect: float) -> Camera:
+def look(camera: Camera, up: Floats, dx: float, dy: float, aspect: float) -> Camera:
     """Turn the head so that the picture follows a drag of (dx, dy) heights of it."""
     at = pose(camera)
     angle = 2.0 * math.atan(min(half_height(camera, aspect), 1.0))
@@ -101,7 +100,7 @@ def pan(camera: Camera, distance: float, dx: float, dy: float, aspect: float) ->
     return moved(camera, transforms.translate(step * (dx * at.left + dy * at.up)))
 
 
-def dolly(camera: Camera, pivot: Vector, by: float) -> Camera:
+def dolly(camera: Camera, pivot: Floats, by: float) -> Camera:
     """Come nearer to a point: the distance falls by the factor e^by; rays that are parallel meet
     a part of the scene that is smaller by it."""
     if isinstance(camera, Orthographic):
@@ -119,7 +118,7 @@ def fly(camera: Camera, distance: float, right: float, up: float, forward: float
     return moved(camera, transforms.translate(distance * step))
 
 
-def _turn(at: Pose, up: Vector, azimuth: float, elevation: float) -> NDArray[np.float64]:
+def _turn(at: Pose, up: Floats, azimuth: float, elevation: float) -> NDArray[np.float64]:
     """Return the turn about `up`, then about the camera's side, which stops before the pole."""
     height = math.asin(float(np.clip(np.dot(at.forward, up), -1.0, 1.0)))
     limit = math.pi / 2.0 - POLE
@@ -130,5 +129,5 @@ def _turn(at: Pose, up: Vector, azimuth: float, elevation: float) -> NDArray[np.
     return transforms.rotate(up, -math.degrees(azimuth)) @ sideways
 
 
-def _unit(vector: Vector) -> Vector:
+def _unit(vector: Floats) -> Floats:
     return vector / np.linalg.norm(vector)

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from clpt import images
 from clpt.colour.view import View
-from clpt.render.film.denoised_picture import DenoisedPicture, Source
+from clpt.render.film.denoised_picture import DenoisedPicture
+from clpt.render.film.pictures import Pictures
 from clpt.render.renderer import Renderer
 from clpt.view.commands import OF_VIEW, CommandError
 
@@ -59,7 +60,7 @@ def shown(renderer: Renderer, display: Display) -> NDArray[np.uint8]:
     return renderer.resolve(exposure=display.exposure, tone=display.tone).get()
 
 
-def denoised(source: Source, display: Display) -> NDArray[np.uint8]:
+def denoised(source: Pictures, display: Display) -> NDArray[np.uint8]:
     """Return a renderer's picture without most of its noise for a screen, (h, w, 3) uint8.
 
     Raises SceneError where the denoiser is not installed.

@@ -17,6 +17,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Image
 from clpt.device import Device
 from clpt.render.progress import Progress
 from clpt.render.renderer import Renderer
@@ -35,8 +36,6 @@ DIVIDERS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 128, 256)
 PASS_SECONDS = 2.0  # of a pass; and more when the render has lasted, since ends of passes are dear
 PASS_SHARE, LONGEST_PASS = 0.5, 10.0  # of the time so far, and [s]
 STATUS_SECONDS = 0.25  # between messages of progress
-
-Film = NDArray[np.float32]
 
 
 class Outlet(Protocol):
@@ -74,9 +73,9 @@ class RenderLoop:
         self.paused = False
         self.watched = True
         self.has_shown = False  # the whole picture of the present scene
-        self.kept: Film | None = None  # a picture to compare with
+        self.kept: Image | None = None  # a picture to compare with
         self.seconds = 0.0  # of rendering the whole picture
-        self._film: Film | None = None
+        self._film: Image | None = None
         self._errors = maps.ErrorMap()
         options = {"cancel_seconds": CANCEL_SECONDS, **options}
         self._make = partial(Renderer, device=device, **options)
@@ -118,7 +117,7 @@ class RenderLoop:
         self._waited = 0.0 if asked is None else time.perf_counter() - asked
 
     @property
-    def film(self) -> Film | None:
+    def film(self) -> Image | None:
         """The whole picture so far, (h, w, 4) float32 as `Renderer.film`; None if there is none."""
         if self._film is None and self.has_shown:
             self._film = self.renderer().film.get()
@@ -246,7 +245,7 @@ class RenderLoop:
                 self._rates = progress.paths / self.seconds, progress.rays / self.seconds
             if time.perf_counter() - self._told > STATUS_SECONDS:
                 self.tell(renderer)
-            if self.has_shown and isinstance(renderer, Renderer):
+            if self.has_shown and renderer.shows_meanwhile:
                 self.meanwhile()
                 if self._stale:
                     self._offer(renderer, 1)

@@ -92,11 +92,8 @@ class Target:
 
     def cancel(self, discard: bool = False) -> None:
         """Let a run end soon; discard: its picture is of no use, and may be emptied."""
-        renderer = self.renderer
-        if discard and isinstance(renderer, Renderer):
-            renderer.cancel(discard=True)
-        elif renderer is not None:
-            renderer.cancel()
+        if self.renderer is not None:
+            self.renderer.cancel(discard=discard)
 
     def close(self) -> None:
         """Give the device's memory back."""

@@ -67,10 +67,11 @@ inline TriHit binary_trace(global const float *nodes, global const float *leaves
     BinaryState s;
     binary_start(tree, &ray, hit.t, &s);
     do {
-        if (!binary_descend(tree, &ray, hit.t, &s)) continue;
-        uint begin = node_link(s.node), end = begin + node_count(s.node);
-        for (uint i = begin; i < end; i++) triangle_intersect(leaves + (ulong)i * 16, &shear, ray.tmin, &hit);
-        if (first_only && hit.prim != BVH_MISS) return hit;
+        if (binary_descend(tree, &ray, hit.t, &s)) {
+            uint begin = node_link(s.node), end = begin + node_count(s.node);
+            for (uint i = begin; i < end; i++) triangle_intersect(leaves + (ulong)i * 16, &shear, ray.tmin, &hit);
+            if (first_only && hit.prim != BVH_MISS) s.waits = 0; /* no return: see compact_end */
+        }
     } while (binary_next(tree, hit.t, &s));
     return hit;
 }

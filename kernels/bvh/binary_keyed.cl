@@ -39,7 +39,7 @@ inline TriHit binary_keyed_trace(global const float *nodes, global const float *
         }
         for (uint i = link; i < link + node_count(node); i++) {
             global const float *record = leaves + (ulong)i * count * KEYED_LEAF;
-            if (keyed_nearer(&shear, record, 12, KEYED_LEAF, share, tmin, &hit) && first_only) return hit;
+            if (keyed_nearer(&shear, record, 12, KEYED_LEAF, share, tmin, &hit) && first_only) waits = 0;
         }
     }
     return hit;

@@ -150,6 +150,13 @@ inline uint compact_item(uint2 *items)
     return items->x + bit;
 }
 
+/* Leaves nothing to visit, so that the loops end by their conditions: a return from within them parts the rays of a
+ * GPU's group, and those that go on would wait for one another no more. */
+inline void compact_end(CompactState *state, uint2 *items)
+{
+    state->group.y = state->waits = items->y = 0;
+}
+
 inline TriHit compact_hit(global const float *leaves, uint item, float t, float u, float v)
 {
     global const float *c = leaves + (ulong)item * 12;
@@ -194,14 +201,18 @@ inline int compact_occluded(global const float *nodes, global const float *leave
     Shear shear = shear_make(ox, oy, oz, dx, dy, dz);
     CompactState state;
     uint2 items;
+    int met = 0;
     compact_start(&state);
     while (compact_next(nodes, &r, tmax, &state, &items)) {
         while (items.y) {
             float at, u, v;
             uint item = compact_item(&items);
             int inside = shear_intersect(&shear, leaves + (ulong)item * 12, 1, &at, &u, &v);
-            if (inside && at > tmin && at < tmax) return 1;
+            if (inside && at > tmin && at < tmax) {
+                met = 1;
+                compact_end(&state, &items);
+            }
         }
     }
-    return 0;
+    return met;
 }

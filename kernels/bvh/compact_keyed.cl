@@ -77,7 +77,8 @@ inline TriHit compact_keyed_trace(global const float *nodes, global const float 
     while (compact_keyed_next(nodes, count, share, &r, hit.t, &state, &items)) {
         while (items.y) {
             global const float *record = leaves + (ulong)compact_item(&items) * count * KEYED_LEAF;
-            if (keyed_nearer(&shear, record, 9, KEYED_LEAF, share, tmin, &hit) && first_only) return hit;
+            int nearer = keyed_nearer(&shear, record, 9, KEYED_LEAF, share, tmin, &hit);
+            if (nearer && first_only) compact_end(&state, &items);
         }
     }
     return hit;

@@ -8,18 +8,17 @@
 #include "bvh/collapsed.cl"
 #include "bvh/items.cl"
 
-/* Slots for the children: the pair with the largest offset along a slot's diagonal first, and so on. */
-inline void compact_child_slots(global const float8 *nodes, float8 parent, const uint *children, uint found,
-                                uint slots[8])
+/* Slots for the children, four bits each, 8 beyond `found`: the pair with the largest offset along a slot's diagonal
+ * first, and so on. */
+inline uint compact_child_slots(global const float8 *nodes, float8 parent, const uint *children, uint found)
 {
     float4 middle = parent.lo + parent.hi;
-    for (uint i = 0; i < 8; i++) slots[i] = 8;
-    uint taken = 0;
+    uint slots = 0x88888888u, taken = 0;
     for (uint round = 0; round < found; round++) {
         uint child = 0, slot = 0;
         float farthest = -INFINITY;
         for (uint i = 0; i < found; i++) {
-            if (slots[i] < 8) continue;
+            if ((slots >> 4 * i & 15) < 8) continue;
             float8 box = nodes[children[i]];
             float4 offset = box.lo + box.hi - middle;
             for (uint s = 0; s < 8; s++) {
@@ -32,9 +31,10 @@ inline void compact_child_slots(global const float8 *nodes, float8 parent, const
                 }
             }
         }
-        slots[child] = slot;
+        slots ^= (8 ^ slot) << 4 * child;
         taken |= 1u << slot;
     }
+    return slots;
 }
 
 /* Nodes from `begin` on, a level; those above it are there. leaves: records of triangles, which get their
@@ -46,18 +46,18 @@ kernel NO_VECTORIZE void compact_nodes(global const float8 *restrict nodes, glob
                                        global uint *restrict leaves, global const uint *restrict tags)
 {
     if (get_global_id(0) >= count) return;
-    uint w = begin + get_global_id(0), children[8], slots[8];
+    uint w = begin + get_global_id(0), children[8]; /* no second array: see collapse_children */
     uint2 place = w ? places[w] : (uint2)(0);
-    uint found = collapse_children(nodes, costs, roots[place.x], children), mask = 0, next = 0;
-    compact_child_slots(nodes, nodes[roots[place.x]], children, found, slots);
+    uint found = collapse_children(nodes, costs, roots[place.x], children), mask = 0, inner = 0;
+    uint slots = compact_child_slots(nodes, nodes[roots[place.x]], children, found);
     global uint *node = compact + (ulong)w * COMPACT_WORDS;
-    uint numbers[8], base = firsts[place.x].x, own = 0;
-    ulong meta = 0; /* no array of bytes: NVIDIA's compiler of driver 580 put one in the place of `slots` */
+    uint base = firsts[place.x].x, own = 0;
+    ulong meta = 0;
     for (uint i = 0; i < found; i++) {
         float8 child = nodes[children[i]];
-        numbers[i] = base + next;
+        uint slot = slots >> 4 * i & 15;
         if (node_is_leaf(child)) {
-            meta |= (ulong)(own | (0xe0u >> (3 - node_count(child)) & 0xe0u)) << 8 * slots[i];
+            meta |= (ulong)(own | (0xe0u >> (3 - node_count(child)) & 0xe0u)) << 8 * slot;
             for (uint k = 0; k < node_count(child); k++, own++) {
                 uint at = place.y + own, prim = item_index(items[node_link(child) + k]);
                 if (tags) {
@@ -67,9 +67,9 @@ kernel NO_VECTORIZE void compact_nodes(global const float8 *restrict nodes, glob
                 }
             }
         } else {
-            meta |= (ulong)(0x20u | (24 + slots[i])) << 8 * slots[i];
-            mask |= 1u << slots[i];
-            next++;
+            meta |= (ulong)(0x20u | (24 + slot)) << 8 * slot;
+            mask |= 1u << slot;
+            inner |= 1u << i;
         }
     }
     node[3] = mask << 24;
@@ -81,8 +81,8 @@ kernel NO_VECTORIZE void compact_nodes(global const float8 *restrict nodes, glob
     for (uint slot = 0; slot < 8; slot++) {
         if (!(mask >> slot & 1)) continue;
         uint i = 0;
-        while (slots[i] != slot) i++;
-        places[position++] = (uint2)(numbers[i], item);
+        while ((slots >> 4 * i & 15) != slot) i++;
+        places[position++] = (uint2)(base + popcount(inner & ((1u << i) - 1)), item);
         item += node_count(nodes[children[i]]);
     }
 }

@@ -17,7 +17,7 @@ inline uint shapes_trace(global const float *nodes, global const uint *indices, 
         if (node_is_leaf(node)) {
             for (uint i = link; i < link + node_count(node); i++)
                 if (shape_intersect(table, indices[i], o, d, tmin, t)) found = indices[i];
-            if (first_only && found != BVH_MISS) return found;
+            if (first_only && found != BVH_MISS) n = 0; /* no return: see compact_end */
         } else {
             float left = ray_enter(&ray, tree[link], *t), right = ray_enter(&ray, tree[link + 1], *t);
             float near = ray_min(left, right), far = ray_max(left, right);

@@ -5,6 +5,11 @@
 #include "film/sums.cl"
 #include "path/seen_wavelengths.cl"
 #define LIGHT_PICTURE_WORDS 9
+#if LIGHT_LAYER_GROUPS /* the light that next-event estimation has chosen */
+#define light_layers_chosen(path, at, m, row) store_path_light(path, at, m, row)
+#else
+#define light_layers_chosen(path, at, m, row)
+#endif
 
 inline void light_layer_sum(Scene scene, mask m, integer pixel_index, integer picture, vec3 value,
                             global uint *light_layers)

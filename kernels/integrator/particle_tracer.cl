@@ -1,4 +1,5 @@
-/* One vertex of a path that comes from a light: it is joined to the camera, and goes on.
+/* One vertex of a path that comes from a light: it is joined to the camera, and goes on. Steps that a scene or a
+ * material does not have do nothing.
  *
  * f is asked for as radiance flows, from the light to the camera, and light that is carried takes it with the
  * geometric cosine of the side where it leaves (Veach 1997, 5.3.2): what bsdf_sample gives for the opposite flow
@@ -12,100 +13,33 @@
 #include "generated/connect.cl"
 #include "lighting/light_path.cl"
 #include "generated/rivals.cl"
+#include "generated/light_path_steps.cl"
 
 inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask active, Vertex v)
 {
-    global const Settings *settings = scene.settings;
-    Surface s = v.s;
-    Spectrum beta = v.beta, ratio = load_path_ratio(path, at);
-    integer state = v.state, depth = v.depth;
-
-    Sampler sampler = light_path_sampler(settings, load_path_pixel_index(path, at), load_path_sample(path, at));
+    Spectrum ratio = load_path_ratio(path, at);
+    integer pixel_index = load_path_pixel_index(path, at);
+    Sampler sampler = light_path_sampler(scene.settings, pixel_index, load_path_sample(path, at));
     Scattering scatter = vertex_scattering(scene, path, at, active, v, sampler);
-    Bsdf m = scatter.bsdf;
-    Frame frame = scatter.shading.frame;
-    vec3 wo = scatter.wo;
-    real arrives = 1.0f / max_r(VERTEX_COSINE(s.n, v.d), (real)(1e-6f));
-#if WEIGHS_LIGHT_PATHS && !BSDF_IS_NULL
-    Rival rival = rival_of_emission(scene, path, at, v, vertex_hemisphere(frame, wo));
-#endif
+    real arrives = 1.0f / max_r(VERTEX_COSINE(v.s.n, v.d), (real)(1e-6f));
+    Rival rival = rival_of_emission(scene, path, at, v, vertex_hemisphere(scatter.shading.frame, scatter.wo));
 
-#if !BSDF_DELTA && JOINS_CAMERA
-    /* To the camera. */
-    vec2 lens = sampler_pair(sampler, scatter.dimension + DIMENSION_LIGHT);
-    CameraPoint c = camera_connect(scene, s.p, mask_of(0), lens);
-    vec3 to = to_local(frame, neg3(c.d));
-    Spectrum f = bsdf_eval(m, to, wo);
-    mask shine = active & c.seen & (spectrum_max(f) > 0.0f);
-    real carries = VERTEX_COSINE(s.n, c.d) * arrives * c.importance * shading_frame_share(scatter.shading, neg3(v.d));
-#if WEIGHS_LIGHT_PATHS
-    carries *= 1.0f / (1.0f + rival_of_joint(scene, rival, s, c, rival_pdf(m, to, wo), rival_pdf(m, wo, to)));
-    mask hidden = mask_of(settings->hide_lights != 0) & (s.light >= 0);
-#if BSDF_IS_PHASE
-    shine = shine & (!rival.first | !rival.met);
-#else
-    shine = shine & !rival.first;
-#endif
-    shine = shine & !hidden & !rival_ends(scene, v);
-#endif
-    Spectrum value = spectrum_scale(spectrum_mul(beta, f), carries);
-    value = vertex_beyond(scene, v, neg3(c.d), c.t, v.lambdas, value);
-    connect_camera(shadow, at, active, shine, s, c, value);
-#if SHADOW_MEDIA
-#if USES_BODIES
-    store_shadow_through(shadow, at, shine, bodies_beyond(v.bodies, dot3(s.n, c.d) > 0.0f));
-#else
-    store_shadow_through(shadow, at, shine, vertex_medium(v, neg3(c.d)));
-#endif
-#endif
-    state += sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
-#endif
+    v.state += join_camera(scene, shadow, at, active, v, scatter, rival, arrives);
 
-    /* The next direction. */
     vec2 uv = sampler_pair(sampler, scatter.dimension + DIMENSION_BSDF);
-    BsdfSample bs = hero_sample(m, wo, v3(uv.x, uv.y, scatter.choice.y), &ratio);
+    BsdfSample bs = hero_sample(scatter.bsdf, scatter.wo, v3(uv.x, uv.y, scatter.choice.y), &ratio);
     mask null = vertex_is_null(bs.lobe), next = active & (bs.pdf > 0.0f) & vertex_continues(scene, v, null);
-    vec3 onward = normalize3(to_world(frame, bs.wi));
-    real leaves = VERTEX_COSINE(s.n, onward) * arrives;
-#if BSDF_IS_PHASE
-    real adjoint = 1.0f;
-#else
-    real adjoint = bs.eta * bs.eta * leaves * fabs(wo.z) / max_r(fabs(bs.wi.z), (real)(1e-6f));
-#endif
-    Spectrum carried = spectrum_scale(bs.weight, adjoint);
-#if BSDF_CHROMATIC && !BSDF_IS_PHASE /* eta differs between the wavelengths */
-    mask spread = next & ((bs.lobe & LOBE_DELTA) == 0);
-    Spectrum exact = spectrum_scale(bsdf_eval(m, bs.wi, wo), leaves / sel(spread, bs.pdf, (real)(1.0f)));
-    carried = spectrum_sel(spread, exact, carried);
-#endif
-    beta = spectrum_scale(spectrum_mul(beta, carried), shading_frame_share(scatter.shading, neg3(v.d)));
+    vec3 onward = normalize3(to_world(scatter.shading.frame, bs.wi));
+    Spectrum carried = adjoint_weight(v, scatter, bs, next, VERTEX_COSINE(v.s.n, onward) * arrives);
+    Spectrum beta = spectrum_mul(v.beta, carried);
+    beta = spectrum_scale(beta, shading_frame_share(scatter.shading, neg3(v.d)));
+    next = light_path_roulette(scene, path, at, next, null, v, scatter, &beta);
 
-#if !BSDF_IS_NULL /* Russian roulette, on what is left of what the light gave. */
-    mask play = !null & (depth >= settings->rr_depth);
-    real strength = spectrum_max(beta) * load_path_weight(path, at);
-    next = next & (strength > 0.0f);
-    if (any(next & play)) {
-        vec2 u = sampler_pair(sampler, scatter.dimension + DIMENSION_ROULETTE);
-        next = roulette(next, play, strength, u.x, &beta);
-    }
-#endif
-
-#if WEIGHS_LIGHT_PATHS && !BSDF_IS_NULL
-    next = next & !rival_ends(scene, v);
-    mask delta = (bs.lobe & LOBE_DELTA) != 0;
-    real p = rival_pdf(m, wo, bs.wi), p_back = rival_pdf(m, bs.wi, wo);
-    store_path_rival(path, at, next & !null, rival_to_camera(rival, s, onward, delta, p, p_back));
-#if MERGES
-    store_path_pending(path, at, next & !null, rival_merged(rival, s, onward, delta, p, p_back));
-    state = state | sel_i(rival_sharp(delta, p, p_back) & !null, (integer)(PATH_SHARP), (integer)(0));
-#endif
-#endif
-#if BSDF_IS_PANE
-    path_scattered(path, at, next & !null);
-#endif
+    next = rival_goes_to_camera(scene, path, at, next, null, rival, scatter, &v, onward, bs);
+    if (BSDF_IS_PANE) path_scattered(path, at, next & !null);
     vertex_leave(path, at, next, null, v, onward, beta);
     store_path_ratio(path, at, next, ratio);
-    vertex_end(path, at, active, next, null, state);
+    vertex_end(path, at, active, next, null, v.state);
 }
 
 #if !SHADES_BOTH

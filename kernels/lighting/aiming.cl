@@ -1,6 +1,6 @@
 /* Light paths that start toward what is sharp; of those that are weighed.
  *
- * Spheres stand around glass and mirrors, see clpt/render/lowering/lights/aims.py; `distributions` has centre, radius
+ * Spheres stand around glass and mirrors, see clpt/render/analysis/lights/aims.py; `distributions` has centre, radius
  * and share of each, the smallest first. The share s_k of the light paths aims at sphere k, the others start as without
  * aiming, with density p. From a point of a light an aimed direction lies evenly in the cone that the sphere fills,
  * p_k = 1 / (2 pi (1 - cos)) [1/sr]; from infinity a path starts evenly over the sphere's disk across its direction,

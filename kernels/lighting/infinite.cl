@@ -1,7 +1,7 @@
 /* What one infinite light sends to a path that leaves the scene along d [W m^-2 sr^-1 nm^-1], and the share `w` of it
- * that counts. The direction was chosen with `pdf` [1/sr] (below 0: delta) at a point p of a surface that sends light to
- * `hemisphere`, see interface/light.cl; the power heuristic weighs that against its choice on the light (Veach 1997,
- * 9.2.4), and, by the path's `rival`, against paths from the light (lighting/rivals.cl). */
+ * that counts. The direction was chosen with `pdf` [1/sr] (below 0: delta) at a point p of a surface that sends light
+ * to `hemisphere`, see interface/light.cl; the power heuristic weighs that against its choice on the light (Veach
+ * 1997, 9.2.4), and, by the path's `rival`, against paths from the light (lighting/rivals.cl). */
 inline Spectrum infinite_met(Scene scene, int row, vec3 p, vec3 hemisphere, vec3 d, real pdf, real rival,
                              Wavelengths lambdas, real *w)
 {

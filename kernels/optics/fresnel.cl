@@ -64,9 +64,10 @@ inline real fresnel_metal(real cos_i, real eta, real k)
     real large = sqrt_r(0.5f * (q + fabs(d))); /* of a and b; eta k is their product */
     real a = sel(d < 0.0f, eta * k / max_r(large, (real)(1e-15f)), large);
     real t = 2.0f * cos_i * a;
-    real s_polarised = (q + c2 - t) / max_r(q + c2 + t, (real)(1e-20f));
-    real p = (q * c2 + s2 * s2 - t * s2) / max_r(q * c2 + s2 * s2 + t * s2, (real)(1e-20f));
-    return min_r(0.5f * s_polarised * (1.0f + p), (real)(1.0f));
+    real m = max_r(q + c2, (real)(1e-15f)), n = max_r(q * c2 + s2 * s2, (real)(1e-15f));
+    /* s = (m - t) / (m + t) of light polarised across the plane of incidence, and s (n - t s2) / (n + t s2) along it;
+     * the mean of both with one division. */
+    return clamp_r((m - t) * n / ((m + t) * (n + t * s2)), (real)(0.0f), (real)(1.0f));
 }
 inline Spectrum fresnel_conductor(real cos_i, Spectrum eta, Spectrum k)
 {

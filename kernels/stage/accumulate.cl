@@ -1,14 +1,16 @@
-/* Makes a picture of the film, pixel by pixel: means of sums, taken to the output space by the matrix in the
- * settings; the fourth value of a pixel is its number of samples. halves: see film/picture.cl. */
+/* Makes the picture of the film for those who look on, pixel by pixel: means of sums, taken to the output space by the
+ * matrix in the settings; the fourth value of a pixel is its number of samples. The same steps as in
+ * clpt/render/film/developed.py, which makes the pictures that are kept: so nothing is contracted. */
 #include "core/base.cl"
 #include "film/picture.cl"
+#pragma OPENCL FP_CONTRACT OFF
 
-kernel void accumulate(global const Settings *settings, global const uint *film, global float *image,
-                       int2 halves LIGHT_PATHS_ARG)
+kernel void accumulate(global const Settings *settings, global const uint *film, global float *image LIGHT_PATHS_ARG)
 {
     int x = get_global_id(0), y = get_global_id(1);
     if (x < settings->width && y < settings->height) {
         int pixel_index = film_pixel_index(settings, x, y);
+        int2 halves = (int2)(0, settings->halves);
         float count = SAMPLES, mean = film_mean(settings, film, pixel_index, halves, count);
         vec3 v = scale3(film_sum(settings, film, pixel_index, halves, 0), mean);
 #if SUMS_LIGHT_PATHS
@@ -22,18 +24,3 @@ kernel void accumulate(global const Settings *settings, global const uint *film,
         pixel[3] = count;
     }
 }
-
-#if USES_ALPHA
-/* How much of each pixel is covered. */
-kernel void accumulate_alpha(global const Settings *settings, global const uint *film, global float *alpha, int2 halves)
-{
-    int x = get_global_id(0), y = get_global_id(1);
-    if (x < settings->width && y < settings->height) {
-        size_t stream = settings->padded_pixels;
-        int pixel_index = film_pixel_index(settings, x, y);
-        float sum = halves_sum(film + FILM_ALPHA * stream + pixel_index, stream, FILM_WORDS * stream, halves);
-        float samples = (float)film_samples(settings, film, pixel_index, halves);
-        alpha[(size_t)y * settings->width + x] = sum * film_mean(settings, film, pixel_index, halves, samples);
-    }
-}
-#endif

@@ -8,7 +8,7 @@
 #include "interface/shape.cl"
 #include "generated/shapes.cl"
 #include "generated/medium.cl"
-#include "path/surface.cl"
+#include "surface/surface.cl"
 #include "lighting/light_path_sampler.cl"
 #include "merging/area.cl"
 #include "merging/cells.cl"

@@ -16,7 +16,7 @@
 #include "generated/lights.cl"
 #include "generated/emission.cl"
 #include "generated/shapes.cl"
-#include "path/surface.cl"
+#include "surface/surface.cl"
 #include "path/path_end.cl"
 #include "path/next_light_path.cl"
 #include "lighting/next_event.cl"

@@ -8,7 +8,7 @@
 #include "generated/textures.cl"
 #include "generated/mixture.cl"
 #include "generated/shapes.cl"
-#include "path/surface.cl"
+#include "surface/surface.cl"
 
 STAGE(mix_materials)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
 {

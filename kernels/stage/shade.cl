@@ -10,7 +10,7 @@
 #include "generated/textures.cl"
 #include "generated/shapes.cl"
 #include "generated/lights.cl"
-#include "path/surface.cl"
+#include "surface/surface.cl"
 #include "generated/shading_frame.cl"
 #include "lighting/next_event.cl"
 #include "optics/fresnel.cl"
@@ -20,7 +20,6 @@
 #include "generated/medium.cl"
 #include "path/vertex.cl"
 #include "path/hero.cl"
-#include "path/roulette.cl"
 #include "generated/integrator.cl"
 
 #if QUEUED

@@ -5,7 +5,7 @@
 #include "generated/deposit_args.cl"
 #include "interface/shape.cl"
 #include "generated/shapes.cl"
-#include "path/surface.cl"
+#include "surface/surface.cl"
 #include "guiding/guide.cl"
 
 #define TRAIN_UNIT 256.0f /* of what a light path begins with */

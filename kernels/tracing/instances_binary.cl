@@ -13,11 +13,13 @@ inline uint instances_trace(global const float *nodes, global const float *leave
     BinaryState s;
     binary_start(tree, &ray, hit->t, &s);
     do {
-        if (!binary_descend(tree, &ray, hit->t, &s)) continue;
-        uint row = node_link(s.node);
-        if (!instance_meet(nodes, leaves, scene, row, o, d, tmin, hit, first_only)) continue;
-        nearest = row;
-        if (first_only) return nearest;
+        if (binary_descend(tree, &ray, hit->t, &s)) {
+            uint row = node_link(s.node);
+            if (instance_meet(nodes, leaves, scene, row, o, d, tmin, hit, first_only)) {
+                nearest = row;
+                if (first_only) s.waits = 0;
+            }
+        }
     } while (binary_next(tree, hit->t, &s));
     return nearest;
 }

@@ -15,9 +15,10 @@ inline uint instances_trace(global const float *nodes, global const float *leave
     while (compact_next(instance_nodes, &ray, hit->t, &state, &items)) {
         while (items.y) {
             uint row = compact_item(&items);
-            if (!instance_meet(nodes, leaves, scene, row, o, d, tmin, hit, first_only)) continue;
-            nearest = row;
-            if (first_only) return nearest;
+            if (instance_meet(nodes, leaves, scene, row, o, d, tmin, hit, first_only)) {
+                nearest = row;
+                if (first_only) compact_end(&state, &items);
+            }
         }
     }
     return nearest;

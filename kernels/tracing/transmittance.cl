@@ -4,7 +4,7 @@
 #include "generated/textures.cl"
 #include "generated/mixture.cl"
 #include "generated/shapes.cl"
-#include "path/surface.cl"
+#include "surface/surface.cl"
 #include "tracing/passage.cl"
 #include "generated/null_transmittance.cl"
 

@@ -5,7 +5,7 @@
 #include "generated/textures.cl"
 #include "generated/mixture.cl"
 #include "generated/shapes.cl"
-#include "path/surface.cl"
+#include "surface/surface.cl"
 #include "generated/medium.cl"
 #include "tracing/passage.cl"
 #include "generated/null_transmittance.cl"

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import images
-from clpt.render.lowering.lights.image_lights import face_directions
+from clpt.render.analysis.lights.image_lights import face_directions
 
 Array = NDArray[np.float64]
 

@@ -265,7 +265,15 @@ def test_buffers_are_taken_as_they_are(device, trace):
 
 def test_layouts_are_chosen_by_size_and_device(device):
     assert bvh.choose_layout(device, 4) == "brute"
-    assert bvh.choose_layout(device, 10**6) == ("wide8" if device.info.is_cpu else "compact")
+    assert bvh.choose_layout(device, 10**6) == bvh.choose_tree(device)
+    for kind, vendor, layout in (
+        ("cpu", "AMD", "wide8"),
+        ("gpu", "NVIDIA Corporation", "wide8"),
+        ("gpu", "Advanced Micro Devices, Inc.", "compact"),
+        ("accelerator", "Intel(R) Corporation", "compact"),
+    ):
+        info = dataclasses.replace(device.info, kind=kind, vendor=vendor)
+        assert bvh.choose_tree(dev.Device(device.context, device.queue, info)) == layout
     sphere = trimesh.creation.icosphere(2)
     built = bvh.build(device, sphere.vertices, sphere.faces)
     assert built.layout == bvh.choose_layout(device, len(sphere.faces))

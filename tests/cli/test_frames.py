@@ -99,7 +99,7 @@ def test_a_change_renders_frames_again_and_says_so(scene, tmp_path, capsys, monk
     if change == "scene":
         scene.write_text(scene.read_text().replace("18.387", "9"))
     elif change == "version":
-        monkeypatch.setattr(frames_module, "__version__", "99")
+        monkeypatch.setattr(frames_module, "VERSION", "99")
     assert run([*command, *(change if isinstance(change, list) else [])]) == 0
     after = times(tmp_path.glob("*.exr"))
     assert all(after[name] != before[name] for name in before)

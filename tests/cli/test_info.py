@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from clpt.__main__ import run
-from clpt.cli.info import summary
+from clpt.cli.files.scene_contents import summary
 from clpt.formats import load
 from clpt.scene import Film
 

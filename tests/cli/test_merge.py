@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import OpenEXR
@@ -14,13 +15,14 @@ from clpt.__main__ import run
 from clpt.render.film import film_file
 from tests.cli import killing
 
+LAYERS = ["--layers", "albedo,crypto_object,variance"]
 KINDS = {
     "rgb": ["--mode", "rgb"],
-    "alpha": ["--mode", "rgb", "--alpha"],
+    "alpha": ["--mode", "rgb", "--alpha", *LAYERS],
     "bands": ["--mode", "spectral", "--bands", "4"],
     "light": ["--mode", "rgb", "--light-paths", "1"],
 }
-SUFFIX = {"bands": ".npy"}
+FORMATS = (".exr", ".png", ".hdr", ".pfm", ".npy")
 
 
 def render(output, *more: str) -> int:
@@ -28,27 +30,55 @@ def render(output, *more: str) -> int:
     return run(["render", killing.SCENE, *common, *more])
 
 
-@pytest.mark.parametrize(
-    "kind",
-    KINDS,
-)
+def outputs(paths: list[Path]) -> list[str]:
+    return [word for path in paths for word in ("-o", str(path))]
+
+
+def pixels(path: Path) -> dict[str, np.ndarray]:
+    """What a picture's file holds, by the names of its channels."""
+    if path.suffix != ".exr":
+        return {path.suffix: np.load(path) if path.suffix == ".npy" else images.read(path)}
+    with OpenEXR.File(str(path), separate_channels=True) as file:
+        return {name: channel.pixels for name, channel in file.channels().items()}
+
+
+def check_same(paths: list[Path], others: list[Path]) -> None:
+    """Check that files hold the same pixels, to the bit."""
+    for path, other in zip(paths, others, strict=True):
+        own, given = pixels(path), pixels(other)
+        assert own.keys() == given.keys()
+        for name, values in own.items():
+            np.testing.assert_array_equal(values, given[name], f"{path.name} {name}")
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_ranges_add_to_one_render(tmp_path, kind):
     for name, given in (("a", "0:5"), ("b", "5:6"), ("c", "6:12")):
         assert render(tmp_path / f"{name}.film", "--samples", given, *KINDS[kind]) == 0
-    suffix = SUFFIX.get(kind, ".exr")
-    whole = [tmp_path / f"whole{one}" for one in (".film", suffix)]
-    assert render(whole[0], "-o", str(whole[1]), "--spp", "12", *KINDS[kind]) == 0
+    whole, *direct = (tmp_path / f"whole{one}" for one in (".film", *FORMATS))
+    made, *merged = (tmp_path / f"sum{one}" for one in (".film", *FORMATS))
+    assert render(whole, *outputs(direct), "--spp", "12", *KINDS[kind]) == 0
     films = [str(tmp_path / f"{name}.film") for name in "cab"]
-    made = [tmp_path / f"sum{one}" for one in (".film", suffix, ".png")]
-    given = [word for path in made for word in ("-o", str(path))]
-    assert run(["merge", *films, *given, "--quiet"]) == 0
-    one, other = (film_file.read(path).film for path in (made[0], whole[0]))
-    np.testing.assert_array_equal(one.words, other.words)
-    np.testing.assert_array_equal(one.bands, other.bands)
+    assert run(["merge", *films, *outputs([made, *merged]), "--quiet"]) == 0
+    one, other = (film_file.read(path).film for path in (made, whole))
+    for name, words in one.arrays.items():
+        np.testing.assert_array_equal(words, other.arrays[name])
     assert one.taken == other.taken == ((0, 12),)
-    pictures = [images.read(path) for path in (made[1], whole[1])]
-    np.testing.assert_allclose(*pictures, rtol=1e-3, atol=1e-6)  # .exr has 11 bits
-    assert made[2].exists()
+    check_same(merged, direct)
+
+
+@pytest.mark.parametrize(
+    "more", [["--noise", "0.5"], ["--denoise", "statistical"]], ids=["noise", "denoised"]
+)
+def test_the_picture_of_a_film_is_that_of_its_render(tmp_path, more):
+    """Also where pixels differ in their numbers of samples, and where it is denoised."""
+    film, *direct = (tmp_path / f"whole{one}" for one in (".film", *FORMATS))
+    merged = [tmp_path / f"merged{one}" for one in FORMATS]
+    assert render(film, *outputs(direct), "--spp", "40", "--mode", "spectral", *more) == 0
+    denoised = more if "--denoise" in more else []
+    assert run(["merge", str(film), *outputs(merged), *denoised, "--quiet"]) == 0
+    check_same(merged, direct)
+    assert ("samples.X" in pixels(merged[0])) == ("--noise" in more)
 
 
 def test_no_device_is_needed(tmp_path):

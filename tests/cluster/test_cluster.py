@@ -9,6 +9,7 @@ import threading
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 pytest.importorskip("distributed")
@@ -18,6 +19,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from machines import ROOT, digest_of_one_process, machines, scene, wait_until  # noqa: E402
 
 import clpt  # noqa: E402
+from clpt import device  # noqa: E402
 from clpt.cluster import tasks  # noqa: E402
 from clpt.cluster.cluster_renderer import ClusterRenderer  # noqa: E402
 from clpt.errors import ClusterError  # noqa: E402
@@ -56,9 +58,37 @@ def test_two_workers_are_one(two, expected):
         assert renderer.run(SAMPLES, lambda progress: told.append(progress.samples))
         assert renderer.samples == SAMPLES
         assert sum(record.samples for record in renderer.workers.values()) == SAMPLES
-        assert renderer.counts[0].samples == SAMPLES * 32 * 24
+        assert renderer.counts.samples == SAMPLES * 32 * 24
         assert told == sorted(told) and told[-1] == SAMPLES
         assert renderer.image().shape == (24, 32, 3)
+
+
+def pictures(renderer):
+    """All pictures of what a renderer has, by name."""
+    even, odd = renderer.halves()
+    found = {"image": renderer.image(), "even": even, "odd": odd, **renderer.layers()}
+    return {**found, "samples": renderer.samples_per_pixel()}
+
+
+def test_all_pictures_are_those_of_one_process(two):
+    """By whom ever samples are taken: one device, several, a cluster, or a file of these."""
+    plan = scene()
+    plan.film = dataclasses.replace(plan.film, layers=("albedo", "variance"))
+    with clpt.Renderer(plan, threads=1) as one:
+        one.run(12)
+        wanted, saved = pictures(one), one.saved_film()
+    several = clpt.MultiRenderer(plan, [device.choose(threads=1)])
+    many = ClusterRenderer(plan, two.client, device=device.choose(threads=1))
+    with several, many:
+        for renderer in (several, many):
+            assert renderer.run(5, noise=None) and renderer.run(7)
+            assert renderer.samples == 12 and renderer.active == 1.0
+            assert renderer.saved_film().counts["samples"] == saved.counts["samples"]
+        assert np.array_equal(many.film.get(), several.film.get())
+        for source in (saved, several, many, several.saved_film(), many.saved_film()):
+            found = pictures(source)
+            assert found.keys() == wanted.keys()
+            assert all(np.array_equal(found[name], image) for name, image in wanted.items())
 
 
 @pytest.mark.slow
@@ -101,12 +131,12 @@ def test_a_saved_film_is_gone_on_with(two, expected, tmp_path):
     with ClusterRenderer(scene(), two.client) as renderer:
         renderer.load_state(path)
         assert renderer.samples == SAMPLES // 2
-        assert renderer.counts[0].samples == SAMPLES // 2 * 32 * 24
+        assert renderer.counts.samples == SAMPLES // 2 * 32 * 24
         assert renderer.run(SAMPLES - SAMPLES // 2)
         assert digest(renderer) == expected
     with clpt.Renderer(scene(), threads=1) as renderer:
         renderer.load_state(path)
-        assert renderer.counts[0].samples == SAMPLES // 2 * 32 * 24
+        assert renderer.counts.samples == SAMPLES // 2 * 32 * 24
         renderer.run(SAMPLES - SAMPLES // 2)
         assert digest(renderer) == expected
 
@@ -143,7 +173,7 @@ WRONG = {
     "a wrong film": (
         "whole = tasks.state_to_arrays\n"
         "def wrong(state):\n"
-        "    state.words[0, 0, 0, 5, 5] ^= 1\n"
+        "    state.words[0, 0, 5, 5] ^= 1\n"
         "    return whole(state)\n"
         "tasks.state_to_arrays = wrong", "is wrong",
     ),

@@ -77,7 +77,7 @@ def test_a_cluster_goes_on_where_it_was_saved(hub, folder, capsys):
     assert render("--spp", "20", *on, "--checkpoint", "1h") == 0
     saved = film_file.read(SAVED)
     assert saved.film.taken == ((0, 20),)
-    assert saved.counts[0]["samples"] == 20 * 32 * 24
+    assert saved.counts["samples"] == 20 * 32 * 24
     with Renderer(box(), threads=1) as one:
         assert [session.device for session in saved.sessions] == [one.device_class()]
     assert render("--spp", "50", *on, "--resume") == 0

@@ -65,7 +65,7 @@ def expected():
             one.reset()
             one.run(MOST, noise=NOISE)
             found[f"{kind} at once"] = tasks.film_digest(one.film_state())
-            found[f"{kind} samples"] = one.counts[0].samples
+            found[f"{kind} samples"] = one.counts.samples
     return found
 
 
@@ -80,7 +80,7 @@ def test_the_film_is_that_of_one_process(kind, two, expected):
         told = []
         assert renderer.run(MOST, lambda p: told.append((p.samples, p.active)), noise=NOISE)
         assert digest(renderer) == expected[f"{kind} at once"]
-        assert renderer.counts[0].samples == expected[f"{kind} samples"]
+        assert renderer.counts.samples == expected[f"{kind} samples"]
         assert told == sorted(told, key=lambda pair: pair[0]) and told[-1][1] < 1.0
         assert renderer.samples == MOST
     with ClusterRenderer(plan(kind), two.client) as renderer:
@@ -132,7 +132,7 @@ def test_saved_films_go_on_by_a_cluster_and_by_one_process(two, expected, tmp_pa
             assert loading.samples == 40
             loading.run(MOST - 40, noise=NOISE)
             assert digest(loading) == expected["path at once"]
-            assert loading.counts[0].samples == expected["path samples"]
+            assert loading.counts.samples == expected["path samples"]
     with clpt.Renderer(plan(), threads=1) as one:
         one.run(40, noise=NOISE)
         one.save_state(path)

@@ -133,7 +133,7 @@ def test_films_and_pictures_are_those_of_one_renderer(scenes, pair, kind):
             if halves:
                 for ours, theirs in zip(several.halves(), one.halves(), strict=True):
                     np.testing.assert_array_equal(ours, theirs)
-            assert [c.samples for c in several.counts] == [c.samples for c in one.counts]
+            assert several.counts.samples == one.counts.samples
 
 
 @pytest.mark.parametrize("kind", ["path", "light_paths"])
@@ -348,7 +348,7 @@ def test_saved_films_go_on_on_one_device_and_on_several(
     with clpt.Renderer(scene) as one:
         one.run(20, noise=noise)
         one.run(100, noise=noise)
-        state, counts = one.film_state(), one.counts[0].samples
+        state, counts = one.film_state(), one.counts.samples
     for saving in makers():
         with saving:
             saving.run(20, noise=noise)
@@ -363,7 +363,7 @@ def test_saved_films_go_on_on_one_device_and_on_several(
                 assert loading.samples == 20 and loading.former_seconds > 0.0
                 loading.run(100, noise=noise)
                 assert same(loading.film_state(), state)
-                assert loading.counts[0].samples == counts
+                assert loading.counts.samples == counts
     with clpt.MultiRenderer(scene, pair) as several:  # whose first device then fails
         several.load_state(path)
         several.run(5, noise=noise)
@@ -397,7 +397,7 @@ def test_updates_reach_all_devices(scene, pair):
             one.run(4)
             several.run(4)
             assert same(several.film_state(), one.film_state()), change
-            assert several.counts[0].samples == one.counts[0].samples
+            assert several.counts.samples == one.counts.samples
         several.update(transforms={several.scene.shapes[0]: moved})
         several.reset(seed=5)
         one.reset(seed=5).wait()
@@ -419,7 +419,7 @@ def test_updates_with_motion_reach_all_devices(scene, pair):
         for changed in (one, several):
             changed.update(transforms={still: place}, motion=True)
             changed.run(4)
-        assert one.wavefronts[0].features.motion.parts
+        assert one.wavefront.features.motion.parts
         assert same(several.film_state(), one.film_state())
 
 
@@ -485,6 +485,6 @@ def test_films_are_held_on_their_devices(scene, pair, faults, monkeypatch, noise
                 several.saved_film(held=True)
             return
         saved = several.saved_film(held=True)
-        assert same(saved.film, state) and saved.counts[0]["samples"] >= state.samples.sum()
+        assert same(saved.film, state) and saved.counts["samples"] >= state.samples.sum()
         assert several.saved_film(held=True) is saved
         assert len(several.devices) == (2 if when == "never" else 1)

@@ -1,4 +1,4 @@
-"""Conditions of the preprocessor: what a text decides by itself, and what it leaves to compilers."""
+"""Conditions of the preprocessor: what a text decides, and what it leaves to compilers."""
 
 from __future__ import annotations
 
@@ -23,10 +23,12 @@ def left(text: str, **defines: int) -> list[str]:
 @pytest.mark.parametrize(
     ("condition", "value"),
     [
-        ("1", 1), ("0", 0), ("HEX", 31), ("017", 15), ("ONE == 1", 1), ("NAME == 2", 1), ("-3 / 2", -1),
+        ("1", 1), ("0", 0), ("HEX", 31), ("017", 15), ("ONE == 1", 1), ("NAME == 2", 1),
+        ("-3 / 2", -1),
         ("-3 % 2", -1), ("1 + 2 * 3 == 7", 1), ("(1 + 2) * 3", 9), ("1 << 3 | 1", 9), ("~0", -1),
         ("SUM * 2", 3),  # a value is put in as it stands
-        ("!ONE == 0", 1), ("1 ? 2 : 3", 2), ("NONE ? 2 : 0 ? 4 : 5", 5), ("NONE", 0), ("NONE == 0", 1),
+        ("!ONE == 0", 1), ("1 ? 2 : 3", 2), ("NONE ? 2 : 0 ? 4 : 5", 5), ("NONE", 0),
+        ("NONE == 0", 1),
         ("defined ONE", 1), ("defined(NONE)", 0), ("defined NOTHING && defined(CALL)", 1),
         ("!defined(ONE) || NONE", 0), ("3 > 2 && 2 >= 2 && 1 < 2 && 1 <= 1 && 1 != 2", 1),
         ("6 & 3 ^ 1", 3), ("1 - 1 - 1", -1), ("- - 1", 1), ("8 >> 1 >> 1", 2),
@@ -42,7 +44,8 @@ def test_what_a_text_decides(condition: str, value: int) -> None:
         "__AVX__", "defined(__AVX__)", "__has_builtin(__builtin_ctz)", "cl_khr_fp64", "NOT_INLINED",
         "ONE && __AVX__", "NONE || !__AVX__", "__AVX__ ? 1 : 0", "__AVX__ + 1", "FP_FAST_FMAF",
         "__has_builtin((a, b)) && ONE",
-        "TEXT", "NOTHING", "CALL(1)", "SELF", "1 / 0", "1 % NONE", "(1", "1 2", "", "'a'", "08", "1u > 0",
+        "TEXT", "NOTHING", "CALL(1)", "SELF", "1 / 0", "1 % NONE", "(1", "1 2", "", "'a'", "08",
+        "1u > 0",
     ],
 )  # fmt: skip
 def test_what_is_left_to_compilers(condition: str) -> None:
@@ -70,7 +73,8 @@ def test_branches() -> None:
 
 
 def test_branches_in_branches() -> None:
-    text = "#ifdef A\n#ifndef B\na\n#else\n#if 1\nb\n#endif\n#endif\n#else\n#if A\nno\n#endif\nc\n#endif"
+    text = "#ifdef A\n#ifndef B\na\n#else\n#if 1\nb\n#endif\n#endif\n"
+    text += "#else\n#if A\nno\n#endif\nc\n#endif"
     assert left(text, A=0) == ["a"]
     assert left(text, A=0, B=0) == ["b"]
     assert left(text) == ["c"]
@@ -99,11 +103,13 @@ def test_what_compilers_decide_makes_a_macro_open() -> None:
 
 
 def test_comments_and_continuations() -> None:
-    text = "/* #if 0\n#endif */ a\n#if /* no 0 */ 1 // 0\nb\n#endif /* of\nb */\n#if 1 && \\\n  0\nc\n#endif\nd"
+    text = "/* #if 0\n#endif */ a\n#if /* no 0 */ 1 // 0\nb\n#endif /* of\nb */\n"
+    text += "#if 1 && \\\n  0\nc\n#endif\nd"
     assert left(text) == ["/* #if 0", "#endif */ a", "b", "d"]
     assert left("#if __AVX__ && \\\n  1\na\n#endif") == ["#if __AVX__ && \\", "  1", "a", "#endif"]
     assert left("#define A \\\n  1\n#if A\na\n#endif\r\nb") == ["#define A \\", "  1", "a", "b"]
-    assert left("#define A 1 /* one\nline */\n#if A\na\n#endif") == ["#define A 1 /* one", "line */", "a"]
+    rows = ["#define A 1 /* one", "line */", "a"]
+    assert left("#define A 1 /* one\nline */\n#if A\na\n#endif") == rows
 
 
 def test_an_if_has_an_end() -> None:

@@ -54,6 +54,11 @@ def test_commands(stream, device, monkeypatch, command, code, expected):
     assert isinstance(raised.value.__cause__, cl.Error)
 
 
+def test_a_number_of_nvidias_is_explained():
+    error = refusals.refused("a command", driver_error(-9999))
+    assert "beyond its buffers" in str(error) and "new process" in str(error)
+
+
 class Broken:
     """A queue and an event of a device that was lost."""
 

@@ -76,8 +76,14 @@ def test_what_nothing_names_is_left_out():
     kernel = rest[rest.index("\n/* The kernel") :].replace("/* The", f"#line {number}\n/* The")
     assert text == f'#line 1 "a"\n{head}{kernel}'
     assert assemble("a", {"a": USED}, library=True).text == f'#line 1 "a"\n{USED}'
-    part = {"a": '#include "part"\nkernel void run(void) {}', "part": Part(USED, "b.py", 7)}
-    assert assemble("a", part).text.startswith(f'#line 7 "b.py"\n{USED}#line 2 "a"\n')
+
+
+def test_a_part_is_left_whole_if_it_pastes_names_together():
+    text = "#define CALL(kind, verb) kind##verb\nreal a_b(real x);\n"
+    files = {"a": '#include "part"\nkernel void run(void) {}', "part": Part(text, "b.py", 7)}
+    assert assemble("a", files).text.startswith(f'#line 7 "b.py"\n{text}#line 2 "a"\n')
+    files["part"] = Part(text.replace("##", ""), "b.py", 7)
+    assert assemble("a", files).text == '#line 2 "a"\nkernel void run(void) {}\n'
 
 
 def test_generated_files_are_numbered_as_they_stand():
@@ -102,7 +108,9 @@ def test_what_is_not_a_definition_stays(kept: str):
     assert "unused" not in assemble("a", {"a": text}).text
 
 
-@pytest.mark.parametrize("macro", ["LAYOUT(verb) wide_##verb", "END(x) x##_closest", "A(x) f(wide_##x)"])
+@pytest.mark.parametrize(
+    "macro", ["LAYOUT(verb) wide_##verb", "END(x) x##_closest", "A(x) f(wide_##x)"]
+)
 def test_names_that_are_pasted_together_are_named(macro: str):
     name = macro.split("(")[0]
     text = f"#define {macro}\nreal wide_closest(void);\nkernel void k(void) {{ {name}(closest); }}"

@@ -97,7 +97,7 @@ def interrupted_after(seconds: float) -> Iterator[None]:
 
 def sums(state: FilmState) -> Sums:
     """The low 64 bits of a pixel's sums, and its number of samples: (pixels, 4)."""
-    words = state.words[0, 0].reshape(state.words.shape[2], -1).astype(np.uint64)
+    words = state.words[0].reshape(state.words.shape[1], -1).astype(np.uint64)
     three = [words[3 * i] | words[3 * i + 1] << np.uint64(32) for i in range(3)]
     return np.stack([*three, words[9]], axis=1)
 

@@ -59,7 +59,7 @@ def test_a_broken_renderer_says_so_until_it_is_reset(
 ) -> None:
     renderer = trial.renderer
     renderer.reset()
-    (wavefront,) = renderer.wavefronts
+    wavefront = renderer.wavefront
 
     def fail(*_: object) -> None:
         raise clpt.DeviceError("the device is gone")

@@ -12,7 +12,7 @@ import pytest
 import clpt
 from clpt import bvh, device
 from clpt import transforms as T
-from clpt.cli.info import summary
+from clpt.cli.files.scene_contents import summary
 from clpt.errors import SceneError
 from clpt.formats.native import load, save
 from clpt.geometry import spheres

@@ -12,6 +12,7 @@ import pyopencl as cl
 from clpt import device
 from clpt.geometry import analytic, shape_records, triangles
 from clpt.records import SETTINGS, SHAPE
+from clpt.render.analysis.lights import sources
 from clpt.render.codegen import lights as light_dispatch
 from clpt.render.codegen import parameters
 from clpt.render.codegen import shapes as shape_text
@@ -151,7 +152,8 @@ def lit(
             first += len(faces)
         made.append((row, lights.Emitter(shape, number, vertices, faces, uvs)))
     emitting = [emitter for _, emitter in made]
-    rows = lights.light_rows(lamps, emitting, encoder, radius, 1 if tree else None)
+    found = sources.measured(lamps, emitting, radius, encoder.look)
+    rows = lights.light_rows(lamps, emitting, encoder, found, 1 if tree else None)
     for (row, _), at in zip(made, rows.first, strict=True):
         row["light"] = at
         encoder.store.append("shapes", row.view(np.uint32))
@@ -166,5 +168,5 @@ def shape_probe(shape) -> Lit:
     """A scene whose `geometry` holds one shape, and the kind's functions."""
     encoder = Encoder("rgb")
     encoder.store.append("geometry", analytic.row(shape))
-    none = lights.light_rows((), (), encoder, 1.0)
+    none = lights.light_rows((), (), encoder, sources.measured((), (), 1.0, encoder.look))
     return Lit(encoder, none, (f"generated/shape/{shape.kind}.cl",))

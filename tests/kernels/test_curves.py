@@ -10,6 +10,7 @@ from scipy.interpolate import BSpline
 
 from clpt import transforms as T
 from clpt.geometry import analytic, strands
+from clpt.render.analysis.lights import sources
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.lights import lights
 from clpt.scene.shapes import Curves
@@ -72,7 +73,7 @@ def _probe() -> tuple[Lit, dict[str, tuple[int, int]]]:
         made.append(own)
     encoder.store.append("geometry", analytic.row(CURVES["line"]))
     encoder.store.append_floats("spheres", np.concatenate(made))
-    none = lights.light_rows((), (), encoder, 1.0)
+    none = lights.light_rows((), (), encoder, sources.measured((), (), 1.0, encoder.look))
     return Lit(encoder, none, ("generated/shape/curves.cl",)), ranges
 
 

@@ -11,9 +11,10 @@ from scipy.stats import chi2
 from clpt import transforms as T
 from clpt.errors import SceneError
 from clpt.geometry import triangles
+from clpt.render.analysis.lights import image_lights
+from clpt.render.analysis.lights.image_lights import face_coordinates, face_directions
 from clpt.render.contract import light_records
-from clpt.render.lowering.lights import image_lights, lights
-from clpt.render.lowering.lights.image_lights import face_coordinates, face_directions
+from clpt.render.lowering.lights import lights
 from clpt.scene.lights import (
     Area,
     Constant,
@@ -336,7 +337,7 @@ def test_images_are_chosen_by_what_they_send(name):
     value = r[5] / r[4]
     assert (r[4] > 0.0).all()
     assert value.std() < 0.1 * value.mean()
-    _, mean = image_lights.lower_image(lamp, scene.encoder)
+    mean = image_lights.mean_radiance(lamp, image_lights.content(lamp, scene.encoder.look))
     assert value.mean() == pytest.approx(4.0 * np.pi * mean, rel=0.02)
 
 
@@ -631,7 +632,7 @@ def test_uv_on_a_mesh():
 
 
 def test_brightness_of_a_texture_is_its_mean():
-    from clpt.render.lowering.lights.non_shape_lights import brightness
+    from clpt.render.analysis.lights.light_power import brightness
 
     board = Checkerboard(color0=(1.0, 1.0, 1.0), color1=(0.0, 0.5, 1.0))
     assert brightness(board) == pytest.approx(0.75)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from clpt.errors import SceneError
+from clpt.render.analysis.texels import FAR, bands
 from clpt.render.codegen.textures import dispatch_text
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.features import of_textures
-from clpt.render.lowering.textures.texels import FAR, bands
 from clpt.scene import textures as scene
 from clpt.scene.lights import Constant, CubeMap, Envmap
 from clpt.spectra import Tabulated, luminance

@@ -10,11 +10,11 @@ from PIL import Image
 
 from clpt import images, spectra
 from clpt.errors import SceneError
+from clpt.render.analysis.texels import texels
 from clpt.render.codegen.textures import dispatch_text
 from clpt.render.contract.features import TextureFeatures
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.textures.bitmaps import NODES, pack
-from clpt.render.lowering.textures.texels import texels
 from clpt.render.lowering.textures.texture_programs import folded
 from clpt.scene import textures as scene
 from clpt.spectra import cie

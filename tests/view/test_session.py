@@ -524,10 +524,13 @@ def test_several_devices_make_the_same_picture(audience, on) -> None:
 def test_the_merged_picture_of_a_cluster(audience, on) -> None:
     pytest.importorskip("distributed", reason="the extra clpt[cluster] is not installed")
     from clpt.cluster import processes
-    from clpt.cluster.steered import SteeredCluster
+    from clpt.cluster.cluster_renderer import ClusterRenderer
 
     with processes.local_cluster(1) as (client, _):
-        make = partial(SteeredCluster, client=client, device=on)
+
+        def make(scene, cancel_seconds, **made):
+            return ClusterRenderer(scene, client, device=on, mixed=True, **made)
+
         session = Session(small(), on, audience, make=make)
         session.watched(1)
         session.start()

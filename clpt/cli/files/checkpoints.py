@@ -18,9 +18,8 @@ from ..opening.makers import AnyRenderer
 from ..printing.display import clock
 from . import outputs
 from .standard_output import is_standard
-from .targets import FILM, default
+from .targets import CHECKPOINT, FILM, default
 
-SUFFIX = ".resume.exr"
 PERIOD = 300.0  # seconds from one checkpoint to the next
 PATIENCE = 600.0  # seconds of a render after which it has checkpoints unasked
 ADVICE = "render that again, or begin anew with --no-resume"
@@ -33,7 +32,7 @@ def path_of(scene: Path, targets: tuple[Path, ...]) -> Path:
     """
     files = [path for path in targets if not is_standard(path)]
     target = (files or default(scene))[0]
-    return target.with_name(target.stem + SUFFIX)
+    return target.with_name(target.stem + CHECKPOINT)
 
 
 def former_of(path: Path) -> Path:

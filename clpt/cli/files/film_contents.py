@@ -8,17 +8,9 @@ from typing import Any
 import numpy as np
 
 from ...render.film import film_file
-from ...render.film.host_picture import HostPicture
 from ...render.film.layer_channels import channels_of
 from ..printing.console import shown
-from . import checkpoints
 from .image_contents import ImageContents, size_text
-from .targets import FILM
-
-
-def is_film(path: Path) -> bool:
-    """Whether a file has the name of a film."""
-    return path.suffix.lower() == FILM or path.name.endswith(checkpoints.SUFFIX)
 
 
 def film_summary(path: Path) -> dict[str, Any]:
@@ -48,7 +40,7 @@ def film_summary(path: Path) -> dict[str, Any]:
 
 def film_contents(path: Path) -> ImageContents:
     """Return the picture of a film, and what it says of itself. Raises SceneError."""
-    picture, summary = HostPicture(film_file.read(path)), film_summary(path)
+    picture, summary = film_file.read(path).developed(), film_summary(path)
     form, lambdas, quantity = picture.form, None, "value (linear)"
     colours = picture.colours()
     values = picture.image()
@@ -57,7 +49,7 @@ def film_contents(path: Path) -> ImageContents:
         labels = [f"{nm:g} nm" for nm in lambdas]
     else:
         beside = channels_of(picture.layers()) if form.layers else {}
-        beside |= {"samples.X": picture.samples_per_pixel()} if picture.is_adaptive else {}
+        beside |= {"samples.X": picture.samples_per_pixel()} if form.adaptive else {}
         labels = [*"RGBA"[: values.shape[2]], *beside]
         values = np.dstack([values, *beside.values()])
     facts = {"size": size_text(values)} | {k: shown(v).plain for k, v in summary.items()}

@@ -77,7 +77,7 @@ def read_contents(path: Path) -> ImageContents:
 
 
 def _stored(attributes: dict[str, Any]) -> dict[str, str]:
-    """How an .exr holds what it holds: space of its colours, compression, window."""
+    """Describe the form of an .exr: space of its colours, compression, window."""
     facts = {}
     if "chromaticities" in attributes:
         stated = np.ravel(attributes["chromaticities"])
@@ -93,7 +93,7 @@ def _stored(attributes: dict[str, Any]) -> dict[str, str]:
 
 
 def _provenance(attributes: Mapping[str, Any]) -> dict[str, str]:
-    """What whoever wrote the file says of it, without what the layout needs."""
+    """Return the attributes that the writer of a file gave it, without those of its layout."""
     plain = {
         k: v
         for k, v in attributes.items()

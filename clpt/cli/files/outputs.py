@@ -9,43 +9,38 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from ... import __version__, images
-from ...cluster.cluster_renderer import ClusterRenderer
+from ... import images
 from ...device import disk_cache
 from ...errors import ClptError, SceneError
 from ...render.film import film_file, layer_channels
 from ...render.film.denoised_picture import DenoisedPicture
-from ...render.film.host_picture import HostPicture
-from ..opening.makers import AnyRenderer, OfDevices
+from ...render.film.saved_film import SavedFilm
+from ...render.film_renderer import FilmRenderer
+from ...render.pictures import DevicePictures
+from ...version import VERSION
 from ..options.grading import Grading
 from .standard_output import is_standard
 from .targets import FILM
 
-Film = AnyRenderer | HostPicture  # what pictures are taken of
-Source = Film | DenoisedPicture
+Film = FilmRenderer | SavedFilm  # what can be saved
+Source = Film | DenoisedPicture  # what pictures are taken of
 
 
-def metadata(renderer: AnyRenderer, scene: Path, seconds: float) -> dict[str, str | int | float]:
+def metadata(renderer: DevicePictures, scene: Path, seconds: float) -> dict[str, str | int | float]:
     """Return the metadata of an .exr: how it was made. spp is the mean over all pixels.
 
     seconds: of this session; those of former ones are added.
     """
-    plan, devices = renderer.scene, ""
-    if isinstance(renderer, ClusterRenderer):
-        pictured: OfDevices = renderer.developed()
-        devices = "; ".join(sorted({record.kind for record in renderer.workers.values()}))
-    else:
-        pictured = renderer
-    samples = max(counts.samples for counts in pictured.counts)
+    plan = renderer.scene
     return {
-        "software": f"clpt {__version__}",
+        "software": f"clpt {VERSION}",
         "scene": os.fsencode(scene).decode("utf-8", "replace"),
         "mode": plan.film.mode,
         "integrator": plan.integrator.kind,
         "sampler": plan.sampler.kind,
         "seed": plan.seed,
-        "spp": samples / pictured.wavefronts[0].paths.pixels,
-        "device": devices or " and ".join(on.info.label for on in pictured.devices),
+        "spp": renderer.counts.samples / renderer.wavefront.paths.pixels,
+        "device": renderer.device_text,
         "seconds": round(seconds + renderer.former_seconds, 3),
     }
 
@@ -56,27 +51,33 @@ def write_all(
     stats: dict[str, str | int | float],
     grading: Grading,
     tell: Callable[[str], None],
+    denoise: str | None = None,
 ) -> None:
     """Write the picture so far to every path, denoised where that was asked for; tell of each.
+
+    denoise: a denoiser, by default the one that the film was made for.
 
     A picture that cannot be written goes to another folder, and if that fails too the film does.
     Raises SceneError at the end, which says where it is.
     """
     failures = []
-    source: Source = film
-    if film.denoise is not None and any(path.suffix.lower() != FILM for path in paths):
+    picture: Source = film
+    denoise = denoise or film.denoise
+    if denoise is not None and any(path.suffix.lower() != FILM for path in paths):
         try:
-            source = DenoisedPicture(film)
-            stats = {**stats, "denoised": source.text}
+            picture = DenoisedPicture(film, denoise)
+            stats = {**stats, "denoised": picture.text}
         except ClptError as error:  # the picture is worth more
             tell(f"clpt: warning: not denoised: {error}")
     for path in paths:
+        source = film if path.suffix.lower() == FILM else picture
         try:
             write(path, source, stats, grading)
             name = "standard output" if is_standard(path) else path
             tell(f"{name}  {stats['spp']:.4g} spp, {stats['seconds']:.1f} s")
         except FAILURES as error:
-            failures.append(f"{failure(path, error)}; {_rescue(path, source, stats, grading)}")
+            rescued = _rescue(path, film, source, stats, grading)
+            failures.append(f"{failure(path, error)}; {rescued}")
     if failures:
         raise SceneError("; ".join(failures))
 
@@ -85,7 +86,7 @@ FAILURES = (ClptError, OSError, MemoryError)  # of writing a file
 
 
 def _rescue(
-    path: Path, source: Source, stats: dict[str, str | int | float], grading: Grading
+    path: Path, film: Film, source: Source, stats: dict[str, str | int | float], grading: Grading
 ) -> str:
     """Write a picture, or else its film, where there is room for it; return what to say."""
     label = f"{path.stem}-{secrets.token_hex(4)}"
@@ -98,7 +99,7 @@ def _rescue(
     for folder in folders:
         other = folder / f"{label}{FILM}"
         with suppress(*FAILURES):
-            film_file.write(other, source.saved_film())
+            film_file.write(other, film.saved_film())
             return f"the film is in {other}, of which clpt merge makes the picture"
     return f"nor can it in {' or '.join(map(str, folders))}"
 
@@ -116,7 +117,7 @@ def write(
 ) -> None:
     """Write the picture so far, or the film. Raises SceneError, OSError."""
     form = source.form
-    if path.suffix.lower() == FILM:
+    if path.suffix.lower() == FILM and not isinstance(source, DenoisedPicture):
         saved = source.saved_film(held=True)
         if not saved.film.taken:
             raise SceneError("no pass has come to its end: there is no film yet", file=path)

@@ -8,6 +8,7 @@ from ... import images, output_files
 from ...errors import SceneError
 
 FILM = ".film"  # suffix of films, which hold all that a picture was made of
+CHECKPOINT = ".resume.exr"  # ends the name of the film that a render goes on from
 
 
 def default(scene: Path) -> tuple[Path, ...]:
@@ -33,3 +34,8 @@ def checked(paths: tuple[Path, ...]) -> tuple[Path, ...]:
 def name_of(scene: Path) -> str:
     """Return the name by which a scene's files are called."""
     return default(scene)[0].stem
+
+
+def is_film(path: Path) -> bool:
+    """Whether a file has the name of a film."""
+    return path.suffix.lower() == FILM or path.name.endswith(CHECKPOINT)

@@ -1,1 +1,1 @@
-"""What a command renders with: scenes, devices of this machine, the workers of a cluster."""
+"""Opens scenes, devices of this machine, and the workers of a cluster, for commands that render."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from ... import device as dev
 from ...cluster.cluster_renderer import ClusterRenderer
 from ...cluster.multi_renderer import MultiRenderer
+from ...render.pictures import DevicePictures
 from ...render.progress import Progress
 from ...render.renderer import Renderer
 from ...scene import Scene
@@ -27,8 +28,7 @@ OVERLAP = 2  # pictures of a cluster at a time: workers begin the next one while
 DEVICE_SECONDS = 3.0  # of a pass: at its end few paths are left; only there is there a checkpoint
 CLUSTER_SECONDS = 30.0  # of a pass with noise, at the end of which workers wait for each other
 
-OfDevices: TypeAlias = Renderer | MultiRenderer
-AnyRenderer: TypeAlias = OfDevices | ClusterRenderer
+AnyRenderer: TypeAlias = DevicePictures
 
 
 class Maker:
@@ -64,14 +64,14 @@ class Maker:
 class DeviceMaker(Maker):
     """Devices of this machine; renderer: the last one that was made."""
 
-    renderer: OfDevices
+    renderer: AnyRenderer
 
     def __init__(self, devices: list[dev.Device], options: SceneOptions):
         self.devices = devices
         self.name = " and ".join(on.info.label for on in devices)
         self._made = options.made
 
-    def make(self, scene: Scene, shown: Display, first_sample: int = 0) -> OfDevices:
+    def make(self, scene: Scene, shown: Display, first_sample: int = 0) -> AnyRenderer:
         """Return a new renderer of a scene; note its warnings."""
         names = " and ".join(on.info.name for on in self.devices)
         with prompt(dev.kill_compilers), shown.phase(f"building kernels for {names}"):
@@ -128,7 +128,7 @@ class ClusterMaker(Maker):
         return -self.frame
 
 
-def new_renderer(scene: Scene, devices: list[dev.Device], **made: Any) -> OfDevices:
+def new_renderer(scene: Scene, devices: list[dev.Device], **made: Any) -> AnyRenderer:
     """Return a renderer on one device, or on several."""
     if len(devices) > 1:
         return MultiRenderer(scene, devices, **made)

@@ -1,1 +1,1 @@
-"""Options that several commands have, and the records of what they say."""
+"""Options that several commands have, and records of their values."""

@@ -1,4 +1,4 @@
-"""What options change of a scene: samples, film, light transport, camera and surroundings."""
+"""Options change a scene: its samples, film, light transport, camera and surroundings."""
 
 from __future__ import annotations
 

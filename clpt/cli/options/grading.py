@@ -15,7 +15,7 @@ from .records import Command, with_options
 
 @dataclass(frozen=True)
 class Grading:
-    """How files say a picture.
+    """The form of pictures in files.
 
     exposure [stops]; tone: a curve of clpt.colour.tones; view: of OpenColorIO, instead; names: of
     channels of an .exr, a set of clpt.render.film.layer_channels.SETS.
@@ -29,7 +29,7 @@ class Grading:
 
 @dataclass(frozen=True)
 class GradingOptions:
-    """What the options of `grading_options` and `names_option` say."""
+    """The options of `grading_options` and `names_option`."""
 
     exposure: float
     tone: str | None
@@ -41,7 +41,7 @@ class GradingOptions:
 
     @cached_property
     def grading(self) -> Grading:
-        """How files say a picture. Raises SceneError, click.UsageError."""
+        """The grading that the options ask for. Raises SceneError, click.UsageError."""
         if not (self.view or self.display or self.look):
             if self.ocio != DEFAULT_CONFIG:
                 raise click.UsageError("--ocio needs --view or --display")

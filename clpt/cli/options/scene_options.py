@@ -1,4 +1,4 @@
-"""Options that say what is rendered, and by what: of `clpt render`, `view`, `warm` and others."""
+"""Options of scenes and of those who render them: of `clpt render`, `view`, `warm` and others."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from .values import LightPaths, Names, SensorName, Size, White
 
 @dataclass(frozen=True)
 class Loading:
-    """How a scene's file is read: see `clpt.load`."""
+    """Options of reading a scene's file: see `clpt.load`."""
 
     variables: dict[str, Any]
     missing_textures: Missing = "error"
@@ -51,7 +51,7 @@ class Machine:
 
 @dataclass(frozen=True)
 class Build:
-    """How a renderer is built: see `RenderOptions`."""
+    """Options of renderers that are built: see `RenderOptions`."""
 
     layout: str | None = None
     tree_quality: Quality = "high"
@@ -60,7 +60,7 @@ class Build:
 
 @dataclass(frozen=True)
 class SceneOptions:
-    """What is rendered and by what, as the options of `scene_options` say it."""
+    """The options of `scene_options`: a scene, changes of it, and who renders it."""
 
     loading: Loading
     changes: SceneChanges

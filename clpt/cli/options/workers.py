@@ -36,7 +36,7 @@ class Workers:
 
     @property
     def number(self) -> int | None:
-        """How many workers this machine is to start; None where an address has its own."""
+        """The number of workers to start on this machine; None where an address has its own."""
         where = self.cluster or ""
         return int(where.removeprefix(LOCAL)) if where.startswith(LOCAL) else None
 

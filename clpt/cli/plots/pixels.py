@@ -116,7 +116,7 @@ def _swatch(image: ImageContents, pixel: Pixel) -> Patch:
 
 
 def _dress(axes: Axes, quantity: str) -> None:
-    """What all plots share: a quiet grid, and no frame but the ground."""
+    """Give a plot what all share: a quiet grid, and no frame but the ground."""
     axes.set_ylabel(quantity, color=INK)
     axes.grid(axis="y", color=FAINT, linewidth=0.8)
     axes.set_axisbelow(True)

@@ -1,1 +1,1 @@
-"""What a command prints: the progress of a render, and tables."""
+"""Prints the progress of a render, and tables."""

@@ -1,1 +1,1 @@
-"""What the process of a command does at signals, failures and its end."""
+"""The process of a command: signals, failures, streams, memory."""

@@ -1,4 +1,4 @@
-"""What the user reads where something fails: one line, and an exit status."""
+"""Failures as the user reads them: one line, and an exit status."""
 
 from __future__ import annotations
 

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from ...formats import locate
+from ..files import targets
 from ..options.grading import grading_options, names_option
 from ..options.records import with_records
 from ..options.scene_options import denoise_option, scene_options
@@ -62,6 +64,8 @@ def _rendered(job: Job) -> int:
         from .frames import render_frames
 
         return render_frames(job, display(job.quiet, None))
+    targets.checked(job.targets)
+    locate(job.scene)
     from .picture import render_picture
 
     return render_picture(job, display(job.quiet, job.until.limit))

@@ -1,4 +1,4 @@
-"""How a frame's number and time reach names of files and values of variables."""
+"""A frame's number and time in names of files and values of variables."""
 
 from __future__ import annotations
 

@@ -17,11 +17,12 @@ from typing import Any
 
 import click
 
-from ... import __version__, images
+from ... import images
 from ...errors import ClusterError, SceneError
 from ...render.analysis.checks import check
 from ...scene import Scene
 from ...scene.fingerprint import fingerprint
+from ...version import VERSION
 from ..files import outputs, targets
 from ..opening.devices import choose_devices, share_compilers
 from ..opening.makers import AnyRenderer, Maker, cluster_makers, device_makers
@@ -40,7 +41,7 @@ LOOK = 0.1  # seconds between two looks at signals
 
 @dataclass(frozen=True)
 class _Frames:
-    """What is rendered for each frame of a job; outputs: names with a place for its number."""
+    """The frames of a job; outputs: names of files with a place for the number of a frame."""
 
     job: Job
     numbers: range
@@ -91,7 +92,7 @@ class _Frames:
         decides = {
             "scene": fingerprint(scene).digest, "spp": self.job.until.end(scene),
             "noise": scene.noise, "time": self.job.until.limit,
-            "grading": repr(self.job.graded.grading), "version": __version__,
+            "grading": repr(self.job.graded.grading), "version": VERSION,
             "denoise": changes.denoise,
         }  # fmt: skip
         return scene, hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
@@ -241,7 +242,7 @@ class _FrameLoop:
         render_samples(renderer, end, maker.look, pass_seconds=seconds)
         if self.stopped:
             return renderer  # what it has so far is no frame
-        if not any(counts.samples for counts in renderer.counts):
+        if not renderer.counts.samples:
             message = "in so short a time there was no sample"
             raise click.BadParameter(message, param_hint="--time")
         seconds = time.perf_counter() - began

@@ -8,8 +8,9 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from ...render.film_renderer import MOST_SAMPLES
 from ...render.progress import Progress
-from ...render.renderer import MOST_SAMPLES
+from ...render.wavefront.wavefront import Counts
 from ..opening.makers import DEVICE_SECONDS, AnyRenderer
 
 GROWTH = 3  # times what has been rendered so far
@@ -48,12 +49,11 @@ def render_samples(
     began = time.perf_counter()
     first, last, limit = renderer.first_sample, end.samples or MOST_SAMPLES, end.seconds
     total = 0 if end.samples is None else end.samples - first
-    others = renderer.counts if renderer.samples > first else ()  # who rendered before
-    former = sum(counts.samples for counts in others), sum(counts.rays for counts in others)
+    others = renderer.counts if renderer.samples > first else Counts()  # who rendered before
 
     def tell(progress: Progress) -> bool:
         seconds = time.perf_counter() - began
-        paths, rays = progress.paths - former[0], progress.rays - former[1]
+        paths, rays = progress.paths - others.samples, progress.rays - others.rays
         show(dataclasses.replace(progress, total=total, seconds=seconds, paths=paths, rays=rays))
         over = limit is not None and seconds >= limit
         return not (end.stopped or over)

@@ -13,7 +13,7 @@ from ...errors import ClusterError
 from ...render.film.saved_film import SavedFilm
 from ...render.progress import Progress
 from ...scene import Scene
-from ..files import checkpoints, outputs, targets
+from ..files import checkpoints, outputs
 from ..opening.makers import AnyRenderer, DeviceMaker, Maker, cluster_makers, device_makers
 from ..opening.scenes import open_scene, read_scene
 from ..printing.display import Display
@@ -32,7 +32,6 @@ def render_picture(job: Job, shown: Display) -> int:
     Raises what the render raises, after the picture so far and the film are written.
     """
     began = time.perf_counter()
-    targets.checked(job.targets)
     former = _Former.find(job, shown.note)
     with ExitStack() as resources:
         opened = _open(job, former, shown, resources)
@@ -123,7 +122,7 @@ def _open(job: Job, former: _Former, shown: Display, resources: ExitStack) -> _O
 
 
 class _Picture:
-    """What is written of a render: pictures and films so far, and those of its end.
+    """Writes the pictures and films of a render, while it goes on and at its end.
 
     ready: when it began [s of time.perf_counter].
     """
@@ -184,7 +183,7 @@ class _Picture:
 
     @property
     def _has_samples(self) -> bool:
-        return any(counts.samples for counts in self._renderer.counts)
+        return self._renderer.counts.samples > 0
 
     def _stats(self) -> dict[str, str | int | float]:
         seconds = time.perf_counter() - self.ready

@@ -8,9 +8,8 @@ from ..opening.makers import AnyRenderer
 def refusals(renderer: AnyRenderer) -> list[str]:
     """Return a sentence for each way in which samples of a render, or pixels, are wrong."""
     told = []
-    rejected = sum(counts.rejected for counts in renderer.counts)
-    if rejected:
+    if rejected := renderer.counts.rejected:
         told.append(f"{rejected} samples were not finite, or too bright, and count as black")
-    if any(counts.full for counts in renderer.counts):
+    if renderer.counts.full:
         told.append("pixels are too bright for the film: lower film.exposure")
     return told

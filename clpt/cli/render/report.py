@@ -1,16 +1,16 @@
-"""What `clpt render --verbose` prints on stderr."""
+"""The figures that `clpt render --verbose` prints on stderr."""
 
 from __future__ import annotations
 
 import click
 
 from ...cluster.multi_renderer import MultiRenderer
-from ..opening.makers import OfDevices
+from ..opening.makers import AnyRenderer
 
 
-def before(renderer: OfDevices, loading: float) -> None:
+def before(renderer: AnyRenderer, loading: float) -> None:
     """Print what was made of the scene, and the time; loading: seconds for its file."""
-    first, stats = renderer.wavefronts[0], renderer.stats
+    first, stats = renderer.wavefront, renderer.stats
     for on in renderer.devices:
         _line("device", on.info.label)
     parts = [f"{stats.triangles:,} triangles"]
@@ -47,7 +47,7 @@ def before(renderer: OfDevices, loading: float) -> None:
         )
 
 
-def after(renderer: OfDevices) -> None:
+def after(renderer: AnyRenderer) -> None:
     """Print the time of the first sample, what each device did, and each stage of the first."""
     if isinstance(renderer, MultiRenderer):
         for one in renderer.shares:
@@ -62,12 +62,11 @@ def after(renderer: OfDevices) -> None:
             "samples",
             f"{samples.mean():.1f} in the mean, {samples.min():.0f} to {samples.max():.0f}",
         )
-    for wavefront in renderer.wavefronts:
-        timings = wavefront.timings.collect()
-        whole = sum(timing.seconds for timing in timings.values())
-        for name, timing in timings.items():
-            share = timing.seconds / max(whole, 1e-9)
-            _line(f"stage {name}", f"{timing.seconds:.3f} s, {share:.0%}, {timing.calls:,} calls")
+    timings = renderer.wavefront.timings.collect()
+    whole = sum(timing.seconds for timing in timings.values())
+    for name, timing in timings.items():
+        share = timing.seconds / max(whole, 1e-9)
+        _line(f"stage {name}", f"{timing.seconds:.3f} s, {share:.0%}, {timing.calls:,} calls")
 
 
 def _line(what: str, text: str) -> None:

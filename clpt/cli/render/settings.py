@@ -1,4 +1,4 @@
-"""The options of `clpt render` alone, and the records of what they say."""
+"""The options of `clpt render` alone, and the records that it takes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class SampleRange(click.ParamType):
     name = "FIRST:END"
 
     def convert(self, value: Any, param: Any, ctx: Any) -> tuple[int, int]:
-        from ...render.renderer import MOST_SAMPLES  # here: help needs no OpenCL
+        from ...render.film_renderer import MOST_SAMPLES  # here: help needs no OpenCL
 
         found = re.fullmatch(r"(\d{1,10}):(\d{1,10})", str(value).strip())
         if not found or not int(found[1]) < int(found[2]) <= MOST_SAMPLES:
@@ -111,7 +111,7 @@ class Until:
 
 @dataclass(frozen=True)
 class Resuming:
-    """How often the film is saved [s], and whether the render goes on from one."""
+    """The seconds between two films that are saved, and whether the render goes on from one."""
 
     period: float | None
     resume: bool | None
@@ -139,7 +139,7 @@ class Animation:
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """What the options of `clpt render` say: how scenes are rendered, by what, and what is told.
+    """The options of `clpt render`: when a render ends, who renders, what is written and told.
 
     tev: host and port of a viewer; verbose: whether figures are printed.
     """
@@ -173,7 +173,7 @@ class Settings:
 
 @dataclass(frozen=True, kw_only=True)
 class Job(Settings):
-    """What is rendered of one scene; camera: which of several, as its number."""
+    """A scene to render, by these settings; camera: which of several, as its number."""
 
     scene: Path
     camera: str | None = None

@@ -36,7 +36,7 @@ def shown(source: Film) -> dict[str, NDArray[np.float32]]:
     picture = source.colours() if source.form.bands else source.image()
     made = {letter: picture[..., i] for i, letter in enumerate("RGBA"[: picture.shape[2]])}
     made |= channels_of(source.layers())
-    if source.is_adaptive:
+    if source.form.adaptive:
         made["samples.X"] = source.samples_per_pixel()
     if source.form.bands:
         spectral = source.spectral_image()

@@ -46,9 +46,6 @@ def view(scene: Path, settings: Settings, verbose: int) -> int:
     The line that is printed is the page's address. It opens the page once, on this machine; the
     page makes addresses for others. The scene's file is read again when it changes. Ctrl-C ends it.
     """
-    from ..process.extras import extra
-
-    with extra("view", "clpt view"):
-        from .page import show  # here: help needs neither OpenCL nor a server
+    from .page import show  # here: help needs neither OpenCL nor a server
 
     return show(scene, settings)

@@ -19,7 +19,6 @@ from ...view.access import is_loopback
 from ...view.commands import OF_VIEW
 from ...view.pictures import Display
 from ...view.saving import Folder
-from ...view.server import Server
 from ...view.session import Session, Source
 from ...view.views import load as load_view
 from ..files import outputs, targets
@@ -39,11 +38,15 @@ CLOSE_SECONDS = 3.0  # in which a session ends that waits for no compiler
 
 def show(scene: Path, settings: Settings) -> int:
     """Show a scene until a signal comes; return the exit status. Raises what its session does."""
+    with extra("view", "clpt view"):
+        from ...view.server import Server
     file = locate(scene)
     begins = load_view(settings.opened) if settings.opened is not None else None
     looked_at = _display(settings)
     with ExitStack() as resources:
-        server = _server(settings.listening, resources)
+        server = Server(settings.listening.host, settings.listening.port)
+        resources.callback(server.close)
+        _announce(server.address, settings.listening)
         shown = display(settings.quiet, None)
         opened = open_scene(file, settings.options, shown, resources)
         where, make = _renderers(settings, opened, shown, resources)
@@ -73,17 +76,14 @@ def _display(settings: Settings) -> Display:
     return Display(grading.exposure, tone, grading.view)
 
 
-def _server(listening: Listening, resources: ExitStack) -> Server:
-    """Return the page's server, and open the page; resources: get what closes it."""
-    server = Server(listening.host, listening.port)
-    resources.callback(server.close)
-    click.echo(server.address)
+def _announce(address: str, listening: Listening) -> None:
+    """Print the page's address, and open the page."""
+    click.echo(address)
     if not is_loopback(listening.host):
         warning = f"other machines can reach {listening.host}, and read along"
         click.echo(f"clpt: warning: {warning}", err=True)
     if not listening.no_browser:
-        webbrowser.open(server.address)
-    return server
+        webbrowser.open(address)
 
 
 def _renderers(
@@ -93,10 +93,14 @@ def _renderers(
     device = opened.devices[0]
     if settings.workers.cluster is not None:
         with extra("cluster", "clpt view --cluster"):
-            from ...cluster.steered import SteeredCluster
+            from ...cluster.cluster_renderer import ClusterRenderer
         workers = connected(settings.workers, settings.options.machine, shown)
         client = resources.enter_context(workers)
-        return settings.workers.cluster, partial(SteeredCluster, client=client, device=device)
+
+        def of_cluster(scene: Scene, cancel_seconds: float, **made: Any) -> ClusterRenderer:
+            return ClusterRenderer(scene, client, device=device, mixed=True, **made)
+
+        return settings.workers.cluster, of_cluster
     several = partial(MultiRenderer, devices=opened.devices) if len(opened.devices) > 1 else None
     return " and ".join(one.info.label for one in opened.devices), several
 
@@ -105,8 +109,6 @@ def _folder(file: Path, settings: Settings) -> Folder:
     """Return what writes files of the page."""
 
     def write_exr(path: Path, renderer: Any, seconds: float) -> None:
-        if settings.workers.cluster is not None:
-            renderer = renderer.developed()
         outputs.write(path, renderer, outputs.metadata(renderer, file, seconds), Grading())
 
     return Folder(settings.folder, targets.name_of(file), write_exr)

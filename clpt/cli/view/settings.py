@@ -1,4 +1,4 @@
-"""The records of what the options of `clpt view` say."""
+"""The records that `clpt view` takes in the place of options."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Listening:
 
 @dataclass(frozen=True)
 class Settings:
-    """What the options of `clpt view` say.
+    """The options of `clpt view`.
 
     folder: gets what the page saves; opened: a view that it has saved, to begin with.
     """

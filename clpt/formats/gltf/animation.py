@@ -8,14 +8,13 @@ from __future__ import annotations
 from contextlib import suppress
 
 import numpy as np
-from numpy.typing import NDArray
 
+from clpt.arrays import Floats
 from clpt.errors import SceneError
 from clpt.formats.gltf import pointers
 from clpt.formats.gltf.accessors import floats
 from clpt.formats.gltf.document import Document, Element
 
-Values = NDArray[np.float64]
 PATHS = {
     "translation": ("VEC3",),
     "rotation": ("VEC4",),
@@ -26,13 +25,13 @@ PATHS = {
 INTERPOLATIONS = ("LINEAR", "STEP", "CUBICSPLINE")
 
 
-def pose(document: Document, chosen: str | None, time: float) -> dict[tuple[int, str], Values]:
+def pose(document: Document, chosen: str | None, time: float) -> dict[tuple[int, str], Floats]:
     """Return the values by (node, "rotation" or the like) that an animation sets at a time [s].
 
     chosen: its number or name; the first one if None. What pointers point to elsewhere is written
     into the document. Raises SceneError if there is no such animation.
     """
-    found: dict[tuple[int, str], Values] = {}
+    found: dict[tuple[int, str], Floats] = {}
     for channel in _chosen(document, chosen).children("channels"):
         target = channel.needed("target")
         node = target.index("node", "nodes", None)
@@ -81,7 +80,7 @@ def _chosen(document: Document, chosen: str | None) -> Element:
     raise document.root.error(f"has no animation {chosen!r}; it has: {names}")
 
 
-def _sampled(channel: Element, path: str, time: float) -> Values:
+def _sampled(channel: Element, path: str, time: float) -> Floats:
     """The values of a channel at a time; beyond its ends those at the ends."""
     animation = channel.path.rpartition(".channels")[0]
     owner = channel.document.entry("animations", int(animation.partition("[")[2][:-1]))
@@ -105,7 +104,7 @@ def _sampled(channel: Element, path: str, time: float) -> Values:
     return _unit(_between(how, path, keys[before], keys[after], step, time - times[before]), path)
 
 
-def _between(how: str, path: str, a: Values, b: Values, step: float, past: float) -> Values:
+def _between(how: str, path: str, a: Floats, b: Floats, step: float, past: float) -> Floats:
     t = past / step
     if how == "STEP":
         return a[0]
@@ -120,7 +119,7 @@ def _between(how: str, path: str, a: Values, b: Values, step: float, past: float
     )
 
 
-def _slerp(a: Values, b: Values, t: float) -> Values:
+def _slerp(a: Floats, b: Floats, t: float) -> Floats:
     """Between two unit quaternions, the shorter way (Shoemake 1985)."""
     cosine = float(a @ b)
     b, cosine = (-b, -cosine) if cosine < 0.0 else (b, cosine)
@@ -130,12 +129,12 @@ def _slerp(a: Values, b: Values, t: float) -> Values:
     return (np.sin((1.0 - t) * angle) * a + np.sin(t * angle) * b) / np.sin(angle)
 
 
-def _unit(values: Values, path: str) -> Values:
+def _unit(values: Floats, path: str) -> Floats:
     length = np.linalg.norm(values)
     return values / length if path == "rotation" and length > 0.0 else values
 
 
-def _values(sampler: Element, key: str, types: tuple[str, ...]) -> Values:
+def _values(sampler: Element, key: str, types: tuple[str, ...]) -> Floats:
     accessor = sampler.entry(key, "accessors")
     if accessor is None:
         raise sampler.error(f"{key!r} is missing")

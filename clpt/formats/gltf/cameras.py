@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from clpt import transforms
+from clpt.arrays import Matrix
 from clpt.formats.gltf.document import Element
-from clpt.formats.gltf.nodes import Graph, Matrix
+from clpt.formats.gltf.nodes import Graph
 from clpt.scene.cameras import Camera, Orthographic, Perspective
 from clpt.scene.integrators import Film
 

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Floats32
 from clpt.formats.gltf.accessors import normalised
 from clpt.formats.gltf.document import Element
 
-Floats = NDArray[np.float32]
 TYPES = {  # of the accessors of an attribute, by what its name begins with
     "POSITION": ("VEC3",), "NORMAL": ("VEC3",), "TANGENT": ("VEC4",), "TEXCOORD": ("VEC2",),
     "COLOR": ("VEC3", "VEC4"), "JOINTS": ("VEC4",), "WEIGHTS": ("VEC4",),
@@ -29,7 +29,7 @@ class Geometry:
 
     faces: NDArray[np.int64]
     attributes: dict[str, NDArray[Any]]
-    targets: list[dict[str, Floats]] = field(default_factory=list)
+    targets: list[dict[str, Floats32]] = field(default_factory=list)
 
 
 def types(name: str) -> tuple[str, ...]:

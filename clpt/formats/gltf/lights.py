@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import math
 
+from clpt.arrays import Matrix
 from clpt.formats.gltf.cameras import FROM_GLTF, rigid
 from clpt.formats.gltf.document import Element
-from clpt.formats.gltf.nodes import Graph, Matrix
+from clpt.formats.gltf.nodes import Graph
 from clpt.scene.lights import Directional, Light, Point, Spot
 from clpt.spectra import RGBIlluminant
 

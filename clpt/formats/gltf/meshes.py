@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import budget, transforms
+from clpt.arrays import Matrix
 from clpt.formats.gltf import materials, skins, variants, volume
 from clpt.formats.gltf.accessors import floats
 from clpt.formats.gltf.document import Element
 from clpt.formats.gltf.geometry import Geometry
-from clpt.formats.gltf.nodes import Graph, Matrix, compose
+from clpt.formats.gltf.nodes import Graph, compose
 from clpt.formats.gltf.primitives import geometry
 from clpt.formats.meshes.mesh import checked
 from clpt.formats.meshes.triangles import TANGENTS

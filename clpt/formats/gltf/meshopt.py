@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import budget
+from clpt.arrays import Bytes
 from clpt.formats.gltf import meshopt_filters, meshopt_indices
 from clpt.formats.gltf.document import Element
 
@@ -23,7 +24,6 @@ TAIL = {0: 32, 1: 24}  # bytes at least, by version
 # By control mode (version 1), or for version 0: the bits of a delta by the group's header bits.
 BITS_V0, BITS_V1 = (0, 2, 4, 8), ((0, 1, 2, 4), (1, 2, 4, 8))
 ZERO, LITERAL = 2, 3  # control modes without header bits
-Bytes = NDArray[np.uint8]
 
 
 def extension(view: Element) -> Element | None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Bytes = NDArray[np.uint8]
+from clpt.arrays import Bytes
+
 TABLE = 16  # bytes at a triangle stream's end
 
 

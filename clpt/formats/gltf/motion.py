@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Matrix
 from clpt.errors import SceneError
 from clpt.scene import Scene
 from clpt.scene.motion import Deformation, Shutter, placement, through
@@ -16,8 +17,6 @@ from clpt.scene.shapes import Group, Instance, Mesh
 
 KEYS = 9  # in the time for which the shutter is open
 NEAR = 1e-3  # of a mesh's size, by which a vertex may be off its way between keys
-
-Matrix = NDArray[np.float64]
 
 
 def between(load: Callable[[float], Scene], time: float, length: float) -> Scene:

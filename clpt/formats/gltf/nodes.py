@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Matrix
 from clpt.formats.gltf.document import Document, Element
 
-Matrix = NDArray[np.float64]
 # The defaults of a node, ten numbers in all.
 TRS: dict[str, tuple[float, ...]] = {
     "translation": (0.0, 0.0, 0.0),

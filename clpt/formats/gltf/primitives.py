@@ -7,16 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Floats32
 from clpt.formats.gltf import draco
 from clpt.formats.gltf.accessors import COMPONENTS, floats, integers, stored
 from clpt.formats.gltf.document import Element
-from clpt.formats.gltf.geometry import (
-    Floats,
-    Geometry,
-    target_types,
-    types,
-    warn_of_whole_numbers,
-)
+from clpt.formats.gltf.geometry import Geometry, target_types, types, warn_of_whole_numbers
 
 POINTS, TRIANGLES, STRIP, FAN = 0, 4, 5, 6
 NOT_DRAWN = {0: "points", 1: "lines", 2: "a line loop", 3: "a line strip"}
@@ -85,7 +80,7 @@ def _check_indices(primitive: Element, faces: NDArray[np.int64], vertices: int) 
         raise primitive.error(message, "indices")
 
 
-def _target(target: Element, vertices: int) -> dict[str, Floats]:
+def _target(target: Element, vertices: int) -> dict[str, Floats32]:
     found = {}
     for name in filter(types, target.value):
         accessor = target.entry(name, "accessors")

@@ -15,8 +15,6 @@ from clpt.geometry.polygons import triangulate
 
 DENSE = 8  # numbers between a mesh's first and last vertex, per corner, that a table may have
 
-Named = NDArray[np.int32]
-
 
 @dataclass
 class Part:
@@ -52,7 +50,9 @@ def parts(contents: Contents, *, whole: bool = False) -> Iterator[Part]:
         yield _part(contents, int(material[own[0]]), named, groups[own])
 
 
-def _part(contents: Contents, material: int, named: Named, groups: NDArray[Any]) -> Part:
+def _part(
+    contents: Contents, material: int, named: NDArray[np.int32], groups: NDArray[Any]
+) -> Part:
     """named: (t, 3, 3) vertex, uv and normal of each corner; groups: (t,) smoothing groups."""
     normals, named = _with_normals(contents, named, groups)
     corners = named.reshape(-1, 3)
@@ -73,8 +73,8 @@ def _part(contents: Contents, material: int, named: Named, groups: NDArray[Any])
 
 
 def _with_normals(
-    contents: Contents, named: Named, groups: NDArray[Any]
-) -> tuple[NDArray[np.float32] | None, Named]:
+    contents: Contents, named: NDArray[np.int32], groups: NDArray[Any]
+) -> tuple[NDArray[np.float32] | None, NDArray[np.int32]]:
     """Return normals and corners that name them; None where all triangles are flat.
 
     Corners that name no normal get their smoothing group's, or else their triangle's.
@@ -104,7 +104,7 @@ def _with_normals(
     return np.concatenate(normals), named
 
 
-def _unique(corners: Named) -> tuple[Named, NDArray[np.int64]]:
+def _unique(corners: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
     """Return the corners (k, 3) that differ, and of each corner the number of its like."""
     vertex = corners[:, 0].astype(np.int64)
     low = int(vertex.min())

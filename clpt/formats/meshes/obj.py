@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import budget, input_files, text
+from clpt.arrays import Bytes, Floats32, Integers
 from clpt.errors import SceneError
 
 PER_BYTE = 8  # bytes of memory for each of the file, while it is read
@@ -43,10 +44,6 @@ LEFT_OUT = {
 }  # fmt: skip
 MOST_TOLD = 6  # statements that a warning names
 
-Floats = NDArray[np.float32]
-Integers = NDArray[np.int64]
-Bytes = NDArray[np.uint8]
-
 
 @dataclass
 class Contents:
@@ -58,10 +55,10 @@ class Contents:
     material in `materials`, -1 where none is named; "s": its smoothing group, 0 for none.
     """
 
-    vertices: Floats
-    colours: Floats | None
-    uvs: Floats
-    normals: Floats
+    vertices: Floats32
+    colours: Floats32 | None
+    uvs: Floats32
+    normals: Floats32
     counts: Integers
     corners: NDArray[np.int32]
     labels: dict[str, Integers]
@@ -98,9 +95,9 @@ class _Lines:
 class _Reader:
     path: Path
     data: bytes
-    rows: dict[int, list[Floats]] = field(default_factory=lambda: {key: [] for key in NAMES})
+    rows: dict[int, list[Floats32]] = field(default_factory=lambda: {key: [] for key in NAMES})
     found: dict[int, int] = field(default_factory=lambda: dict.fromkeys(NAMES, 0))
-    colours: list[tuple[int, Floats]] = field(default_factory=list)
+    colours: list[tuple[int, Floats32]] = field(default_factory=list)
     counts: list[Integers] = field(default_factory=list)
     corners: list[NDArray[np.int32]] = field(default_factory=list)
     labels: dict[str, list[Integers]] = field(default_factory=lambda: {k: [] for k in CHANGING})
@@ -219,7 +216,9 @@ class _Reader:
             self.colours.append((self.found[kind], colours))
         self.found[kind] += len(own)
 
-    def each_number(self, at: int, kind: int, plain: Bytes, lines: _Lines, own: Integers) -> Floats:
+    def each_number(
+        self, at: int, kind: int, plain: Bytes, lines: _Lines, own: Integers
+    ) -> Floats32:
         """Return the numbers of lines, read one by one. Raises SceneError for the first bad one."""
         values: list[float] = []
         for start, stop in zip(lines.start[own].tolist(), lines.stop[own].tolist(), strict=True):
@@ -387,7 +386,7 @@ def _parsed(cut: bytes, letters: bytes, dtype: Any, count: int) -> NDArray[Any] 
     return values if len(values) == count else None
 
 
-def _columns(values: Floats, words: Integers, first: int, last: int) -> Floats:
+def _columns(values: Floats32, words: Integers, first: int, last: int) -> Floats32:
     """Return numbers `first` to `last` of each line, (n, last - first); 0 where it has fewer."""
     if words.min() == words.max() >= last:
         return values.reshape(len(words), -1)[:, first:last]

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import budget, text
+from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
 from clpt.formats.gzip_file import read_bytes
 from clpt.formats.meshes.triangles import Triangles, indices, see_through
@@ -24,9 +25,6 @@ PER_BYTE = 32  # bytes of memory for each of the file, while it is read
 COMMENT = re.compile(rb"#[^\r\n]*")
 COLOUR = ("red", "green", "blue", "alpha")
 GREY = (203, 0.6)  # of a mesh without colours: in bytes of sRGB, and linear
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 def read(path: Path) -> list[Triangles]:

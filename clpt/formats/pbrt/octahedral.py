@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float32]
-Points = NDArray[Any]
+from clpt.arrays import Floats32
 
 TALLEST = 4096  # [rows] of an image in latitude and longitude that is made
 DENSE = 1024  # [rows] up to which a pixel takes two lookups in each direction, beyond it one
@@ -53,7 +52,7 @@ def to_sphere(points: ArrayLike) -> NDArray[np.float64]:
     )
 
 
-def lat_long(image: Array, from_world: ArrayLike, *, on_poles: bool = True) -> Array:
+def lat_long(image: Floats32, from_world: ArrayLike, *, on_poles: bool = True) -> Floats32:
     """The image (h, 2h, c) in latitude and longitude of an octahedral one (n, n, c).
 
     from_world: (3, 3), takes directions of the world to those of the octahedron; it may mirror.
@@ -79,8 +78,13 @@ def lat_long(image: Array, from_world: ArrayLike, *, on_poles: bool = True) -> A
 
 
 def _gathered(
-    image: Array, from_world: Points, theta: Points, first: int, count: int, strata: int
-) -> Points:
+    image: Floats32,
+    from_world: NDArray[Any],
+    theta: NDArray[Any],
+    first: int,
+    count: int,
+    strata: int,
+) -> NDArray[Any]:
     """Rows of the result from `first` on, each pixel the mean of strata^2 texels in its cell."""
     size, width, channels = len(image), 2 * len(theta), image.shape[2]
     within = (np.arange(strata) + 0.5) / strata - 0.5
@@ -98,7 +102,12 @@ def _gathered(
 
 
 def _lay_down(
-    made: Array, light: Array, texels: Points, size: int, from_world: Points, theta: Points
+    made: Floats32,
+    light: Floats32,
+    texels: NDArray[Any],
+    size: int,
+    from_world: NDArray[Any],
+    theta: NDArray[Any],
 ) -> None:
     """Add the radiance (m, c) of texels (m, 2), row and column, to an image that is bilinear.
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import spectra, transforms
+from clpt.arrays import fits_single
 from clpt.errors import SceneError
 from clpt.render.analysis import lens
 from clpt.scene.cameras import Camera, Lens, Matrix, Orthographic, Perspective, Spherical, ThinLens
@@ -90,7 +91,7 @@ def _matrix(camera: Camera, name: str) -> NDArray[np.float64]:
         matrix = np.zeros(0)
     if matrix.shape != (4, 4):
         raise SceneError("must be a 4x4 matrix", where=where)
-    if transforms.is_singular(matrix):
+    if transforms.is_singular(matrix) or not fits_single(matrix):
         raise SceneError("must have an inverse and be finite", where=where)
     return matrix
 

@@ -13,6 +13,7 @@ from clpt.scene.integrators import Film
 from clpt.spectra import Sensor, spaces
 from clpt.spectra.sensors import observer
 
+LARGEST = 120  # exponent of 2 of a scale, which is float32
 LARGEST_SCALE = 60  # exponent of 2 of an exposure that sums follow
 # Exponents of 2 between which ordinary light lies in the sums of kernels/core/fixed.cl
 DIMMEST, BRIGHTEST = -20, 32
@@ -50,7 +51,8 @@ def film_scale(film: Film, level: float) -> float:
     if not 0.0 < level < math.inf:
         return 2.0**own
     light = math.frexp(level)[1] + own
-    return 2.0 ** (own + min(max(light, DIMMEST), BRIGHTEST) - light)
+    exponent = own + min(max(light, DIMMEST), BRIGHTEST) - light
+    return 2.0 ** min(max(exponent, -LARGEST), LARGEST)
 
 
 def white(film: Film) -> NDArray[np.float64]:

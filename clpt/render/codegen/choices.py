@@ -5,23 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from clpt import bvh
+from clpt.render.codegen import flags
 from clpt.render.contract.features import Features
+from clpt.scene.scatterer import Scatterer
 
-Files = tuple[str, ...]
 
-
-def when(holds: object, *files: str) -> Files:
+def when(holds: object, *files: str) -> tuple[str, ...]:
     """Return the files where a condition holds, else none."""
     return files if holds else ()
 
 
-def either(holds: object, file: str) -> Files:
+def either(holds: object, file: str) -> tuple[str, ...]:
     """Return a file where a condition holds, else its twin that does nothing, `<name>_none.cl`."""
     return (file if holds else f"{file.removesuffix('.cl')}_none.cl",)
 
 
 # name: the files that stand for it, for a scene's features and the layout of its triangles
-CHOICES: dict[str, Callable[[Features, str], Files]] = {
+CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/spectrum.cl": lambda f, _: (f"spectrum/{f.spectra.mode}.cl",),
     "generated/spectrum_read.cl": lambda f, _: _spectrum_read(f),
     "generated/sampler.cl": lambda f, _: (
@@ -31,63 +31,51 @@ CHOICES: dict[str, Callable[[Features, str], Files]] = {
     "generated/exposure.cl": lambda f, _: (
         "film/splatting.cl" if f.film_weights else "film/exposure.cl",
     ),
-    "generated/bands.cl": lambda f, _: when(f.film.bands, "film/bands.cl"),
+    "generated/bands.cl": lambda f, _: ("film/bands.cl",) * f.film.bands,
     "generated/integrator.cl": lambda f, _: (f"integrator/{f.transport.integrator}.cl",),
     "generated/merging.cl": lambda f, _: either(f.transport.merged, "merging/area.cl"),
     "generated/cone.cl": lambda f, _: either(f.textures.mips, "path/cone.cl"),
+    "generated/vertex_media.cl": lambda f, _: (
+        when(f.media.bodies, "path/vertex_bodies.cl")
+        or either(f.media.absorbing, "path/vertex_media.cl")
+    ),
     "generated/ghosts.cl": lambda f, _: either(f.transport.lit_ghosts, "path/ghosts.cl"),
     "generated/first_ray.cl": lambda f, _: (f"path/first_ray{'_weighted' * f.camera.weighs}.cl",),
     "generated/sky.cl": lambda f, _: (
         *either(f.lights.infinite, "path/sky.cl"),
-        *either(f.lights.infinite and f.film.layers.lights, "path/sky_layers.cl"),
+        *either(f.lights.infinite and bool(f.film.layers.lights), "path/sky_layers.cl"),
     ),
     "generated/join_light.cl": lambda f, _: either(f.shows_lights, "lighting/join_light.cl"),
-    "generated/guide.cl": lambda f, _: when(f.transport.guided, "guiding/guide.cl"),
-    "generated/gather.cl": lambda f, _: when(
-        f.transport.merged and not f.transport.light_paths,
-        "generated/photon.cl",
-        "merging/gather.cl",
-    ),
     "generated/layer_sums.cl": lambda f, _: (
-        *either(f.film.layers.first_samples, "film/layers.cl"),
+        *either(f.film.layers.words > 0, "film/layers.cl"),
         *_screen_motion(f),
     ),
-    "generated/layers.cl": lambda f, _: when(
-        f.film.layers.first_samples,
-        "generated/layer_args.cl",
-        *_screen_motion(f),
-        "path/layers.cl",
+    "generated/layers.cl": lambda f, _: (
+        when(
+            f.film.layers.words > 0, "generated/layer_args.cl", *_screen_motion(f), "path/layers.cl"
+        )
+        or ("path/layers_none.cl",)
     ),
-    "generated/light_layers.cl": lambda f, _: when(
-        f.film.layers.lights,
-        "generated/light_layer_args.cl",
-        "generated/sampler.cl",
-        "film/light_layers.cl",
+    "generated/light_layers.cl": lambda f, _: (
+        *when(f.film.layers.lights, "generated/light_layer_args.cl", "generated/sampler.cl"),
+        *either(f.film.layers.lights, "film/light_layers.cl"),
     ),
-    "generated/flight_layers.cl": lambda f, _: when(
-        f.film.layers.lights and f.media.emissive and not f.transport.light_paths,
-        "film/light_layers.cl",
-    ),
-    "generated/rivals.cl": lambda f, _: when(
-        f.transport.balanced,
-        "generated/merging.cl",
-        "interface/camera.cl",
-        "generated/camera.cl",
-        "film/connect.cl",
-        "generated/connect.cl",
-        "lighting/rivals.cl",
+    "generated/met_weight.cl": lambda f, _: either(f.transport.balanced, "steps/met_weight.cl"),
+    "generated/flight_layers.cl": lambda f, _: (
+        ("film/light_layers.cl",)
+        * (bool(f.film.layers.lights) and f.media.emissive and not f.transport.light_paths)
     ),
     "generated/medium.cl": lambda f, _: (
-        *when(f.media.absorbing, "generated/medium_coefficients.cl", "media/medium.cl"),
-        *when(f.media.dyed, "media/dye_flight.cl"),
-        *when(f.media.grids.present, "media/medium_grid.cl"),
-        *when(f.media.grids.emissive, "media/medium_grid_light.cl"),
-        *when(f.media.bodies, "generated/body_index.cl"),
-        *when(f.media.present, *either(f.media.bodies, "media/bodies.cl")),
+        ("generated/medium_coefficients.cl", "media/medium.cl") * (f.media.absorbing)
+        + ("media/dye_flight.cl",) * f.media.dyed
+        + ("media/medium_grid.cl",) * f.media.grids.present
+        + ("media/medium_grid_light.cl",) * f.media.grids.emissive
+        + ("generated/body_index.cl",) * f.media.bodies
+        + either(f.media.bodies, "media/bodies.cl") * f.media.present
     ),
     "generated/grid_flight.cl": lambda f, _: (
-        *when(f.media.grids.emissive, "generated/lights.cl", "path/met_light.cl"),
-        *when(f.media.grids.present, "media/grid_flight.cl"),
+        ("generated/lights.cl", "path/met_light.cl") * f.media.grids.emissive
+        + ("media/grid_flight.cl",) * f.media.grids.present
     ),
     "generated/light_medium.cl": lambda f, _: (
         ("generated/textures.cl", "generated/medium.cl")
@@ -107,30 +95,112 @@ CHOICES: dict[str, Callable[[Features, str], Files]] = {
     "generated/curve_others.cl": lambda f, _: (
         f"tracing/curve_others{'_none' * (f.geometry.analytic == ('curves',))}.cl",
     ),
-    "generated/shape_traversal.cl": lambda f, layout: when(
-        f.geometry.analytic, f"bvh/{bvh.shapes_layout(layout)}.cl", "bvh/shapes.cl"
+    "generated/shape_traversal.cl": lambda f, layout: (
+        (f"bvh/{bvh.shapes_layout(layout)}.cl", "bvh/shapes.cl") * bool(f.geometry.analytic)
     ),
-    "generated/instances.cl": lambda f, _: when(f.geometry.instances, "tracing/instances.cl"),
+    "generated/hit_space.cl": lambda f, _: either(f.geometry.instances, "surface/hit_space.cl"),
+    "generated/surface_steps.cl": lambda f, _: (
+        "generated/motion.cl",
+        *either(f.textures.attributes, "surface/attributes.cl"),
+        *either(f.screen_motion and f.motion.vertices, "surface/deforms.cl"),
+        *either(f.geometry.normals or f.geometry.uvs or f.geometry.tangents, "surface/triangle.cl"),
+        *either(f.geometry.analytic, "surface/analytic.cl"),
+    ),
+    "generated/corner_rows.cl": lambda f, _: (
+        f"surface/corner_rows{'_keyed' * _corners_move(f)}.cl",
+    ),
+    "generated/triangle_steps.cl": lambda f, _: (
+        *either(f.geometry.normals, "surface/triangle_normal.cl"),
+        *either(f.geometry.uvs, "surface/triangle_uv.cl"),
+        *either(
+            f.geometry.uvs and f.geometry.tangents and f.geometry.vertex_tangents,
+            "surface/triangle_tangents.cl",
+        ),
+    ),
+    "generated/uv_tangents.cl": lambda f, _: either(f.geometry.tangents, "surface/uv_tangents.cl"),
+    "generated/analytic_steps.cl": lambda f, _: (
+        *either(f.motion.shapes, "surface/shape_motion.cl"),
+        *either(f.screen_motion and f.motion.spheres, "surface/spheres_move.cl"),
+        *either(f.geometry.tangents, "surface/analytic_tangents.cl"),
+    ),
+    "generated/instances.cl": lambda f, _: ("tracing/instances.cl",) * f.geometry.instances,
     "generated/motion.cl": lambda f, _: (
         *either(f.motion.present, "tracing/motion.cl"),
         *when(f.motion.vertices or f.motion.spheres, "tracing/vertex_keys.cl"),
     ),
-    "generated/keyed_layout.cl": lambda f, layout: when(
-        f.motion.vertices and layout != "brute", f"bvh/{layout}_keyed.cl"
+    "generated/keyed_layout.cl": lambda f, layout: (
+        (f"bvh/{layout}_keyed.cl",) * (f.motion.vertices and layout != "brute")
     ),
-    "generated/instance_traversal.cl": lambda f, layout: when(
-        f.geometry.instances,
-        f"tracing/instances_{'few' if f.geometry.few_instances else layout}.cl",
-        "tracing/trace_instances.cl",
+    "generated/instance_traversal.cl": lambda f, layout: (
+        (
+            f"tracing/instances_{'few' if f.geometry.few_instances else layout}.cl",
+            "tracing/trace_instances.cl",
+        )
+        * f.geometry.instances
+    ),
+}
+
+_RIVALS = (
+    "generated/merging.cl",
+    "interface/camera.cl",
+    "generated/camera.cl",
+    "film/connect.cl",
+    "generated/connect.cl",
+    "lighting/rivals.cl",
+)
+
+
+def _merges(features: Features, cls: type[Scatterer]) -> bool:
+    """Whether paths from the camera are merged with photons at a material."""
+    return features.transport.merged and flags.gathers_photons(features, cls)
+
+
+# likewise, for a scene's features and the kind of material that a program shades
+MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...]]] = {
+    "generated/rivals.cl": lambda f, cls: (
+        when(f.transport.balanced and not flags.is_null(f, cls), *_RIVALS)
+        or ("lighting/rivals_none.cl",)
+    ),
+    "generated/guide.cl": lambda f, cls: (
+        ("guiding/guided_vertex.cl",)
+        if flags.is_guided(f, cls) and not f.transport.light_paths
+        else ("guiding/guide_none.cl",)
+    ),
+    "generated/path_steps.cl": lambda f, cls: (
+        *either(cls.kind in f.materials.shining, "steps/met_emission.cl"),
+        *when(_merges(f, cls), "generated/photon.cl", "merging/gather.cl"),
+        *either(_merges(f, cls), "steps/merge.cl"),
+        *either(f.lights.kinds and not cls.delta, "steps/next_event.cl"),
+        *either(not flags.is_null(f, cls), "steps/roulette.cl"),
+        *either(not flags.is_null(f, cls), "steps/scatters.cl"),
+    ),
+    "generated/light_path_steps.cl": lambda f, cls: (
+        *either(f.transport.joined and not cls.delta, "steps/join_camera.cl"),
+        "steps/adjoint_weight.cl",
+        *either(not flags.is_null(f, cls), "steps/light_path_roulette.cl"),
+    ),
+    "generated/vertex_steps.cl": lambda f, cls: (
+        *either(f.names_surfaces, "path/vertex_names.cl"),
+        *(
+            when(f.media.bodies, "path/vertex_bodies_ways.cl")
+            or either(f.media.absorbing, "path/vertex_media_ways.cl")
+        ),
+        *either(flags.between_bodies(f, cls), "path/between_bodies.cl"),
+        *either(flags.has_lobe(f, cls, "clearcoat_apart"), "path/coat_normal.cl"),
     ),
 }
 
 
-def _screen_motion(features: Features) -> Files:
+def _screen_motion(features: Features) -> tuple[str, ...]:
     """How what is seen moves across the film, where a layer tells it."""
     files = ("interface/camera.cl", "generated/camera.cl", "generated/screen.cl")
     needed = when(features.screen_motion, *files)
     return (*needed, *either(features.screen_motion, "path/screen_motion.cl"))
+
+
+def _corners_move(features: Features) -> bool:
+    """Whether shading asks for rows of vertices, of meshes that deform."""
+    return features.motion.vertices and (features.geometry.normals or features.geometry.tangents)
 
 
 def _passing(features: Features) -> str:
@@ -140,13 +210,18 @@ def _passing(features: Features) -> str:
     return "" if features.materials.null_surfaces else "_opaque"
 
 
-def _spectrum_read(features: Features) -> Files:
+def _spectrum_read(features: Features) -> tuple[str, ...]:
     """The look-up of spectra, and in spectral mode how the camera draws wavelengths."""
-    own = features.spectra
-    drawn = f"spectrum/{'density' if own.tabulated_density else 'visible'}.cl"
-    return (f"spectrum/{own.mode}_read.cl", *when(own.spectral, drawn))
+    read = f"spectrum/{features.spectra.mode}_read.cl"
+    drawn = f"spectrum/{'density' if features.spectra.tabulated_density else 'visible'}.cl"
+    return (read, drawn) if features.spectra.spectral else (read,)
 
 
-def virtual_files(features: Features, layout: str) -> dict[str, Files]:
+def virtual_files(features: Features, layout: str) -> dict[str, tuple[str, ...]]:
     """Return the files that stand for each name in CHOICES."""
     return {name: choose(features, layout) for name, choose in CHOICES.items()}
+
+
+def material_files(features: Features, cls: type[Scatterer]) -> dict[str, tuple[str, ...]]:
+    """Return the files that stand for each name in MATERIAL_CHOICES."""
+    return {name: choose(features, cls) for name, choose in MATERIAL_CHOICES.items()}

@@ -1,7 +1,8 @@
 """Flags: the macros by which kernels ask what a scene has, and a material.
 
-A flag that holds is 1. One that does not hold is not defined: `#if` takes it for 0, and a text has
-no line for what its scene has not. Numbers and names are defined as they are.
+A flag that holds is 1. One that does not hold is not defined: `#if` takes it for 0. `assemble`
+decides each `#if`, so that a text has no line for what its scene has not. Numbers and names are
+defined as they are.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ def filters_at_random(features: Features, cls: type[Scatterer]) -> bool:
     return any(p.linear and "texture" in sources.get(n, ()) for n, p in declared.items())
 
 
-def _has_lobe(features: Features, cls: type[Scatterer], name: str) -> bool:
+def has_lobe(features: Features, cls: type[Scatterer], name: str) -> bool:
     """Whether a material of the scene has a lobe that a parameter of 0 leaves out."""
     declared, none = device_params(cls), frozenset({"none"})
     sources = features.materials.sources_of(cls.kind)
@@ -52,6 +53,21 @@ def _has_lobe(features: Features, cls: type[Scatterer], name: str) -> bool:
 def _chromatic(features: Features, cls: type[Scatterer]) -> bool:
     """Whether densities of a material's directions differ between wavelengths."""
     return features.materials.phase_varies(cls) if cls.is_phase else cls.chromatic
+
+
+def is_null(features: Features, cls: type[Scatterer]) -> bool:
+    """Whether a material is none: paths cross it as if nothing were there."""
+    return cls.is_null and features.materials.null_surfaces
+
+
+def is_guided(features: Features, cls: type[Scatterer]) -> bool:
+    """Whether a guide helps to choose directions at a material."""
+    return features.transport.guided and cls.guided
+
+
+def between_bodies(features: Features, cls: type[Scatterer]) -> bool:
+    """Whether the index outside of a material is that of a body there."""
+    return features.media.bodies and cls.kind in BETWEEN_BODIES
 
 
 BETWEEN_BODIES = ("dielectric", "rough_dielectric")  # their index outside is that of a body there
@@ -67,11 +83,9 @@ MATERIAL: dict[str, Callable[[Features, type[Scatterer]], int]] = {
     "BSDF_FLUORESCES": fluoresces,
     "BSDF_ENDS_LIGHT_PATHS": lambda f, cls: f.transport.balanced and ends_light_paths(f, cls),
     "BSDF_MERGES": lambda f, cls: f.transport.merged and gathers_photons(f, cls),
-    "BSDF_GUIDED": lambda f, cls: f.transport.guided and cls.guided,
+    "BSDF_GUIDED": is_guided,
     "BSDF_IS_PHASE": lambda f, cls: cls.is_phase,
-    "BSDF_BETWEEN_BODIES": lambda f, cls: f.media.bodies and cls.kind in BETWEEN_BODIES,
-    "BSDF_COAT_APART": lambda f, cls: _has_lobe(f, cls, "clearcoat_apart"),
-    "BSDF_IS_NULL": lambda f, cls: cls.is_null and f.materials.null_surfaces,
+    "BSDF_IS_NULL": is_null,
     "BSDF_IS_PANE": lambda f, cls: cls.is_pane and f.materials.free_panes,
     "STOCHASTIC_FILTERING": filters_at_random,
     "USES_CHOICE": lambda f, cls: cls.uses_lobe_sample or cls.fluoresces or not f.lights.few,
@@ -91,6 +105,8 @@ def of_scene(features: Features) -> Defines:
 
 
 def of_material(features: Features, cls: type[Scatterer]) -> Defines:
-    """Return the macros of the kind of material that a program shades."""
-    values = {name: value(features, cls) for name, value in MATERIAL.items()}
-    return {name: int(value) for name, value in values.items() if value is not False}
+    """Return the macros of the kind of material that a program shades.
+
+    They are 0 where they do not hold: kernels also ask for them by `if`.
+    """
+    return {name: int(value(features, cls)) for name, value in MATERIAL.items()}

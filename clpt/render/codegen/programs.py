@@ -97,7 +97,11 @@ def _shading(
     files, defines = _shared(features, layout), flags.of_scene(features)
     texts = {}
     for cls in features.materials.leaves:
-        own = {**files, "generated/bsdf.cl": stages.bsdf_text(features, cls)}
+        own = {
+            **files,
+            **choices.material_files(features, cls),
+            "generated/bsdf.cl": stages.bsdf_text(features, cls),
+        }
         if cls.is_phase:
             own["generated/shading_frame.cl"] = ("path/phase_frame.cl",)
         if cls.source is not None:
@@ -112,9 +116,8 @@ def _shading(
 
 
 def film_sources(features: Features, layout: str) -> dict[str, device.Source]:
-    """Return the texts of what makes pictures of a film, by program name."""
-    names = ("accumulate", *(("bands",) if features.film.bands else ()))
-    return _static(_alone(features, layout, *names))
+    """Return the text of what makes the picture of a film, by program name."""
+    return _static(_alone(features, layout, "accumulate"))
 
 
 def noise_sources(features: Features, layout: str) -> dict[str, device.Source]:

@@ -16,7 +16,7 @@ import pyopencl as cl
 from numpy.typing import NDArray
 
 from clpt import bvh, transforms
-from clpt.arrays import on_device
+from clpt.arrays import Points, on_device
 from clpt.geometry import analytic, shapes, strands, triangles
 from clpt.geometry.tessellate import keeps_its_kind
 from clpt.records import SHAPE, SHAPE_BITS
@@ -263,7 +263,7 @@ class Moving:
         self,
         ranges: _Ranges,
         new: Shape,
-        points: shapes.Points | None,
+        points: Points | None,
         matrix: transforms.Matrix,
         device_matrix: Location | None,
     ) -> None:

@@ -9,9 +9,9 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
-from clpt.arrays import on_device
+from clpt.arrays import Points, on_device
 from clpt.bvh import Building
-from clpt.geometry import instancing, shapes
+from clpt.geometry import instancing
 from clpt.records import INSTANCE
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene.shapes import Shape
@@ -36,7 +36,7 @@ class MovingInstances:
         self.numbers: dict[int, list[int]] = {}
         for k, number in enumerate(self.lowered.rows["number"].tolist()):
             self.numbers.setdefault(number, []).append(k)
-        self._hulls: dict[int, shapes.Points] = {}
+        self._hulls: dict[int, Points] = {}
 
     def plan(
         self, moved: Sequence[tuple[int, Shape]], matrices: Sequence[Location | None]
@@ -102,7 +102,7 @@ class MovingInstances:
             instances=trees.instances, boxes=boxes,
         )  # fmt: skip
 
-    def _hull(self, prototype: int) -> shapes.Points:
+    def _hull(self, prototype: int) -> Points:
         """Points whose hull holds the triangles of a prototype."""
         if prototype not in self._hulls:
             lowered, triangles = self.scene.lowered, self.lowered.triangles

@@ -8,10 +8,10 @@ from typing import Any
 
 from clpt.geometry.instancing import distinct
 from clpt.render.analysis.cameras import dispersive_glasses
+from clpt.render.analysis.lights.aims import is_sharp
 from clpt.render.editing.rebuild import ranges
 from clpt.render.editing.scene_edit import Replacements
 from clpt.render.lowering.camera.cameras import lower_camera
-from clpt.render.lowering.lights.aims import is_sharp
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera, Lens

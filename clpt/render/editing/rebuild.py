@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -63,22 +63,18 @@ class _Staged:
     queue: dict[str, Any]
 
 
-def prepare(
-    wavefronts: Sequence[Wavefront], lowered: Lowered, refit: bool = False
-) -> Callable[[], None]:
-    """Return what lets wavefronts render another lowering from now on.
+def prepare(wavefront: Wavefront, lowered: Lowered, refit: bool = False) -> Callable[[], None]:
+    """Return what lets a wavefront render another lowering from now on.
 
-    It may be called again where an error has ended it. wavefronts: all of a renderer, which share
-    their scene; refit: refit the tree over triangles
-    that only moved, which is faster to do, and slower to trace where they went far. Programs are
-    built if the features differ, trees if triangles or boxes do; of tables the words that differ
-    are written. The picture is then that of a new renderer.
+    It may be called again where an error has ended it. refit: refit the tree over triangles that
+    only moved, which is faster to do, and slower to trace where they went far. Programs are built
+    if the features differ, trees if triangles or boxes do; of tables the words that differ are
+    written. The picture is then that of a new renderer.
 
     Raises SceneError for a film of another size, KernelBuildError, MemoryBudgetError; nothing has
     changed then.
     """
-    first = wavefronts[0]
-    scene, paths = first.scene, first.paths
+    scene, paths = wavefront.scene, wavefront.paths
     if any(scene.lowered.settings[name] != lowered.settings[name] for name in FIXED):
         raise SceneError(
             "its size, bands, alpha, the reach of its filter, light paths and guiding stay; make a "
@@ -88,10 +84,10 @@ def prepare(
     former, new = scene.lowered.features.film.layers, lowered.features.film.layers
     if (former.names, former.light_groups) != (new.names, new.light_groups):
         raise SceneError("other layers need a new Renderer", where="film.layers")
-    changes = _changes(first, lowered, refit)
+    changes = _changes(wavefront, lowered, refit)
     with scene.buffers.all_or_nothing():
-        staged = _stage(first, lowered, changes)
-    replaced = _replaced(first, staged)
+        staged = _stage(wavefront, lowered, changes)
+    replaced = _replaced(wavefront, staged)
 
     def take() -> None:
         _write_tables(scene, lowered, staged.tables)
@@ -102,8 +98,7 @@ def prepare(
         paths.queue = staged.queue
         _refit(scene, changes)
         if changes.kernels or changes.boxes or replaced or staged.tables:
-            for wavefront in wavefronts:
-                wavefront.bind_again(rebuilt=changes.kernels)
+            wavefront.bind_again(rebuilt=changes.kernels)
         while replaced:
             scene.buffers.release(replaced.pop())
 

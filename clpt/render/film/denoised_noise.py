@@ -13,7 +13,7 @@ the other, whose numbers it decides.
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +22,10 @@ from clpt import device
 from clpt.denoise import needs
 from clpt.denoise.oidn import LUMINANCE, Oidn
 from clpt.denoise.statistical import Statistical
+from clpt.render.film.pictures import Image, Pictures
 from clpt.render.wavefront.cells import SIDE
 from clpt.render.wavefront.noise_meter import DARK, divide
 
-Image = NDArray[np.float32]
 Values = NDArray[np.float64]
 
 SURE = {"oidn": 0.02, "statistical": 0.1}  # of the noise before: less is not believed to be left
@@ -33,23 +33,15 @@ BESIDE = 2  # squares around those that are asked for, which are denoised with t
 AROUND = np.array([1.0, 2.0, 1.0])  # how much squares in a row count beside each other
 
 
-class Halved(Protocol):
-    """A renderer with halves."""
-
-    device: device.Device
-
-    def halves(self) -> tuple[Image, Image]: ...
-    def layers(self) -> dict[str, Image]: ...
-
-
 class DenoisedNoise:
     """Tells how far the picture of a renderer is from the truth once it is denoised.
 
-    method: a name of clpt.denoise.needs.METHODS.
+    renderer: with halves; on: the device that denoises; method: a name of
+    clpt.denoise.needs.METHODS.
     """
 
-    def __init__(self, renderer: Halved, method: str):
-        self._renderer, self._method = renderer, method
+    def __init__(self, renderer: Pictures, on: device.Device, method: str):
+        self._renderer, self._device, self._method = renderer, on, method
         self._oidn: dict[int, tuple[list[Image | None], Oidn]] = {}  # of each colour
 
     def measure(self, cells: NDArray[np.bool_]) -> Values:
@@ -61,7 +53,8 @@ class DenoisedNoise:
         noise before, which pixels of one colour alone may hide, as their edges are rough. Raises
         DeviceError where the denoiser fails.
         """
-        halves, layers = self._renderer.halves(), self._renderer.layers()
+        picture = self._renderer.developed()
+        halves, layers = picture.halves(), picture.layers()
         height, width = halves[0].shape[:2]
         down, across = -(-height // SIDE), -(-width // SIDE)
         dark = DARK * max(float(np.mean(halves[0] + halves[1]) / 2.0), 0.0)
@@ -105,7 +98,7 @@ class DenoisedNoise:
         self, colour: int, halves: tuple[Image, Image], surfaces: list[Image | None]
     ) -> tuple[Image, Image]:
         if self._method == "statistical":
-            return Statistical(self._renderer.device, halves, *surfaces).halves()
+            return Statistical(self._device, halves, *surfaces).halves()
         former, oidn = self._oidn.get(colour, ([], None))
         same = len(former) > 0 and all(
             np.array_equal(a, b)

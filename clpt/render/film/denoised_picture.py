@@ -3,42 +3,19 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from clpt import device
 from clpt.denoise import needs
 from clpt.denoise.oidn import Oidn
 from clpt.denoise.statistical import Statistical
 from clpt.errors import SceneError
-from clpt.render.film.saved_film import PictureForm, SavedFilm
-from clpt.scene import Film
-from clpt.spectral_exr import SpectralImage
-
-Image = NDArray[np.float32]
+from clpt.render.film.pictures import Image, Pictures, Still
 
 
-class Source(Protocol):
-    """What a picture is taken of, such as a `Renderer`. denoise: the denoiser it is for."""
-
-    denoise: str | None
-
-    @property
-    def form(self) -> PictureForm: ...
-    @property
-    def is_adaptive(self) -> bool: ...
-    def colours(self) -> Image: ...
-    def image(self) -> Image: ...
-    def layers(self) -> dict[str, Image]: ...
-    def samples_per_pixel(self) -> Image: ...
-    def halves(self) -> tuple[Image, Image]: ...
-    def saved_film(self, *, held: bool = False) -> SavedFilm: ...
-
-
-class DenoisedPicture:
-    """The picture of a source as it is now, with the source's methods that make pictures.
+class DenoisedPicture(Still):
+    """The picture of a source as it is now, without most of its noise.
 
     method: a name of clpt.denoise.needs.METHODS, by default the source's own. Layers help where the
     film has them, see clpt.denoise.needs. A film of bands is denoised in all of them, and its
@@ -50,12 +27,11 @@ class DenoisedPicture:
     denoiser is not installed, DeviceError where it fails.
     """
 
-    def __init__(self, source: Source, method: str | None = None):
+    def __init__(self, source: Pictures, method: str | None = None):
         self.method = needs.check_method(method or source.denoise or needs.METHODS[0])
-        self.form, self.is_adaptive = source.form, source.is_adaptive
-        self._source, self._layers = source, source.layers()
-        self._noisy, self._image = source.colours(), source.image()
-        self._samples = source.samples_per_pixel()
+        self._source, self.form = source.developed(), source.form
+        self._noisy, self._image = self._source.colours(), self._source.image()
+        self._layers = self._source.layers()
         surfaces = [self._layers.get(name) for name in needs.LAYERS]
         with_layers = [name for name in needs.LAYERS if name in self._layers]
         name = self.method
@@ -76,8 +52,24 @@ class DenoisedPicture:
 
     def _halves(self) -> tuple[Image, Image]:
         """The pictures of even and odd samples. Raises SceneError where they are not both there."""
-        if self._samples.min() < 2:
+        if self._source.samples_per_pixel().min() < 2:
             raise SceneError("needs two samples of every pixel or more", where="denoise")
+        return self._source.halves()
+
+    def layers(self) -> dict[str, Image]:
+        """The layers of the film by name, as they are."""
+        return self._layers
+
+    def samples_per_pixel(self) -> Image:
+        """Return how many samples each pixel has, (h, w) float32."""
+        return self._source.samples_per_pixel()
+
+    def light_paths_per_pixel(self) -> float:
+        """Return how many paths have begun at lights for each pixel."""
+        return self._source.light_paths_per_pixel()
+
+    def halves(self) -> tuple[Image, Image]:
+        """The pictures of the even and of the odd samples, with their noise."""
         return self._source.halves()
 
     def colours(self) -> Image:
@@ -87,16 +79,6 @@ class DenoisedPicture:
     def image(self) -> Image:
         """The picture, as `Renderer.image` returns it; alpha is as it was."""
         return self._denoised
-
-    def spectral_image(self) -> SpectralImage:
-        """The picture of a film with bands, at their centres."""
-        form = self.form
-        film = Film(bands=form.bands, lambda_min=form.lambda_min, lambda_max=form.lambda_max)
-        return SpectralImage(self.image(), film.band_centres, emissive=True)
-
-    def layers(self) -> dict[str, Image]:
-        """The layers of the film by name, (h, w, 1 to 3) float32."""
-        return self._layers
 
     def noisy(self) -> Image:
         """The picture as it was before, in three colours, (h, w, 3) float32."""
@@ -112,11 +94,3 @@ class DenoisedPicture:
         """What files have beside the picture: `noisy`, and `denoised_error` where it is known."""
         error = {} if self.error is None else {"denoised_error": self.error}
         return {"noisy": self._noisy} | error
-
-    def samples_per_pixel(self) -> Image:
-        """How many samples each pixel has, (h, w) float32."""
-        return self._samples
-
-    def saved_film(self, *, held: bool = False) -> SavedFilm:
-        """The film of the source, which has its noise; see `Renderer.saved_film`."""
-        return self._source.saved_film(held=held)

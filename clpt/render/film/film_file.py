@@ -26,8 +26,8 @@ from clpt import output_files
 from clpt.errors import SceneError
 from clpt.images import exr_files
 from clpt.render.contract.layer_names import LayerNames
-from clpt.render.film.host_picture import HostPicture
-from clpt.render.film.saved_film import Origin, PictureForm, SavedFilm, Session
+from clpt.render.film.picture_form import PictureForm
+from clpt.render.film.saved_film import Origin, SavedFilm, Session
 from clpt.render.wavefront.film_state import FilmState
 from clpt.scene.fingerprint import Fingerprint
 from clpt.spectra.spaces import chromaticities
@@ -35,7 +35,7 @@ from clpt.spectra.spaces import chromaticities
 _Parts = Mapping[str, Mapping[str, NDArray[np.uint32]]]  # channels by name, of parts by name
 _T = TypeVar("_T")
 
-FORMAT = 1
+FORMAT = 2  # format 1 had a row of films, always one, and its counts in a list
 ATTRIBUTE = "clpt"
 SUFFIXES = (".film", ".exr")
 SEAL = b"clpt film"
@@ -143,12 +143,15 @@ def _header(path: Path, text: Any) -> dict[str, Any]:
             f"its format is {header['format']}, of clpt {header['clpt']}; this clpt reads "
             f"{FORMAT} and older: use a newer clpt",
         )
+    if header["format"] == 1:
+        del header["shapes"]["words"][0]
+        (header["counts"],) = header["counts"]
     return dict(header)
 
 
 def _picture(saved: SavedFilm) -> Any:
     """The picture so far, with the header: what viewers show."""
-    form, made = saved.form, HostPicture(saved)
+    form, made = saved.form, saved.developed()
     pixels = made.colours() if form.bands else made.image()
     letters = "RGBA"[: pixels.shape[2]]
     stored = np.clip(np.nan_to_num(pixels), -HALF_MAX, HALF_MAX).astype(np.float16)
@@ -173,7 +176,7 @@ def _header_of(saved: SavedFilm) -> dict[str, Any]:
         "settings": dict(saved.origin.settings),
         "kernels": saved.origin.kernels,
         "form": dataclasses.asdict(saved.form),
-        "counts": [dict(one) for one in saved.counts],
+        "counts": dict(saved.counts),
         "sessions": [dataclasses.asdict(one) for one in saved.sessions],
         "adaptive": {n: [a.dtype.str, a.shape] for n, a in saved.adaptive.items()},
     }
@@ -225,7 +228,7 @@ def _restored(header: dict[str, Any], parts: _Parts) -> SavedFilm:
         size = math.prod(shape) * dtype.itemsize // 4
         return stored[:size].copy().view(dtype).reshape(shape)
 
-    form = header["form"]
+    form = {"adaptive": bool(header["adaptive"]), **header["form"]}
     rows = {name: tuple(map(tuple, form[name])) for name in ("to_output", "paper")}
     names: dict[str, Any] = {"layers": tuple(form["layers"])}
     names["names"] = LayerNames(**{n: tuple(v) for n, v in form.get("names", {}).items()})
@@ -238,7 +241,7 @@ def _restored(header: dict[str, Any], parts: _Parts) -> SavedFilm:
             Fingerprint(header["scene"]), header["settings"], header["kernels"], header["clpt"]
         ),
         form=PictureForm(**{**form, **rows, **names}),
-        counts=tuple(header["counts"]),
+        counts=header["counts"],
         sessions=tuple(Session(**one) for one in header["sessions"]),
         adaptive={n: array(n, *about) for n, about in header["adaptive"].items()},
     )

@@ -4,21 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Protocol
-
-import numpy as np
-from numpy.typing import NDArray
 
 from clpt import images, spectral_exr
 from clpt.render.film import cryptomatte
 from clpt.render.film.denoised_picture import DenoisedPicture
 from clpt.render.film.layers import GROUP, matte_names
-from clpt.render.film.saved_film import PictureForm
+from clpt.render.film.picture_form import PictureForm
+from clpt.render.film.pictures import Image, Pictures
 from clpt.scene.layers import LAYERS
 from clpt.spectra.spaces import chromaticities
-from clpt.spectral_exr import SpectralImage
-
-Image = NDArray[np.float32]
 
 VIEW_LAYER = "ViewLayer."  # what Blender's names begin with
 PICTURE = {"clpt": "", "blender": f"{VIEW_LAYER}Combined."}  # before R, G and B of the picture
@@ -26,47 +20,21 @@ SETS = tuple(PICTURE)
 BESIDE = {"noisy": "Noisy Image", "denoised_error": "Denoised Error"}  # Blender's names
 
 
-class Source(Protocol):
-    """A renderer, or a film on the host."""
-
-    @property
-    def form(self) -> PictureForm:
-        """How the film becomes a picture."""
-
-    @property
-    def is_adaptive(self) -> bool:
-        """Whether pixels may differ in their numbers of samples."""
-
-    def image(self) -> Image:
-        """The picture."""
-
-    def colours(self) -> Image:
-        """The picture in three colours."""
-
-    def layers(self) -> dict[str, Image]:
-        """The layers by name."""
-
-    def samples_per_pixel(self) -> Image:
-        """How many samples each pixel has."""
-
-    def spectral_image(self) -> SpectralImage:
-        """The picture of a film with bands."""
-
-
 def write_layers(
     path: str | Path,
-    source: Source,
+    source: Pictures,
     *,
     names: str = "clpt",
     metadata: Mapping[str, str | int | float] | None = None,
 ) -> None:
-    """Write the picture of a renderer and its layers as an .exr: the picture in half floats, or its
-    bands in float32, layers in float32.
+    """Write the picture of a renderer or film and its layers as an .exr.
 
-    names: a set of SETS; "blender" gives names such as ViewLayer.Combined.R. Raises SceneError.
+    The picture is in half floats, or its bands in float32, layers in float32. names: a set of SETS;
+    "blender" gives names such as ViewLayer.Combined.R. Raises SceneError.
     """
+    source = source.developed()
     layers, form = source.layers(), source.form
-    if source.is_adaptive:
+    if form.adaptive:
         layers.setdefault("samples", source.samples_per_pixel()[..., None])
     channels = channels_of(layers, names)
     if isinstance(source, DenoisedPicture):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +10,8 @@ from numpy.typing import NDArray
 from clpt.render.analysis.colour import output_matrix, sensor
 from clpt.render.contract.features.film import layer_places
 from clpt.render.film.cryptomatte import pairs_of
-from clpt.render.film.saved_film import PictureForm
+from clpt.render.film.picture_form import PictureForm
+from clpt.render.film.pictures import Pictures
 from clpt.render.wavefront.film_state import numbers
 from clpt.scene.integrators import Film
 from clpt.scene.layers import LAYERS
@@ -25,28 +25,14 @@ LONG_UNITS = (2.0**8, 2.0**-16, 2.0**-40)
 GROUP = "light_"  # begins the name of a group's picture
 
 
-class Pictured(Protocol):
-    """What has pictures."""
-
-    def samples_per_pixel(self) -> Image:
-        """How many samples each pixel has, (h, w) float32."""
-
-    def light_paths_per_pixel(self) -> float:
-        """How many paths have begun at lights for each pixel."""
-
-    def halves(self) -> tuple[Image, Image]:
-        """The pictures of even and of odd samples, (h, w, 3) float32 each."""
-
-
-def layers_of(
-    form: PictureForm, arrays: Mapping[str, Words], picture: Pictured
-) -> dict[str, Image]:
+def layers_of(arrays: Mapping[str, Words], picture: Pictures) -> dict[str, Image]:
     """Return the layers of a film by name, (h, w, 1 to 12) float32.
 
-    arrays: its words, as `FilmState` has them. Where nothing was seen, as in the sky, a layer is 0,
-    an id -1. `light_groups` becomes a layer light_NAME for each group.
+    arrays: its words, as `FilmState` has them; picture: its other pictures. Where nothing was seen,
+    as in the sky, a layer is 0, an id -1. `light_groups` becomes a layer light_NAME for each group.
     """
     made: dict[str, Image] = {}
+    form = picture.form
     sampled = _sampled(form, arrays["layers"])
     light = _light(form, arrays["light_layers"], picture)
     mattes = iter(arrays["mattes"])
@@ -88,7 +74,7 @@ def _sampled(form: PictureForm, words: Words) -> dict[str, Image]:
     return made
 
 
-def _light(form: PictureForm, words: Words, picture: Pictured) -> dict[str, dict[str, Image]]:
+def _light(form: PictureForm, words: Words, picture: Pictures) -> dict[str, dict[str, Image]]:
     """The pictures of each layer of light."""
     names = [name for name in form.layers if LAYERS[name].form == "light"]
     if not names:

@@ -10,37 +10,13 @@ from typing import Any
 from numpy.typing import NDArray
 
 from clpt.errors import SceneError
-from clpt.render.contract.layer_names import LayerNames
+from clpt.render.film.developed import Developed
+from clpt.render.film.picture_form import PictureForm
+from clpt.render.film.pictures import Pictures
 from clpt.render.wavefront.film_state import FilmState, Ranges
 from clpt.scene.fingerprint import Fingerprint, Plain
 
 MOST_NAMED = 8  # differences that an error names
-
-
-@dataclass(frozen=True)
-class PictureForm:
-    """How a film's words become a picture.
-
-    to_output: (3, 3), rows of the matrix from the sums to the output space; light_paths: all paths
-    start at lights; weighed: some do, beside the camera's; weights: samples serve several pixels;
-    paper: the matrix (3, 3) from sums of layers that are colours to the output space, see
-    `clpt.render.film.layers.white_paper`; names: what layers tell of; the others are those of
-    `clpt.scene.Film`.
-    """
-
-    to_output: tuple[tuple[float, ...], ...]
-    light_paths: bool = False
-    weighed: bool = False
-    weights: bool = False
-    alpha: bool = False
-    bands: int = 0
-    lambda_min: float = 360.0
-    lambda_max: float = 830.0
-    output_space: str = "rec709"
-    exposure: float = 1.0
-    layers: tuple[str, ...] = ()
-    paper: tuple[tuple[float, ...], ...] = ()
-    names: LayerNames = LayerNames()
 
 
 @dataclass(frozen=True)
@@ -85,19 +61,33 @@ class Origin:
 
 
 @dataclass(frozen=True, eq=False)
-class SavedFilm:
+class SavedFilm(Pictures):
     """A film, and all that it takes to go on with it, from `Renderer.saved_film`.
 
-    form: how its picture is made; counts: paths and rays of each film by name; sessions: what was
+    form: how its pictures are made; counts: paths and rays by name; sessions: what was
     done; adaptive: the state of adaptive sampling, arrays by name, empty without.
     """
 
     film: FilmState
     origin: Origin
     form: PictureForm
-    counts: tuple[Mapping[str, int], ...]
+    counts: Mapping[str, int]
     sessions: tuple[Session, ...]
     adaptive: Mapping[str, NDArray[Any]]
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        """Take what a pickle holds; in older ones `counts` are a tuple of always one."""
+        self.__dict__.update(state)
+        if isinstance(state["counts"], tuple):
+            (self.__dict__["counts"],) = state["counts"]
+
+    def developed(self, *words: str) -> Developed:
+        """Return the pictures of the film."""
+        return Developed(self.film, self.form)
+
+    def saved_film(self, *, held: bool = False) -> SavedFilm:
+        """Return itself; held: as of a renderer, here without a meaning."""
+        return self
 
     @property
     def seconds(self) -> float:
@@ -110,13 +100,11 @@ class SavedFilm:
         Raises SceneError where they are not of the same scene, or a sample is in both.
         """
         self.origin.check_same(other.origin)
-        counts = tuple(
-            {name: a[name] + b[name] for name in a}
-            for a, b in zip(self.counts, other.counts, strict=True)
-        )
+        counts = {name: value + other.counts[name] for name, value in self.counts.items()}
         return dataclasses.replace(
             self,
             film=self.film.merged(other.film),
+            form=dataclasses.replace(self.form, adaptive=self.form.adaptive or other.form.adaptive),
             counts=counts,
             sessions=(*self.sessions, *other.sessions),
             adaptive={},

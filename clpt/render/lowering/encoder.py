@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import SceneError
+from clpt.render.analysis.lights.look import Look
+from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.render.analysis.wavelengths import Density
 from clpt.render.contract.features.materials import Sources
 from clpt.render.contract.parameter_words import (
@@ -16,7 +18,6 @@ from clpt.render.contract.parameter_words import (
     REAL_WORDS,
     SPECTRUM_WORDS,
 )
-from clpt.render.lowering.lowering_cache import LoweringCache
 from clpt.render.lowering.spectra import thin_films
 from clpt.render.lowering.spectra.spectra_table import SpectraTable
 from clpt.render.lowering.tables import TableStore, Words, as_words
@@ -54,6 +55,11 @@ class Encoder:
         self._rows: dict[tuple[int, str, bytes], tuple[int, Kind]] = {}
         self.warnings: set[str] = set()  # of tables that the film does not reach
         self._spent = False  # whether it knows of words that no device has
+
+    @property
+    def look(self) -> Look:
+        """How the film looks at lights that are images."""
+        return Look(self.spectra.spectral, *self.spectra.range, self.cache)
 
     @property
     def sources(self) -> Sources:

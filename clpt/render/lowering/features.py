@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from clpt.geometry import shape_records
 from clpt.render.analysis.cameras import dispersive_glasses
+from clpt.render.analysis.geometry import Geometry, spheres_move
 from clpt.render.analysis.index import SceneIndex
 from clpt.render.contract.features import (
     CameraFeatures,
@@ -21,7 +22,6 @@ from clpt.render.contract.features import (
     TransportFeatures,
 )
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.geometry import Geometry, spheres_move
 from clpt.render.lowering.lights.lights import LightRows
 from clpt.render.lowering.materials.material_words import MaterialWords
 from clpt.scene.cameras import Lens

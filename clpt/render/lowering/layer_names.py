@@ -10,11 +10,12 @@ import numpy as np
 
 from clpt.errors import SceneError
 from clpt.geometry import instancing
+from clpt.render.analysis.geometry import Geometry
 from clpt.render.analysis.index import SceneIndex
+from clpt.render.analysis.lights.sources import row_order
 from clpt.render.contract.features import LayerFeatures
 from clpt.render.contract.layer_names import LayerNames
-from clpt.render.lowering.geometry import Geometry
-from clpt.render.lowering.lights.lights import LightRows, row_order
+from clpt.render.lowering.lights.lights import LightRows
 from clpt.render.lowering.tables import TableStore
 from clpt.scene import materials as mt
 from clpt.scene.layers import MOST_NAMED

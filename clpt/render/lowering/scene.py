@@ -9,56 +9,41 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
-from clpt.errors import SceneError
 from clpt.geometry import shape_records, shapes
 from clpt.geometry.instancing import Instances
-from clpt.geometry.motion import at_rest, corners, swept
 from clpt.geometry.refining import is_refined
 from clpt.records import SHAPE_BITS
-from clpt.render.analysis import cameras, open_boundaries
-from clpt.render.analysis.bodies import matter_of
-from clpt.render.analysis.checks import check
+from clpt.render.analysis import cameras, photons
+from clpt.render.analysis.analyse import Analysis, Before, analyse
 from clpt.render.analysis.colour import sensor
-from clpt.render.analysis.index import SceneIndex
-from clpt.render.analysis.sealed import sealed_media
-from clpt.render.analysis.surroundings import (
-    bodies_around,
-    boundaries,
-    contested,
-    media_around,
-    stands_still,
-    warnings_of,
+from clpt.render.analysis.geometry import (
+    Geometry,
+    Owner,
+    spheres_move,
 )
+from clpt.render.analysis.index import SceneIndex
+from clpt.render.analysis.lights.sources import Sources
+from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.render.analysis.wavelengths import Density, density, emissions
 from clpt.render.contract.features import Features, SpectraFeatures
 from clpt.render.contract.layer_names import LayerNames
 from clpt.render.contract.parameter_words import row_words
 from clpt.render.lowering import features as needs
-from clpt.render.lowering import photons
 from clpt.render.lowering.camera import filters
 from clpt.render.lowering.camera.cameras import lower_camera
 from clpt.render.lowering.device_arrays import is_table
 from clpt.render.lowering.device_grids import DeviceGrid
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.geometry import (
-    Emitter,
-    Geometry,
-    lower_geometry,
-    shape_words,
-)
+from clpt.render.lowering.geometry import lower_geometry, shape_words
 from clpt.render.lowering.layer_names import lower_names
-from clpt.render.lowering.lights.aims import aims
-from clpt.render.lowering.lights.hard_light import Lit, decided
-from clpt.render.lowering.lights.light_bounds import Bounds
-from clpt.render.lowering.lights.lights import Around, LightRows, light_rows, row_order
-from clpt.render.lowering.lowering_cache import LoweringCache
+from clpt.render.lowering.lights.lights import LightRows, light_rows
 from clpt.render.lowering.materials.material_words import MaterialWords
 from clpt.render.lowering.media.body_words import BodyWords
-from clpt.render.lowering.media.light_media import NOWHERE, LightMedia, light_media
+from clpt.render.lowering.media.light_media import light_media_words
 from clpt.render.lowering.media.medium_words import MediumWords, medium_aims
 from clpt.render.lowering.motion import lower_motion
 from clpt.render.lowering.settings import DEEPEST, Found, settings_of
-from clpt.render.lowering.textures.attributes import Owner, lower_attributes
+from clpt.render.lowering.textures.attributes import lower_attributes
 from clpt.scene import Scene
 from clpt.scene import materials as mt
 from clpt.scene.integrators import Film, Integrator
@@ -67,6 +52,8 @@ from clpt.scene.media import Lattice
 from clpt.scene.shapes import Mesh
 
 TREE_FROM = 16  # lights from which a tree chooses among them, see bench/lights.py
+
+
 TANGENT_WORDS = 4
 
 
@@ -131,62 +118,41 @@ def lower(
 
     Raises SceneError where the scene makes no sense: it names the shape, light or material.
     """
-    scene = at_rest(scene)
-    check(scene)
-    index, film = SceneIndex.of(scene), scene.film
-    if former:
-        index = replace(index, lit_before=former.features.transport.lit_ghosts)
     cache = LoweringCache(former.cache if former else None)
+    before = Before(former.integrator, former.features.transport.lit_ghosts) if former else None
+    return encode(analyse(scene, cache, before), cache, texture_budget)
+
+
+def encode(found: Analysis, cache: LoweringCache, texture_budget: int | None = None) -> Lowered:
+    """Return a scene's tables, features and settings; cache: what the analysis was made with.
+
+    texture_budget: as of `lower`. Raises SceneError for parameters that cannot be encoded.
+    """
+    index, film = found.index, found.index.scene.film
     ends = film.lambda_min, film.lambda_max
     wavelengths = density(index) if index.spectral else Density(*ends)
     encoder = Encoder(index.mode, *ends, sensor(film), wavelengths, texture_budget, cache)
     filters.lower_filter(film.filter, encoder.store, index.splatting)
     materials = _begin_materials(index, encoder)
-    geometry = lower_geometry(index, encoder, materials)
-    sealed = sealed_media(index, cache) if index.media else frozenset()
-    media = MediumWords(index, encoder, materials, sealed)
-    sphere = geometry.bounding_sphere()
-    lights = _lower_lights(index, encoder, geometry, sphere[1], media)
-    homogeneous = (one for one in index.media if not isinstance(one, Lattice))
-    near = medium_aims(lights) if any(one.scatters for one in homogeneous) else ()
-    encoder.store.append("media", np.array(near, np.float32).view(np.uint32))
-    bounding = [shape for _, shape, _, _ in geometry.owners]
-    bodies = BodyWords(index.shapes) if index.nested else None
-    if bodies is not None:
-        sides = bodies.rows(bounding, encoder, materials, media)
-    else:
-        sides = media.of_shapes(bounding)
-    before = former.integrator if former else None
-    index, lit = _begin_at_lights(index, geometry, lights, media, bodies, sphere, cache)
-    index, why = decided(Lit(index, geometry, encoder, lights, sphere, lit.extinction), before)
-    if index.has_media and (index.balanced or index.light_paths):
-        encoder.store.append("media", lit.words)
-    encoder.store.append("media", sides)
-    around: tuple[Any, ...] = ()
-    if bodies is not None:
-        around = bodies_around(scene, matter_of, cache)
-        camera = bodies.around(around, media)
-        noted = contested(scene, matter_of, cache)
-    else:
-        around = media_around(scene, cache) if index.media else ()
-        camera = 0, media.word(next(iter(around), None))
-        noted = warnings_of(around)
-    if index.motions and index.has_media and scene.camera.medium is None:
-        noted += _passed_through(scene, index, cache)
+    moves = spheres_move(index)
+    geometry = lower_geometry(found.geometry, encoder, materials, spheres_move=moves)
+    media = MediumWords(index, encoder, materials, found.sealed, found.sources.glows)
+    lights = _lower_lights(index, encoder, geometry, found.sources, media)
+    near = _lower_medium_aims(index, encoder, lights)
+    camera = _lower_bodies(found, geometry, encoder, materials, media)
     profile = _lower_profile(index, encoder)
     density_row, tabulated = _lower_density(index, encoder, wavelengths)
-    targets = aims(index, geometry, sphere[1])
+    targets = found.aims
     first_aim = encoder.store.append_floats("distributions", targets)
     lower_attributes(geometry.owners, encoder.textures, cache, geometry.single_count, geometry.keys)
     encoder.store.append("shapes", shape_words(geometry.rows))
     glass_rows = _lower_camera(index, encoder)
     ambient_row = _lower_ambient(index, encoder)
     warnings = (
-        *_warnings(index), *noted, *open_boundaries.warnings_of(index, cache),
-        *sorted(encoder.warnings), *geometry.warnings,
+        *_warnings(index), *found.warnings, *sorted(encoder.warnings), *geometry.warnings,
         *encoder.textures.finish(),
     )  # fmt: skip
-    motion = needs.of_motion(index, geometry, _lower_motion(index, lights, encoder))
+    motion = needs.of_motion(index, geometry, _lower_motion(found, lights, encoder))
     spectra = SpectraFeatures(index.mode, encoder.spectra.samples, encoder.spectra.step, tabulated)
     names, layers = lower_names(index, geometry, lights, encoder.store)
     textures = needs.of_textures(encoder)
@@ -198,15 +164,15 @@ def lower(
         film=needs.of_film(index, layers),
         transport=needs.of_transport(index, profile, aimed=len(targets) > 0),
         lights=needs.of_lights(lights),
-        media=needs.of_media(index, materials, len(near), sealed=bool(sealed)),
+        media=needs.of_media(index, materials, near, sealed=bool(found.sealed)),
         motion=motion,
         geometry=shaped,
         textures=textures,
         spectra=spectra,
         materials=needs.of_materials(index, encoder, materials),
     )
-    found = Found(density_row, ambient_row, (first_aim, len(targets)), camera, features.dispersion)
-    settings = settings_of(index, geometry, lights, wavelengths, sphere, found)
+    own = Found(density_row, ambient_row, (first_aim, len(targets)), camera, features.dispersion)
+    settings = settings_of(index, geometry, lights, wavelengths, found.sphere, own)
     cache.settle()
     tables = encoder.store.arrays()
     encoder.textures.images.joined(tables["images"])
@@ -225,37 +191,19 @@ def lower(
         glass_rows=glass_rows,
         warnings=warnings,
         integrator=index.scene.integrator,
-        reason=why,
-        around=around,
+        reason=found.reason,
+        around=found.around,
         encoder=encoder,
         cache=cache,
         device_grids=tuple(encoder.store.device_grids),
     )
 
 
-def _begin_at_lights(
-    index: SceneIndex,
-    geometry: Geometry,
-    lights: LightRows,
-    media: MediumWords,
-    bodies: BodyWords | None,
-    sphere: tuple[NDArray[np.float64], float],
-    cache: LoweringCache,
-) -> tuple[SceneIndex, LightMedia]:
-    """Return the index with whether paths can start at lights in media, and the lights' media."""
-    if not index.has_media or not index.may_have_light_paths:
-        return index, NOWHERE
-    found = light_media(index, geometry, lights, media, bodies, sphere, cache)
-    if found.refusal and index.light_paths:
-        raise SceneError(f"no light paths: {found.refusal}", where="integrator")
-    return replace(index, lit_media=found.refusal), found
-
-
-def _lower_motion(index: SceneIndex, lights: LightRows, encoder: Encoder) -> int:
+def _lower_motion(found: Analysis, lights: LightRows, encoder: Encoder) -> int:
     """Append the table of what moves, if anything does; return where in `distributions` it is."""
+    index, rows = found.index, list(found.sources.order)
     if not index.motions:
         return 0
-    rows = row_order(index.scene.lights)
     rows += [-1] * ((*lights.first, len(lights.rows))[0] - len(rows))  # bricks of media
     return lower_motion(index.motions, index.scene, rows, encoder.store)
 
@@ -298,27 +246,53 @@ def _begin_materials(index: SceneIndex, encoder: Encoder) -> MaterialWords:
     return MaterialWords(encoder, index.leaves, index.normal_mapped)
 
 
+def _lower_medium_aims(index: SceneIndex, encoder: Encoder, lights: LightRows) -> int:
+    """Append the lamps near which flights through media end; return how many."""
+    homogeneous = (one for one in index.media if not isinstance(one, Lattice))
+    near = medium_aims(lights) if any(one.scatters for one in homogeneous) else ()
+    encoder.store.append("media", np.array(near, np.float32).view(np.uint32))
+    return len(near)
+
+
+def _lower_bodies(
+    found: Analysis,
+    geometry: Geometry,
+    encoder: Encoder,
+    materials: MaterialWords,
+    media: MediumWords,
+) -> tuple[int, int]:
+    """Append what is around lights, and on both sides of shapes; return that at the camera.
+
+    Kernels find the sides of shapes behind the media of lights: all are parts of one table.
+    """
+    index, bounding = found.index, [shape for _, shape, _, _ in geometry.owners]
+    bodies = BodyWords(index.shapes) if index.nested else None
+    if bodies is not None:
+        sides = bodies.rows(bounding, encoder, materials, media)
+    else:
+        sides = media.of_shapes(bounding)
+    if index.has_media and (index.balanced or index.light_paths):
+        words = light_media_words(found.light_media, media, bodies)
+        encoder.store.append("media", words)
+    encoder.store.append("media", sides)
+    if bodies is not None:
+        return bodies.around(found.around, media)
+    return 0, media.word(next(iter(found.around), None))
+
+
 def _lower_lights(
     index: SceneIndex,
     encoder: Encoder,
     geometry: Geometry,
-    scene_radius: float,
+    sources: Sources,
     media: MediumWords,
 ) -> LightRows:
     """Append the rows of `lights`, and note in the rows of shapes which lights they are."""
     tree_from = None if index.light_paths else TREE_FROM
     for medium in index.emitting:
         media.word(medium)
-    around = _light_bounds(index, geometry) if index.motions else None
-    lights = light_rows(
-        index.scene.lights,
-        geometry.emitters,
-        encoder,
-        scene_radius,
-        tree_from,
-        media.lights,
-        around,
-    )
+    emitters = geometry.emitters
+    lights = light_rows(index.scene.lights, emitters, encoder, sources, tree_from, media.lights)
     encoder.store.append("lights", lights.rows.view(np.uint32))
     if lights.tree is not None:
         encoder.store.append("lights", lights.tree)
@@ -327,24 +301,6 @@ def _lower_lights(
         row["light"] = first
         row["flags"] |= SHAPE_BITS["one_light"] if whole else 0
     return lights
-
-
-def _light_bounds(index: SceneIndex, geometry: Geometry) -> Around:
-    """What makes bounds of lights hold while they move: boxes of their ways, and all directions."""
-    motions = index.motions
-
-    def around(light: int | Emitter, bounds: Bounds) -> Bounds:
-        if isinstance(light, Emitter):
-            keys = motions.shapes.get(int(geometry.rows[light.shape_row]["number"]))
-        else:
-            keys = motions.lamps.get(light)
-        if keys is None:
-            return bounds
-        points = corners(np.stack([bounds.low, bounds.high], axis=1))
-        low, high = swept(keys, points, motions.shutter).astype(np.float64).transpose(1, 0, 2)
-        return replace(bounds, low=low, high=high, theta_o=np.full(len(low), np.pi))
-
-    return around
 
 
 def _lower_camera(index: SceneIndex, encoder: Encoder) -> tuple[int, ...]:
@@ -405,25 +361,6 @@ def _of_motion(index: SceneIndex) -> list[str]:
                 f"{shapes.where(shape)}.motion: its boundary moves, the grid of its medium stays"
             )
     return warnings
-
-
-def _passed_through(scene: Scene, index: SceneIndex, cache: LoweringCache) -> list[str]:
-    """A warning where the camera is not in the same media all the time, else none."""
-    bounding = boundaries(scene, matter_of if index.nested else None)
-    if index.motions.camera is None and stands_still(bounding):
-        return []
-    found = [
-        bodies_around(bounding, matter_of, cache, time)
-        if index.nested
-        else media_around(bounding, cache, time)
-        for time in index.motions.looks()
-    ]
-    if all(one == found[0] for one in found):
-        return []
-    return [
-        "camera: it comes into another medium while the shutter is open; all its paths begin in "
-        "what is around it when that opens"
-    ]
 
 
 def _left_to_the_camera(index: SceneIndex) -> list[str]:

@@ -10,15 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.records import SETTINGS
+from clpt.render.analysis import photons
 from clpt.render.analysis.colour import film_scale, output_matrix
+from clpt.render.analysis.geometry import Geometry
 from clpt.render.analysis.index import SceneIndex
 from clpt.render.analysis.wavelengths import Density
-from clpt.render.lowering import guides, photons
-from clpt.render.lowering.geometry import Geometry
+from clpt.render.lowering import guides
 from clpt.render.lowering.lights.light_level import light_level
 from clpt.render.lowering.lights.lights import LightRows
 from clpt.spectra.cie import tanh_ends
 
+LARGEST = 62  # exponent of 4 of a unit of areas, which is float32
 ORDINARY_SIZE = 10  # exponent of 2 of the radius of a scene [m], up and down
 MOST_SAMPLE_BITS = 16  # of a zsobol pixel's part of its sequence
 DEEPEST = 4000  # path state has 12 bits for the depth
@@ -108,7 +110,7 @@ def rival_area(scene_radius: float) -> float:
     """
     exponent = math.frexp(scene_radius)[1]
     beyond = exponent - min(max(exponent, -ORDINARY_SIZE), ORDINARY_SIZE)
-    return 4.0**beyond
+    return 4.0 ** min(max(beyond, -LARGEST), LARGEST)
 
 
 def _set_photons(

@@ -23,6 +23,8 @@ from clpt.render.wavefront.film_state import (
 )
 from clpt.scene.layers import MATTE_SLOTS
 
+NONE = {"layers": NO_LAYERS, "light_layers": NO_LIGHT_LAYERS, "mattes": NO_MATTES}
+READ = 1 << 24  # bytes that are read at once: memory is dear
 SIDE_BY_SIDE = ("layers", "mattes")  # whose pixels have their words together
 
 
@@ -43,7 +45,7 @@ class Film:
         settings: NDArray[np.void],
         features: Features,
     ):
-        self.stream, self.has_bands, self._words = stream, features.film.bands, features.film_words
+        self.stream, self._words = stream, features.film_words
         self._allocate = buffers.allocate
         self.size = int(settings["width"]), int(settings["height"])
         self.band_count = int(settings["bands"]) if features.film.bands else 0
@@ -55,16 +57,13 @@ class Film:
         self._at = (y * self.size[0] + x)[self._inside]  # in a picture, of each of these
         words = 4 * self._padded_pixels * self.halves
         pixels, advice = math.prod(self.size), "lower the image's size"
-        sums, images = {"film": self._words * words}, {"image": 16 * pixels}
+        sums = {"film": self._words * words}
         if features.film.bands:
             advice += " or the number of bands"
             sums["bands"] = SUM_WORDS * self._band_sums * words
-            images["band_image"] = 4 * self.band_count * pixels
-        self._layer_words, self._mattes = (
-            features.film.layers.words,
-            len(features.film.layers.mattes),
-        )
-        self._light_sums = 3 * features.film.layers.light_pictures * features.film_groups
+        layers = features.film.layers
+        self._layer_words, self._mattes = layers.words, layers.matte_count
+        self._light_sums = 3 * layers.light_pictures * features.film_groups
         for name, count in (
             ("layers", self._layer_words),
             ("light_layers", SUM_WORDS * self._light_sums),
@@ -72,30 +71,25 @@ class Film:
         ):
             if count:
                 sums[name] = 4 * count * self._padded_pixels
-        self.sums, self._images = (
-            {name: buffers.allocate(f"the {name}", size, advice) for name, size in sizes.items()}
-            for sizes in (sums, images)
-        )
+        self.sums = {n: buffers.allocate(f"the {n}", size, advice) for n, size in sums.items()}
+        self._image = buffers.allocate("the image", 16 * pixels, advice)
         self._sum_bytes = sums
         self._held: dict[str, cl.Buffer] = {}
         shape = (*self.size[::-1], 4)
-        self.picture = device.DeviceArray(
-            stream.queue, shape, np.float32, data=self._images["image"]
-        )
+        self.picture = device.DeviceArray(stream.queue, shape, np.float32, data=self._image)
         self._written: cl.Event | None = None  # of the last command that wrote `picture`
 
     @property
     def arguments(self) -> dict[str, Any]:
         """The kernels' arguments by name."""
-        return {**self.sums, **self._images}
+        return {**self.sums, "image": self._image}
 
     def clear(self) -> None:
         """Enqueue that the film is empty and its picture black."""
         for name, size in self._sum_bytes.items():
             self.stream.fill(self.sums[name], 0, 0, size)
         self.stream.after(self.picture.events)
-        image = self._images["image"]
-        device.supersede(self.picture, self.stream.fill(image, 0, 0, image.size))
+        device.supersede(self.picture, self.stream.fill(self._image, 0, 0, self._image.size))
 
     @property
     def group_bytes(self) -> int:
@@ -128,21 +122,6 @@ class Film:
         device.supersede(self.picture, self._written)
         return self._written
 
-    def colours(self) -> NDArray[np.float32]:
-        """Return the picture, (h, w, 3) float32 in the film's output space; wait for it."""
-        return np.ascontiguousarray(self._read(self._images["image"], 4)[..., :3])
-
-    def made(
-        self, kernel: device.BoundKernel, image: cl.Buffer, channels: int
-    ) -> NDArray[np.float32]:
-        """Return what a kernel makes in a buffer, (h, w, channels) float32; wait for it."""
-        self.stream.run(kernel, *device.tiles(*self.size))
-        return self._read(image, channels)
-
-    def bands(self, kernel: device.BoundKernel) -> NDArray[np.float32]:
-        """Return the mean radiance in each band, (h, w, bands) float32; wait for it."""
-        return self.made(kernel, self._images["band_image"], self.band_count)
-
     def hold(self) -> None:
         """Enqueue a copy of what the film holds, for `words`. Raises MemoryBudgetError."""
         if not self._held:
@@ -153,31 +132,31 @@ class Film:
         for name, copy in self._held.items():
             self.stream.copy(copy, self.sums[name])
 
-    def words(self, *, held: bool = False) -> dict[str, Words]:
-        """Return what the film holds by name, as `FilmState` has it of one film: words (halves, 10
-        to 26, h, w) uint32, bands (halves, sums, 3, h, w), and `layer_words`; wait for it. held:
-        what it held at `hold`."""
-        width, height = self.size
-        film = self._planes("film", self.halves * self._words, held)
-        bands = self._planes("bands", self.halves * SUM_WORDS * self._band_sums, held)
-        return {
-            "words": film.reshape(self.halves, -1, height, width),
-            "bands": bands.reshape(self.halves, self._band_sums, SUM_WORDS, height, width),
-            **self.layer_words(held=held),
-        }
+    def words(self, *names: str, held: bool = False) -> dict[str, Words]:
+        """Return what the film holds, arrays of `FilmState` by these names; wait for it.
 
-    def layer_words(self, *, held: bool = False) -> dict[str, Words]:
-        """Return the words of layers beside the picture, as `FilmState` has them; wait for it."""
-        found = {"layers": NO_LAYERS, "light_layers": NO_LIGHT_LAYERS, "mattes": NO_MATTES}
-        if self._layer_words:
-            found["layers"] = self._pixels("layers", self._layer_words, held)
-        if self._light_sums:
-            sums = self._planes("light_layers", SUM_WORDS * self._light_sums, held)
-            found["light_layers"] = sums.reshape(-1, SUM_WORDS, *sums.shape[1:])
-        if self._mattes:
-            slots = self._pixels("mattes", MATTE_SLOTS * self._mattes, held)
-            found["mattes"] = slots.reshape(self._mattes, MATTE_SLOTS, *slots.shape[1:])
-        return found
+        held: what it held at `hold`.
+        """
+        return {name: self._array(name, held) for name in names}
+
+    def _array(self, name: str, held: bool) -> Words:
+        """An array of `FilmState`, perhaps of no words."""
+        width, height = self.size
+        if name == "words":
+            film = self._planes("film", self.halves * self._words, held)
+            return film.reshape(self.halves, -1, height, width)
+        if name == "bands":
+            bands = self._planes("bands", self.halves * SUM_WORDS * self._band_sums, held)
+            return bands.reshape(self.halves, self._band_sums, SUM_WORDS, height, width)
+        if name not in self.sums:
+            return NONE[name]
+        if name == "layers":
+            return self._pixels(name, self._layer_words, held)
+        if name == "light_layers":
+            sums = self._planes(name, SUM_WORDS * self._light_sums, held)
+            return sums.reshape(-1, SUM_WORDS, *sums.shape[1:])
+        slots = self._pixels(name, MATTE_SLOTS * self._mattes, held)
+        return slots.reshape(self._mattes, MATTE_SLOTS, *slots.shape[1:])
 
     def _pixels(self, name: str, count: int, held: bool) -> Words:
         """Return a buffer whose pixels have their words side by side as pictures, (count, h, w)."""
@@ -190,10 +169,13 @@ class Film:
         width, height = self.size
         sums = self._held if held else self.sums
         pixels = np.empty((count, height, width), np.uint32)
-        stored = np.empty(self._padded_pixels, np.uint32)  # of one word: memory is dear
-        for i, plane in enumerate(pixels):
-            self.stream.read(sums[name], stored, i * stored.nbytes)
-            plane[:] = work_list.picture(self._settings, stored)
+        size = 4 * self._padded_pixels
+        at_once = max(READ // size, 1)
+        for i in range(0, count, at_once):
+            stored = np.empty((min(at_once, count - i), self._padded_pixels), np.uint32)
+            self.stream.read(sums[name], stored, i * size)
+            for plane, words in zip(pixels[i:], stored, strict=False):
+                plane[:] = work_list.picture(self._settings, words)
         return pixels
 
     def set_words(self, arrays: Mapping[str, Words]) -> None:
@@ -207,18 +189,14 @@ class Film:
                 stored = np.ascontiguousarray(streams.T) if name in SIDE_BY_SIDE else streams
                 self.stream.write(self.sums[name], stored)
 
-    def count_samples(self, group: int) -> list[int]:
-        """Return how many samples the film has in a group of words, in each half; wait for it."""
-        counts = []
+    def count_samples(self, group: int) -> int:
+        """Return how many samples the film has in a group of words; wait for it."""
+        count, words = 0, np.empty(self._padded_pixels, np.uint32)
         for half in range(self.halves):
-            words = np.empty(self._padded_pixels, np.uint32)
             at = self._word_at(half, group + SAMPLES_WORD)
-            counts.append(int(self.stream.read(self.sums["film"], words, at).sum(dtype=np.uint64)))
-        return counts
+            count += int(self.stream.read(self.sums["film"], words, at).sum(dtype=np.uint64))
+        return count
 
     def _word_at(self, half: int, word: int) -> int:
         """Where a word of the pixels begins [bytes]."""
         return 4 * (half * self._words + word) * self._padded_pixels
-
-    def _read(self, image: cl.Buffer, channels: int) -> NDArray[np.float32]:
-        return self.stream.read(image, np.empty((*self.size[::-1], channels), np.float32))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -29,8 +29,9 @@ def _none(*shape: int) -> Words:
     return none
 
 
+NO_BANDS = _none(SUM_WORDS, 1, 1)[None]
 NO_LAYERS, NO_LIGHT_LAYERS, NO_MATTES = _none(1, 1), _none(SUM_WORDS, 1, 1), _none(1, 1, 1)
-DIMENSIONS = {"words": 5, "bands": 5, "layers": 3, "light_layers": 4, "mattes": 4}
+DIMENSIONS = {"words": 4, "bands": 5, "layers": 3, "light_layers": 4, "mattes": 4}
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,10 +41,10 @@ class FilmState:
     A sum is 96 bits in two's complement, three words with the lowest first, in units of 2^-48. So
     two states of different samples merge to the state of one run, to the bit, in any order.
 
-    words: (films, halves, 10 to 26, h, w) uint32, one film; of
-    each pixel three sums, and the number of its samples; then, where samples serve all pixels whose
-    filters hold them, a sum of the filter's values, and with alpha a sum of what is covered; then,
-    where light paths are weighed, three sums of theirs, and how many began at the pixel's number.
+    words: (halves, 10 to 26, h, w) uint32; of each pixel three sums, and the number of its samples;
+    then, where samples serve all pixels whose filters hold them, a sum of the filter's values, and
+    with alpha a sum of what is covered; then, where light paths are weighed, three sums of theirs,
+    and how many began at the pixel's number.
     halves: 2 where even and odd samples are kept apart, else 1. bands: (halves, sums, 3, h, w)
     uint32, a sum for each band, then, where light paths are weighed, one of theirs for each; sums
     may be 0. taken: first and end of each range of sample
@@ -55,12 +56,18 @@ class FilmState:
     """
 
     words: Words
-    bands: Words
-    taken: Ranges
+    bands: Words = field(default_factory=lambda: NO_BANDS)
+    taken: Ranges = ()
     scale: float = 1.0
     layers: Words = field(default_factory=lambda: NO_LAYERS)
     light_layers: Words = field(default_factory=lambda: NO_LIGHT_LAYERS)
     mattes: Words = field(default_factory=lambda: NO_MATTES)
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        """Take what a pickle holds; older ones have `words` of a row of films, always one."""
+        self.__dict__.update(state)
+        if self.words.ndim > DIMENSIONS["words"]:
+            self.__dict__["words"] = self.words[0]
 
     @property
     def arrays(self) -> dict[str, Words]:
@@ -68,14 +75,9 @@ class FilmState:
         return {name: getattr(self, name) for name in DIMENSIONS}
 
     @property
-    def films(self) -> tuple[dict[str, Words], ...]:
-        """All words by name, of each film."""
-        return tuple({**self.arrays, "words": words} for words in self.words)
-
-    @property
     def samples(self) -> NDArray[np.uint32]:
         """How many samples each pixel has, (h, w) uint32."""
-        counts: NDArray[np.uint32] = self.words[0, :, SAMPLES_WORD].sum(axis=0, dtype=np.uint32)
+        counts: NDArray[np.uint32] = self.words[:, SAMPLES_WORD].sum(axis=0, dtype=np.uint32)
         return counts
 
     def merged(self, other: FilmState) -> FilmState:

@@ -180,11 +180,6 @@ class Wavefront:
         return self.features.transport.light_paths or self.features.transport.weighed
 
     @property
-    def light_paths_per_pixel(self) -> float:
-        """How many paths that start at lights there were for each pixel."""
-        return self._samples(0, len(self._paths)).get("light_paths", 0.0)
-
-    @property
     def light_group(self) -> int:
         """Which of a pixel's words is the first that light paths add to."""
         return self.features.passes[0].film.first_word
@@ -244,7 +239,7 @@ class Wavefront:
 
     def clear(self) -> None:
         """Enqueue that the film is empty; the next sample is number 0."""
-        self._paths = [0] * self.film.halves  # that began at lights, in each half of the film
+        self._light_paths = 0  # that are in the film
         self._in_flight = None  # the next paths take the places of these
         self.paths.clear_counters()
         self._counted = np.zeros(len(COUNTERS), np.uint64), Counts()
@@ -317,55 +312,27 @@ class Wavefront:
     def refresh(self) -> None:
         """Make the picture of whatever the film holds."""
         if self.has_light_paths:
-            self._paths = self.film.count_samples(self.light_group)
+            self._light_paths = self.film.count_samples(self.light_group)
         self.accumulate_film()
 
     def accumulate_film(self) -> cl.Event:
         """Enqueue that the film's picture becomes that of the samples so far; return the event."""
-        self._accumulate.set_args(**self._samples(0, self.film.halves))
+        if self.has_light_paths:
+            self._accumulate.set_args(light_paths=self._light_paths / math.prod(self.film.size))
         return self.film.accumulate(self._accumulate)
-
-    def image(self) -> NDArray[np.float32]:
-        """Return the picture so far, (h, w, 3) float32 in the film's output space; wait for it."""
-        return self.film.colours()
-
-    def half(self, which: int) -> NDArray[np.float32]:
-        """Return the picture of the even (0) or odd (1) samples, as `image` does."""
-        halves = (which, which + 1)
-        image = self.buffers.allocate("a half's image", 16 * math.prod(self.film.size))
-        own = {"image": image, "halves": halves, "light_paths": 0.0, **self._samples(*halves)}
-        whole = self.film.made(self.kernels.bind("accumulate", "accumulate", **own), image, 4)
-        return np.ascontiguousarray(whole[..., :3])
-
-    def alpha(self) -> NDArray[np.float32]:
-        """Return how much of each pixel is covered so far, (h, w) float32; wait for it."""
-        image = self.buffers.allocate("the alpha", 4 * math.prod(self.film.size))
-        own = {"alpha": image, "halves": (0, self.film.halves)}
-        kernel = self.kernels.bind("accumulate", "accumulate_alpha", **own)
-        return self.film.made(kernel, image, 1)[..., 0]
-
-    def bands(self) -> NDArray[np.float32]:
-        """Return the mean radiance in each band so far, (h, w, bands) float32; wait for it."""
-        assert self._accumulate_bands is not None, "the film has no bands"
-        self._accumulate_bands.set_args(**self._samples(0, self.film.halves))
-        return self.film.bands(self._accumulate_bands)
 
     def set_words(self, arrays: Mapping[str, Words]) -> None:
         """Enqueue that the film holds these words, of the form that `Film.words` returns."""
         self.film.set_words(arrays)
-        film = arrays["words"]
-        count = SAMPLES_WORD + (self.light_group if self.has_light_paths else 0)
-        self._paths = [int(half[count].sum(dtype=np.uint64)) for half in film]
+        if self.has_light_paths:
+            counts = arrays["words"][:, self.light_group + SAMPLES_WORD]
+            self._light_paths = int(counts.sum(dtype=np.uint64))
         self.accumulate_film()
 
     def _bind_film(self) -> None:
-        """Bind the kernels that make a picture of the film."""
+        """Bind the kernel that makes a picture of the film."""
         self.kernels.build(programs.film_sources(self.features, self.scene.strategy.layout))
-        whole = {"halves": (0, self.film.halves), "light_paths": 0.0}
-        self._accumulate = self.kernels.bind("accumulate", "accumulate", **whole)
-        self._accumulate_bands = (
-            self.kernels.bind("bands", "accumulate_bands", **whole) if self.film.has_bands else None
-        )
+        self._accumulate = self.kernels.bind("accumulate", "accumulate", light_paths=0.0)
 
     def _turns(self, first: int, end: int) -> list[tuple[int, int]]:
         """The numbers of samples that all kinds of paths take one after the other: few at a time,
@@ -428,15 +395,7 @@ class Wavefront:
     def _note_paths(self, first: int, end: int) -> None:
         """Count the light paths of samples first to end - 1, which are in the film by now."""
         first, end = self.loops[0].numbers(first, end)
-        for half in range(len(self._paths)):
-            of_half = len(range(first + (first + half) % len(self._paths), end, len(self._paths)))
-            self._paths[half] += of_half * self.paths.pixels
-
-    def _samples(self, first: int, end: int) -> dict[str, float]:
-        """The argument `light_paths` of pictures of halves: how many there were for each pixel."""
-        if not self.has_light_paths:
-            return {}
-        return {"light_paths": sum(self._paths[first:end]) / math.prod(self.film.size)}
+        self._light_paths += (end - first) * self.paths.pixels
 
     def _count(self, counters: NDArray[np.uint64], samples: bool) -> None:
         """Add what the counters have gained since they were read last; samples: these too."""

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from clpt.cli.info import summary
+from clpt.cli.files.scene_contents import summary
 from clpt.formats import gltf, load
 from clpt.formats.meshes import framing
 

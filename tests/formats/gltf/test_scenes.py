@@ -365,7 +365,7 @@ def textured(build, image: bytes, sampler=None, **info):
 
 def bitmaps(scene):
     """The bitmaps of the first shape's material, by what they are of."""
-    from clpt.cli.info import _nested
+    from clpt.cli.files.scene_contents import _nested
     from clpt.scene.textures import Bitmap
 
     return [kind for kind in _nested([scene.shapes[0]]) if isinstance(kind, Bitmap)]

@@ -1,4 +1,4 @@
-"""A device that rounds otherwise renders the same picture: no choice is a hash of a rounded number."""
+"""A device that rounds otherwise renders the same picture."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ import pytest
 import clpt
 from clpt.device import building
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 
 @pytest.mark.slow
 def test_the_same_paths(monkeypatch: pytest.MonkeyPatch) -> None:
     """A compiler that may reorder sums stands for a GPU's, which joins products and sums.
 
-    Few paths differ, where a number was at the edge of a choice. Light here comes from many bricks.
+    Few paths differ, where a number was at the edge of a choice; none is a hash of what was
+    rounded. Light here comes from many bricks.
     """
     scene = clpt.load(ROOT / "scenes" / "candle_behind_smoke")
     scene = dataclasses.replace(scene, film=dataclasses.replace(scene.film, width=32, height=32))

@@ -64,7 +64,7 @@ def test_in_crops_and_halves(transparent):
         image = renderer.image()
         assert image.shape == (9, 12, 4) and image[..., 3].min() < image[..., 3].max() == 1.0
         state = renderer.film_state()
-        assert state.words.shape[2] == 13
+        assert state.words.shape[1] == 13
         renderer.reset()
         renderer.merge(state)
         np.testing.assert_array_equal(renderer.image(), image)

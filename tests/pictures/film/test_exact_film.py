@@ -103,13 +103,13 @@ def test_halves(scene, whole):
         renderer.run(SPP - 5)
         state = renderer.film_state()
         words = FILM_WORDS + 2 * SUM_WORDS * scene.film.alpha  # weights, and what is covered
-        assert state.words.shape == (1, 2, words, SIZE["height"], SIZE["width"])
+        assert state.words.shape == (2, words, SIZE["height"], SIZE["width"])
         np.testing.assert_array_equal(renderer.image(), whole[1])
         even, odd = renderer.halves()
         assert not np.array_equal(even, odd)
         if not scene.film.bands and not scene.film.alpha:
             np.testing.assert_allclose(0.5 * (even + odd), whole[1], rtol=1e-5, atol=1e-6)
-        assert (state.words[0, :, SAMPLES_WORD].sum(axis=(1, 2)) == SPP / 2 * 26 * 18).all()
+        assert (state.words[:, SAMPLES_WORD].sum(axis=(1, 2)) == SPP / 2 * 26 * 18).all()
 
 
 def test_halves_of_a_whole_film(scene, whole):
@@ -166,8 +166,8 @@ def test_more_samples_than_a_float_counts():
         total = int(2**48 * 0.5) * (2**31 - 5)
         sums = np.array([total >> 32 * i & 0xFFFFFFFF for i in range(3)], np.uint32)
         for first in (0, 3, 6):
-            many[0, 0, first : first + 3] = sums[:, None, None]
-        many[0, 0, 9] = 2**31 - 5
+            many[0, first : first + 3] = sums[:, None, None]
+        many[0, 9] = 2**31 - 5
         renderer.merge(FilmState(many, two.bands, ((0, 2**31 - 5),)))
         assert renderer.samples == 2**31 - 3
         np.testing.assert_allclose(renderer.image(), 0.5, rtol=1e-6)
@@ -233,7 +233,7 @@ def test_a_stop_that_becomes_a_discard():
 def test_a_flag_that_running_kernels_see():
     """Where a device shares words, no bounce begins while `leave` is raised, but for steps."""
     with clpt.Renderer(sky(width=40, height=40), slots=64) as renderer:
-        (wavefront,) = renderer.wavefronts
+        wavefront = renderer.wavefront
         if not (wavefront.looped and renderer.device.info.shares_words):
             pytest.skip("this device's kernels see nothing while they run")
         taken = []
@@ -281,12 +281,12 @@ def test_sums_near_their_end_are_counted():
     with clpt.Renderer(painted(2.0**42)) as renderer:
         renderer.run(2)
         np.testing.assert_allclose(renderer.image()[..., 0], np.float32(2.0**42), 1e-6)
-        assert renderer.wavefronts[0].counts.full == 0
+        assert renderer.wavefront.counts.full == 0
         renderer.run(20)
-        assert renderer.wavefronts[0].counts.full > 0
+        assert renderer.wavefront.counts.full > 0
         renderer.update(scene=painted(2.0**45))
         renderer.run(2)
-        assert renderer.wavefronts[0].counts.rejected == 12 and not renderer.image().any()
+        assert renderer.wavefront.counts.rejected == 12 and not renderer.image().any()
 
 
 def test_the_exposure_moves_the_range():
@@ -297,7 +297,7 @@ def test_the_exposure_moves_the_range():
         )
         with clpt.Renderer(scene) as renderer, clpt.Renderer(sky()) as plain:
             renderer.run(3)
-            assert renderer.wavefronts[0].counts.rejected == 0
+            assert renderer.wavefront.counts.rejected == 0
             np.testing.assert_allclose(renderer.image(), [[[1.0, 0.5, 0.0]] * 3] * 2, rtol=1e-5)
             with pytest.raises(SceneError, match="exposure"):
                 plain.merge(renderer.film_state())

@@ -12,7 +12,7 @@ import pytest
 
 from clpt import spectra
 from clpt import transforms as tf
-from clpt.render.lowering import grids
+from clpt.render.analysis.bricks import Glow
 from clpt.scene import Film, Scene, media
 from clpt.scene.cameras import Orthographic, Perspective
 from clpt.scene.integrators import Box
@@ -177,11 +177,12 @@ def test_bricks_as_lights(mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scene.integrator = PathIntegrator(max_depth=3, light_paths=0)
     scene.lights = []
     pictures = [exposures(scene, 12, 128).mean(axis=(1, 2), keepdims=True)]
-    monkeypatch.setattr(grids.Glow, "brightest", nothing)
+    monkeypatch.setattr(Glow, "brightest", nothing)
     pictures.append(exposures(scene, 12, 256).mean(axis=(1, 2), keepdims=True))
     assert_agree(*pictures, "a flame as lights and a flame that is met", 2e-4)
 
 
-def nothing(glow: grids.Glow) -> grids.Glow:
+def nothing(glow: Glow) -> Glow:
     """No brick of those that emit."""
-    return grids.Glow(glow.numbers[:0], glow.power[:0], glow.corners[:0], glow.edges[:0])
+    none = (values[:0] for values in (glow.numbers, glow.power, glow.corners, glow.edges))
+    return Glow(*none, glow.emitting)

@@ -7,7 +7,7 @@ import re
 from clpt.device import kernels_folder
 from clpt.render.codegen import flags, programs
 from clpt.render.lowering.scene import lower
-from clpt.scene import Film, Scene, materials, shapes
+from clpt.scene import Film, Scene, lights, materials, shapes
 from clpt.scene.cameras import Perspective
 from clpt.spectra import Tabulated
 
@@ -37,15 +37,13 @@ def test_every_flag_is_asked_for() -> None:
     assert set(re.findall(r"\b[A-Z]\w*", kernels())) >= TABLES
 
 
-def test_a_flag_that_does_not_hold_is_not_in_the_text() -> None:
-    """What asks for it is decided: of flags a text names those alone that it calculates with."""
-    scene = Scene(camera=Perspective(), shapes=[shapes.Sphere()], film=Film(width=4, height=4))
-    features = lower(scene).features
-    hold = flags.of_scene(features) | flags.of_material(features, materials.Diffuse)
-    text = programs.sources(features, "wide8", 1, queued=False)["shade_diffuse"].text
-    named = set(re.findall(r"\b[A-Z]\w*", re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)))
-    assert "USES_ANALYTIC" in hold and "USES_INSTANCES" not in hold
-    assert named & TABLES <= hold.keys()
+def test_only_flags_that_kernels_calculate_with_are_in_the_text() -> None:
+    film, sky = Film(width=4, height=4), lights.Constant()
+    scene = Scene(camera=Perspective(), shapes=[shapes.Sphere()], lights=[sky], film=film)
+    texts = programs.sources(lower(scene).features, "wide8", 1, queued=False)
+    head = texts["shade_diffuse"].text.split("#line", 1)[0]
+    assert "USES_ANALYTIC" not in head and "USES_INSTANCES" not in head
+    assert "#define BSDF_TRANSMITS 0\n" in head
 
 
 def test_features_are_told_apart_by_their_values() -> None:

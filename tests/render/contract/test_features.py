@@ -72,7 +72,6 @@ def test_a_macro_is_defined_where_its_field_holds() -> None:
     """A flag where it holds, a number wherever there is one."""
     nothing, moves = (dict(said(MotionFeatures(row=row))) for row in (None, 0))
     assert nothing["MOTION_ROW"] is None and moves["MOTION_ROW"] == 0
-    assert nothing["USES_MOTION"] is None
     found = dict(said(MotionFeatures(vertices=True)))
-    assert found["USES_MOTION"] == found["MOVES_VERTICES"] == 1 and found["MOVES_SHAPES"] is None
-    assert found["USES_MOTION"] is not True, "true is 1 in kernels"
+    assert found["MOVES_VERTICES"] == 1 and found["MOVES_INSTANCES"] is None
+    assert found["MOVES_VERTICES"] is not True, "true is 1 in kernels"

@@ -80,7 +80,7 @@ def bent(amount: float) -> np.ndarray:
 
 def fresh(renderer: Renderer) -> np.ndarray:
     """What a new renderer makes of the scene as it is now."""
-    layout = renderer.wavefronts[0].scene.strategy.layout
+    layout = renderer.wavefront.scene.strategy.layout
     return picture(Renderer(renderer.scene, renderer.device, layout=layout))
 
 
@@ -152,7 +152,7 @@ def test_what_cannot_be_is_told(renderer: Renderer) -> None:
 
 
 def test_where_light_is_traced_from_lights_nothing_moves_in_place(renderer: Renderer) -> None:
-    target = renderer.wavefronts[0].scene
+    target = renderer.wavefront.scene
     moving, lowered = Moving(target, renderer.scene), target.lowered
     assert moving.move(renderer.scene, {}, lambda: None) is None
     features = dataclasses.replace(lowered.features, transport=TransportFeatures(light_paths=True))
@@ -175,7 +175,7 @@ def test_the_reason_why_a_shape_does_not_move(
     renderer: Renderer, name: str, changes: dict[str, Any], reason: str
 ) -> None:
     scene_ = scene()
-    moving = Moving(renderer.wavefronts[0].scene, scene_)
+    moving = Moving(renderer.wavefront.scene, scene_)
     old = next(shape for shape in scene_.shapes if shape.name == name)
     refusal = moving.move(
         scene_, {id(old): (old, dataclasses.replace(old, **changes))}, lambda: None

@@ -46,15 +46,17 @@ def test_the_error_is_told(method):
         (truth * (1 + 0.3 * 2**0.5 * rng.standard_normal((size, size, 1)))).astype(np.float32)
         for _ in range(2)
     ]
-    made = SimpleNamespace(device=choose(), halves=lambda: tuple(halves), layers=dict)
+    made = SimpleNamespace(halves=lambda: tuple(halves), layers=dict)
+    made.developed = lambda: made
     cells = np.ones(2 * (size // 16) ** 2, bool)
-    told = float(np.sqrt(DenoisedNoise(made, method).measure(cells).mean()))
+    told = float(np.sqrt(DenoisedNoise(made, choose(), method).measure(cells).mean()))
     picture = SimpleNamespace(
-        denoise=method, device=made.device, halves=made.halves, layers=dict,
-        colours=lambda: sum(halves) / 2, image=lambda: sum(halves) / 2, is_adaptive=True,
+        denoise=method, halves=made.halves, layers=dict,
+        colours=lambda: sum(halves) / 2, image=lambda: sum(halves) / 2,
         samples_per_pixel=lambda: np.full((size, size), 2.0),
         form=SimpleNamespace(bands=0, alpha=False),
     )  # fmt: skip
+    picture.developed = lambda: picture
     weights = np.array([0.2126, 0.7152, 0.0722])
     wrong = (clpt.DenoisedPicture(picture).colours() - truth) @ weights / (truth @ weights)
     left = float(np.sqrt(np.mean(wrong**2)))
@@ -62,7 +64,7 @@ def test_the_error_is_told(method):
     print(method, told, left)
     assert 0.6 * left < told < 3.0 * left and told < 0.15
     part = cells & (np.arange(len(cells)) < 2)  # of the first square alone
-    assert DenoisedNoise(made, method).measure(part)[:2].max() < 0.15**2
+    assert DenoisedNoise(made, choose(), method).measure(part)[:2].max() < 0.15**2
 
 
 def test_a_limit_is_for_what_is_left():

@@ -14,7 +14,8 @@ from clpt.__main__ import run
 from clpt.render.contract.layer_names import LayerNames
 from clpt.render.film.cryptomatte import RANKS
 from clpt.render.film.layer_channels import SETS, channels_of
-from clpt.render.film.saved_film import PictureForm
+from clpt.render.film.picture_form import PictureForm
+from clpt.render.film.pictures import Still
 from clpt.scene.layers import LAYERS
 
 SIZE = (3, 5)
@@ -31,10 +32,8 @@ def pictures() -> dict[str, np.ndarray]:
     return made
 
 
-class Source:
+class Source(Still):
     """What a renderer has to show, without one."""
-
-    is_adaptive = False
 
     def __init__(self, bands: int = 0):
         names = LayerNames(objects=("a ball", "a ball", "floor"), materials=("ink",))
@@ -50,7 +49,7 @@ class Source:
         return pictures()
 
     def spectral_image(self):
-        lambdas = np.linspace(400.0, 700.0, self.form.bands)
+        lambdas = self.form.band_centres
         return clpt.SpectralImage(np.ones((*SIZE, len(lambdas)), np.float32), lambdas, True)
 
 

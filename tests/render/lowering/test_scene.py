@@ -10,8 +10,8 @@ import pytest
 import clpt
 from clpt.errors import SceneError
 from clpt.records import SETTINGS, SHAPE, SHAPE_BITS, TABLES
+from clpt.render.analysis import geometry
 from clpt.render.contract.parameter_words import MIXTURE
-from clpt.render.lowering import geometry
 from clpt.render.lowering.scene import lower
 from clpt.render.lowering.settings import DEEPEST
 from clpt.scene import Film, Scene

@@ -27,7 +27,7 @@ def cornell(scenes: Path) -> Scene:
 def picture(wavefront: Wavefront) -> np.ndarray:
     wavefront.clear()
     assert wavefront.render_samples(0, 2)
-    return wavefront.image()
+    return wavefront.film.picture.get()[..., :3]
 
 
 def coloured(scene: Scene, colour: tuple[float, float, float]) -> Scene:
@@ -68,9 +68,7 @@ def test_two_wavefronts_share_a_lowered_scene(cornell: Scene) -> None:
     write()
     patched = picture(one)
     assert not np.array_equal(patched, first)
-    rebuild.prepare(
-        [one], lower(coloured(cornell, (0.1, 0.2, 0.9)), former=one.scene.lowered)
-    )()
+    rebuild.prepare(one, lower(coloured(cornell, (0.1, 0.2, 0.9)), former=one.scene.lowered))()
     np.testing.assert_array_equal(picture(one), patched)
 
     assert other.scene.lowered is lowered
@@ -78,7 +76,7 @@ def test_two_wavefronts_share_a_lowered_scene(cornell: Scene) -> None:
     # What one has edited the other edits by itself, if need be by lowering again.
     write = parameter_patch.patch(other.scene, cornell, edited)
     if isinstance(write, str):
-        write = rebuild.prepare([other], lower(edited, former=other.scene.lowered))
+        write = rebuild.prepare(other, lower(edited, former=other.scene.lowered))
     write()
     new = Wavefront.create(on, lower(edited), layout="binary", slots=64, looped=False)
     np.testing.assert_array_equal(picture(other), picture(new))

@@ -146,7 +146,6 @@ class Features:
         return "motion" in self.film.layers.names and self.motion.present
 
     @property
-    @macro("NAMES_SURFACES")
     def names_surfaces(self) -> bool:
         """Whether some layer asks which surface is seen."""
         forms = {LAYERS[name].form for name in self.film.layers.names}

@@ -15,8 +15,8 @@ class GeometryFeatures:
     instances: bool = flag("USES_INSTANCES")
     only_instances: bool = flag("ONLY_INSTANCES")  # all triangles are of groups
     few_instances: int = flag("FEW_INSTANCES", 0)  # how many, if a ray goes to each without a tree
-    normals: bool = flag("USES_NORMALS")
-    uvs: bool = flag("USES_UVS")
+    normals: bool = False
+    uvs: bool = False
     tangents: bool = flag("USES_TANGENTS")
     vertex_tangents: int = flag("VERTEX_TANGENTS", 0)  # where in `distributions` meshes' own lie
 

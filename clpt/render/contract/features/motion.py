@@ -13,7 +13,7 @@ class MotionFeatures:
 
     camera: bool = False
     instances: bool = flag("MOVES_INSTANCES")
-    shapes: bool = flag("MOVES_SHAPES")  # analytic ones
+    shapes: bool = False  # analytic ones
     lights: bool = False
     vertices: bool = flag("MOVES_VERTICES")  # have a row for each key
     spheres: bool = flag("MOVES_SPHERES")  # of shapes `spheres` have a row for each key

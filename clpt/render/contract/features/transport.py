@@ -19,7 +19,7 @@ class TransportFeatures:
     merged: bool = flag("MERGES")  # those leave photons, which paths from the camera gather
     guided: bool = flag("USES_GUIDE")  # directions of the camera's paths are learned
     aimed: bool = flag("AIMS_LIGHT_PATHS")  # some light paths start toward what is sharp
-    lit_ghosts: bool = flag("LIT_GHOSTS")  # light paths are ghosts of the lens, and no more
+    lit_ghosts: bool = False  # light paths are ghosts of the lens, and no more
     light_filter: tuple[int, int, int] = (0, 0, 0)  # of weighed light paths: taps, reach, profile
 
     @property

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import fits_single
+from clpt.errors import SceneError
 from clpt.render.analysis.cameras import MEMBERS, dispersive_glasses, rigid
 from clpt.render.contract.camera_records import RECORDS
 from clpt.render.lowering.camera import lens
@@ -28,6 +30,8 @@ def lower_camera(
     record = RECORDS[camera.kind]
     words = np.zeros((), record.dtype)
     for name, value in MEMBERS[type(camera)](camera, width, height).items():
+        if not fits_single(value):
+            raise SceneError("is beyond float32, 3.4e38", where=f"{camera.kind}.{name}")
         words[name] = value
     for row in rows.values():
         words["glass"] = row

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from clpt.render.analysis.bricks import Glow
 from clpt.render.contract.light_records import RECORDS, VOLUME
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.grids import Glow
-from clpt.render.lowering.lights.light_bounds import Bounds
 
 
 @dataclass(frozen=True)
@@ -32,15 +31,3 @@ class BrickLights:
         words["chord"], words["inverse"] = 4.0 * volume / surface, 1.0 / volume
         first = encoder.store.append("light_params", words.view(np.uint32))
         return first + record.words * np.arange(len(words))
-
-    def bounds(self) -> Bounds:
-        """Boxes around the bricks, which shine in all directions."""
-        corners, edges = self.glow.corners, self.glow.edges
-        count = len(corners)
-        return Bounds(
-            corners + np.minimum(edges, 0.0).sum(axis=1),
-            corners + np.maximum(edges, 0.0).sum(axis=1),
-            np.tile([0.0, 0.0, 1.0], (count, 1)),
-            np.full(count, np.pi), np.full(count, np.pi / 2.0), np.full(count, False),
-            np.full(count, True),
-        )  # fmt: skip

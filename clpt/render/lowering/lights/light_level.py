@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.render.analysis.index import SceneIndex
-from clpt.render.lowering.lights.light_bounds import concatenated
+from clpt.render.analysis.lights.light_bounds import concatenated
+from clpt.render.analysis.lights.light_power import brightness
 from clpt.render.lowering.lights.lights import LightRows
-from clpt.render.lowering.lights.non_shape_lights import brightness
 
 
 def light_level(

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt import transforms
 from clpt.errors import SceneError
+from clpt.render.analysis.lights.light_power import aspect, invertible
 from clpt.render.lowering.encoder import Encoder
 from clpt.scene.lights import SPOT_EDGES, Goniometric, Light, Projector, Spot
 from clpt.scene.pixels import pixels, spectral_image
@@ -29,7 +29,7 @@ def members(lamp: Light, encoder: Encoder) -> dict[str, ArrayLike]:
     """
     if isinstance(lamp, Projector):
         half = float(np.tan(np.radians(lamp.fov) / 2.0))
-        axes = _place(lamp.to_world, "projector.to_world", half, half / _aspect(lamp))
+        axes = _place(lamp.to_world, "projector.to_world", half, half / aspect(lamp))
         return {**axes, **_image(lamp.image, encoder)}
     if isinstance(lamp, Goniometric):
         return {**_place(lamp.to_world, "goniometric.to_world"), **_image(lamp.image, encoder)}
@@ -42,27 +42,6 @@ def members(lamp: Light, encoder: Encoder) -> dict[str, ArrayLike]:
         "smooth": SPOT_EDGES.index(lamp.edge),
         "factor": encoder.store.append("light_params", encoder.factor_words(lamp.image)),
     }
-
-
-def invertible(to_world: ArrayLike, where: str) -> NDArray[np.float64]:
-    """Return a light's transform. Raises SceneError for a matrix without an inverse."""
-    matrix = np.asarray(to_world, np.float64)
-    if matrix.shape != (4, 4) or transforms.is_singular(matrix):
-        raise SceneError("must be an invertible (4, 4) matrix", where=where)
-    return matrix
-
-
-def image_area(lamp: Projector) -> float:
-    """Return the area of a projector's image a metre before it [m^2]."""
-    half = float(np.tan(np.radians(lamp.fov) / 2.0))
-    return 4.0 * half * half / _aspect(lamp)
-
-
-def _aspect(lamp: Projector) -> float:
-    if lamp.aspect > 0.0 or not isinstance(lamp.image, Bitmap):
-        return lamp.aspect or 1.0
-    height, width = pixels(lamp.image, "reflectance").shape[:2]
-    return width / height
 
 
 def _image(image: Any, encoder: Encoder) -> dict[str, ArrayLike]:

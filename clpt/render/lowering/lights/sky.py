@@ -1,55 +1,24 @@
-"""The sky on its way to the device: its images as texels, and grids to choose directions by."""
+"""The sky on its way to the device: its images and grids."""
 
 from __future__ import annotations
 
-from functools import partial
-from typing import Any, NamedTuple
-
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from clpt.render.analysis.lights.image_lights import axes_of
+from clpt.render.analysis.lights.sky_light import content
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.lights import block_grids, image_lights
-from clpt.render.lowering.textures.texels import bands, texels
+from clpt.render.lowering.lights.grid_words import members as grid_members
 from clpt.scene.lights import Sky
-from clpt.sky import dome
-from clpt.sky.dome import (
-    COLUMNS,
-    ROWS,
-    SUN_COLUMNS,
-    SUN_RADIUS,
-    SUN_ROWS,
-    directions,
-    elevations,
-    horizon,
-)
-from clpt.spectra import Tabulated, luminance
-from clpt.spectra.air import LAMBDAS
-from clpt.spectral_exr import SpectralImage
-
-Floats = NDArray[np.float64]
-
-MOST = 0.75  # share of samples that the sun may take
+from clpt.sky.dome import COLUMNS, ROWS, SUN_RADIUS, horizon
 
 
-class _Content(NamedTuple):
-    """The radiance of a sky: texels (n, bands or 4), the disc's too, and the grid to choose by."""
-
-    texels: NDArray[np.float32]
-    sun: NDArray[np.float32]
-    number: Tabulated | None
-    corners: Floats
-    grid: block_grids.BlockGrid
-    sun_share: float
-    strength: float
-
-
-def lower_sky(lamp: Sky, encoder: Encoder) -> tuple[str, dict[str, ArrayLike], float]:
-    """Put a sky into the tables; its record's name, its members, and its mean radiance.
+def lower_sky(lamp: Sky, encoder: Encoder) -> tuple[str, dict[str, ArrayLike]]:
+    """Put a sky into the tables; return its record's name and its members.
 
     Raises SceneError for a transform that is more than a rotation.
     """
-    axes, spectra, made = image_lights.axes_of(lamp), encoder.spectra, _found(lamp, encoder)
+    axes, spectra, made = axes_of(lamp), encoder.spectra, content(lamp, encoder.look)
     x, y, z = axes.T
     turn, up = np.radians(lamp.sun_azimuth), np.radians(lamp.sun_elevation)
     members: dict[str, ArrayLike] = {
@@ -60,7 +29,7 @@ def lower_sky(lamp: Sky, encoder: Encoder) -> tuple[str, dict[str, ArrayLike], f
         "height": ROWS,
         "texels": encoder.store.append_floats("texels", made.texels),
         "sun_texels": encoder.store.append_floats("texels", made.sun),
-        **block_grids.members(made.corners, made.grid, encoder),
+        **grid_members(made.corners, made.grid, encoder),
         "horizon": horizon(lamp.altitude),
         "sun_cos": np.cos(up),
         "sun_sin": np.sin(up),
@@ -68,64 +37,6 @@ def lower_sky(lamp: Sky, encoder: Encoder) -> tuple[str, dict[str, ArrayLike], f
         "sun_share": made.sun_share,
     }
     if made.number is None:
-        return "sky", members, made.strength
+        return "sky", members
     members |= {"bands": made.texels.shape[1], "number": spectra.row(made.number)}
-    return "spectral_sky", members, made.strength
-
-
-def sun_share(lamp: Sky, encoder: Encoder) -> float:
-    """Return the share of a sky's samples that its disc gets, 0 where the sun has set."""
-    return _found(lamp, encoder).sun_share
-
-
-def _found(lamp: Sky, encoder: Encoder) -> _Content:
-    """The tables of a sky, found once."""
-    given = *dome.numbers(lamp), encoder.spectra.spectral, *encoder.spectra.range
-    return encoder.cache(_content, *given, by=(repr(given),))
-
-
-def _content(
-    numbers: tuple[float, ...], ground: tuple[float, ...], spectral: bool, lo: float, hi: float
-) -> _Content:
-    """The tables of a sky; its spectra from lo to hi [nm]."""
-    around, sun = dome.images(numbers, ground)
-    at = horizon(numbers[1])
-    flat = (f.reshape(1, -1, f.shape[-1]) for f in (around, sun))
-    images = [SpectralImage(f.astype(np.float32), LAMBDAS, True) for f in flat]
-    colours = [np.maximum(image.to_rgb(), 0.0) for image in images]
-    seen = [
-        luminance(colour) + image_lights.UNSEEN * image.values.mean(axis=2)
-        for colour, image in zip(colours, images, strict=True)
-    ]
-    if spectral:
-        (found, number), (disc, _) = bands(images[0], lo, hi), bands(images[1], lo, hi)
-    else:
-        found, disc = (texels(colour, "emission", False) for colour in colours)
-    half = seen[0].reshape(2, ROWS + 1, -1)
-    weights = np.concatenate([half, half[..., -2::-1]], axis=2).astype(np.float64)
-    rows = np.clip(np.arange(ROWS + 1), 0.25, ROWS - 0.25) / ROWS
-    root = np.stack([1.0 - rows, rows])
-    span = np.array([0.5 * np.pi - at, 0.5 * np.pi + at])[:, None]
-    angle = np.stack([elevations(at, rows), elevations(at, 1.0 + rows)])
-    area = 2.0 * root * span * np.cos(angle) * 2.0 * np.pi / (ROWS * COLUMNS)
-    corners = weights * area[..., None]
-    cell = 2.0 * 0.5 * np.pi / ROWS, 2.0 * np.pi / COLUMNS
-    grid = block_grids.of(corners, partial(directions, at), cell)
-    shining = _sun_power(seen[1].reshape(SUN_ROWS, SUN_COLUMNS))
-    total = grid.total + shining
-    share = min(shining / total, MOST) if total > 0.0 else 0.0
-    return _Content(
-        found, disc, number if spectral else None, corners, grid, share, total / (4.0 * np.pi)
-    )
-
-
-def _sun_power(bright: NDArray[Any]) -> float:
-    """A disc's brightness times solid angle, of its image (rows, columns)."""
-    at = np.linspace(-1.0, 1.0, 101)
-    a, b = np.meshgrid(at, at)
-    inside = 1.0 - a * a - b * b
-    keep = inside > 0.0
-    row = (0.5 + 0.5 * b[keep]) * (SUN_ROWS - 1)
-    column = np.sqrt(inside[keep]) * (SUN_COLUMNS - 1)
-    found = bright[np.rint(row).astype(int), np.rint(column).astype(int)]
-    return float(found.mean() * np.pi * np.sin(SUN_RADIUS) ** 2)
+    return "spectral_sky", members

@@ -1,240 +1,24 @@
-"""The media around lights, where paths that start there begin: words of the table `media`.
-
-A lamp at a place is in what boundaries put there. A shape shines into what its `exterior` names,
-else into what is at some points just before it: these must agree.
-"""
+"""The media around lights as words of the table `media`."""
 
 from __future__ import annotations
-
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import transforms
-from clpt.geometry import analytic, shapes, winding
-from clpt.geometry.motion import Motions
-from clpt.render.analysis import surroundings
-from clpt.render.analysis.bodies import matter_of
-from clpt.render.analysis.index import SceneIndex
-from clpt.render.lowering.geometry import Emitter, Geometry
-from clpt.render.lowering.lights import light_bounds
-from clpt.render.lowering.lights.lights import LightRows, row_order
-from clpt.render.lowering.lowering_cache import LoweringCache
+from clpt.render.analysis.lights.light_media import LightMedia
 from clpt.render.lowering.media.body_words import BodyWords
 from clpt.render.lowering.media.medium_words import MediumWords
-from clpt.scene import Scene
-from clpt.scene.media import Lattice, Medium
-from clpt.scene.motion import Deformation, Keys
-
-POINTS = 6  # of a shape that shines
-BEFORE = 1e-4  # how far before it they are, over its size
-AFAR = 1e4  # radii of the scene: a place that stands for infinity
-CROSSES = "{} comes into another medium while the shutter is open"
-
-Around = tuple[Any, ...]  # media, or the matter of bodies
 
 
-class LightMedia(NamedTuple):
-    """words: bodies and medium of each row of lights (2 n,) uint32; refusal: why no paths can start
-    at some light, "" if they can; extinction: of each row, of the medium that scatters its light,
-    else 0 (n,) [1/m]; nan where its density is on a grid."""
-
-    words: NDArray[np.uint32]
-    refusal: str
-    extinction: NDArray[np.float64]
-
-
-NOWHERE = LightMedia(np.zeros(0, np.uint32), "", np.zeros(0))
-
-
-def light_media(
-    index: SceneIndex,
-    geometry: Geometry,
-    lights: LightRows,
-    media: MediumWords,
-    bodies: BodyWords | None,
-    sphere: tuple[NDArray[np.float64], float],
-    cache: LoweringCache,
-) -> LightMedia:
-    """Return the media around all lights of a scene that has media.
-
-    geometry: of the shapes that shine; bodies: where these overlap; sphere: centre and radius of
-    one around the scene [m]. What moves is looked at again and again while the shutter is open:
-    a light must stay in one medium.
-    """
-    scene, rows, motions = index.scene, [], index.motions
-    if index.emitting:
-        name = index.emitting[0].name or index.emitting[0].kind
-        return NOWHERE._replace(
-            refusal=f"no path starts in the medium {name!r}, which gives out light"
-        )
-    known = _Known(scene, bodies is not None, cache, motions)
-    hole = None if bodies is not None else known.open_medium()
-    unknown = (
-        ""
-        if hole is None
-        else (
-            f"the boundary of the medium {hole.name or hole.kind!r} is not closed, so that nobody "
-            "knows whether {} is in it"
-        )
-    )
-    afar = sphere[0] + AFAR * sphere[1] * np.ones(3)
-    for i in row_order(scene.lights):
-        lamp = scene.lights[i]
-        if unknown:
-            return NOWHERE._replace(refusal=unknown.format(f"lights[{i}]"))
-        if lamp.reach == "placed":
-            bounds = light_bounds.of_lamp(lamp)
-            inside = known.along(bounds.low[0], motions.lamps.get(i))
-            if inside is None:
-                return NOWHERE._replace(refusal=CROSSES.format(f"lights[{i}]"))
-            rows.append((inside, 1))
-            continue
-        found = known.along(afar, None)
-        if found or found is None:
-            reason = f"the light of lights[{i}] comes from infinity, where a medium has no end"
-            return NOWHERE._replace(refusal=reason)
-        rows.append((found, 1))
-    ends = (*lights.first, len(lights.rows))[1:]
-    for emitter, first, end in zip(geometry.emitters, lights.first, ends, strict=True):
-        if unknown and not _says(emitter.shape):
-            return NOWHERE._replace(refusal=unknown.format(shapes.where(emitter.shape)))
-        number = int(geometry.rows[emitter.shape_row]["number"])
-        into = _around_shape(emitter, known, motions, number)
-        if into is None:
-            reason = f"{shapes.where(emitter.shape)} shines into more than one medium"
-            if motions.moving:
-                reason += " while the shutter is open"
-            return NOWHERE._replace(refusal=reason)
-        rows.append((into, end - first))
-    words, extinction = [], []
-    for around, count in rows:
+def light_media_words(
+    found: LightMedia, media: MediumWords, bodies: BodyWords | None
+) -> NDArray[np.uint32]:
+    """Return bodies and medium of each row of `lights`, (2 n,) uint32."""
+    words: list[tuple[int, int]] = []
+    for around, count in found.around:
         if bodies is None:
             own = 0, media.word(next(iter(around), None))
         else:
             own = bodies.around(around, media)
         words += [own] * count
-        extinction += [_extinction(around)] * count
-    return LightMedia(np.array(words, np.uint32).ravel(), "", np.array(extinction))
-
-
-def _extinction(around: Around) -> float:
-    """The extinction of a medium, which is the first, or that in the first bodies [1/m].
-
-    0 of one that scatters no light, nan of one whose density is on a grid.
-    """
-    media = (one[-1] if isinstance(one, tuple) else one for one in around[:1])
-    medium = next((one for one in media if one is not None and one.scatters), None)
-    if medium is None or isinstance(medium, Lattice):
-        return 0.0 if medium is None else float("nan")
-    both = [one.to_rgb("unbounded") for one in medium.coefficients(spectral=False)]
-    return float(np.mean(np.add(*both)))
-
-
-class _Known:
-    """What is at points of a scene."""
-
-    def __init__(self, scene: Scene, nested: bool, cache: LoweringCache, motions: Motions):
-        self.scene = surroundings.boundaries(scene, matter_of if nested else None)
-        self.nested, self.cache = nested, cache
-        self.looks = motions.looks()
-        self.still = surroundings.stands_still(self.scene)
-        # A camera's medium that no boundary holds is wherever there is no other.
-        self.rest: Around = ()
-        named = scene.camera.medium
-        if named is not None and not nested:
-            origin = surroundings.camera_origin(scene)
-            found = surroundings.media_at(self.scene, origin, cache)
-            self.rest = () if named in found else (named,)
-
-    def open_medium(self) -> Medium | None:
-        """A medium whose boundary has a hole at some time."""
-        times = self.looks[:1] if self.still else self.looks
-        found = (surroundings.open_medium(self.scene, self.cache, time) for time in times)
-        return next((one for one in found if one is not None), None)
-
-    def along(
-        self, p: NDArray[np.float64], keys: Keys | None, times: Sequence[float] = ()
-    ) -> Around | None:
-        """The media at a point (3,) [m] that moves by keys, that which counts first; or the bodies.
-
-        times: at which it is looked, by default all of them. None where what is found changes.
-        """
-        first: Around | None = None
-        looks = times or self.looks
-        for time in looks[:1] if self.still and keys is None else looks:
-            at = p if keys is None else transforms.transform_points(keys.at(time), p)
-            found = self._at(np.asarray(at, np.float64), time)
-            if first is not None and found != first:
-                return None
-            first = found
-        return first
-
-    def _at(self, p: NDArray[np.float64], time: float) -> Around:
-        if self.nested:
-            return surroundings.bodies_at(self.scene, matter_of, p, self.cache, time)
-        return surroundings.media_at(self.scene, p, self.cache, time)[:1] or self.rest
-
-
-def _around_shape(emitter: Emitter, known: _Known, motions: Motions, number: int) -> Around | None:
-    """What a shape shines into, None if that is not the same everywhere, at all times."""
-    shape: Any = emitter.shape
-    both = getattr(shape.emission, "two_sided", False)
-    if known.nested and matter_of(shape) is not None:
-        return None
-    if not known.nested and _says(shape):
-        if both and shape.interior is not shape.exterior:
-            return None
-        return () if shape.exterior is None else (shape.exterior,)
-    sides = (BEFORE, -BEFORE) if both else (BEFORE,)
-    keys = motions.shapes.get(number)
-    if emitter.keys == 1:
-        found = [known.along(p, keys) for side in sides for p in _before(emitter, side)]
-    else:
-        found = [
-            known.along(p, keys, (time,))
-            for one, time in _deformed(emitter, motions.deforming[number], known.looks)
-            for side in sides
-            for p in _before(one, side)
-        ]
-    return found[0] if all(one == found[0] for one in found) else None
-
-
-def _deformed(
-    emitter: Emitter, times: Sequence[float], looks: Sequence[float]
-) -> Iterator[tuple[Emitter, float]]:
-    """A shape that deforms as it is at each time of looks; times: of its rows of vertices."""
-    assert emitter.vertices is not None and emitter.faces is not None
-    rows = emitter.vertices.reshape(-1, emitter.keys, 3)
-    way = Deformation(times, np.moveaxis(rows, 1, 0))
-    faces = emitter.faces // np.uint32(emitter.keys)
-    for time in looks:
-        yield replace(emitter, vertices=way.at(time)[0], faces=faces, keys=1), time
-
-
-def _says(shape: Any) -> bool:
-    """Whether a shape says itself in which media it stands."""
-    return shape.interior is not None or shape.exterior is not None
-
-
-def _before(emitter: Emitter, before: float) -> NDArray[np.float64]:
-    """Some points before a shape that shines, or behind it (n, 3) [m]."""
-    shape, vertices, faces = emitter.shape, emitter.vertices, emitter.faces
-    six = np.concatenate([np.eye(3), -np.eye(3)])
-    if shape.kind == "sphere" and vertices is None:
-        low, high = analytic.bounds(shape)
-        before *= -1.0 if shape.flip_normals else 1.0
-        return (low + high) / 2.0 + (0.5 + before) * (high - low) * six
-    if vertices is not None and faces is None:
-        balls = np.asarray(vertices, np.float64)[:: max(1, len(vertices) // POINTS)]
-        return (balls[:, None, :3] + (1.0 + before) * balls[:, None, 3:] * six).reshape(-1, 3)
-    if vertices is None or faces is None:
-        vertices, faces = winding.triangles_of(shape)
-    chosen = np.asarray(faces)[:: max(1, len(faces) // POINTS)]
-    a, b, c = np.moveaxis(np.asarray(vertices, np.float64)[chosen], 1, 0)
-    n = np.cross(b - a, c - a)
-    size = np.sqrt(np.linalg.norm(n, axis=1, keepdims=True))
-    return (a + b + c) / 3.0 + before * n / np.maximum(size, 1e-30)
+    return np.array(words, np.uint32).ravel()

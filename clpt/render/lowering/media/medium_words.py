@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from clpt.records import MEDIUM_BITS
+from clpt.render.analysis.bricks import Glow, black_bodies, brick_counts
 from clpt.render.analysis.index import SceneIndex
 from clpt.render.contract.parameter_words import SPECTRUM_WORDS
 from clpt.render.lowering import grids
@@ -56,9 +58,10 @@ class MediumWords:
         encoder: Encoder,
         materials: MaterialWords,
         sealed: frozenset[Medium] = frozenset(),
+        glows: Mapping[Medium, Glow] = MappingProxyType({}),
     ):
         self._index, self._encoder, self._materials = index, encoder, materials
-        self._sealed = sealed
+        self._sealed, self._glows = sealed, glows
         self._words: dict[Medium, int] = {}
         self.lights: list[BrickLights] = []  # of media whose words are made
         self._row = len(index.scene.lights)  # in `lights`, of the next brick
@@ -99,7 +102,7 @@ class MediumWords:
         before = 2 + (SPECTRUM_WORDS if self._index.emitting else 0)
         word |= before + self._encoder.store.size("materials")
         if isinstance(medium, Lattice) and self._index.grids.emissive:
-            rows.append(self._glow(medium, word, absorbs))
+            rows.append(self._glow(medium, word))
         if isinstance(medium, Lattice) and self._index.grids.tinted:
             rows.append(self._tint(medium, "albedo_grid"))
         if isinstance(medium, Lattice) and self._index.grids.coloured:
@@ -142,7 +145,7 @@ class MediumWords:
         apart = name == "albedo_grid" and not medium.albedo_with_density
         return np.array([-first if apart else first], np.int32).view(np.uint32)
 
-    def _glow(self, medium: Lattice, word: int, absorbs: Spectrum) -> Words:
+    def _glow(self, medium: Lattice, word: int) -> Words:
         """What stands behind the row of a grid: what its bricks emit, and which lights they are."""
         words = np.zeros(grids.GLOW_WORDS, np.uint32)
         light: Any = medium.light
@@ -150,26 +153,21 @@ class MediumWords:
         if light is None:
             return words
         if not isinstance(medium, Grid):  # none of its bricks is a light
-            rows = np.full(np.prod(grids.brick_counts(medium.size)), -1, np.int32)
+            rows = np.full(np.prod(brick_counts(medium.size)), -1, np.int32)
             words[0] = store.append("images", rows.view(np.uint32))
             return words
-        rgb = np.asarray(absorbs.to_rgb("unbounded"), float)
-        source, table = medium.emission_grid, None
+        source = medium.emission_grid
         if medium.temperature is not None:
             source = medium.temperature
-            table = grids.black_bodies(medium, light.kelvin)
+            table = black_bodies(medium, light.kelvin)
             words[1] = 2 if medium.normalised else 1
             words[4] = store.append_floats("distributions", table[:, 1:])
             words[3], words[5] = as_words([medium.brightness, (len(table) - 1) / light.kelvin])
-            table = np.stack([table[:, 0], table[:, 1:].mean(axis=1)], axis=1)
-        else:
-            rgb = rgb * np.asarray(light.to_rgb("emission"), float)
         if source is not None:
             words[2] = store.append("images", self._encoder.cache(grids.bricks, source))
-        glow = grids.glow(medium, max(float(rgb.mean()), 1e-30), table)
-        bright = glow.brightest()
-        rows = np.zeros(np.prod(grids.brick_counts(medium.size)), np.int32)
-        rows[glow.numbers] = -1
+        bright = self._glows[medium]
+        rows = np.zeros(np.prod(brick_counts(medium.size)), np.int32)
+        rows[bright.emitting] = -1
         rows[bright.numbers] = 1 + self._row + np.arange(len(bright.numbers))
         words[0] = store.append("images", rows.view(np.uint32))
         self._row += len(bright.numbers)

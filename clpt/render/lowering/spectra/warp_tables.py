@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.measured.warp import Values, warp
+from clpt.arrays import Floats
+from clpt.measured.warp import warp
 
 LARGEST = 4096.0  # of the halves that stand for numbers
 LEAST = 2.0**-14  # of those, but for 0: what is less needs care that kernels do not take
@@ -57,7 +58,7 @@ def _slices_last(part: NDArray[Any]) -> NDArray[np.float32]:
     return np.asarray(moved, np.float32).reshape(len(part), -1)
 
 
-def _ends(sums: Values) -> Values:
+def _ends(sums: Floats) -> Floats:
     """Where even shares of sums (..., n), from 0 to 1, begin and end, (..., n, 2) from 0 to 1."""
     n = sums.shape[-1]
     flat = sums.reshape(-1, n)
@@ -68,7 +69,7 @@ def _ends(sums: Values) -> Values:
     return np.stack([ends[..., :-1], ends[..., 1:]], axis=-1)
 
 
-def _words(ends: Values) -> NDArray[np.float32]:
+def _words(ends: Floats) -> NDArray[np.float32]:
     """Pairs (..., 2) from 0 to 1 as words of two 16383ths; as floats these are finite."""
     steps = np.round(16383.0 * ends).astype("<u4")
     return (steps[..., 0] | steps[..., 1] << np.uint32(16)).view(np.float32)

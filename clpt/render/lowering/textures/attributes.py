@@ -14,14 +14,15 @@ import numpy as np
 from clpt import spectra
 from clpt.errors import SceneError
 from clpt.geometry import shape_records, shapes, triangles
-from clpt.render.lowering.lowering_cache import LoweringCache
-from clpt.render.lowering.textures.texels import texels
-from clpt.render.lowering.textures.textures import TextureTable, per_face
+from clpt.geometry.triangles import per_face
+from clpt.render.analysis.geometry import Owner
+from clpt.render.analysis.lowering_cache import LoweringCache
+from clpt.render.analysis.texels import texels
+from clpt.render.lowering.textures.textures import TextureTable
 from clpt.scene.shapes import Shape
 from clpt.scene.textures import SECOND_UV, MeshAttribute, textures_in
 
 COLOUR_WORDS = 4
-Owner = tuple[np.ndarray, Shape, int, int]  # a row of `shapes`, its shape, first vertex and face
 
 
 def lower_attributes(

@@ -25,10 +25,10 @@ from clpt import images, spectra
 from clpt.arrays import on_host
 from clpt.errors import SceneError
 from clpt.images import Stored
+from clpt.render.analysis.lowering_cache import LoweringCache, version
+from clpt.render.analysis.texels import texels
 from clpt.render.contract.texture_records import KINDS, MIPS
-from clpt.render.lowering.lowering_cache import LoweringCache, version
 from clpt.render.lowering.tables import TableStore, Words
-from clpt.render.lowering.textures.texels import texels
 from clpt.scene.pixels import channel, spectral_image
 from clpt.scene.textures import Bitmap
 

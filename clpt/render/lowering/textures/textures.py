@@ -12,13 +12,14 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import SceneError
+from clpt.geometry.triangles import per_face
+from clpt.render.analysis.texels import bands
 from clpt.render.contract.parameter_words import SPECTRUM_WORDS
 from clpt.render.contract.texture_records import KINDS, PROGRAM, RECORDS
 from clpt.render.lowering.spectra.spectra_table import SpectraTable
 from clpt.render.lowering.tables import TableStore
 from clpt.render.lowering.textures import noise
 from clpt.render.lowering.textures.bitmaps import Images, has_levels, identity
-from clpt.render.lowering.textures.texels import bands
 from clpt.render.lowering.textures.texture_programs import folded, is_composite, program, separated
 from clpt.scene.params import params
 from clpt.scene.pixels import spectral_image
@@ -205,11 +206,6 @@ def _bitmap(texture: Bitmap, role: str, table: TextureTable) -> int:
         "number": table.spectra.row(number),
     }
     return table.append_row("spectral_bitmap", {**members, **more})[0]
-
-
-def per_face(name: str) -> bool:
-    """Return whether an attribute has a value for each face, by its name."""
-    return name.startswith("face_")
 
 
 def _mesh_attribute(

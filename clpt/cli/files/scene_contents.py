@@ -1,0 +1,103 @@
+"""The contents of a scene, as `clpt info` shows them."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from ...formats.meshes import framing
+from ...geometry.triangles import triangulate
+from ...scene import Scene, materials, shapes, textures
+from ...scene.params import Kind
+
+OF_FILES = ("scenes", "variables", "asset")  # what some formats tell besides
+FLAT_TRIANGLES = {shapes.Rectangle: 2, shapes.Cube: 12}
+
+
+def summary(scene: Scene) -> dict[str, Any]:
+    """Return what a scene's file holds, without what the studio added.
+
+    `triangles` counts those of meshes, cubes and rectangles once, `triangles_instanced` once for
+    each instance; `spheres` counts those of shapes with many.
+    """
+    added = scene.extra.get("studio", {"camera": False, "shapes": 0, "lights": 0})
+    own = scene.shapes[: len(scene.shapes) - added["shapes"]]
+    groups = {id(shape.group): shape.group for shape in own if isinstance(shape, shapes.Instance)}
+    inside = [shape for group in groups.values() for shape in group.shapes]
+    plain = [shape for shape in own if not isinstance(shape, shapes.Instance)]
+    surfaces = [*plain, *inside]
+    counts = {_arrays(shape): _triangles(shape) for shape in surfaces}
+    kinds = list(_nested(surfaces))
+    lights = [light.kind for light in scene.lights[: len(scene.lights) - added["lights"]]]
+    lights += [shape.emission.kind for shape in surfaces if shape.emission is not None]
+    bounds = [corner.tolist() for corner in framing.world_bounds(own)] if own else None
+    return {
+        "format": scene.extra.get("format", "python"),
+        "triangles": sum(counts.values()),
+        "triangles_instanced": sum(_instanced_triangles(own, groups)),
+        "spheres": sum(len(s.centers) for s in surfaces if isinstance(s, shapes.Spheres)),
+        "instances": len(own) - len({_arrays(shape) for shape in plain}),
+        "bounds": bounds,
+        "shapes": dict(Counter(shape.kind for shape in own)),
+        "cameras": scene.extra.get("cameras", [] if added["camera"] else [scene.camera.kind]),
+        "lights": dict(Counter(lights)),
+        "materials": _by_kind(kinds, materials.Material),
+        "textures": _by_kind(kinds, textures.Texture),
+        "animations": scene.extra.get("animations", []),
+        "film": _film(scene),
+        "spp": scene.spp,
+        "integrator": scene.integrator.kind,
+        "sampler": scene.sampler.kind,
+        "sampler_in_file": scene.extra.get("sampler", scene.sampler.kind),
+        **{name: scene.extra[name] for name in OF_FILES if scene.extra.get(name)},
+        "warnings": scene.warnings,
+    }
+
+
+def _arrays(shape: shapes.Shape) -> int:
+    """Return the identity of a mesh's triangles, or of any other shape."""
+    return id(shape.faces) if isinstance(shape, shapes.Mesh) else id(shape)
+
+
+def _instanced_triangles(
+    own: Iterable[shapes.Shape], groups: dict[int, shapes.Group]
+) -> Iterator[int]:
+    """Yield the triangles that each shape adds to the scene."""
+    sizes = {key: sum(map(_triangles, group.shapes)) for key, group in groups.items()}
+    for shape in own:
+        if isinstance(shape, shapes.Instance):
+            yield sizes[id(shape.group)]
+        else:
+            yield _triangles(shape)
+
+
+def _triangles(shape: shapes.Shape) -> int:
+    if isinstance(shape, shapes.Mesh):
+        return len(shape.faces)
+    if isinstance(shape, shapes.SdfGrid):
+        return len(triangulate(shape)[1])
+    return FLAT_TRIANGLES.get(type(shape), 0)
+
+
+def _nested(things: Iterable[Kind]) -> Iterator[Kind]:
+    """Yield the kinds within things: materials, lights and the textures in them."""
+    for thing in things:
+        yield thing
+        values = [getattr(thing, field.name) for field in dataclasses.fields(thing)]
+        yield from _nested(value for value in values if isinstance(value, Kind))
+
+
+def _by_kind(things: Iterable[Kind], base: type[Kind]) -> dict[str, int]:
+    distinct = {id(thing): thing for thing in things if isinstance(thing, base)}
+    return dict(Counter(thing.kind for thing in distinct.values()))
+
+
+def _film(scene: Scene) -> dict[str, Any]:
+    film = scene.film
+    size = dict(zip(("width", "height"), film.size, strict=True))
+    whole = {} if film.crop is None else {"crop": [*film.crop], "of": [film.width, film.height]}
+    usual = {"bands": 0, "alpha": False, "layers": (), "output_space": "rec709"}
+    unusual = {k: getattr(film, k) for k, usual in usual.items() if getattr(film, k) != usual}
+    return {**size, **whole, "mode": film.mode, "filter": film.filter.kind, **unusual}

@@ -1,0 +1,148 @@
+"""Analysis: what a scene has, and what follows from that, before anything becomes words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.errors import SceneError
+from clpt.geometry.motion import at_rest
+from clpt.render.analysis import open_boundaries
+from clpt.render.analysis.bodies import matter_of
+from clpt.render.analysis.checks import check
+from clpt.render.analysis.geometry import Geometry, assembled
+from clpt.render.analysis.index import SceneIndex
+from clpt.render.analysis.lights.aims import aims
+from clpt.render.analysis.lights.hard_light import Lit, decided
+from clpt.render.analysis.lights.light_media import NOWHERE, LightMedia, light_media
+from clpt.render.analysis.lights.look import Look
+from clpt.render.analysis.lights.sources import Sources, sources_of
+from clpt.render.analysis.lowering_cache import LoweringCache
+from clpt.render.analysis.sealed import sealed_media
+from clpt.render.analysis.surroundings import (
+    bodies_around,
+    boundaries,
+    contested,
+    media_around,
+    stands_still,
+    warnings_of,
+)
+from clpt.scene import Scene
+from clpt.scene.integrators import Integrator
+from clpt.scene.media import Medium
+
+
+@dataclass(frozen=True)
+class Before:
+    """What was decided before an edit, and stays: the integrator, whose film has a place for light
+    paths or none, and whether light paths were ghosts of a lens."""
+
+    integrator: Integrator
+    lit_ghosts: bool
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """What a scene is.
+
+    index: with the integrator that renders it; reason: why that one, "" where there was no choice;
+    sphere: centre and radius of one around it [m]; sources: what its lights send; sealed: media
+    that rays to lights cannot leave; light_media: what is around lights; around: the media, or the
+    matter of bodies, at the camera; aims (k, 5): spheres at which light paths aim, see `aims`;
+    warnings: of media.
+    """
+
+    index: SceneIndex
+    reason: str
+    geometry: Geometry
+    sphere: tuple[NDArray[np.float64], float]
+    sources: Sources
+    sealed: frozenset[Medium]
+    light_media: LightMedia
+    around: tuple[Any, ...]
+    aims: NDArray[np.float32]
+    warnings: tuple[str, ...]
+
+
+def analyse(scene: Scene, cache: LoweringCache, before: Before | None = None) -> Analysis:
+    """Return what a scene is; cache: what the analysis before need not make again.
+
+    Raises SceneError where the scene makes no sense: it names the shape, light or material.
+    """
+    scene = at_rest(scene)
+    check(scene)
+    index = replace(SceneIndex.of(scene), lit_before=before.lit_ghosts if before else None)
+    geometry = assembled(index, cache)
+    sphere = geometry.bounding_sphere()
+    look = Look(index.spectral, scene.film.lambda_min, scene.film.lambda_max, cache)
+    sources = sources_of(index, geometry, sphere[1], look)
+    index, lit = _media_at_lights(index, geometry, sources, sphere, cache)
+    former = before.integrator if before else None
+    lights = Lit(index, geometry, look, sources, sphere, lit.extinction)
+    index, reason = decided(lights, former)
+    around, warnings = _at_the_camera(index, cache)
+    return Analysis(
+        index=index,
+        reason=reason,
+        geometry=geometry,
+        sphere=sphere,
+        sources=sources,
+        sealed=sealed_media(index, cache) if index.media else frozenset(),
+        light_media=lit,
+        around=around,
+        aims=aims(index, geometry, sphere[1]),
+        warnings=(*warnings, *open_boundaries.warnings_of(index, cache)),
+    )
+
+
+def _media_at_lights(
+    index: SceneIndex,
+    geometry: Geometry,
+    sources: Sources,
+    sphere: tuple[NDArray[np.float64], float],
+    cache: LoweringCache,
+) -> tuple[SceneIndex, LightMedia]:
+    """Return the index with whether paths can start at lights in media, and the lights' media."""
+    if not index.has_media or not index.may_have_light_paths:
+        return index, NOWHERE
+    found = light_media(index, geometry, sources, sphere, cache)
+    if found.refusal and index.light_paths:
+        raise SceneError(f"no light paths: {found.refusal}", where="integrator")
+    return replace(index, lit_media=found.refusal), found
+
+
+def _at_the_camera(index: SceneIndex, cache: LoweringCache) -> tuple[tuple[Any, ...], list[str]]:
+    """Return the media or the bodies at the camera, and warnings."""
+    scene = index.scene
+    around: tuple[Any, ...] = ()
+    if index.nested:
+        around = bodies_around(scene, matter_of, cache)
+        warnings = contested(scene, matter_of, cache)
+    else:
+        around = media_around(scene, cache) if index.media else ()
+        warnings = warnings_of(around)
+    if index.motions and index.has_media and scene.camera.medium is None:
+        warnings += _passed_through(scene, index, cache)
+    return around, warnings
+
+
+def _passed_through(scene: Scene, index: SceneIndex, cache: LoweringCache) -> list[str]:
+    """A warning where the camera is not in the same media all the time, else none."""
+    bounding = boundaries(scene, matter_of if index.nested else None)
+    if index.motions.camera is None and stands_still(bounding):
+        return []
+    found = [
+        bodies_around(bounding, matter_of, cache, time)
+        if index.nested
+        else media_around(bounding, cache, time)
+        for time in index.motions.looks()
+    ]
+    if all(one == found[0] for one in found):
+        return []
+    return [
+        "camera: it comes into another medium while the shutter is open; all its paths begin in "
+        "what is around it when that opens"
+    ]

@@ -1,0 +1,270 @@
+"""What helps with hard light: what the integrator `auto` becomes, and "auto" light paths of `path`.
+
+Light paths find the light that something sharp has gathered on something dull. Where the lamp is
+large, paths from the camera find that light too, and sooner. Photons find it also where it is seen
+in a mirror or through glass.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.geometry import analytic, shape_records, shapes, triangles
+from clpt.render.analysis import cameras, surroundings
+from clpt.render.analysis.geometry import Emitter, Geometry
+from clpt.render.analysis.index import SceneIndex
+from clpt.render.analysis.lights import image_lights, light_bounds, sky_light
+from clpt.render.analysis.lights.aims import is_sharp, sharp_pieces
+from clpt.render.analysis.lights.look import Look
+from clpt.render.analysis.lights.sources import Sources
+from clpt.render.analysis.lowering_cache import LoweringCache
+from clpt.scene import materials as mt
+from clpt.scene.integrators import AUTO, Auto, Integrator, Path, Vcm
+from clpt.scene.lights import CubeMap, Envmap, Sky
+from clpt.scene.shapes import Shape
+
+SMALL = 0.03  # of the sphere that is seen: up to it a light is small
+NEAR = 0.25  # of the scene's radius: a light counts as no nearer to what it shines on
+SUN = 0.25  # of an image's power: where it comes from a small part the image is a small light
+FEWEST = 3  # edges of a path from a light over two surfaces to the camera: the shortest caustic
+MOSTLY = 0.5  # of the power of all lights: where small ones have less, few paths start at lights
+FEW = 0.25  # a sample
+SOME = 0.5  # where they have more; `vcm` has one, as its photons are these
+MANY = 4  # where they are in bulbs: the camera's paths find next to nothing there
+DIRECTIONS = 128  # in which a light looks for what is sharp
+BULB = 0.75  # of them: where what is sharp fills more, the light is in a bulb
+SEEN = 0.02  # of the picture: where what is sharp fills more, caustics may be seen through it
+
+THIN, DENSE = 0.3, 5.0  # optical depths from a light to the camera, see bench/NOTES.md
+ALL_AROUND = 0.49 * np.pi  # [rad] from a light's axis: what shines so far is no spot
+
+Ball = tuple[NDArray[np.float64], float]  # centre and radius
+
+
+@dataclass(frozen=True)
+class Lit:
+    """What the choice looks at.
+
+    sphere: centre and radius of one around the scene [m]; extinction (n,): of the medium around
+    each row of `lights` where it scatters, else 0, and nan on a grid [1/m]; () without media.
+    """
+
+    index: SceneIndex
+    geometry: Geometry
+    look: Look
+    sources: Sources
+    sphere: Ball
+    extinction: NDArray[np.float64]
+
+
+def decided(lit: Lit, former: Integrator | None = None) -> tuple[SceneIndex, str]:
+    """Return the index with the integrator that "auto" stands for, and the reason as a sentence.
+
+    The sentence is empty where the scene leaves no choice. former: what a renderer has chosen that
+    goes on with this scene, whose film has a place for light paths or none. Raises SceneError for
+    an image light that is broken.
+    """
+    index = lit.index
+    given: Any = index.scene.integrator
+    if not isinstance(given, Auto) and getattr(given, "light_paths", None) != AUTO:
+        return index, ""
+    if former is None:
+        chosen, reason = _choice(lit)
+    else:
+        keeps = isinstance(former, Vcm) and isinstance(given, Auto)
+        chosen = former if keeps else Path(light_paths=getattr(former, "light_paths", 0))
+        reason = "as before the scene was edited"
+    if index.light_layers and index.scene.noise is not None:
+        chosen, reason = Path(light_paths=0), "layers of light have no guides of noise"
+    elif "light_groups" in index.layers and isinstance(chosen, Vcm):
+        chosen, reason = Path(light_paths=chosen.light_paths), "photons do not know their group"
+    if getattr(given, "guiding", False):
+        chosen, reason = Path(light_paths=0, guiding=True), "directions are guided"
+    shared = ("max_depth", "rr_depth", "hide_lights", "free_panes")
+    own = {name: getattr(given, name) for name in shared if hasattr(given, name)}
+    chosen = replace(chosen, **own)
+    return replace(index, scene=replace(index.scene, integrator=chosen)), reason
+
+
+def _choice(lit: Lit) -> tuple[Integrator, str]:
+    """The integrator but for its depths, and why; what is cheap to know is asked first."""
+    index, geometry = lit.index, lit.geometry
+    scene, without = index.scene, Path(light_paths=0)
+    if not index.lights_reach:
+        return without, index.lit_media
+    if not cameras.is_connected(scene.camera, scene.film.mode):
+        return without, "points cannot be joined to this camera"
+    integrator: Any = scene.integrator
+    fewest = FEWEST - getattr(integrator, "free_panes", False)
+    if 0 <= integrator.max_depth < fewest:
+        return without, "the longest path is too short for a caustic"
+    in_fog = _in_fog(lit)
+    if in_fog is not None:
+        return in_fog
+    sharp = _first_with((one for one in index.shapes if not _hides(one)), is_sharp)
+    if sharp is None:
+        return without, "nothing is sharp"
+    if _first_with((one for one in index.shapes if one.emission is None), _is_dull) is None:
+        return without, "there is nothing dull for a caustic to be seen on"
+    small = list(_small_lights(lit))
+    if not small:
+        return without, "no light is small"
+    reason = f"{shapes.where(sharp)} is sharp, and {small[0][0]} is a small light"
+    if sum(share for *_, share in small) < MOSTLY:
+        return Path(light_paths=FEW), f"{reason}, though most light is of large ones"
+    number = SOME
+    if sum(share for _, place, share in small if _is_enclosed(geometry, place)) >= MOSTLY:
+        number, reason = MANY, f"{reason}, in a bulb"
+    if not isinstance(scene.integrator, Auto):
+        return Path(light_paths=number), reason
+    if scene.noise is not None:
+        return Path(light_paths=number), f"{reason}; noise is not measured with photons"
+    if index.has_media or index.shifts or _share_seen(index, geometry) < SEEN:
+        return Path(light_paths=number), reason
+    if index.motions:
+        return Path(light_paths=number), f"{reason}; photons of a pass are all at one time"
+    whole = max(1, int(number))
+    return Vcm(light_paths=whole), f"{reason}; the camera sees what is sharp"
+
+
+def _in_fog(lit: Lit) -> tuple[Integrator, str] | None:
+    """The integrator where small lights are in media that scatter, None where they are not.
+
+    Near such a light much is scattered that the camera's paths find by chance alone. Through much
+    fog light paths do not come to the camera. In little, what is near a light is lit by it alone,
+    which the camera's paths find, but around a spot lamp.
+    """
+    if not lit.extinction.any():
+        return None
+    share = lit.sources.power / max(lit.sources.power.sum(), 1e-300)
+    bounds = light_bounds.concatenated([one.bounds for one in lit.sources.every])
+    spots = bounds.theta_o + bounds.theta_e < ALL_AROUND
+    shutter = lit.index.motions.shutter
+    eye = surroundings.camera_origin(lit.index.scene, (shutter.open + shutter.close) / 2.0)
+    small = []
+    for name, place, _, rows in _small_rows(lit):
+        far = 0.0 if place is None else float(np.linalg.norm(place - eye))
+        depth = far * lit.extinction[rows]
+        pays = np.isnan(depth) | (depth > np.where(spots[rows], 0.0, THIN)) & (depth < DENSE)
+        small.append((name, share[rows][pays].sum()))
+    power = sum(part for _, part in small)
+    if power < FEW:
+        return None
+    name = next(name for name, part in small if part)
+    number = SOME if power >= MOSTLY else FEW
+    return Path(light_paths=number), f"{name} is a small light in a medium that scatters"
+
+
+def _hides(shape: Shape) -> bool:
+    """Whether what goes into a shape is scattered there, so that it makes no caustic."""
+    return shape.interior is not None and shape.interior.scatters
+
+
+def _is_enclosed(geometry: Geometry, place: NDArray[np.float64] | None) -> bool:
+    """Whether a light is in a bulb: what is only sharp fills most directions from its place [m]."""
+    if place is None:
+        return False
+    number = np.arange(DIRECTIONS) + 0.5  # spread evenly, on a spiral
+    z, turn = 1.0 - 2.0 * number / DIRECTIONS, np.pi * (1.0 + math.sqrt(5.0)) * number
+    level = np.sqrt(1.0 - z * z)
+    directions = np.stack([level * np.cos(turn), level * np.sin(turn), z])
+    covered = np.zeros(DIRECTIONS, bool)
+    for pieces in sharp_pieces(geometry, (), lambda one: is_sharp(one) and not _is_dull(one)):
+        a, b, c = (pieces[:, i : i + 3] - place for i in (0, 3, 6))
+        ahead = np.sign(np.einsum("ij,ij->i", a, np.cross(b, c)))[:, None]
+        edges = [np.cross(p, q) @ directions * ahead for p, q in ((a, b), (b, c), (c, a))]
+        middle, reach = (a + b + c) / 3.0, pieces[:, 9:]
+        along = np.maximum(middle @ directions, 0.0)
+        apart = (middle * middle).sum(axis=1, keepdims=True) - along * along
+        covered |= ((apart <= reach * reach) | (np.minimum.reduce(edges) > 0.0)).any(axis=0)
+    return bool(covered.mean() > BULB)
+
+
+def _share_seen(index: SceneIndex, geometry: Geometry) -> float:
+    """The share of the picture that sharp things fill: as if nothing hid them, with all sides."""
+    view = cameras.view_of(index.scene.camera, index.scene.film.width, index.scene.film.height)
+    assert view is not None, "a camera that can be joined has a point"
+    pieces = np.concatenate([np.zeros((0, 10)), *sharp_pieces(geometry, index.motions.shapes)])
+    a, b, c = (pieces[:, i : i + 3] - view.place for i in (0, 3, 6))
+    middle, reach = (a + b + c) / 3.0, pieces[:, 9]
+    away = np.maximum(np.linalg.norm(middle, axis=1), 1e-30)
+    size = reach + np.max([np.linalg.norm(p - middle, axis=1) for p in (a, b, c)], axis=0)
+    around = np.arcsin(np.minimum(size / away, 1.0))
+    apart = np.arccos(np.clip(middle @ view.axis / away, -1.0, 1.0))
+    facing = np.abs(np.einsum("ij,ij->i", np.cross(b - a, c - a), middle)) / (2.0 * away**3)
+    solid = np.minimum(facing + np.pi * (reach / away) ** 2, 2.0 * np.pi)
+    solid = solid[apart < view.angle + around]
+    return float(solid.sum() / (2.0 * np.pi * (1.0 - math.cos(view.angle))))
+
+
+def _first_with(all_: Iterable[Shape], wanted: Any) -> Shape | None:
+    """The first shape whose material is as wanted; a material is asked once."""
+    asked: set[int] = set()
+    for shape in all_:
+        if id(shape.material) not in asked and wanted(shape.material):
+            return shape
+        asked.add(id(shape.material))
+    return None
+
+
+def _is_dull(material: mt.Material) -> bool:
+    """Whether light paths can be joined to the camera on a material, or on one inside it."""
+    if isinstance(material, mt.NormalMapped) or not material.reversible:
+        return False
+    if isinstance(material, mt.COMPOSITES):
+        return any(_is_dull(part) for _, part in mt.inner(material))
+    return not material.delta and not is_sharp(material)
+
+
+def _small_lights(lit: Lit) -> Iterator[tuple[str, NDArray[np.float64] | None, float]]:
+    """The names of small lights, where they are [m], and the share of all light that is theirs."""
+    for name, place, share, _ in _small_rows(lit):
+        yield name, place, share
+
+
+def _small_rows(lit: Lit) -> Iterator[tuple[str, NDArray[np.float64] | None, float, slice]]:
+    """The same, and their rows in `lights`."""
+    motions, geometry = lit.index.motions, lit.geometry
+    sources, (middle, radius) = lit.sources, lit.sphere
+    lamps, share = lit.index.scene.lights, sources.power / max(sources.power.sum(), 1e-300)
+    for row, i in enumerate(sources.order):
+        lamp = lamps[i]
+        if isinstance(lamp, (Envmap, CubeMap)):
+            small = image_lights.extent(lamp, lit.look, SUN) < SMALL
+        elif isinstance(lamp, Sky):
+            small = sky_light.sun_share(lamp, lit.look) >= SUN
+        else:
+            small = lamp.reach in ("placed", "distant") and getattr(lamp, "falloff", True)
+        if small:
+            place = None
+            if lamp.reach == "placed":
+                bounds = light_bounds.of_lamp(lamp)
+                place = motions.halfway(motions.lamps.get(i), (bounds.low + bounds.high)[0] / 2.0)
+            yield f"lights[{i}]", place, float(share[row]), slice(row, row + 1)
+    ends = (*sources.first, len(share))[1:]
+    for emitter, first, end in zip(geometry.emitters, sources.first, ends, strict=True):
+        area, place = _area_and_place(emitter, lit.look.cache)
+        keys = motions.shapes.get(int(geometry.rows[emitter.shape_row]["number"]))
+        place = motions.halfway(keys, place)
+        far = max(float(np.linalg.norm(place - middle)), NEAR * radius)
+        if area < SMALL * 4.0 * np.pi * far**2:
+            rows = slice(first, end)
+            yield shapes.where(emitter.shape), place, float(share[rows].sum()), rows
+
+
+def _area_and_place(emitter: Emitter, cache: LoweringCache) -> tuple[float, NDArray[Any]]:
+    """The area of a shape that emits [m^2], and the middle of the box around it (3,) [m]."""
+    vertices, faces = emitter.vertices, emitter.faces
+    if vertices is None:
+        low, high = analytic.bounds(emitter.shape)
+        return analytic.area(emitter.shape), (low + high) / 2.0
+    middle = (vertices[:, :3].min(axis=0) + vertices[:, :3].max(axis=0)) / 2.0
+    if emitter.shape.kind in shape_records.ONE_OF:
+        return float(4.0 * np.pi * (vertices[:, 3].astype(np.float64) ** 2).sum()), middle
+    return float(cache(triangles.triangle_areas, vertices, faces).sum()), middle

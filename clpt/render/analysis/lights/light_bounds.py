@@ -1,0 +1,126 @@
+"""Where each light is and where it shines: boxes and cones, what a tree over lights is built of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clpt.arrays import Faces, Points
+from clpt.geometry import analytic
+from clpt.scene import lights
+from clpt.scene.lights import Light
+from clpt.scene.shapes import Shape
+
+Floats = NDArray[np.float64]
+
+NARROW = 0.02  # [rad] around a cone of directions that is known to hold all light
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Of n lights: boxes, and cones as Conty Estevez and Kulla 2018 (4.1) have them.
+
+    low, high (n, 3) [m]; axis (n, 3) unit length; theta_o (n,): how far normals lean from it [rad];
+    theta_e (n,): how far light leans from a normal [rad], up to pi / 2; both (n,) bool: light
+    leaves against the normals too; placed (n,) bool: False for what shines on the whole scene.
+    """
+
+    low: Floats
+    high: Floats
+    axis: Floats
+    theta_o: Floats
+    theta_e: Floats
+    both: NDArray[np.bool_]
+    placed: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.low)
+
+    def __getitem__(self, rows: ArrayLike) -> Bounds:
+        return Bounds(*(getattr(self, field.name)[rows] for field in fields(self)))
+
+
+def concatenated(parts: Sequence[Bounds]) -> Bounds:
+    """Return the bounds of all lights, in their order."""
+    return Bounds(
+        *(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Bounds))
+    )
+
+
+def of_lamp(lamp: Light) -> Bounds:
+    """Return the bounds (1) of a light that is not on a shape."""
+    if isinstance(lamp, lights.Point) and lamp.falloff:
+        return _one(np.asarray(lamp.position, np.float64))
+    if isinstance(lamp, (lights.Spot, lights.Projector, lights.Goniometric)):
+        matrix = np.asarray(lamp.to_world, np.float64)
+        place, axis = matrix[:3, 3], matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
+        if isinstance(lamp, lights.Spot):
+            return _one(place, axis, np.radians(lamp.cutoff), NARROW)
+        if isinstance(lamp, lights.Projector):
+            return _one(place, axis, np.pi / 2.0, NARROW)
+        return _one(place)
+    if lamp.reach == "placed" and not isinstance(lamp, lights.Point):
+        own: Any = lamp
+        position = own.to_world[:3, 3] if hasattr(lamp, "to_world") else own.position
+        return _one(np.asarray(position, np.float64))
+    return _one(np.zeros(3), placed=False)
+
+
+def of_shape(shape: Shape, two_sided: bool) -> Bounds:
+    """Return the bounds (1) of a shape that is sampled as a whole."""
+    low, high = (np.asarray(corner, np.float64) for corner in analytic.bounds(shape))
+    if shape.kind in ("sphere", "cylinder"):
+        return _one(low, high=high)
+    axis = analytic.facing(shape)
+    return _one(low, axis, 0.0, np.pi / 2.0, high=high, both=two_sided)
+
+
+def of_triangles(vertices: Points, faces: Faces, two_sided: bool) -> Bounds:
+    """Return the bounds (m) of triangles (m, 3); the front is on the winding's side."""
+    corners = np.asarray(vertices, np.float64)[faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    count = len(faces)
+    return Bounds(
+        corners.min(axis=1),
+        corners.max(axis=1),
+        normals / np.where(lengths > 0.0, lengths, 1.0),
+        np.where(lengths[:, 0] > 0.0, 0.0, np.pi),
+        np.full(count, np.pi / 2.0),
+        np.full(count, two_sided),
+        np.full(count, True),
+    )
+
+
+def of_balls(balls: NDArray[np.float32]) -> Bounds:
+    """Return the bounds (n) of spheres (n, 4): centre and radius."""
+    center, radius = balls[:, :3].astype(np.float64), balls[:, 3:].astype(np.float64)
+    count = len(balls)
+    return Bounds(
+        center - radius, center + radius, np.tile([0.0, 0.0, 1.0], (count, 1)),
+        np.full(count, np.pi), np.full(count, np.pi / 2.0), np.full(count, False),
+        np.full(count, True),
+    )  # fmt: skip
+
+
+def _one(
+    low: Floats,
+    axis: ArrayLike = (0.0, 0.0, 1.0),
+    theta_o: float = np.pi,
+    theta_e: float = np.pi / 2.0,
+    *,
+    high: Floats | None = None,
+    both: bool = False,
+    placed: bool = True,
+) -> Bounds:
+    """Of a single light; by default one that shines everywhere."""
+    high = low if high is None else high
+    angles = (np.array([theta_o]), np.array([theta_e]))
+    return Bounds(
+        low[None], high[None], np.array([axis], np.float64), *angles, np.array([both]),
+        np.array([placed]),
+    )  # fmt: skip

@@ -1,0 +1,92 @@
+"""What a light sends, and how much it counts; and whether it has a place."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clpt import transforms
+from clpt.arrays import fits_single
+from clpt.errors import SceneError
+from clpt.scene import lights
+from clpt.scene.lights import Light, Projector
+from clpt.scene.pixels import pixels
+from clpt.scene.textures import Bitmap, Checkerboard, Dots, MeshAttribute, Mix, Product, Solid
+
+
+def power(lamp: Light, strength: float, scene_radius: float) -> float:
+    """Estimate what a light off all shapes sends into the scene, mean of channels [W/nm].
+
+    strength: the mean of its intensity, irradiance or radiance. A light of which nothing more is
+    known shines to all sides, or on the whole disk of the scene.
+    """
+    if isinstance(lamp, lights.Goniometric):
+        return 4.0 * np.pi * strength * brightness(lamp.image)
+    if isinstance(lamp, lights.Projector):
+        return image_area(lamp) * strength * brightness(lamp.image)
+    if isinstance(lamp, lights.Spot):
+        edge = np.radians([min(lamp.beam_width, lamp.cutoff), lamp.cutoff])
+        return 2.0 * np.pi * (1.0 - float(np.cos(edge).mean())) * strength
+    if lamp.reach == "placed":
+        return 4.0 * np.pi * strength
+    disk = np.pi * scene_radius**2
+    return disk * strength if lamp.reach == "distant" else 4.0 * np.pi * disk * strength
+
+
+def importance(lamp: Light, strength: float, power: float) -> float:
+    """Return how much a light off all shapes counts in a tree over lights.
+
+    A small flat light of power P gives an irradiance of P / pi at a metre, so that of a light
+    without a place counts pi times.
+    """
+    if lamp.reach == "placed" and getattr(lamp, "falloff", True):
+        return power
+    return np.pi * strength * (np.pi if lamp.reach == "infinite" else 1.0)
+
+
+def brightness(value: Any) -> float:
+    """Return the mean over channels, and over a texture, of an emission."""
+    if isinstance(value, Bitmap):
+        return float(np.maximum(pixels(value, "emission"), 0.0).mean(dtype=np.float64))
+    if isinstance(value, Checkerboard):
+        return 0.5 * (brightness(value.color0) + brightness(value.color1))
+    if isinstance(value, (MeshAttribute, Solid, Dots)):
+        return 0.5  # whatever it is: this only shares out samples
+    if isinstance(value, Product):
+        return brightness(value.first) * brightness(value.second)
+    if isinstance(value, Mix):
+        share = value.amount if isinstance(value.amount, float) else brightness(value.amount)
+        return (1.0 - share) * brightness(value.first) + share * brightness(value.second)
+    return float(np.mean(value.to_rgb("emission")))
+
+
+def image_area(lamp: Projector) -> float:
+    """Return the area of a projector's image a metre before it [m^2]."""
+    half = float(np.tan(np.radians(lamp.fov) / 2.0))
+    return 4.0 * half * half / aspect(lamp)
+
+
+def aspect(lamp: Projector) -> float:
+    """Return the width of a projector's image over its height."""
+    if lamp.aspect > 0.0 or not isinstance(lamp.image, Bitmap):
+        return lamp.aspect or 1.0
+    height, width = pixels(lamp.image, "reflectance").shape[:2]
+    return width / height
+
+
+def invertible(to_world: ArrayLike, where: str) -> NDArray[np.float64]:
+    """Return a light's transform. Raises SceneError for a matrix without an inverse."""
+    matrix = np.asarray(to_world, np.float64)
+    if matrix.shape != (4, 4) or transforms.is_singular(matrix) or not fits_single(matrix):
+        raise SceneError("must be an invertible (4, 4) matrix", where=where)
+    return matrix
+
+
+def three(value: ArrayLike, where: str) -> NDArray[np.float64]:
+    """Return a vector. Raises SceneError for what are no three finite numbers."""
+    values = np.asarray(value, np.float64)
+    if values.shape != (3,) or not np.isfinite(values).all():
+        raise SceneError(f"must be three finite numbers, found {value!r}", where=where)
+    return values

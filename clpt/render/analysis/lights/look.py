@@ -1,0 +1,17 @@
+"""How a film looks at lights."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from clpt.render.analysis.lowering_cache import LoweringCache
+
+
+@dataclass(frozen=True)
+class Look:
+    """spectral: whether in spectra, from lo to hi [nm], or in colours; cache: of costly pieces."""
+
+    spectral: bool
+    lo: float
+    hi: float
+    cache: LoweringCache

@@ -1,0 +1,256 @@
+"""What each light of a scene sends, and where: before it has a row in the tables."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.arrays import Faces, Points
+from clpt.errors import SceneError
+from clpt.geometry import analytic, shape_records, shapes, triangles
+from clpt.geometry.motion import corners, swept
+from clpt.render.analysis.bricks import Glow
+from clpt.render.analysis.geometry import Emitter, Geometry
+from clpt.render.analysis.glow import glows
+from clpt.render.analysis.index import SceneIndex
+from clpt.render.analysis.lights import image_lights, light_bounds, light_power, sky_light
+from clpt.render.analysis.lights.light_bounds import Bounds
+from clpt.render.analysis.lights.look import Look
+from clpt.render.analysis.lights.triangle_means import triangle_means
+from clpt.render.analysis.lowering_cache import LoweringCache
+from clpt.render.contract.light_records import INFINITE, RECORDS
+from clpt.scene import lights
+from clpt.scene.lights import DirectionalArea, Light
+from clpt.scene.media import Medium
+from clpt.scene.params import params
+from clpt.scene.shapes import Shape
+from clpt.scene.textures import MeshAttribute, textures_in
+
+Around: TypeAlias = Callable[[int | Emitter, light_bounds.Bounds], light_bounds.Bounds] | None
+
+
+@dataclass(frozen=True)
+class Source:
+    """What the rows of a lamp, of a medium or of a shape send.
+
+    power (n,) [W/nm]; bounds (n): where they are and shine; importance (n,): how much they count in
+    a tree; radiance: of a shape, the largest mean one [W m^-2 sr^-1 nm^-1].
+    """
+
+    power: NDArray[np.float64]
+    bounds: Bounds
+    importance: NDArray[np.float64]
+    radiance: float = 0.0
+
+
+@dataclass(frozen=True)
+class Sources:
+    """All lights of a scene.
+
+    order: as `row_order`; lamps: in that order; glows: the bricks that are lights of each medium
+    that has some; media: of these; emitters: shapes. Their rows follow one another.
+    """
+
+    order: tuple[int, ...]
+    infinite: int
+    lamps: tuple[Source, ...]
+    glows: dict[Medium, Glow]
+    media: tuple[Source, ...]
+    emitters: tuple[Source, ...]
+
+    @property
+    def every(self) -> tuple[Source, ...]:
+        """All of them, in the order of their rows."""
+        return (*self.lamps, *self.media, *self.emitters)
+
+    @cached_property
+    def power(self) -> NDArray[np.float64]:
+        """What each row sends (n,) [W/nm]."""
+        return np.concatenate([np.zeros(0), *(one.power for one in self.every)])
+
+    @cached_property
+    def first(self) -> tuple[int, ...]:
+        """The first row of each emitter."""
+        ends = np.cumsum([0, *(len(one.power) for one in self.every)])
+        return tuple(int(i) for i in ends[len(self.lamps) + len(self.media) : -1])
+
+
+def row_order(lamps: Sequence[Light]) -> list[int]:
+    """Return the index of each light that is no shape, in the order of their rows: infinite first.
+
+    Each of them has one row; those of emitters follow.
+    """
+    return sorted(range(len(lamps)), key=lambda i: lamps[i].kind not in INFINITE)
+
+
+def sources_of(index: SceneIndex, geometry: Geometry, scene_radius: float, look: Look) -> Sources:
+    """Return what the lights of a scene send; scene_radius: of a sphere around it [m].
+
+    Raises SceneError for a light that has no place, and for an image that is none.
+    """
+    found = glows(index.emitting, index.spectral)
+    around = _around(index, geometry) if index.motions else None
+    return measured(index.scene.lights, geometry.emitters, scene_radius, look, found, around)
+
+
+def measured(
+    lamps: Sequence[Light],
+    emitters: Sequence[Emitter],
+    scene_radius: float,
+    look: Look,
+    glows: dict[Medium, Glow] | None = None,
+    around: Around = None,
+) -> Sources:
+    """Return what lamps, shapes and media send.
+
+    glows: the bricks of media; around: makes bounds of a lamp (by its index) or emitter hold while
+    it moves.
+    """
+    order = row_order(lamps)
+    glows = glows or {}
+    made = [_of_lamp(lamps[i], scene_radius, look) for i in order]
+    media = [Source(glow.power, _of_bricks(glow), glow.power) for glow in glows.values()]
+    shining = [_of_emitter(emitter, look.cache) for emitter in emitters]
+    if around is not None:
+        made = [_moved(one, around(i, one.bounds)) for i, one in zip(order, made, strict=True)]
+        shining = [
+            _moved(one, around(light, one.bounds))
+            for light, one in zip(emitters, shining, strict=True)
+        ]
+    infinite = sum(lamps[i].kind in INFINITE for i in order)
+    return Sources(tuple(order), infinite, tuple(made), glows, tuple(media), tuple(shining))
+
+
+def _moved(one: Source, bounds: Bounds) -> Source:
+    return replace(one, bounds=bounds)
+
+
+def is_whole(shape: Shape) -> bool:
+    """Return whether a shape is sampled as one light; a mesh and a cube are many."""
+    return shape.kind in shape_records.RECORDS
+
+
+def emissions_of(lamp: Light) -> dict[str, Any]:
+    """Return the values of a light's emission parameters."""
+    declared = params(type(lamp)).items()
+    return {name: getattr(lamp, name) for name, param in declared if param.role == "emission"}
+
+
+def _of_lamp(lamp: Light, scene_radius: float, look: Look) -> Source:
+    """What a light that is not on a shape sends."""
+    _check_place(lamp)
+    if isinstance(lamp, (lights.Envmap, lights.CubeMap)):
+        strength = image_lights.mean_radiance(lamp, image_lights.content(lamp, look))
+    elif isinstance(lamp, lights.Sky):
+        strength = sky_light.content(lamp, look).strength
+    else:
+        values = emissions_of(lamp).values()
+        strength = float(np.mean([light_power.brightness(value) for value in values]))
+    power = light_power.power(lamp, strength, scene_radius)
+    counts = light_power.importance(lamp, strength, power)
+    return Source(np.array([power]), light_bounds.of_lamp(lamp), np.array([counts]))
+
+
+def _check_place(lamp: Light) -> None:
+    """Raise SceneError for a light that only shapes have, or that has no place."""
+    if lamp.kind not in RECORDS:
+        raise SceneError(f"a light of kind {lamp.kind!r} is a shape's `emission`", where="lights")
+    if isinstance(lamp, (lights.Envmap, lights.CubeMap, lights.Sky)):
+        image_lights.axes_of(lamp)
+    elif hasattr(lamp, "to_world"):
+        light_power.invertible(lamp.to_world, f"{lamp.kind}.to_world")
+    elif hasattr(lamp, "position"):
+        light_power.three(lamp.position, f"{lamp.kind}.position")
+
+
+def _of_bricks(glow: Glow) -> Bounds:
+    """Boxes around bricks, which shine in all directions."""
+    count = len(glow.corners)
+    return Bounds(
+        glow.corners + np.minimum(glow.edges, 0.0).sum(axis=1),
+        glow.corners + np.maximum(glow.edges, 0.0).sum(axis=1),
+        np.tile([0.0, 0.0, 1.0], (count, 1)),
+        np.full(count, np.pi), np.full(count, np.pi / 2.0), np.full(count, False),
+        np.full(count, True),
+    )  # fmt: skip
+
+
+def _of_emitter(emitter: Emitter, cache: LoweringCache) -> Source:
+    """What a shape that emits sends."""
+    shape = emitter.shape
+    emission: Any = shape.emission  # an area light, of either kind
+    along = isinstance(emission, DirectionalArea)
+    both = not along and emission.two_sided
+    value = emission.irradiance if along else emission.radiance
+    strength = 1.0 if along else 2.0 * np.pi if both else np.pi
+    if is_whole(shape):
+        bright = light_power.brightness(value)
+        power = np.array([strength * analytic.area(shape) * bright])
+        return Source(power, light_bounds.of_shape(shape, both), power, bright)
+    if shape.kind in shape_records.ONE_OF:
+        bright = light_power.brightness(value)
+        balls: Any = emitter.vertices
+        areas = 4.0 * np.pi * balls[:, 3].astype(np.float64) ** 2
+        power = strength * bright * areas
+        return Source(power, light_bounds.of_balls(balls), power, bright)
+    if emitter.vertices is None or emitter.faces is None:
+        raise SceneError("its triangles are missing", where=shapes.where(shape))
+    given = emitter.vertices, emitter.faces, emitter.keys
+    by_face = _face_attributes(shape, value)
+    if by_face:
+        means = triangle_means(value, emitter.uvs, emitter.faces, by_face)
+    else:
+        means = cache(triangle_means, value, emitter.uvs, emitter.faces)
+    power = strength * cache(_triangle_areas, *given) * means
+    bounds = cache(_triangle_bounds, *given, both)
+    return Source(power, bounds, power, float(means.max(initial=0.0)))
+
+
+def _face_attributes(shape: Shape, value: Any) -> dict[str, NDArray[np.float32]]:
+    """What an emission reads of each triangle."""
+    names = {one.name for one in textures_in(value) if isinstance(one, MeshAttribute)}
+    return {name: triangles.attribute(shape, name) for name in names if triangles.per_face(name)}
+
+
+def _triangle_areas(vertices: Points, faces: Faces, keys: int) -> NDArray[np.float64]:
+    """The mean area over all keys (m,) [m^2]: by it triangles are chosen, at any time alike."""
+    areas = (triangles.triangle_areas(vertices, faces + np.uint32(i)) for i in range(keys))
+    return np.asarray(sum(areas) / keys)
+
+
+def _triangle_bounds(vertices: Points, faces: Faces, keys: int, two_sided: bool) -> Bounds:
+    """Bounds (m) that hold at all times: between two keys a triangle is in the box around both."""
+    first, *others = (
+        light_bounds.of_triangles(vertices, faces + np.uint32(i), two_sided) for i in range(keys)
+    )
+    if not others:
+        return first
+    return replace(
+        first,
+        low=np.minimum.reduce([first.low, *(one.low for one in others)]),
+        high=np.maximum.reduce([first.high, *(one.high for one in others)]),
+        theta_o=np.full(len(faces), np.pi),
+    )
+
+
+def _around(index: SceneIndex, geometry: Geometry) -> Around:
+    """What makes bounds of lights hold while they move: boxes of their ways, and all directions."""
+    motions = index.motions
+
+    def around(light: int | Emitter, bounds: Bounds) -> Bounds:
+        if isinstance(light, Emitter):
+            keys = motions.shapes.get(int(geometry.rows[light.shape_row]["number"]))
+        else:
+            keys = motions.lamps.get(light)
+        if keys is None:
+            return bounds
+        points = corners(np.stack([bounds.low, bounds.high], axis=1))
+        low, high = swept(keys, points, motions.shutter).astype(np.float64).transpose(1, 0, 2)
+        return replace(bounds, low=low, high=high, theta_o=np.full(len(low), np.pi))
+
+    return around

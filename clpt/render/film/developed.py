@@ -1,0 +1,134 @@
+"""The pictures of a film, made of its words on the host."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.errors import SceneError
+from clpt.render.contract.features import SUM_WORDS
+from clpt.render.film.layers import layers_of
+from clpt.render.film.picture_form import PictureForm
+from clpt.render.film.pictures import Image, Still
+from clpt.render.wavefront.film_state import (
+    FILM_WORDS,
+    SAMPLES_WORD,
+    FilmState,
+    Words,
+    add_films,
+    add_sums,
+    light_group,
+    numbers,
+)
+
+
+class Developed(Still):
+    """The pictures of a film: what every picture of clpt is made by.
+
+    Equal words give equal pictures on every machine: each step is one of IEEE 754 in float32, and
+    their order stands here. `Renderer.film`, which kernels/stage/accumulate.cl makes on the device
+    for those who look on, takes the same steps; a device may divide and contract otherwise.
+    """
+
+    def __init__(self, film: FilmState, form: PictureForm):
+        self._film, self.form = film, form
+
+    def image(self) -> Image:
+        """The picture: colours, with alpha where the film has it, or the film's bands."""
+        if self.form.bands:
+            return self._mean_bands() * np.float32(self.form.exposure)
+        if self.form.alpha:
+            return np.dstack([self.colours(), self._alpha()])
+        return self.colours()
+
+    def colours(self) -> Image:
+        """The picture in three colours, (h, w, 3) float32, also of a film with bands."""
+        return self._colours(self._words)
+
+    def layers(self) -> dict[str, Image]:
+        """The layers by name, (h, w, 1 to 12) float32."""
+        return layers_of(self._film.arrays, self)
+
+    def halves(self) -> tuple[Image, Image]:
+        """The pictures of the even and of the odd samples. Raises SceneError without."""
+        words = self._film.words
+        if len(words) != 2:
+            raise SceneError(
+                "even and odd samples are not kept apart; give Renderer halves=True, or render "
+                "with --denoise statistical"
+            )
+        return self._colours(words[0]), self._colours(words[1])
+
+    def samples_per_pixel(self) -> Image:
+        """Return how many samples each pixel has, (h, w) float32."""
+        return self._samples(self._words)
+
+    def light_paths_per_pixel(self) -> float:
+        """Return how many paths have begun at lights for each pixel."""
+        return self._light_paths(self._words)
+
+    @cached_property
+    def _words(self) -> Words:
+        """The words of all samples, (10 to 26, h, w)."""
+        total, *others = self._film.words
+        for half in others:
+            total = add_films(total, half)
+        return np.asarray(total)
+
+    def _colours(self, words: Words) -> Image:
+        first, second, third = _sums(words, 0) * self._mean(words)
+        if self.form.weighed:
+            brought = _sums(words, light_group(len(words))) * self._light_mean(words)
+            first, second, third = first + brought[0], second + brought[1], third + brought[2]
+        rows = np.array(self.form.to_output, np.float32)
+        return np.stack([a * first + b * second + c * third for a, b, c in rows], axis=2)
+
+    def _alpha(self) -> Image:
+        words, first = self._words, FILM_WORDS + SUM_WORDS * self.form.weights
+        return numbers(words[first : first + SUM_WORDS]) * self._mean(words)
+
+    def _mean_bands(self) -> Image:
+        sums, *others = self._film.bands
+        for half in others:
+            sums = add_sums(sums, half)
+        values, count = numbers(np.moveaxis(sums, 1, 0)), self.form.bands
+        words, scale = self._words, np.float32(self._film.scale)
+        total = values[:count] * (self._mean(words) / scale)
+        if self.form.weighed:
+            total += values[count:] * (self._light_mean(words) / scale)
+        return np.ascontiguousarray(np.moveaxis(total, 0, 2))
+
+    def _samples(self, words: Words) -> Image:
+        if not self.form.light_paths:
+            return words[SAMPLES_WORD].astype(np.float32)
+        return np.full(words.shape[1:], self._light_paths(words), np.float32)
+
+    def _mean(self, words: Words) -> Image:
+        """One over what a pixel's sums are divided by, 0 where that is nothing."""
+        weighed = self.form.weights
+        by = numbers(words[FILM_WORDS:][:SUM_WORDS]) if weighed else self._samples(words)
+        return _inverse(by)
+
+    def _light_mean(self, words: Words) -> Image:
+        """One over the number of light paths; 0 where a pixel has no samples of the camera."""
+        inverse = _inverse(np.full((), self._light_paths(words), np.float32))
+        return np.where(words[SAMPLES_WORD] > 0, inverse, np.float32(0.0))
+
+    def _light_paths(self, words: Words) -> float:
+        """Return how many light paths there were for each pixel."""
+        first = light_group(len(words)) if self.form.weighed else 0
+        count = words[first + SAMPLES_WORD]
+        return float(count.sum(dtype=np.uint64)) / count.size
+
+
+def _sums(words: Words, first: int) -> Image:
+    """Three sums of pixels (n, h, w) from a word on, (3, h, w) float32."""
+    sums = words[first : first + 3 * SUM_WORDS].reshape(3, SUM_WORDS, *words.shape[1:])
+    return numbers(np.moveaxis(sums, 1, 0))
+
+
+def _inverse(by: NDArray[Any]) -> Image:
+    return np.divide(np.float32(1.0), by, out=np.zeros_like(by), where=by > 0)

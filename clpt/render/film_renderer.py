@@ -1,0 +1,325 @@
+"""The base of all renderers, be it on a device, on several, or on a cluster.
+
+Samples are asked for here, and the film that they make is denoised, saved and gone on with. Heirs
+say who takes the samples.
+"""
+
+from __future__ import annotations
+
+import time
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from clpt.errors import SceneError
+from clpt.render.contents import FilmOwner
+from clpt.render.contract.features import Features
+from clpt.render.film import film_file
+from clpt.render.film.denoised_picture import DenoisedPicture
+from clpt.render.film.developed import Developed
+from clpt.render.film.pictures import Image, Pictures
+from clpt.render.film.saved_film import Origin, SavedFilm, Session
+from clpt.render.locking import Stop, synchronized
+from clpt.render.progress import Progress
+from clpt.render.wavefront import adaptive
+from clpt.render.wavefront.adaptive import Adaptive
+from clpt.render.wavefront.film_state import FilmState
+from clpt.render.wavefront.wavefront import Counts
+from clpt.scene import Scene
+from clpt.scene.cameras import Camera
+from clpt.scene.fingerprint import Plain
+from clpt.version import VERSION
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+MOST_SAMPLES = 2**31 - 1
+
+OnProgress = Callable[[Progress], bool | None]
+
+
+class FilmRenderer(FilmOwner, Pictures):
+    """Base of renderers: what adds samples of a scene to a film.
+
+    scene: that is rendered; warnings: for people; shows_meanwhile: whether there is a picture to
+    show while samples are taken.
+    """
+
+    scene: Scene
+    warnings: list[str]
+    shows_meanwhile = False
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._stop = Stop()
+        self._first_sample = 0
+        self._start = time.perf_counter()
+        self._seconds: dict[str, float] = {}
+        self._seconds_rendered = 0.0  # since the film was empty, or gone on with
+        self._telling = False  # of progress, while samples are taken
+
+    # ---- what there is
+
+    @property
+    def device_text(self) -> str:
+        """Names of the devices that take the samples, for people."""
+        return " and ".join(on.info.label for on in self.devices)
+
+    @property
+    @abstractmethod
+    def counts(self) -> Counts:
+        """Counts of what has happened so far."""
+
+    @property
+    def samples(self) -> int:
+        """The number of the next sample: of all so far, where they began at number 0."""
+        taken = self._known.taken
+        return taken[-1][1] if taken else self._first_sample
+
+    @property
+    def first_sample(self) -> int:
+        """The number of the first sample of the film, or of the first one to come."""
+        taken = self._known.taken
+        return taken[0][0] if taken else self._first_sample
+
+    @property
+    def active(self) -> float:
+        """The share of the pixels that would get more samples, 1 but for `run` with `noise`."""
+        chosen = self._adaptive
+        return 1.0 if chosen is None else chosen.active
+
+    @property
+    def former_seconds(self) -> float:
+        """Seconds for which others rendered the film, before this renderer went on with it."""
+        return sum(session.seconds for session in self._known.sessions)
+
+    @property
+    def _adaptive(self) -> Adaptive | None:
+        """Which pixels get more samples, None before that was asked."""
+        return self._known.adaptive
+
+    def _progress_so_far(self, device: Mapping[str, Plain]) -> dict[str, Any]:
+        """Return what a saved film has beside its words and origin; device: the class it is of."""
+        now, chosen = self.contents, self._adaptive
+        session = Session(now.began, self._seconds_rendered, VERSION, device)
+        return {
+            "taken": now.taken,
+            "counts": dict(vars(self.counts)),
+            "sessions": (*now.sessions, session),
+            "adaptive": {} if chosen is None else chosen.arrays(),
+        }
+
+    @abstractmethod
+    def origin(self) -> Origin:
+        """Return what the samples are of. Raises SceneError for a scene that cannot be read."""
+
+    # ---- samples
+
+    def prepare(self) -> None:
+        """Get ready, so that the first samples come at once; others may do so by themselves."""
+
+    @abstractmethod
+    def update(self, *, camera: Camera | None = None, scene: Scene | None = None) -> Any:
+        """Render another scene from now on, or another camera, and begin again at sample 0."""
+
+    @synchronized
+    def run(
+        self, samples: int, progress: OnProgress | None = None, *, noise: float | None = None
+    ) -> bool:
+        """Add samples to every pixel and wait; `self.samples` is then the next one's number.
+
+        noise: leave pixels as soon as the noise around them is as low, relative to the picture,
+        such as 0.02; `samples` is then the most that a pixel gets, see
+        clpt.render.wavefront.adaptive. A renderer with `denoise` counts what is left after that.
+        progress: called every few milliseconds to seconds; if it returns False the run stops soon,
+        as after `cancel`. Returns whether it came to its end. What progress raises, or Ctrl+C at
+        any line, is raised when the paths in flight have ended. The film is whole after a stop too:
+        its pixels have fewer samples, and the numbers of those left out are not used again.
+
+        Raises SceneError for noise that makes no sense with the scene, and for more than 2^31 - 1
+        samples.
+        """
+        first, end = next_range(self.samples, samples)
+        if self._stop.is_set():  # before it began: nothing is taken
+            self._rest()
+            return False
+        if noise is not None:
+            noise = adaptive.checked(noise, self._features)
+        watch = Watch(self, progress, end)
+        try:
+            finished = self._add_samples(first, end, noise, watch)
+        finally:
+            self._seconds_rendered += watch.seconds
+            self._rest()
+        if watch.raised is not None:
+            raise watch.raised
+        return finished
+
+    @property
+    @abstractmethod
+    def _features(self) -> Features:
+        """The features of the scene."""
+
+    @abstractmethod
+    def _add_samples(self, first: int, end: int, noise: float | None, watch: Watch) -> bool:
+        """Add samples first to end - 1, or those of pixels with noise; return whether all were.
+
+        watch: called all the while.
+        """
+
+    @property
+    @abstractmethod
+    def _pixels(self) -> int:
+        """The number of pixels that are sampled."""
+
+    def _so_far(self, end: int, seconds: float) -> Progress:
+        """Return how far a run is after some seconds; end: the number after its last sample."""
+        counts = self.counts
+        mean = counts.samples / self._pixels
+        return Progress(mean, end, counts.samples, counts.rays, seconds, self.active)
+
+    def cancel(self, *, discard: bool = False) -> None:
+        """Let the `run` of another thread, or else the next one, stop soon and return False.
+
+        discard: the film is of no use any more, which one device makes use of: paths in flight are
+        left as they are, which is sooner, and a run that has begun leaves the film as after
+        `reset`. A step is not stopped. It may be called from anywhere, also from a signal's
+        handler, and waits for nothing.
+        """
+        self._stop.set()
+
+    def _rest(self) -> None:
+        """Note that no run is under way, nor to be stopped any more."""
+        self._telling = False
+        self._stop.clear()
+
+    # ---- the film, its pictures, and its files
+
+    @synchronized
+    def developed(self, *words: str) -> Developed:
+        """Return the pictures of the film as it is now, which then stay; see `Pictures`."""
+        return Developed(self.film_state(), self.form)
+
+    @abstractmethod
+    def film_state(self) -> FilmState:
+        """Return what the film holds, as whole numbers on the host; wait for it."""
+
+    @abstractmethod
+    def merge(self, state: FilmState) -> None:
+        """Add the samples of another film of the same scene to this one, and wait."""
+
+    @abstractmethod
+    def hold(self) -> None:
+        """Keep the film as it is now, for `saved_film`."""
+
+    @abstractmethod
+    def saved_film(self, *, held: bool = False) -> SavedFilm:
+        """Return the film with all that it takes to go on with it; held: as it was when held."""
+
+    @abstractmethod
+    def restore(self, saved: SavedFilm) -> None:
+        """Go on from a saved film, as `load_state` does. Raises SceneError."""
+
+    def denoised(self, method: str | None = None) -> Image:
+        """The picture so far without most of its noise, as `image` returns it.
+
+        method: oidn or statistical, by default what the renderer was made for, else oidn. Make the
+        renderer with the option `denoise`: so the film has what the denoiser wants. See
+        `clpt.DenoisedPicture`, also for what it raises.
+        """
+        return DenoisedPicture(self, method).image()
+
+    def save_state(self, path: str | Path) -> None:
+        """Write the film to a file, from which `load_state` goes on, in another process too.
+
+        Raises SceneError for a file that cannot be written: the former one is then as it was.
+        """
+        saved = self.saved_film()
+        try:
+            film_file.write(path, saved)
+        except OSError as error:
+            raise SceneError(f"cannot be written: {error}", file=path) from error
+
+    def load_state(self, path: str | Path) -> None:
+        """Go on from a file of `save_state`, of any renderer: what the film held before is gone.
+
+        All that follows is to the bit as if nothing had been interrupted, where the device is of
+        the class that took the samples; `warnings` tells where it is not.
+
+        Raises SceneError for a file that cannot be read, is damaged, or is of another scene, other
+        settings or other kernels: it says what differs, and nothing has changed.
+        """
+        saved = film_file.read(path)
+        try:
+            self.restore(saved)
+        except SceneError as error:
+            raise SceneError(error.message, file=path) from None
+
+    # ---- the end
+
+    @abstractmethod
+    def close(self) -> None:
+        """Give back what it holds; it is of no use afterwards."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+
+class Watch:
+    """Called while a run takes samples: it tells of them, and returns whether they go on.
+
+    end: the number after the last sample. raised: what `progress` raised.
+    """
+
+    def __init__(self, renderer: FilmRenderer, progress: OnProgress | None, end: int):
+        self._renderer, self._progress, self._end = renderer, progress, end
+        self._began = time.perf_counter()
+        self.raised: BaseException | None = None
+
+    @property
+    def seconds(self) -> float:
+        """Seconds that the run has taken."""
+        return time.perf_counter() - self._began
+
+    def __call__(self, _: object = None) -> bool:
+        renderer = self._renderer
+        if renderer.counts.samples:
+            taken = time.perf_counter() - renderer._start
+            renderer._seconds.setdefault("first_sample", taken)
+        if renderer._stop.is_set() or self._progress is None:
+            return not renderer._stop.is_set()
+        renderer._telling = True
+        try:
+            if self._progress(renderer._so_far(self._end, self.seconds)) is False:
+                renderer._stop.set()
+        except BaseException as error:
+            self.raised = error
+            renderer._stop.set()
+        finally:
+            renderer._telling = False
+        return not renderer._stop.is_set()
+
+
+def next_range(first: int, samples: int) -> tuple[int, int]:
+    """Return the numbers, first and end, of so many samples from the first. Raises SceneError."""
+    return first, checked_number(first + checked_samples(samples))
+
+
+def checked_number(number: int) -> int:
+    """Return a sample's number. Raises SceneError for one that is too large."""
+    if number > MOST_SAMPLES:
+        raise SceneError(f"a pixel cannot have more than {MOST_SAMPLES} samples", where="samples")
+    return number
+
+
+def checked_samples(samples: int) -> int:
+    """Return a number of samples. Raises SceneError for one that is none."""
+    if isinstance(samples, bool) or not isinstance(samples, (int, np.integer)) or samples < 1:
+        raise SceneError(f"samples per pixel must be a whole number above zero, not {samples!r}")
+    return int(samples)

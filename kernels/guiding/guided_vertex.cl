@@ -1,0 +1,21 @@
+/* What a path does with a guide at a vertex. */
+#include "guiding/guide.cl"
+
+#define guided_pdf(guide, guided, d, p) guide_pdf(guide, guided, d, p)
+
+/* The next direction, of the guide or of the material. */
+inline BsdfSample onward_sample(Scattering scatter, global const uint *guide, Guided guided, Spectrum *ratio)
+{
+    vec2 uv = sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_BSDF);
+    real pick = sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_CHOICE).y;
+    return guide_sample(guide, guided, scatter.bsdf, scatter.shading.frame, scatter.wo, uv, pick, ratio);
+}
+
+/* Russian roulette by what a guide knows, see guide_roulette; beta: of the ray that arrives. */
+inline mask guided_plays(Slab path, uint at, Guided guided, Spectrum beta, Scattering scatter, mask *next,
+                         Spectrum *after)
+{
+    real brings = spectrum_max(spectrum_mul(beta, bsdf_albedo(scatter.bsdf)));
+    real chance = sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_ROULETTE).x;
+    return guide_roulette(path, at, guided, brings, chance, next, after);
+}

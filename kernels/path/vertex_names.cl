@@ -1,0 +1,19 @@
+/* What layers call a surface: its index in the scene's shapes, its number in the shape, and that of its material. */
+inline void vertex_names(Scene scene, Slab hit, uint at, mask active, Vertex *v)
+{
+    v->object = v->primitive = v->material = -1;
+    if (BSDF_IS_PHASE) return;
+    integer row = sel_i(active, load_hit_shape(hit, at), (integer)(0));
+    ShapeRow shape = shape_row_row(scene.shapes, row * SHAPE_ROW_WORDS);
+#if MATERIAL_NUMBERS
+    v->material = to_integer(gather(scene.distributions, MATERIAL_NUMBERS + row));
+#endif
+    v->object = shape.number;
+#if USES_INSTANCES
+    integer instance = sel_i(active, load_hit_instance(hit, at), (integer)(0));
+    integer placed = sel_i(instance > 0, instance - 1, (integer)(0)) * INSTANCE_ROW_WORDS;
+    v->object = sel_i(instance > 0, instance_row_row(scene.instances, placed).number, v->object);
+#endif
+    mask many = (shape.kind == 0) | ((shape.flags & SHAPE_MANY) != 0);
+    v->primitive = sel_i(active & many, load_hit_prim(hit, at) - shape.prim, (integer)(0));
+}

@@ -1,0 +1,40 @@
+/* Next-event estimation: a point of a light is chosen, and a ray toward it waits in the shadow slab. */
+typedef struct {
+    mask shine; /* the material sends light from there on */
+    LightSample ls;
+    Spectrum value;
+} NextEvent;
+
+inline NextEvent next_event(Scene scene, mask next, Vertex v, Scattering scatter, Rival rival, Guided guided,
+                            Spectrum ratio SHADE_ARGS)
+{
+    NextEvent e;
+    Frame frame = scatter.shading.frame;
+    vec3 hemisphere = vertex_hemisphere(frame, scatter.wo);
+    vec2 point = sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_LIGHT);
+    mask seeks = next & !vertex_sealed(v);
+    e.ls = light_sample_nothing();
+    if (!(BSDF_ABSORBS || BSDF_IS_SEALED) || any(seeks))
+        e.ls = light_sample(scene, v.s.p, hemisphere, scatter.choice.x, point, scatter.lambdas);
+    vec3 wi = to_local(frame, e.ls.wi);
+    Spectrum f = bsdf_eval(scatter.bsdf, scatter.wo, wi);
+    f = spectrum_scale(f, shading_frame_share(scatter.shading, e.ls.wi));
+    real w = event_weight(scene, rival, v.s, e.ls, scatter.bsdf, scatter.wo, wi,
+                          guided_pdf(guide, guided, e.ls.wi, hero_pdf(scatter.bsdf, scatter.wo, wi, ratio)));
+    e.shine = seeks & (e.ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
+    w = w / sel(e.shine, fabs(e.ls.pdf), (real)(1.0f));
+    e.value = spectrum_scale(spectrum_mul(spectrum_mul(v.beta, f), e.ls.radiance), w);
+    e.value = vertex_beyond(scene, v, e.ls.wi, e.ls.t, scatter.lambdas, e.value);
+    return e;
+}
+
+/* Keeps it, after the next direction is sampled: between them compilers would read tables of materials again. Returns
+ * what Path.state gains. */
+inline integer next_event_keep(Scene scene, Slab path, Slab shadow, uint at, mask active, Vertex v, NextEvent e)
+{
+    shadow_toward(shadow, at, active, e.shine, v.s, e.ls, e.value);
+    light_layers_chosen(path, at, e.shine, e.ls.row);
+    store_shadow_into(shadow, at, e.shine, brick_medium(scene, sel_i(e.shine, e.ls.row, (integer)(0))));
+    store_shadow_through(shadow, at, e.shine, vertex_through(v, e.ls.wi));
+    return sel_i(e.shine, (integer)(PATH_SHADOW), (integer)(0));
+}

@@ -1,0 +1,6 @@
+/* How a shape has moved since it was lowered. */
+typedef Motion ShapeMotion;
+#define shape_motion(scene, shape) motion_of_shape(scene, (shape).number)
+#define shape_point(motion, p) motion_point(motion, p)
+#define shape_point_back(motion, p) motion_point_back(motion, p)
+#define shape_vector(motion, v) motion_vector(motion, v)

@@ -1,0 +1,6 @@
+/* Stands for surface/shape_motion.cl where shapes stand still. */
+typedef integer ShapeMotion;
+#define shape_motion(scene, shape) ((integer)(0))
+#define shape_point(motion, p) (p)
+#define shape_point_back(motion, p) (p)
+#define shape_vector(motion, v) (v)
