@@ -22,6 +22,7 @@ from clpt.records import SETTINGS, TABLES
 from clpt.render.analysis.lens import glasses
 from clpt.render.codegen import stages
 from clpt.render.codegen.signatures import scene_text
+from clpt.render.contract.features import CameraFeatures
 from clpt.render.lowering.camera.cameras import lower_camera
 from clpt.scene.cameras import Lens
 
@@ -53,11 +54,12 @@ def rate(on: device.Device, lens: Lens, lanes: int) -> float:
     """Rays in a second of processor time."""
     rows = glasses(lens)
     _, words = lower_camera(lens, 90, 60, range(len(rows)))
+    camera = CameraFeatures("lens", disperses=True, losses=lens.reflects)
     files = {
         "generated/scene.cl": scene_text(),
         "generated/spectrum.cl": '#include "spectrum/spectral.cl"\n',
         "generated/spectrum_read.cl": '#include "spectrum/spectral_read.cl"\n',
-        "generated/camera.cl": stages.camera_text("lens", True, lens.reflects),
+        "generated/camera.cl": stages.camera_text(camera),
         "bench": MAIN,
     }
     defines = {

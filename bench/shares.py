@@ -78,7 +78,9 @@ def measure(path: Path, mode: str, bounces: int = BOUNCES) -> dict[str, Any]:
     flight = Flight(on, scene)
     features = flight.wavefront.features
     tree = flight.wavefront.scene.trees.triangles
-    plain = tree.layout != "brute" and not (features.instances or features.analytic)
+    plain = tree.layout != "brute" and not (
+        features.geometry.instances or features.geometry.analytic
+    )
     bare = Bare(on, tree, flight.slots) if plain else None
     seconds: dict[str, float] = defaultdict(float)
     counts = dict.fromkeys(("intersect", "shadow"), 0)

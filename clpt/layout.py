@@ -49,6 +49,39 @@ def select_name(lane: str) -> str:
     return _SELECT.get(lane) or f"{_snake(lane)}_sel"
 
 
+class Constants:
+    """Numbers that host and kernels share, by their names; kernels put a prefix before them.
+
+    values: each number, and what it means. `constants["name"]` is the number.
+    """
+
+    def __init__(self, prefix: str, doc: str, unsigned: bool = False, **values: tuple[int, str]):
+        self.prefix, self.doc, self.unsigned, self._values = prefix, doc, unsigned, values
+
+    def __getitem__(self, name: str) -> int:
+        return self._values[name][0]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names, in their order."""
+        return tuple(self._values)
+
+    def text(self) -> str:
+        """Return a `#define` of each."""
+        rows = [f"/* {self.doc} */"]
+        for name, (value, doc) in self._values.items():
+            number = f"{value:#x}" if value >= 1 << 12 else str(value)
+            suffix, comment = "u" * self.unsigned, f" /* {doc} */" if doc else ""
+            rows.append(f"#define {self.prefix}{name.upper()} {number}{suffix}{comment}")
+        return "\n".join([*rows, ""])
+
+
+def bits(prefix: str, doc: str, first: int = 1, **docs: str) -> Constants:
+    """Return constants that are a bit each, from `first` on; docs: what each means."""
+    values = {name: (first << i, meaning) for i, (name, meaning) in enumerate(docs.items())}
+    return Constants(prefix, doc, False, **values)
+
+
 @dataclass(frozen=True)
 class Member:
     """One member of a record: its type, why it is there, where its first word stands.

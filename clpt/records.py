@@ -2,12 +2,13 @@
 
 Three slabs hold the state of all paths, one slot a path: `Path`, `Hit` and `Shadow`. The scene lies
 in tables of 4-byte words: `TABLES` lists them once, and the kernels' `Scene` struct and arguments
-follow from it. A member's text is what it means, with its unit.
+follow from it. A member's text is what it means, with its unit. `CONSTANTS` are the bits and other
+numbers that both sides know, each a file `generated/<name>.cl` of kernels.
 """
 
 from __future__ import annotations
 
-from clpt.layout import Record
+from clpt.layout import Constants, Record, bits
 
 PATH = Record(
     "Path",
@@ -170,7 +171,7 @@ SHAPE = Record(
     front=("integer", "material word of its front"),
     back=("integer", "material word of its back"),
     light=("integer", "first of its rows in `lights`; -1: it does not emit"),
-    flags=("integer", "SHAPE_ bits, see kernels/path/surface_flags.cl"),
+    flags=("integer", "SHAPE_ bits, see CONSTANTS"),
     prim=("integer", "its first primitive"),
     params=("integer", "first word of its parameters in `geometry`; analytic shapes"),
     number=("integer", "its index in the scene's shapes"),
@@ -246,3 +247,101 @@ TABLES: dict[str, tuple[str, str]] = {
     ),
     "camera": ("float", "parameters of the camera"),
 }
+
+# Numbers that both sides know. A kernel file includes them as generated/<name>.cl.
+SHAPE_BITS = bits(
+    "SHAPE_",
+    "Bits of ShapeRow.flags.",
+    normals="its vertices have normals",
+    uvs="its vertices have uv",
+    two_sided="the back is shaded as if it were a front",
+    one_light="all of its primitives are one row of `lights`",
+    many="a primitive is one of its spheres; attributes are per sphere",
+    tangents="its vertices have tangents of their own",
+    deforms="its vertices move by themselves",
+)
+MEDIUM_BITS = bits(
+    "MEDIUM_",
+    "Bits of a medium's name.",
+    1 << 26,
+    dyed="a dye gives out light",
+    sealed="no ray to a light leaves it: its boundaries bend light",
+    bytes="its density has 8 bits for each number",
+    grid="a density on a grid multiplies its coefficients",
+    flies="the stage `flight` takes rays through it",
+)
+PATH_BITS = bits(
+    "PATH_",
+    "Bits of Path.state, above its depth and below the number of its shadow rays.",
+    1 << 12,
+    alive="a ray is in flight",
+    fresh="no sample has been begun: there is nothing to deposit",
+    done="the slot is at the end of its work list",
+    sharp="a surface of a light path was sharp, or all of a camera's path were",
+)
+LOBE_BITS = bits(
+    "LOBE_",
+    "Bits of BsdfSample.lobe.",
+    reflect="",
+    transmit="",
+    delta="a direction out of finitely many; pdf is then a probability",
+    disperse="the direction holds for the hero wavelength only",
+    null="it goes on as if nothing were there, but for its weight",
+)
+COUNTER_NUMBERS = Constants(
+    "COUNTER_",
+    "Counters that the host reads while it enqueues, two words each, the lower first.",
+    done=(0, "slots that have come to the end of their work list"),
+    samples=(1, "paths put on the film"),
+    closest=(2, "rays of them"),
+    shadow=(3, "shadow rays of them"),
+    rejected=(4, "samples that were not finite, or too bright, and count as black"),
+    full=(5, "times when a sum was found near the end of its range"),
+)
+PHOTON_NUMBERS = Constants(
+    "PHOTON_",
+    "Numbers of photons.",
+    unsigned=True,
+    none=(0xFFFFFFFF, "stands for the cell of one where there is none"),
+    run=(1024, "cells that a work-item sums"),
+)
+BRICK_SIZES = Constants(
+    "BRICK_",
+    "Sizes of the bricks of a grid.",
+    unsigned=True,
+    words=(365, "of its 9^3 points, two in each"),
+)
+MOTION_SIZES = Constants("MOTION_", "Sizes of tables of motion.", step=(29, "floats of one"))
+DENSITY_SIZES = Constants(
+    "DENSITY_",
+    "Sizes of tables of wavelengths.",
+    guides=(1024, "a power of two, so that u * DENSITY_GUIDES is exact"),
+)
+TREE_BITS = Constants(
+    "BVH_",
+    "Bits of a link of a tree over boxes.",
+    unsigned=True,
+    leaf=(0x80000000, "it names an item, no node"),
+)
+MATERIAL_KINDS = Constants(
+    "MATERIAL_", "Kinds of material words.", mixture=(0xFF, "of a mask or a blend, no leaf")
+)
+
+CONSTANTS = {
+    "shape_bits": SHAPE_BITS,
+    "medium_bits": MEDIUM_BITS,
+    "path_bits": PATH_BITS,
+    "lobe_bits": LOBE_BITS,
+    "counter_numbers": COUNTER_NUMBERS,
+    "photon_numbers": PHOTON_NUMBERS,
+    "brick_sizes": BRICK_SIZES,
+    "motion_sizes": MOTION_SIZES,
+    "density_sizes": DENSITY_SIZES,
+    "tree_bits": TREE_BITS,
+    "material_kinds": MATERIAL_KINDS,
+}
+
+
+def constant_files() -> dict[str, str]:
+    """Return the text of CONSTANTS by the names under which kernels include it."""
+    return {f"generated/{name}.cl": constants.text() for name, constants in CONSTANTS.items()}

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pyopencl as cl
 import pytest
 
 from clpt import device
-from clpt.layout import TYPES, Record
-from clpt.records import LIGHT, PATH, SETTINGS, SHAPE, SLABS
+from clpt.device import kernels_folder
+from clpt.layout import TYPES, Constants, Record, bits
+from clpt.records import CONSTANTS, LIGHT, PATH, SETTINGS, SHAPE, SLABS
 from clpt.render.codegen.signatures import scene_text
 from clpt.render.contract import camera_records
 
@@ -178,3 +181,20 @@ def test_records_are_chosen_lane_by_lane(opened: device.Device, lanes: int) -> N
     nothing = np.zeros((), record.dtype)
     nothing["t"], nothing["i"], nothing["p"] = 1e30, -1, (1, 2, 3)
     assert np.array_equal(found[1], np.tile(nothing.reshape(1).view(np.uint32), (lanes, 1)).T)
+
+
+def test_constants_are_the_same_on_both_sides() -> None:
+    """Bits ascend from the first; kernels get each as a number of the right type."""
+    both = bits("SIDE_", "Sides.", 1 << 12, front="what is seen", back="")
+    assert both.names == ("front", "back") and (both["front"], both["back"]) == (0x1000, 0x2000)
+    text = "/* Sides. */\n#define SIDE_FRONT 0x1000 /* what is seen */\n#define SIDE_BACK 0x2000\n"
+    assert both.text() == text
+    assert "#define A_B 3u /* c */" in Constants("A_", "", unsigned=True, b=(3, "c")).text()
+
+
+def test_no_kernel_defines_a_constant_anew() -> None:
+    """One that both sides know stands in clpt/records.py alone."""
+    shared = {row.split()[1] for own in CONSTANTS.values() for row in own.text().splitlines()[1:]}
+    for path in kernels_folder().rglob("*.cl"):
+        defined = re.findall(r"#\s*define (\w+)", path.read_text("utf-8"))
+        assert shared.isdisjoint(defined), path

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 from clpt import device
 from clpt.layout import Record
-from clpt.records import HIT, PATH, SHADOW
+from clpt.records import HIT, PATH, PATH_BITS, SHADOW
 from clpt.render.lowering.scene import lower
 from clpt.render.wavefront.bounce_loop import Step
 from clpt.render.wavefront.path_buffers import default_slots
 from clpt.render.wavefront.wavefront import Wavefront
 from clpt.scene import Scene
 
-ALIVE, FRESH, DONE = 0x1000, 0x2000, 0x4000  # kernels/path/path_state.cl
+ALIVE, FRESH, DONE = (PATH_BITS[name] for name in ("alive", "fresh", "done"))
 ENDLESS = 1 << 24  # samples of a pixel
 _TYPES = {"integer": np.int32, "natural": np.uint32}
 
@@ -119,7 +119,7 @@ class Flight:
         if kernel == "mix_materials":
             return int(self.met.sum())
         if kernel == "shade":
-            kinds = self.wavefront.features.materials
+            kinds = self.wavefront.features.materials.kinds
             return int((self.kinds == kinds.index(step.name.removeprefix("shade_"))).sum())
         if kernel in ("shadow", "splat"):
             return int(self.shadowed.sum())

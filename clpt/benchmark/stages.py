@@ -113,7 +113,7 @@ def _queue(flight: Flight, copying: Copying, rounds: int) -> Figure:
     """All slots brought into queues by the kind of their material, looked at afterwards."""
     on, wave = flight.device, flight.wavefront
     features, layout = wave.features, wave.scene.strategy.layout
-    kinds = len(features.materials)
+    kinds = len(features.materials.kinds)
     for step in wave.stages:  # so that hits wait to be shaded
         if step.bound.kernel.name == "shade" or step.name in QUEUEING:
             break

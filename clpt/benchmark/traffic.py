@@ -43,7 +43,7 @@ def traffic(features: Features, layout: str, *, queued: bool = False) -> dict[st
     unused = blocks.unused(features)
     sizes = {
         f"{record.name.lower()}_{member.name}": member.words
-        - (member.type == "spectrum" and features.mode == "rgb")
+        - (member.type == "spectrum" and not features.spectra.spectral)
         for record in SLABS
         for member in record.members
         if member.name not in unused

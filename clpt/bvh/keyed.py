@@ -9,12 +9,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..records import TREE_BITS
 from .building import Building
 from .layouts import LAYOUTS, Mesh, Packed, Part, Quality, refit_nodes
 
 WORDS = {"binary": (8, 16), "wide8": (64, 88), "compact": (20, 12)}  # of a node, and of a leaf
 _FARTHEST = 1e38  # of boxes of what is not there: finite, so that no product with 0 is NaN
-_LEAF = np.uint32(0x80000000)  # BVH_LEAF of kernels/bvh/node.cl
+_LEAF = np.uint32(TREE_BITS["leaf"])
 
 
 def keyed(

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 import pyopencl as cl
 
+from ..records import TREE_BITS
 from . import tree, wide
 from .building import Building
 
@@ -23,7 +24,7 @@ _BINARY_LEAF = 4  # triangles of a leaf, at most
 _BLOCK = 8
 _COMPACT_LEAF = 3  # triangles of a leaf, at most; kernels/bvh/compact.cl counts them in 3 bits
 SHAPES_LEAF = 2  # boxes of a leaf of "shapes_binary", at most
-_LEAF = 0x80000000  # BVH_LEAF of kernels/bvh/node.cl
+_LEAF = TREE_BITS["leaf"]
 
 
 @dataclass(frozen=True)

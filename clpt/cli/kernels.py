@@ -39,7 +39,7 @@ def kernels(scene: Path, folder: Path, lanes: str, layout: str, variables: dict[
     their functions in one program.
     """
     features = lower(load(scene, **variables)).features
-    queued = len(features.materials) > 1
+    queued = len(features.materials.kinds) > 1
     made = film_sources(features, layout)
     for own in features.passes:
         label = "light_" if own is not features else ""

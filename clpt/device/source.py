@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from ..errors import KernelBuildError
+from ..records import constant_files
 from .conditions import OPENING, Macros, taken
 from .definitions import Paragraph, macro, named, paragraphs, whole
 from .text_rows import Row, rows_of
@@ -112,6 +113,8 @@ def assemble(
     defines: written as `#define` lines at the top.
     library: whether another text will name what this one defines, and its defines.
 
+    The constants of clpt.records are virtual files of all texts.
+
     What an `#if` leaves out is not in the text, nor is the `#if`, but for those that ask for what
     compilers define (`conditions.OUTSIDE`). Functions, types, constants and macros that nothing in
     the text names are left out too, unless it is a library, or they are of a Part that pastes names
@@ -125,7 +128,7 @@ def assemble(
     for an `#if` without its end.
     """
     given = {name: str(value) for name, value in (defines or {}).items()}
-    assembly = _Assembly(root, virtual or {}, given, library)
+    assembly = _Assembly(root, {**constant_files(), **(virtual or {})}, given, library)
     assembly.add(root, None, 0)
     return assembly.source()
 

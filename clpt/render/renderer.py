@@ -126,8 +126,8 @@ class Renderer(Resumable):
         self._first_sample = checked_number(options.get("first_sample", 0))
         self._progress = progress
         if self.denoise is not None:
-            splats = first.features.filter_reach > 0
-            weighed = scene.noise is not None and first.features.weighed
+            splats = first.features.film.filter.reach > 0
+            weighed = scene.noise is not None and first.features.transport.weighed
             self.warnings += needs.remarks(lowered.integrator, scene.sampler, splats, weighed)
         self._moving: Moving | None = None
         self._blurred = False  # by keys that `scene` does not have
@@ -523,12 +523,12 @@ class Renderer(Resumable):
     def _enters_a_medium(self, scene: Scene) -> bool:
         """Whether the camera or a light of a changed scene may be in other media than before."""
         lowered = self.wavefront.scene.lowered
-        if not lowered.features.media:
+        if not lowered.features.media.present:
             return False
         if lowered.features.light_media and _lights_moved(self.scene, scene):
             return True
         readable = resolve_device_arrays(scene, self.device.queue)
-        if not lowered.features.bodies:
+        if not lowered.features.media.bodies:
             return media_around(readable, lowered.cache) != lowered.around
         return bodies_around(readable, matter_of, lowered.cache) != lowered.around
 

@@ -107,13 +107,13 @@ class Resumable(DevicePictures):
         settings: dict[str, Plain] = {
             "chosen.integrator": lowered.integrator.kind,
             "chosen.light_paths": float(lowered.settings["light_paths"]),
-            "chosen.splatting": features.filter_reach > 0,
+            "chosen.splatting": features.film.filter.reach > 0,
             "chosen.texels": int(lowered.tables["texels"].size),
             "halves": first.film.halves == 2,
         }
         if type(self.scene.sampler) not in PIXELWISE:  # their points are for some number of samples
             settings["sampler.points"] = 1 << int(lowered.settings["sample_bits"])
-        outside = [cls for cls in features.leaves if cls not in LEAVES]
+        outside = [cls for cls in features.materials.leaves if cls not in LEAVES]
         texts = [custom_materials.text(cls).text for cls in outside]
         digest = hashlib.sha256("\0".join([kernels_digest(), *texts]).encode()).hexdigest()
         return Origin(self._scene_read[1], settings, digest, VERSION)
@@ -137,7 +137,7 @@ class Resumable(DevicePictures):
         have their noise before. Raises SceneError where halves are wanted and not kept.
         """
         first = self.wavefront
-        if denoise is None or first.features.weighed:
+        if denoise is None or first.features.transport.weighed:
             return Adaptive(first, tracer)
         if first.film.halves != 2:
             message = "what is left after denoising is told by even and odd samples apart"
@@ -186,17 +186,17 @@ class Resumable(DevicePictures):
         settings, features = first.paths.settings, first.features
         return PictureForm(
             tuple(tuple(float(v) for v in np.ravel(settings[name])[:3]) for name in TO_OUTPUT),
-            light_paths=features.light_paths,
-            weighed=features.weighed,
+            light_paths=features.transport.light_paths,
+            weighed=features.transport.weighed,
             weights=features.film_weights,
-            alpha=features.alpha,
+            alpha=features.film.alpha,
             bands=first.film.band_count,
             lambda_min=film.lambda_min,
             lambda_max=film.lambda_max,
             output_space=film.output_space,
             exposure=film.exposure,
-            layers=features.layers,
-            paper=tuple(map(tuple, white_paper(film, features.mode).tolist())),
+            layers=features.film.layers.names,
+            paper=tuple(map(tuple, white_paper(film, features.spectra.mode).tolist())),
             names=first.scene.lowered.layer_names,
             adaptive=self.scene.noise is not None or self._known.adaptive is not None,
         )

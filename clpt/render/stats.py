@@ -82,7 +82,7 @@ def collect(
 
 def _light_paths_end(features: Features) -> tuple[str, ...]:
     """Where paths that are weighed against those from the camera end."""
-    if not features.balanced:
+    if not features.transport.balanced:
         return ()
-    kinds = [cls.kind for cls in features.leaves if ends_light_paths(features, cls)]
-    return (*kinds, *["normal maps"] * features.normal_mapped)
+    kinds = [cls.kind for cls in features.materials.leaves if ends_light_paths(features, cls)]
+    return (*kinds, *["normal maps"] * features.materials.normal_mapped)

@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.records import LOBE_BITS
 from clpt.scene.materials import Material
 from clpt.scene.params import device_params
 from clpt.testing.probe import Probe
 from clpt.testing.rounding import CONTRACTED, contracts
 from clpt.testing.settings import directions, pairs, settings, tilted
 
-TRANSMIT, DELTA, DISPERSE = 2, 4, 8  # kernels/interface/bsdf.cl
+TRANSMIT, DELTA, DISPERSE = (LOBE_BITS[name] for name in ("transmit", "delta", "disperse"))
 SAMPLES, THETA, PHI, FINE = 60_000, 16, 24, 12
 ANGLES = (25.0, 75.0, 140.0)  # of wo to the normal [degrees]
 ALL_ANGLES = (1.0, 30.0, 60.0, 80.0, 88.0, 100.0, 135.0, 178.0)

@@ -3,7 +3,7 @@
  * The link of a leaf is its first item with BVH_LEAF set, that of an inner node its left child; the
  * right one follows it. The root is node 0. No leaf is more than BVH_DEPTH levels below the root.
  */
-#define BVH_LEAF 0x80000000u
+#include "generated/tree_bits.cl"
 #define BVH_DEPTH 48
 #define COMPACT_WORDS 20 /* of a node of bvh/compact.cl */
 

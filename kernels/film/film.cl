@@ -79,13 +79,7 @@ inline void film_count(global const Settings *settings, global uint *film, mask 
             sums_add_word(film + film_at(settings, planes[i], pixels[i]) + FILM_SAMPLES * settings->padded_pixels, 1u);
 }
 
-/* Counters that the host reads while it enqueues, two words each, the lower first. */
-#define COUNTER_DONE 0     /* slots that have come to the end of their work list */
-#define COUNTER_SAMPLES 1  /* paths put on the film */
-#define COUNTER_CLOSEST 2  /* rays of them */
-#define COUNTER_SHADOW 3   /* shadow rays of them */
-#define COUNTER_REJECTED 4 /* samples that were not finite, or too bright, and count as black */
-#define COUNTER_FULL 5     /* times when a sum was found near the end of its range */
+#include "generated/counter_numbers.cl"
 inline void count(global uint *counters, int which, mask m, integer v)
 {
     if (any(m) && sums_add_word(counters + 2 * which, (uint)sum_lanes(sel_i(m, v, (integer)(0)))))

@@ -18,11 +18,7 @@
  * Functions are pure and free of branches but for if (any(mask)); lanes that have nothing to do
  * compute what they like, but their result must not be NaN where pdf > 0.
  */
-#define LOBE_REFLECT 1
-#define LOBE_TRANSMIT 2
-#define LOBE_DELTA 4    /* a direction out of finitely many; pdf is then a probability */
-#define LOBE_DISPERSE 8 /* the direction holds for the hero wavelength only */
-#define LOBE_NULL 16    /* it goes on as if nothing were there, but for its weight */
+#include "generated/lobe_bits.cl"
 
 typedef struct {
     vec3 wi;

@@ -2,7 +2,6 @@
  * through: there the extinction tells little of where that is. Of such flights the share DYE_SHARE ends at a distance
  * of its own, never beyond the end of the ray. A dye that takes much is lit where light comes in, so most of these are
  * near one of both ends, and some anywhere. All ways to choose are weighed by their sum. */
-#define MEDIUM_DYED 0x04000000
 #define DYE_SHARE 0.5f
 #define DYE_EVEN 0.2f    /* of these, share of those that are anywhere */
 #define DYE_TAKES 2.0f   /* about how much more a dye takes at some wavelengths than it gives out at its highest */

@@ -9,8 +9,7 @@
  * dims what rays bring through them. Their rows hold sigma_a and sigma_s, and before them the word of their phase
  * function. Where some media emit, five words of the radiance that a thick body of each would emit stand before that.
  */
-#define MEDIUM_FLIES 0x40000000
-#define MEDIUM_SEALED 0x08000000 /* no ray to a light leaves it: its boundaries bend light */
+#include "generated/medium_bits.cl"
 #define MEDIUM_ROW(name) (((name) & 0xffffff) - 1)
 
 /* What is left of light after t metres, t up to FAR; medium_absorption and medium_scattering are generated. */

@@ -8,7 +8,6 @@
  * number of bricks along x, y and z, a matrix of three rows from the world to the lattice, and the upper corner of the
  * box there; the lower one is (1/2, 1/2, 1/2). In `images` each brick has two words: where its points begin from the
  * first word on, and its highest density. A medium with MEDIUM_BYTES in its name has 8 bits for each number. */
-#define MEDIUM_GRID 0x20000000
 #define GRID_CELLS 8
 #define GRID_POINTS 9
 #define GRID_ROULETTE 0.05f /* what passes below this is at stake */
@@ -38,7 +37,6 @@ inline natural grid_key(Scene scene, natural pixel_key, integer sample, integer 
 }
 
 #if USES_BYTES
-#define MEDIUM_BYTES 0x10000000
 #define grid_packed(name) sel_i(((name) & MEDIUM_BYTES) != 0, (integer)(2), (integer)(1))
 #endif
 

@@ -3,9 +3,7 @@
  * numbers: of the cell of each place, PHOTON_NONE where there is no photon. cells: one word more than there are cells;
  * in the end those of cell k are order[cells[k]] and further, below order[cells[k + 1]], in ascending order. */
 #include "bvh/no_vectorize.cl"
-#include "merging/none.cl"
-
-#define SORT_RUN 1024 /* cells that a work-item sums */
+#include "generated/photon_numbers.cl"
 
 /* How many photons are in each cell; cells: zeros. */
 kernel NO_VECTORIZE void photons_count(global const uint *restrict numbers, uint count, global uint *restrict cells)
@@ -16,7 +14,7 @@ kernel NO_VECTORIZE void photons_count(global const uint *restrict numbers, uint
 
 kernel NO_VECTORIZE void photons_sum(global const uint *restrict cells, uint count, global uint *restrict sums)
 {
-    uint begin = get_global_id(0) * SORT_RUN, end = min(begin + SORT_RUN, count), sum = 0;
+    uint begin = get_global_id(0) * PHOTON_RUN, end = min(begin + PHOTON_RUN, count), sum = 0;
     for (uint k = begin; k < end; k++) sum += cells[1 + k];
     sums[get_global_id(0)] = sum;
 }
@@ -35,7 +33,7 @@ kernel NO_VECTORIZE void photons_scan(global uint *restrict sums, uint runs)
 /* Of each cell where its photons begin. */
 kernel NO_VECTORIZE void photons_begin(global uint *restrict cells, uint count, global const uint *restrict sums)
 {
-    uint begin = get_global_id(0) * SORT_RUN, end = min(begin + SORT_RUN, count), at = sums[get_global_id(0)];
+    uint begin = get_global_id(0) * PHOTON_RUN, end = min(begin + PHOTON_RUN, count), at = sums[get_global_id(0)];
     for (uint k = begin; k < end; k++) {
         uint number = cells[1 + k];
         cells[1 + k] = at;

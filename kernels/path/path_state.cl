@@ -1,10 +1,7 @@
 /* What Path.state holds: depth in bits 0 to 11, flags, and the number of shadow rays in bits 16 to 27; and the
  * dimensions of a sample. */
+#include "generated/path_bits.cl"
 #define PATH_DEPTH 0x0fff
-#define PATH_ALIVE 0x1000 /* a ray is in flight */
-#define PATH_FRESH 0x2000 /* no sample has been begun: there is nothing to deposit */
-#define PATH_DONE 0x4000  /* the slot is at the end of its work list */
-#define PATH_SHARP 0x8000 /* a surface of a light path was sharp, or all of a camera's path were */
 #define PATH_SHADOW 0x10000
 #define PATH_SEEN 0x10000000 /* layers for denoisers have the path, see path/layers.cl */
 #define PATH_GHOST 0x20000000 /* of a lens's samples, of light that two of its surfaces have reflected */

@@ -1,15 +1,16 @@
 /* Wavelengths by a tabulated density, linear between nodes of equal distance
  * (clpt/render/analysis/wavelengths.py).
  * At settings->density in `distributions`: the number of cells n, the first node and the distance
- * [nm], n + 1 cumulative shares, n + 1 densities [1/nm], and the cells in which the shares i / GUIDES
- * lie, for i from 0 to GUIDES. Same functions in spectrum/visible.cl. */
-#define GUIDES 1024 /* a power of two, so that u * GUIDES is exact; as in clpt/render/analysis/wavelengths.py */
+ * [nm], n + 1 cumulative shares, n + 1 densities [1/nm], and the cells in which the shares i / DENSITY_GUIDES
+ * lie, for i from 0 to DENSITY_GUIDES. Same functions in spectrum/visible.cl. */
+#include "generated/density_sizes.cl"
 
 /* The wavelength below which a share u of the density lies [nm]. */
 inline real density_invert(Scene scene, real u)
 {
     int head = scene.settings->density, n = (int)scene.distributions[head], sums = head + 3, values = sums + n + 1;
-    integer guide = max_i(min_i(to_integer(u * (float)GUIDES), (integer)(GUIDES - 1)), (integer)(0)) + (values + n + 1);
+    integer cell = min_i(to_integer(u * (float)DENSITY_GUIDES), (integer)(DENSITY_GUIDES - 1));
+    integer guide = max_i(cell, (integer)(0)) + (values + n + 1);
     integer low = to_integer(gather(scene.distributions, guide));
     integer high = to_integer(gather(scene.distributions, guide + 1)) + 1;
     while (any((high - low) > 1)) {

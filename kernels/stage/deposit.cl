@@ -12,7 +12,7 @@
 #include "lighting/light_path_sampler.cl"
 #include "merging/area.cl"
 #include "merging/cells.cl"
-#include "merging/none.cl"
+#include "generated/photon_numbers.cl"
 #include "merging/weight.cl"
 #include "generated/photon.cl"
 

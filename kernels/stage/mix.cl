@@ -10,8 +10,6 @@
 #include "generated/shapes.cl"
 #include "surface/surface.cl"
 
-#define MIXTURE 0xff /* the kind in a mixture's material word */
-
 STAGE(mix_materials)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
 {
     SLABS
@@ -19,7 +17,7 @@ STAGE(mix_materials)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
     STAGE_AT
     integer state = load_path_state(path, at), word = load_hit_material(hit, at);
     mask active = ((state & PATH_ALIVE) != 0) & (load_hit_prim(hit, at) >= 0);
-    mask open = active & (MATERIAL_KIND(word) == MIXTURE);
+    mask open = active & (MATERIAL_KIND(word) == MATERIAL_MIXTURE);
     if (any(open)) {
         scene.time = load_path_time(path, at);
         mask front, chosen = open;
@@ -29,7 +27,7 @@ STAGE(mix_materials)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
         integer met = (state & PATH_DEPTH) + load_path_nulls(path, at);
         natural dimension = as_natural(DIMENSION_VERTEX + met * DIMENSIONS_A_VERTEX + DIMENSION_ROULETTE);
         real u = sampler_pair(sampler, dimension).y;
-        for (; any(open); open = open & (MATERIAL_KIND(word) == MIXTURE)) {
+        for (; any(open); open = open & (MATERIAL_KIND(word) == MATERIAL_MIXTURE)) {
             integer row = sel_i(open, MATERIAL_ROW(word), (integer)(0));
             real w = mixture_weight(scene, row, surface_texture_point(s), lambdas);
             mask second = u < w;

@@ -2,7 +2,7 @@
  * symmetric S change linearly between two keys, the rotation R by slerp (Shoemake 1985), see clpt/scene/motion.py.
  * The table begins in `distributions` at MOTION_ROW: where the shutter, the camera's track, the tracks of shapes by
  * their number and those of lamps by their row begin. A track has its number of steps, and MOTION_STEP floats each. */
-#define MOTION_STEP 29
+#include "generated/motion_sizes.cl"
 
 /* x, y, z: rows of the matrix from the world at that time to where things were lowered; t: the way back [m]. */
 typedef struct { vec3 x, y, z, t; } Motion;

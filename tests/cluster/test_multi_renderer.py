@@ -419,7 +419,7 @@ def test_updates_with_motion_reach_all_devices(scene, pair):
         for changed in (one, several):
             changed.update(transforms={still: place}, motion=True)
             changed.run(4)
-        assert one.wavefront.features.moving
+        assert one.wavefront.features.motion.parts
         assert same(several.film_state(), one.film_state())
 
 

@@ -59,13 +59,13 @@ def test_triangles_are_held_once() -> None:
     assert len(rows) == 50 and set(rows["prim"]) == {2}
     assert rows["number"].tolist() == list(range(1, 51))
     assert made.tables["shapes"].view(SHAPE.dtype)["prim"].tolist() == [0, 2, 102]
-    assert made.features.instances
+    assert made.features.geometry.instances
 
 
 def test_what_is_placed_once_is_an_ordinary_shape() -> None:
     matrix = placements(1)[0]
     made = lower(scene(*place(Group((STONE,)), [matrix])))
-    assert not made.features.instances and len(made.tables["instances"]) == 1
+    assert not made.features.geometry.instances and len(made.tables["instances"]) == 1
     expected = tf.transform_points(matrix, STONE.vertices)
     np.testing.assert_allclose(made.vertices, expected, rtol=1e-5, atol=1e-3)
 
@@ -156,7 +156,9 @@ def test_groups_hold_shapes_only() -> None:
         Instance()
     with pytest.raises(TypeError, match="material"):
         Instance(group=Group(), material=Diffuse())
-    assert not lower(scene(Instance(group=Group()), Instance(group=Group()))).features.instances
+    assert not lower(
+        scene(Instance(group=Group()), Instance(group=Group()))
+    ).features.geometry.instances
 
 
 def test_materials_of_a_group_are_checked() -> None:

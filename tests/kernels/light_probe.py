@@ -18,7 +18,9 @@ from clpt.render.codegen import parameters
 from clpt.render.codegen import shapes as shape_text
 from clpt.render.codegen import textures as texture_text
 from clpt.render.codegen.signatures import scene_text
+from clpt.render.contract.features import Features, MaterialFeatures
 from clpt.render.lowering.encoder import Encoder
+from clpt.render.lowering.features import of_lights, of_textures
 from clpt.render.lowering.lights import lights
 from clpt.render.lowering.spectra.spectra_table import STEP
 from tests.kernels.harness import opened
@@ -74,16 +76,14 @@ class Lit:
         found = found or frozenset({"constant"})
         text = ""
         if encoder.textures.roles:
-            used = {kind for kind, _ in encoder.textures.roles}
-            text += texture_text.dispatch_text(used, encoder.textures.roles)
+            text += texture_text.dispatch_text(of_textures(encoder))
         text += parameters.emission_text(found)
         if factors:
             text += parameters.factor_text(factors)
-        rows = self.rows
-        tree = rows.tree is not None
-        return text + light_dispatch.dispatch_text(
-            rows.kinds, "texture" in found, rows.two_sided, tree
+        features = Features(
+            lights=of_lights(self.rows), materials=MaterialFeatures(sources=encoder.sources)
         )
+        return text + light_dispatch.dispatch_text(features)
 
     def _settings(self) -> np.ndarray:
         settings = np.zeros(1, SETTINGS.dtype)

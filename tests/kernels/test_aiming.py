@@ -7,6 +7,7 @@ tests/pictures/support.py.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator
 
 import numpy as np
@@ -110,15 +111,14 @@ def scene_of(light: Light | Shape) -> Scene:
 def probe(lowered: Lowered, aimed: bool) -> SceneProbe:
     """Rays from the lights: five random numbers to o, d, power, gain from either end."""
     features = lowered.features
-    two_sided, textured = features.two_sided_lights, "texture" in stages.emission_sources(features)
+    transport = dataclasses.replace(features.transport, aimed=aimed)
+    sent = dataclasses.replace(features, transport=transport)
     virtual = {
         **shapes.virtual_files(),
         **lights.virtual_files(),
         "generated/lights.cl": stages.lights_text(features),
-        "generated/emission.cl": emission.dispatch_text(
-            features.lights, textured, two_sided, aimed
-        ),
-        "generated/textures.cl": textures.dispatch_text(features.textures, features.texture_roles),
+        "generated/emission.cl": emission.dispatch_text(sent),
+        "generated/textures.cl": textures.dispatch_text(features.textures),
     }
     return SceneProbe(
         BODY + GAIN * aimed,
@@ -126,7 +126,7 @@ def probe(lowered: Lowered, aimed: bool) -> SceneProbe:
         9,
         files=("generated/lights.cl", "generated/emission.cl"),
         virtual=virtual,
-        defines=flags.defines(flags.SCENE, features),
+        defines=flags.of_scene(features),
         tables={name: lowered.table(name) for name in lowered.tables},
         settings={name: lowered.settings[name] for name in lowered.settings.dtype.names or ()},
     )
@@ -168,7 +168,7 @@ def batches(lowered: Lowered, aimed: bool) -> Iterator[NDArray[np.float64]]:
 )
 def test_paths_go_and_carry_light_where_they_did(name: str) -> None:
     lowered = lower(scene_of(LIGHTS[name]))
-    assert lowered.features.aimed
+    assert lowered.features.transport.aimed
     sums: dict[bool, list[NDArray[np.float64]]] = {True: [], False: []}
     hits = {}
     for aimed, found in sums.items():

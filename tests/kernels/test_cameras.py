@@ -11,6 +11,7 @@ from clpt import spectra, transforms
 from clpt.errors import SceneError
 from clpt.render.codegen import stages
 from clpt.render.contract import camera_records
+from clpt.render.contract.features import CameraFeatures
 from clpt.render.lowering.camera.cameras import lower_camera
 from clpt.scene import cameras as scene
 from tests.kernels.scene_harness import SceneProbe
@@ -28,7 +29,7 @@ PLACE = transforms.look_at([3.0, 2.0, -1.5], [0.2, 0.4, 0.1], [0.1, 1.0, 0.2])
 
 @cache
 def _text(kind: str) -> dict[str, str]:
-    return {"generated/camera.cl": stages.camera_text(kind, False, True)}
+    return {"generated/camera.cl": stages.camera_text(CameraFeatures(kind, losses=True))}
 
 
 def rays(camera, width, height, film, lens=None, lanes=8, index=None):

@@ -60,16 +60,14 @@ def lowered() -> tuple[Lowered, np.ndarray]:
 def test_points_and_densities_of_lamps_that_deform() -> None:
     made, corners = lowered()
     features = made.features
-    assert {"vertices", "emitters"} == {*features.moving} and not features.light_tree
+    assert {"vertices", "emitters"} == {*features.motion.parts} and not features.lights.tree
     virtual = {
         **shapes.virtual_files(),
         **lights.virtual_files(),
         **parameters.virtual_files(features),
         **choices.virtual_files(features, "wide8"),
         "generated/lights.cl": stages.lights_text(features),
-        "generated/emission.cl": emission.dispatch_text(
-            features.lights, False, features.two_sided_lights, deforming=True
-        ),
+        "generated/emission.cl": emission.dispatch_text(features),
     }
     settings = {name: made.settings[name] for name in made.settings.dtype.names}
     probe = SceneProbe(
@@ -81,7 +79,7 @@ def test_points_and_densities_of_lamps_that_deform() -> None:
             *("generated/lights.cl", "generated/emission.cl"),
         ),
         virtual=virtual,
-        defines=flags.defines(flags.SCENE, features),
+        defines=flags.of_scene(features),
         tables={**made.tables, "vertices": made.vertices, "faces": made.faces},
         settings=settings,
     )

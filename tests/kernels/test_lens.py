@@ -12,6 +12,7 @@ from clpt.lenses.coatings import quarter_wave
 from clpt.lenses.tracing import Rays, trace
 from clpt.render.analysis.lens import glasses
 from clpt.render.codegen import stages
+from clpt.render.contract.features import CameraFeatures
 from clpt.render.lowering.camera.cameras import lower_camera
 from clpt.render.lowering.camera.lens import ghost_pairs
 from clpt.scene.cameras import Lens
@@ -35,6 +36,7 @@ def probe(camera: Lens, lanes: int = 8, ghosts: bool = False) -> SceneProbe:
     rows = glasses(camera)
     _, words = lower_camera(camera, WIDTH, HEIGHT, range(len(rows)))
     table = np.concatenate([np.zeros(1), *(glass.sample(GRID) for glass in rows)])[bool(rows) :]
+    features = CameraFeatures("lens", disperses=bool(rows), losses=camera.reflects)
     return SceneProbe(
         BODY,
         5,
@@ -42,7 +44,7 @@ def probe(camera: Lens, lanes: int = 8, ghosts: bool = False) -> SceneProbe:
         mode="spectral",
         lanes=lanes,
         files=("interface/camera.cl", "generated/camera.cl"),
-        virtual={"generated/camera.cl": stages.camera_text("lens", bool(rows), camera.reflects)},
+        virtual={"generated/camera.cl": stages.camera_text(features)},
         defines={
             "CAMERA_DISPERSES": int(bool(rows)),
             "LENS_LOSSES": int(camera.reflects),

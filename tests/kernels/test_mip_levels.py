@@ -8,6 +8,7 @@ import pytest
 from clpt.images import linear_to_srgb, srgb_to_linear
 from clpt.render.codegen.textures import dispatch_text
 from clpt.render.lowering.encoder import Encoder
+from clpt.render.lowering.features import of_textures
 from clpt.render.lowering.textures.bitmaps import _level_sizes, _levels
 from clpt.scene.textures import Bitmap
 from tests.kernels.scene_harness import SceneProbe
@@ -41,10 +42,9 @@ class LookUp:
             for role in ("reflectance", "real")
         )
         encoder.textures.finish()
-        roles = frozenset(encoder.textures.roles)
         self.probe = SceneProbe(
             LOOK_UP, 7, 7, files=(FILE,),
-            virtual={FILE: dispatch_text({kind for kind, _ in roles}, roles, stochastic=True)},
+            virtual={FILE: dispatch_text(of_textures(encoder), stochastic=True)},
             defines={"USES_MIPS": 1, "STOCHASTIC_FILTERING": 1},
             tables=encoder.store.arrays(),
         )  # fmt: skip

@@ -9,6 +9,7 @@ from clpt import spectra
 from clpt.errors import SceneError
 from clpt.render.codegen.textures import dispatch_text
 from clpt.render.lowering.encoder import Encoder
+from clpt.render.lowering.features import of_textures
 from clpt.render.lowering.textures import noise
 from clpt.scene import textures as scene
 from clpt.spectra.spectrum import d65
@@ -38,12 +39,7 @@ def look_up(made, role, places=PLACES, mode="rgb", lanes=8):
     body += f"{kind} s = texture_{role}(scene, to_integer(x[0]), point, lambdas);"
     parts = ["s"] if role == "real" else [f"s.{c}" for c in components]
     body += "".join(f"r[{i}] = {part};" for i, part in enumerate(parts))
-    text = dispatch_text(
-        {kind for kind, _ in encoder.textures.roles},
-        encoder.textures.roles,
-        encoder.textures.depth,
-        encoder.textures.mappings,
-    )
+    text = dispatch_text(of_textures(encoder))
     probe = SceneProbe(
         body,
         4,

@@ -9,6 +9,7 @@ from clpt.errors import SceneError
 from clpt.render.analysis.texels import FAR, bands
 from clpt.render.codegen.textures import dispatch_text
 from clpt.render.lowering.encoder import Encoder
+from clpt.render.lowering.features import of_textures
 from clpt.scene import textures as scene
 from clpt.scene.lights import Constant, CubeMap, Envmap
 from clpt.spectra import Tabulated, luminance
@@ -113,7 +114,7 @@ def test_scenes_without_spectral_images_do_not_hold_their_text():
     encoder = Encoder("spectral")
     encoder.textures.row(scene.Bitmap(image=np.zeros((2, 2, 3))), "reflectance")
     encoder.textures.finish()
-    text = dispatch_text({kind for kind, _ in encoder.textures.roles}, encoder.textures.roles)
+    text = dispatch_text(of_textures(encoder))
     assert "pectral" not in text.replace("spectrum", "")
     assert "bands" not in text
 

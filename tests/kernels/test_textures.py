@@ -12,6 +12,7 @@ from clpt import images, spectra
 from clpt.errors import SceneError
 from clpt.render.analysis.texels import texels
 from clpt.render.codegen.textures import dispatch_text
+from clpt.render.contract.features import TextureFeatures
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.textures.bitmaps import NODES, pack
 from clpt.render.lowering.textures.texture_programs import folded
@@ -32,7 +33,7 @@ COLOURS = np.random.default_rng(1).random((5, 7, 3)).astype(np.float32)
 @cache
 def _dispatch(roles):
     stochastic = any(role == "reflectance" for _, role in roles)
-    return dispatch_text({kind for kind, _ in roles}, roles, 4, stochastic=stochastic)
+    return dispatch_text(TextureFeatures(roles, depth=4), stochastic=stochastic)
 
 
 def _body(role, mode):
@@ -542,7 +543,7 @@ def test_a_texture_is_put_in_once(tmp_path):
 
 
 def test_no_textures_no_text():
-    assert dispatch_text((), ()).strip() == ""
+    assert dispatch_text(TextureFeatures()).strip() == ""
 
 
 @pytest.mark.parametrize(

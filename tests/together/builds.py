@@ -28,13 +28,13 @@ class Way:
 
 def layouts(features: Features) -> list[str]:
     """The layouts that can hold a scene's triangles."""
-    return [name for name in bvh.LAYOUTS if not (name == "brute" and features.instances)]
+    return [name for name in bvh.LAYOUTS if not (name == "brute" and features.geometry.instances)]
 
 
 def texts(features: Features, way: Way) -> list[str]:
     """The texts of all programs of a scene in one way; through trees where it has instances."""
     layout, lanes = way.layout, way.lanes
-    if layout == "brute" and features.instances:
+    if layout == "brute" and features.geometry.instances:
         layout = bvh.TREES[0]
     if way.form == "film":
         made = {

@@ -25,7 +25,7 @@ from clpt.geometry import (
 )
 from clpt.geometry.instancing import Instances, Placed, Prototype
 from clpt.geometry.motion import Motions
-from clpt.records import SHAPE
+from clpt.records import SHAPE, SHAPE_BITS
 from clpt.render.analysis.index import SceneIndex
 from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.scene.params import fields_of
@@ -33,8 +33,6 @@ from clpt.scene.shapes import Shape
 
 LEAST_RADIUS = 1e-12  # of a sphere around a scene [m]
 SWEPT_CELLS = 4  # of the hull of what moves, see `instancing.hull_points`
-SHAPE_NORMALS, SHAPE_UVS, SHAPE_TWO_SIDED, SHAPE_ONE_LIGHT, SHAPE_MANY = 1, 2, 4, 8, 16
-SHAPE_TANGENTS, SHAPE_DEFORMS = 32, 64
 
 Owner = tuple[np.ndarray, Shape, int, int]  # a row of `shapes`, its shape, first vertex and face
 Triangles = tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.uint32]]
@@ -247,7 +245,7 @@ class _Builder:
         times: at which they have rows, for what belongs to something that deforms.
         """
         row["prim"] = self.single_count + sum(map(len, self.many))
-        row["flags"] |= SHAPE_MANY
+        row["flags"] |= SHAPE_BITS["many"]
         by = shapes.geometry(shape)
         if times:
             keyed = self.cache(spheres.keyed, shape, times, by=(*by, times))
@@ -270,7 +268,7 @@ class _Builder:
         """Append a shape's triangles; return their vertices, faces and uvs, and what is stored."""
         by = shapes.geometry(shape)
         if times:
-            row["flags"] |= SHAPE_DEFORMS
+            row["flags"] |= SHAPE_BITS["deforms"]
             self.keys[self.vertex_count] = len(times)
             made = self.cache(triangles.keyed, shape, times, by=(*by, times))
         else:
@@ -278,11 +276,11 @@ class _Builder:
         vertices, faces, normals, uvs, flat = made
         self.flat += flat
         row["prim"] = self.face_count
-        row["flags"] |= SHAPE_NORMALS if normals is not None else 0
-        row["flags"] |= SHAPE_UVS if uvs is not None else 0
+        row["flags"] |= SHAPE_BITS["normals"] if normals is not None else 0
+        row["flags"] |= SHAPE_BITS["uvs"] if uvs is not None else 0
         self.normals |= normals is not None
         if getattr(shape, "tangents", None) is not None and not times:
-            row["flags"] |= SHAPE_TANGENTS
+            row["flags"] |= SHAPE_BITS["tangents"]
             own = (*shapes.geometry(shape), shape.tangents)
             along = self.cache(triangles.tangents, shape, by=own)
             self.tangents.append((self.vertex_count, along))

@@ -12,12 +12,13 @@ from clpt.geometry.instancing import Placed, Prototype
 from clpt.geometry.motion import Motions
 from clpt.render.analysis import cameras, filters
 from clpt.render.contract import custom_materials
+from clpt.render.contract.features import GridFeatures
 from clpt.scene import Scene
 from clpt.scene import materials as mt
 from clpt.scene.cameras import Lens
 from clpt.scene.integrators import Auto, Direct, ParticleTracer, Path, Vcm
 from clpt.scene.layers import LAYERS
-from clpt.scene.media import PHASE_LEAVES, Lattice, Medium
+from clpt.scene.media import PHASE_LEAVES, Grid, Lattice, Medium
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.shapes import Shape
 
@@ -87,30 +88,24 @@ class SceneIndex:
         return tuple(medium for medium in self.media if medium.light is not None)
 
     @property
-    def glowing(self) -> bool:
-        """Whether some of these have a density on a grid."""
-        return any(isinstance(medium, Lattice) for medium in self.emitting)
-
-    @property
     def free_panes(self) -> bool:
         """Whether there is thin glass that is no step of a path."""
         free = getattr(self.scene.integrator, "free_panes", False)
         return free and any(cls.is_pane for cls in self.leaves)
 
     @property
-    def tinted(self) -> bool:
-        """Whether some medium has an albedo on a grid."""
-        return any(getattr(medium, "albedo_grid", None) is not None for medium in self.media)
-
-    @property
-    def coloured(self) -> bool:
-        """Whether the extinction of some medium has colours on a grid."""
-        return any(getattr(medium, "colour_grid", None) is not None for medium in self.media)
-
-    @property
-    def most_parts(self) -> int:
-        """Of how many media the mixture of most is made; 0: there is none."""
-        return max((len(getattr(medium, "parts", ())) for medium in self.media), default=0)
+    def grids(self) -> GridFeatures:
+        """What the media are whose density is on a grid."""
+        media, emitting = self.media, self.emitting
+        return GridFeatures(
+            present=any(isinstance(medium, Lattice) for medium in media),
+            emissive=any(isinstance(medium, Lattice) for medium in emitting),
+            hot=any(getattr(one, "temperature", None) is not None for one in emitting),
+            tinted=any(getattr(one, "albedo_grid", None) is not None for one in media),
+            coloured=any(getattr(one, "colour_grid", None) is not None for one in media),
+            mixed=max((len(getattr(one, "parts", ())) for one in media), default=0),
+            bytes=any(isinstance(one, Grid) and one.bits == 8 for one in media),
+        )
 
     @property
     def dyed(self) -> bool:

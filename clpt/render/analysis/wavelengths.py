@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt import spectra, spectral_exr
+from clpt.records import DENSITY_SIZES
 from clpt.render.analysis.colour import sensor
 from clpt.render.analysis.index import SceneIndex
 from clpt.scene.integrators import Film
@@ -29,7 +30,7 @@ Values = NDArray[np.float64]
 STEP = 1.0  # [nm] at most, between the nodes of a table
 LIGHTS, SENSOR = 0.5, 0.45  # shares of a table; the rest is even, so that nothing is left out
 WORTH = 2.2  # times that the second moment must fall for a table, which costs time, to be taken
-GUIDES = 1024  # kernels/spectrum/density.cl
+GUIDES = DENSITY_SIZES["guides"]
 
 
 @dataclass(frozen=True)

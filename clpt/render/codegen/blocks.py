@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from clpt.records import HIT, SHADOW, SLABS
-from clpt.render.codegen import flags
 from clpt.render.contract.features import Features
 
 CHANGED = (
@@ -14,29 +13,36 @@ CHANGED = (
     "cone",
 )  # fmt: skip
 READ = ("weight", "light", "time", "pixel_index", "pixel_key", "sample")  # and not changed
-# members that a scene has only with a flag, or one of two
-NEEDED = {
-    "lambdas": "SPECTRAL",
-    "sampled_hemisphere": "USES_HEMISPHERE",
-    "null_distance": "USES_NULL_SURFACES",
-    "nulls": "USES_NULL_SURFACES",
-    "ratio": "USES_RATIO",
-    "medium": "USES_ABSORPTION",
-    "bodies": "USES_BODIES",
-    "lead": "USES_ABSORPTION",
-    "through": "SHADOW_MEDIA",
-    "into": "BRICK_LIGHTS",
-    "rival": "WEIGHS_LIGHT_PATHS",
-    "pending": "MERGES",
-    "expected": "USES_GUIDE",
-    "cone": "USES_MIPS",
-    "weight": "LIGHT_PATHS USES_LAYERS LIGHT_LAYERS",
-    "light": "WEIGHS_LIGHT_PATHS",
-    "time": "USES_MOTION",
-    "pixel_index": "LIGHT_PATHS USES_LAYERS LIGHT_LAYERS",
-    "film": "LIGHT_PATHS",
-    "instance": "USES_INSTANCES",
+# members that not every scene has, each with the features that ask for it
+NEEDED: dict[str, Callable[[Features], bool]] = {
+    "lambdas": lambda f: f.spectra.spectral,
+    "sampled_hemisphere": lambda f: f.hemispheres,
+    "null_distance": lambda f: f.materials.null_surfaces,
+    "nulls": lambda f: f.materials.null_surfaces,
+    "ratio": lambda f: f.ratios,
+    "medium": lambda f: f.media.absorbing,
+    "bodies": lambda f: f.media.bodies,
+    "lead": lambda f: f.media.absorbing,
+    "through": lambda f: f.shadow_media,
+    "into": lambda f: f.lights.bricks,
+    "rival": lambda f: f.transport.balanced,
+    "pending": lambda f: f.transport.merged,
+    "expected": lambda f: f.transport.guided,
+    "cone": lambda f: f.textures.mips,
+    "weight": lambda f: f.transport.light_paths or _has_layers(f),
+    "light": lambda f: f.transport.balanced,
+    "time": lambda f: f.motion.present,
+    "pixel_index": lambda f: f.transport.light_paths or _has_layers(f),
+    "film": lambda f: f.transport.light_paths,
+    "instance": lambda f: f.geometry.instances,
 }
+
+
+def _has_layers(features: Features) -> bool:
+    """Whether a film has layers beside the picture."""
+    layers = features.film.layers
+    return layers.first_samples or layers.light_pictures > 0
+
 
 # members that stages other than shading use too, whatever the flags above
 ELSEWHERE = frozenset({"weight", "light", "pixel_index", "film"})
@@ -52,20 +58,17 @@ def unused(features: Features) -> frozenset[str]:
 
 def _has(features: Features, name: str) -> bool:
     """Whether paths of one kind have a member."""
-    defined = flags.defines(flags.SCENE, features)
-    has = {"SPECTRAL": features.mode == "spectral", **defined}
-    return name not in NEEDED or any(has.get(flag) for flag in NEEDED[name].split())
+    return name not in NEEDED or NEEDED[name](features)
 
 
 def members(features: Features) -> dict[str, list[str]]:
     """Return the members of each slab that a block takes, and as "changed" those of a path that
     shading may change, which come first."""
-    defined = flags.defines(flags.SCENE, features)
 
     def there(names: Iterable[str]) -> list[str]:
         return [name for name in names if _has(features, name)]
 
-    chosen = ("light",) if "LIGHT_LAYER_GROUPS" in defined else ()  # by next-event estimation
+    chosen = ("light",) if features.film.layers.groups else ()  # by next-event estimation
     changed = [*there(CHANGED), *chosen]
     return {
         "changed": changed,
@@ -97,6 +100,6 @@ def _words(features: Features, slab: str, names: Iterable[str]) -> list[int]:
     record = next(r for r in SLABS if r.name.lower() == ("path" if slab == "changed" else slab))
     found = []
     for member in (next(m for m in record.members if m.name == name) for name in names):
-        count = member.words - (member.type == "spectrum" and features.mode == "rgb")
+        count = member.words - (member.type == "spectrum" and not features.spectra.spectral)
         found += [member.word + i for i in range(count)]
     return found

@@ -28,16 +28,16 @@ def order(features: Features, layout: str, lanes: int, interleaved: bool = False
     if features.shows_lights:
         bounce.append(Stage(join, join, joining))
     bounce.append(Stage("intersect", "intersect", lanes if interleaved else tracing))
-    if features.media:
+    if features.media.present:
         bounce.append(Stage(flight(features), "flight", lanes))
     if deposits(features):
         bounce.append(Stage("deposit", "deposit", lanes))
     if trains(features):
         bounce.append(Stage("train", "train", lanes))
-    if features.mixtures:
+    if features.materials.mixtures:
         bounce.append(Stage("mix", "mix_materials", lanes))
-    bounce += [Stage(f"shade_{kind}", "shade", lanes) for kind in features.materials]
-    if joins(features) and any(not cls.delta for cls in features.leaves):
+    bounce += [Stage(f"shade_{kind}", "shade", lanes) for kind in features.materials.kinds]
+    if joins(features) and any(not cls.delta for cls in features.materials.leaves):
         bounce.append(Stage(join, join, joining))
     return bounce
 
@@ -45,29 +45,29 @@ def order(features: Features, layout: str, lanes: int, interleaved: bool = False
 def begin_and_join(features: Features) -> tuple[str, str]:
     """Return the stage that begins paths, and the one that tests the rays that join them to a light
     or, of paths that start at lights, to the camera."""
-    if not features.light_paths:
+    if not features.transport.light_paths:
         return "generate", "shadow"
-    return "flare" if features.lit_ghosts else "emit", "splat"
+    return "flare" if features.transport.lit_ghosts else "emit", "splat"
 
 
 def joins(features: Features) -> bool:
     """Whether paths are joined to lights or, those that start at lights, to the camera."""
-    return not features.light_paths or features.joined
+    return not features.transport.light_paths or features.transport.joined
 
 
 def deposits(features: Features) -> bool:
     """Whether paths leave photons."""
-    return features.light_paths and features.merged
+    return features.transport.light_paths and features.transport.merged
 
 
 def trains(features: Features) -> bool:
     """Whether paths leave what a guide learns from."""
-    return features.light_paths and features.guided
+    return features.transport.light_paths and features.transport.guided
 
 
 def flight(features: Features) -> str:
     """Return the program that takes rays through media: that of light paths does without aims."""
-    return "flight_of_light" if features.light_paths and features.medium_aims else "flight"
+    return "flight_of_light" if features.transport.light_paths and features.media.aims else "flight"
 
 
 def trace_lanes(layout: str, lanes: int) -> int:
@@ -77,12 +77,12 @@ def trace_lanes(layout: str, lanes: int) -> int:
 
 def join_lanes(features: Features, layout: str, lanes: int, interleaved: bool) -> int:
     """How many rays a work-item tests that join paths: interleaved ones where there are curves."""
-    return lanes if interleaved and features.analytic else trace_lanes(layout, lanes)
+    return lanes if interleaved and features.geometry.analytic else trace_lanes(layout, lanes)
 
 
 def has_both(features: Features) -> bool:
     """Whether materials shade paths from the camera and from lights."""
-    return len(features.passes) > 1 and not features.lit_ghosts
+    return len(features.passes) > 1 and not features.transport.lit_ghosts
 
 
 def loop_text(features: Features, layout: str, lanes: int, interleaved: bool) -> str:
@@ -223,7 +223,8 @@ def _walk_text(own: Features, calls: list[_Call], words: str) -> list[str]:
         return []
     rest = [call for call in calls[1:] if call not in shading]
     join = [call for call in rest if calls.index(call) > calls.index(shading[0])]
-    phases = {cls.kind for cls in own.leaves if cls.is_phase and not own.light_paths}
+    of_camera = () if own.transport.light_paths else own.materials.leaves
+    phases = {cls.kind for cls in of_camera if cls.is_phase}
     lines = []
     for kind, call in enumerate(shading):
         if call.stage.program.removeprefix("shade_") not in phases:

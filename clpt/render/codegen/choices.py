@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 from clpt import bvh
 from clpt.render.codegen import flags
-from clpt.render.contract.camera_records import WEIGHTED
 from clpt.render.contract.features import Features
 from clpt.scene.scatterer import Scatterer
 
@@ -23,40 +22,38 @@ def either(holds: object, file: str) -> tuple[str, ...]:
 
 # name: the files that stand for it, for a scene's features and the layout of its triangles
 CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
-    "generated/spectrum.cl": lambda f, _: (f"spectrum/{f.mode}.cl",),
+    "generated/spectrum.cl": lambda f, _: (f"spectrum/{f.spectra.mode}.cl",),
     "generated/spectrum_read.cl": lambda f, _: _spectrum_read(f),
     "generated/sampler.cl": lambda f, _: (
-        f"sampler/{f.sampler}.cl",
-        f"path/pixel_sampler{'_z' * (f.sampler == 'zsobol')}.cl",
+        f"sampler/{f.transport.sampler}.cl",
+        f"path/pixel_sampler{'_z' * (f.transport.sampler == 'zsobol')}.cl",
     ),
     "generated/exposure.cl": lambda f, _: (
         "film/splatting.cl" if f.film_weights else "film/exposure.cl",
     ),
-    "generated/bands.cl": lambda f, _: ("film/bands.cl",) * f.bands,
-    "generated/integrator.cl": lambda f, _: (f"integrator/{f.integrator}.cl",),
-    "generated/merging.cl": lambda f, _: either(f.merged, "merging/area.cl"),
-    "generated/cone.cl": lambda f, _: either(f.mips, "path/cone.cl"),
+    "generated/bands.cl": lambda f, _: ("film/bands.cl",) * f.film.bands,
+    "generated/integrator.cl": lambda f, _: (f"integrator/{f.transport.integrator}.cl",),
+    "generated/merging.cl": lambda f, _: either(f.transport.merged, "merging/area.cl"),
+    "generated/cone.cl": lambda f, _: either(f.textures.mips, "path/cone.cl"),
     "generated/vertex_media.cl": lambda f, _: (
-        when(f.bodies, "path/vertex_bodies.cl")
-        or either(f.absorption or f.media, "path/vertex_media.cl")
+        when(f.media.bodies, "path/vertex_bodies.cl")
+        or either(f.media.absorbing, "path/vertex_media.cl")
     ),
-    "generated/front_motion.cl": lambda f, _: either("camera" in f.moving, "path/front_motion.cl"),
-    "generated/ghosts.cl": lambda f, _: either(f.lit_ghosts, "path/ghosts.cl"),
-    "generated/first_ray.cl": lambda f, _: (
-        f"path/first_ray{'_weighted' * (f.camera in WEIGHTED)}.cl",
-    ),
-    "generated/sky.cl": lambda f, _: (
-        *either(f.infinite, "path/sky.cl"),
-        *either(f.infinite and bool(f.light_layers), "path/sky_layers.cl"),
+    "generated/front_motion.cl": lambda f, _: either(f.motion.camera, "path/front_motion.cl"),
+    "generated/ghosts.cl": lambda f, _: either(f.transport.lit_ghosts, "path/ghosts.cl"),
+    "generated/first_ray.cl": lambda f, _: (f"path/first_ray{'_weighted' * f.camera.weighs}.cl",),
+    "generated/ghosts.cl": lambda f, _: either(f.transport.lit_ghosts, "path/ghosts.cl"),
+    "generated/first_ray.cl": lambda f, _: (f"path/first_ray{'_weighted' * f.camera.weighs}.cl",),
+        *either(f.lights.infinite and bool(f.film.layers.lights), "path/sky_layers.cl"),
     ),
     "generated/join_light.cl": lambda f, _: either(f.shows_lights, "lighting/join_light.cl"),
     "generated/layer_sums.cl": lambda f, _: (
-        *either(f.layer_words > 0, "film/layers.cl"),
+        *either(f.film.layers.words > 0, "film/layers.cl"),
         *_screen_motion(f),
     ),
     "generated/layers.cl": lambda f, _: (
         when(
-            f.layer_words > 0,
+            f.film.layers.words > 0,
             "generated/layer_args.cl",
             *_screen_motion(f),
             *either(f.screen_motion, "path/screen_motion_record.cl"),
@@ -64,27 +61,27 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         )
         or ("path/layers_none.cl",)
     ),
-    "generated/mattes.cl": lambda f, _: either(f.mattes, "path/mattes.cl"),
+    "generated/mattes.cl": lambda f, _: either(f.film.layers.mattes, "path/mattes.cl"),
     "generated/light_layers.cl": lambda f, _: (
-        *when(f.light_layers, "generated/light_layer_args.cl", "generated/sampler.cl"),
-        *either(f.light_layers, "film/light_layers.cl"),
+        *when(f.film.layers.lights, "generated/light_layer_args.cl", "generated/sampler.cl"),
+        *either(f.film.layers.lights, "film/light_layers.cl"),
     ),
-    "generated/met_weight.cl": lambda f, _: either(f.balanced, "steps/met_weight.cl"),
+    "generated/met_weight.cl": lambda f, _: either(f.transport.balanced, "steps/met_weight.cl"),
     "generated/flight_layers.cl": lambda f, _: (
         ("film/light_layers.cl",)
-        * (bool(f.light_layers) and f.emissive_media and not f.light_paths)
+        * (bool(f.film.layers.lights) and f.media.emissive and not f.transport.light_paths)
     ),
     "generated/medium.cl": lambda f, _: (
-        ("generated/medium_coefficients.cl", "media/medium.cl") * (f.absorption or f.media)
-        + ("media/dye_flight.cl",) * f.dyed_media
-        + ("media/medium_grid.cl",) * f.grids
-        + ("media/medium_grid_light.cl",) * f.emissive_grids
-        + ("generated/body_index.cl",) * f.bodies
-        + either(f.bodies, "media/bodies.cl") * f.media
+        ("generated/medium_coefficients.cl", "media/medium.cl") * (f.media.absorbing)
+        + ("media/dye_flight.cl",) * f.media.dyed
+        + ("media/medium_grid.cl",) * f.media.grids.present
+        + ("media/medium_grid_light.cl",) * f.media.grids.emissive
+        + ("generated/body_index.cl",) * f.media.bodies
+        + either(f.media.bodies, "media/bodies.cl") * f.media.present
     ),
     "generated/grid_flight.cl": lambda f, _: (
-        ("generated/lights.cl", "path/met_light.cl") * f.emissive_grids
-        + ("media/grid_flight.cl",) * f.grids
+        ("generated/lights.cl", "path/met_light.cl") * f.media.grids.emissive
+        + ("media/grid_flight.cl",) * f.media.grids.present
     ),
     "generated/light_medium.cl": lambda f, _: (
         ("generated/textures.cl", "generated/medium.cl")
@@ -93,7 +90,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     ),
     "generated/shading_frame.cl": lambda f, _: (
         ("generated/normal_map.cl", "path/shading_frame_mapped.cl")
-        if f.normal_mapped
+        if f.materials.normal_mapped
         else ("path/shading_frame.cl",)
     ),
     "generated/transmittance.cl": lambda f, _: (f"tracing/transmittance{_passing(f)}.cl",),
@@ -102,47 +99,50 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         f"tracing/trace_{'lanes' if layout == 'brute' else 'one'}.cl",
     ),
     "generated/curve_others.cl": lambda f, _: (
-        f"tracing/curve_others{'_none' * (f.analytic == ('curves',))}.cl",
+        f"tracing/curve_others{'_none' * (f.geometry.analytic == ('curves',))}.cl",
     ),
     "generated/shape_traversal.cl": lambda f, layout: (
-        (f"bvh/{bvh.shapes_layout(layout)}.cl", "bvh/shapes.cl") * bool(f.analytic)
+        (f"bvh/{bvh.shapes_layout(layout)}.cl", "bvh/shapes.cl") * bool(f.geometry.analytic)
     ),
-    "generated/hit_space.cl": lambda f, _: either(f.instances, "surface/hit_space.cl"),
+    "generated/hit_space.cl": lambda f, _: either(f.geometry.instances, "surface/hit_space.cl"),
     "generated/surface_steps.cl": lambda f, _: (
         "generated/motion.cl",
-        *either(f.attributes, "surface/attributes.cl"),
-        *either(f.screen_motion and "vertices" in f.moving, "surface/deforms.cl"),
-        *either(f.normals or f.uvs or f.tangents, "surface/triangle.cl"),
-        *either(f.analytic, "surface/analytic.cl"),
+        *either(f.textures.attributes, "surface/attributes.cl"),
+        *either(f.screen_motion and f.motion.vertices, "surface/deforms.cl"),
+        *either(f.geometry.normals or f.geometry.uvs or f.geometry.tangents, "surface/triangle.cl"),
+        *either(f.geometry.analytic, "surface/analytic.cl"),
     ),
     "generated/corner_rows.cl": lambda f, _: (
         f"surface/corner_rows{'_keyed' * _corners_move(f)}.cl",
     ),
     "generated/triangle_steps.cl": lambda f, _: (
-        *either(f.normals, "surface/triangle_normal.cl"),
-        *either(f.uvs, "surface/triangle_uv.cl"),
-        *either(f.uvs and f.tangents and f.vertex_tangents, "surface/triangle_tangents.cl"),
+        *either(f.geometry.normals, "surface/triangle_normal.cl"),
+        *either(f.geometry.uvs, "surface/triangle_uv.cl"),
+        *either(
+            f.geometry.uvs and f.geometry.tangents and f.geometry.vertex_tangents,
+            "surface/triangle_tangents.cl",
+        ),
     ),
-    "generated/uv_tangents.cl": lambda f, _: either(f.tangents, "surface/uv_tangents.cl"),
+    "generated/uv_tangents.cl": lambda f, _: either(f.geometry.tangents, "surface/uv_tangents.cl"),
     "generated/analytic_steps.cl": lambda f, _: (
-        *either("shapes" in f.moving, "surface/shape_motion.cl"),
-        *either(f.screen_motion and "spheres" in f.moving, "surface/spheres_move.cl"),
-        *either(f.tangents, "surface/analytic_tangents.cl"),
+        *either(f.motion.shapes, "surface/shape_motion.cl"),
+        *either(f.screen_motion and f.motion.spheres, "surface/spheres_move.cl"),
+        *either(f.geometry.tangents, "surface/analytic_tangents.cl"),
     ),
-    "generated/instances.cl": lambda f, _: ("tracing/instances.cl",) * f.instances,
+    "generated/instances.cl": lambda f, _: ("tracing/instances.cl",) * f.geometry.instances,
     "generated/motion.cl": lambda f, _: (
-        *either(bool(f.moving), "tracing/motion.cl"),
-        *when({"vertices", "spheres"} & {*f.moving}, "tracing/vertex_keys.cl"),
+        *either(f.motion.present, "tracing/motion.cl"),
+        *when(f.motion.vertices or f.motion.spheres, "tracing/vertex_keys.cl"),
     ),
     "generated/keyed_layout.cl": lambda f, layout: (
-        (f"bvh/{layout}_keyed.cl",) * ("vertices" in f.moving and layout != "brute")
+        (f"bvh/{layout}_keyed.cl",) * (f.motion.vertices and layout != "brute")
     ),
     "generated/instance_traversal.cl": lambda f, layout: (
         (
-            f"tracing/instances_{'few' if f.few_instances else layout}.cl",
+            f"tracing/instances_{'few' if f.geometry.few_instances else layout}.cl",
             "tracing/trace_instances.cl",
         )
-        * f.instances
+        * f.geometry.instances
     ),
 }
 
@@ -158,37 +158,38 @@ _RIVALS = (
 
 def _merges(features: Features, cls: type[Scatterer]) -> bool:
     """Whether paths from the camera are merged with photons at a material."""
-    return features.merged and flags.gathers_photons(features, cls)
+    return features.transport.merged and flags.gathers_photons(features, cls)
 
 
 # likewise, for a scene's features and the kind of material that a program shades
 MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...]]] = {
     "generated/rivals.cl": lambda f, cls: (
-        when(f.balanced and not flags.is_null(f, cls), *_RIVALS) or ("lighting/rivals_none.cl",)
+        when(f.transport.balanced and not flags.is_null(f, cls), *_RIVALS)
+        or ("lighting/rivals_none.cl",)
     ),
     "generated/guide.cl": lambda f, cls: (
         ("guiding/guided_vertex.cl",)
-        if flags.is_guided(f, cls) and not f.light_paths
+        if flags.is_guided(f, cls) and not f.transport.light_paths
         else ("guiding/guide_none.cl",)
     ),
     "generated/path_steps.cl": lambda f, cls: (
-        *either(cls.kind in f.shining, "steps/met_emission.cl"),
+        *either(cls.kind in f.materials.shining, "steps/met_emission.cl"),
         *when(_merges(f, cls), "generated/photon.cl", "merging/gather.cl"),
         *either(_merges(f, cls), "steps/merge.cl"),
-        *either(f.lights and not cls.delta, "steps/next_event.cl"),
+        *either(f.lights.kinds and not cls.delta, "steps/next_event.cl"),
         *either(not flags.is_null(f, cls), "steps/roulette.cl"),
         *either(not flags.is_null(f, cls), "steps/scatters.cl"),
     ),
     "generated/light_path_steps.cl": lambda f, cls: (
-        *either(f.joined and not cls.delta, "steps/join_camera.cl"),
+        *either(f.transport.joined and not cls.delta, "steps/join_camera.cl"),
         "steps/adjoint_weight.cl",
         *either(not flags.is_null(f, cls), "steps/light_path_roulette.cl"),
     ),
     "generated/vertex_steps.cl": lambda f, cls: (
-        *either(flags.names_surfaces(f), "path/vertex_names.cl"),
+        *either(f.names_surfaces, "path/vertex_names.cl"),
         *(
-            when(f.bodies, "path/vertex_bodies_ways.cl")
-            or either(f.absorption or f.media, "path/vertex_media_ways.cl")
+            when(f.media.bodies, "path/vertex_bodies_ways.cl")
+            or either(f.media.absorbing, "path/vertex_media_ways.cl")
         ),
         *either(flags.between_bodies(f, cls), "path/between_bodies.cl"),
         *either(flags.has_lobe(f, cls, "clearcoat_apart"), "path/coat_normal.cl"),
@@ -205,21 +206,21 @@ def _screen_motion(features: Features) -> tuple[str, ...]:
 
 def _corners_move(features: Features) -> bool:
     """Whether shading asks for rows of vertices, of meshes that deform."""
-    return "vertices" in features.moving and (features.normals or features.tangents)
+    return features.motion.vertices and (features.geometry.normals or features.geometry.tangents)
 
 
 def _passing(features: Features) -> str:
     """How the name of what tells which light passes ends."""
     if features.shadow_media:
         return "_media"
-    return "" if features.null_surfaces else "_opaque"
+    return "" if features.materials.null_surfaces else "_opaque"
 
 
 def _spectrum_read(features: Features) -> tuple[str, ...]:
     """The look-up of spectra, and in spectral mode how the camera draws wavelengths."""
-    read = f"spectrum/{features.mode}_read.cl"
-    drawn = f"spectrum/{'density' if features.tabulated_density else 'visible'}.cl"
-    return (read, drawn) if features.mode == "spectral" else (read,)
+    read = f"spectrum/{features.spectra.mode}_read.cl"
+    drawn = f"spectrum/{'density' if features.spectra.tabulated_density else 'visible'}.cl"
+    return (read, drawn) if features.spectra.spectral else (read,)
 
 
 def virtual_files(features: Features, layout: str) -> dict[str, tuple[str, ...]]:

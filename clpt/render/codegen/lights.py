@@ -8,6 +8,7 @@ from clpt.geometry import shape_records
 from clpt.records import LIGHT, SHAPE
 from clpt.render.codegen.dispatch import Case, Function, active, choose, function, masked
 from clpt.render.contract import light_records
+from clpt.render.contract.features import Features
 from clpt.render.contract.light_records import (
     BASES,
     BOTH,
@@ -33,24 +34,35 @@ def virtual_files() -> dict[str, str]:
     return files
 
 
-def dispatch_text(
-    kinds: Iterable[str],
-    textured: bool = False,
-    two_sided: bool = False,
-    tree: bool = False,
-    densities: str = "",
-    aimed: bool = False,
-    grouped: bool = False,
-    moving: bool = False,
-    deforming: bool = False,
-) -> str:
-    """Return the functions over all lights, for the kinds in the scene (`LightRows.kinds`).
+def emission_sources(features: Features) -> frozenset[str]:
+    """Return where the emissions of all lights come from."""
+    return features.materials.sources_of("emission").get("value", frozenset({"constant"}))
 
-    textured: some emission is a texture, so that triangles need the uv of their mesh; two_sided:
-    some shape emits from its back too; tree: the rows are followed by a tree that chooses among
-    them; densities: the functions that weigh light paths, where there are some; aimed: some of
-    these start toward what is sharp; grouped: a sample tells its light; moving: some lights move;
-    deforming: triangles of some have a row for each key. It includes the files of
+
+def textured(features: Features) -> bool:
+    """Whether some emission is a texture, so that triangles need the uv of their mesh."""
+    return "texture" in emission_sources(features)
+
+
+def kinds_of(features: Features) -> list[str]:
+    """Return the kinds of lights in the scene, in the order of their table."""
+    return [kind for kind in KINDS if kind in features.lights.kinds]
+
+
+def surfaces_of(features: Features) -> list[str]:
+    """Return those of these kinds that are shapes."""
+    return [kind for kind in kinds_of(features) if kind in shape_records.RECORDS]
+
+
+def others_of(features: Features) -> list[str]:
+    """Return those of these kinds that have parameters of their own, off all shapes."""
+    return [kind for kind in kinds_of(features) if kind in RECORDS]
+
+
+def dispatch_text(features: Features, densities: str = "") -> str:
+    """Return the functions over all lights.
+
+    densities: the functions that weigh light paths, where there are some. It includes the files of
     `virtual_files`, here and in clpt.render.codegen.shapes.
 
     light_sample(scene, p, hemisphere, pick, u, lambdas): chooses a light and a direction to it
@@ -59,33 +71,24 @@ def dispatch_text(
     infinite_light(scene, row, p, hemisphere, d, lambdas, ...): radiance and pdf of an infinite one
     infinite_gather(scene, p, hemisphere, d, pdf, lambdas): what they add to a path that left
     """
-    present = [kind for kind in KINDS if kind in set(kinds)]
-    others = [kind for kind in present if kind in RECORDS]
-    surfaces = [kind for kind in present if kind in shape_records.RECORDS]
+    present, others, surfaces = kinds_of(features), others_of(features), surfaces_of(features)
     includes = ["path/surface_flags.cl", "interface/shape.cl", "interface/light.cl", "core/mis.cl"]
     includes += ["lighting/light_choice.cl"]
     includes += ["generated/textures.cl", "generated/medium.cl"] if VOLUME in others else []
     includes += [f"generated/light/{kind}.cl" for kind in others]
     includes += [f"generated/shape/{kind}.cl" for kind in surfaces]
     includes += ["light/area.cl"] if surfaces else []
-    includes += ["light/moving.cl"] if moving else []
-    includes += ["light/deforming.cl"] if deforming else []
+    includes += ["light/moving.cl"] if features.motion.lights else []
+    includes += ["light/deforming.cl"] if features.motion.emitters else []
     words = shape_records.RECORDS["triangle"].words
-    parts = [f"#define TRIANGLE_ROW_WORDS {words}"] * deforming
+    parts = [f"#define TRIANGLE_ROW_WORDS {words}"] * features.motion.emitters
     parts += [f"#define LIGHT_ROW_WORDS {LIGHT.words}", f"#define SHAPE_ROW_WORDS {SHAPE.words}"]
     parts += [f"#define LIGHT_{kind.upper()} {KINDS.index(kind)}" for kind in present]
     parts += [f'#include "{name}"' for name in includes]
-    parts += _tree_text() if tree else []
-    parts.append(_sides_text(two_sided))
-    weighed = bool(densities)
-    parts.append(
-        _sample_text(
-            others, surfaces, textured, two_sided, tree, weighed, aimed, grouped, moving, deforming
-        )
-    )
-    parts += [_pdf_text(surfaces, tree, moving, deforming), densities]
-    parts += [_brick_pdf_text(tree)] if VOLUME in present else []
-    parts += _infinite_text([kind for kind in others if kind in INFINITE], tree, moving)
+    parts += _tree_text() if features.lights.tree else []
+    parts += [_sides_text(features), _sample_text(features), _pdf_text(features), densities]
+    parts += [_brick_pdf_text(features)] if VOLUME in present else []
+    parts += _infinite_text(features)
     return "\n".join(parts) + "\n"
 
 
@@ -94,9 +97,9 @@ def kind_test(kind: str, kinds: Iterable[str]) -> str:
     return "" if {*kinds} == {kind} else f"l.kind == LIGHT_{kind.upper()}"
 
 
-def row_text(kind: str, deforming: bool = False) -> str:
+def row_text(features: Features, kind: str) -> str:
     """The kind's parameters of the light `l`; other lanes read the first row, see `blank_row`."""
-    if deforming and kind == "triangle":
+    if features.motion.emitters and kind == "triangle":
         return "triangle_then(scene, l, m)"
     table = "light_params" if kind in RECORDS else "geometry"
     return f"{kind}_row(scene.{table}, {active('l.params')})"
@@ -126,28 +129,23 @@ def _tree_text() -> list[str]:
     ]
 
 
-def _sides_text(two_sided: bool) -> str:
+def _sides_text(features: Features) -> str:
     """Whether the side of a shape that a ray met emits; most scenes need not look at the row."""
-    if not two_sided:
+    if not features.lights.two_sided:
         return "#define light_shows(scene, row, front) (front)"
     mode = "light_at(scene, max_i(row, (integer)(0))).emission_mode"
     head = "mask light_shows(Scene scene, integer row, mask front)"
     return function(head, f"return front | ({mode} == {BOTH});")
 
 
-def _sample_text(
-    others: list[str],
-    surfaces: list[str],
-    textured: bool,
-    two_sided: bool,
-    tree: bool,
-    weighed: bool,
-    aimed: bool,
-    grouped: bool,
-    moving: bool,
-    deforming: bool,
-) -> str:
-    kinds = [*others, *surfaces]
+def _sample_text(features: Features) -> str:
+    """`light_sample`: a light that is chosen by `pick`, and a direction to it."""
+    others, surfaces = others_of(features), surfaces_of(features)
+    kinds, moving, weighed = (
+        [*others, *surfaces],
+        features.motion.lights,
+        features.transport.balanced,
+    )
     head = (
         "LightSample light_sample(Scene scene, vec3 p, vec3 hemisphere, real pick, vec2 u, "
         "Wavelengths lambdas)"
@@ -155,7 +153,7 @@ def _sample_text(
     if not kinds:
         return function(head, "return light_sample_nothing();")
     number = "FEW_LIGHTS ? &u.x : &pick"
-    if tree:
+    if features.lights.tree:
         rows = [
             "real pmf;",
             f"integer row = light_tree_pick(scene, p, hemisphere, {number}, u.y, &pmf);",
@@ -172,7 +170,7 @@ def _sample_text(
         ]
     for kind in others:
         seen = "hemisphere" if kind in INFINITE else "p"
-        sampled = f"{kind}_sample({row_text(kind)}, scene, {seen}, u, lambdas)"
+        sampled = f"{kind}_sample({row_text(features, kind)}, scene, {seen}, u, lambdas)"
         rows += choose("s", "LightSample", Case(kind_test(kind, kinds), sampled))
     if surfaces:
         rows += [
@@ -180,13 +178,13 @@ def _sample_text(
             "TexturePoint point = texture_point_nowhere();",
         ]
     for kind in surfaces:
-        sampled = f"ShapeSample r = {kind}_sample({row_text(kind, deforming)}, p, u);"
-        point = point_text(kind, "r.uv") if textured else ()
+        sampled = f"ShapeSample r = {kind}_sample({row_text(features, kind)}, p, u);"
+        point = point_text(kind, "r.uv") if textured(features) else ()
         rows += choose("q", "ShapeSample", Case(kind_test(kind, kinds), "r", (sampled, *point)))
     if moving:
         rows.append("s = light_moved(motion, s);")
         rows += ["q = area_moved(motion, q);", "p = seen_from;"] if surfaces else []
-    if two_sided:
+    if features.lights.two_sided:
         rows.append(f"q = area_turned(q, l.emission_mode == {BOTH});")
     if surfaces:
         rows += [
@@ -194,21 +192,23 @@ def _sample_text(
             "Spectrum le = emission_load(scene, l.radiance, point, lambdas);",
             "s = light_sample_sel(l.shape >= 0, area_sample(q, point.p, le), s);",
         ]
-    pmf = "pmf" if tree else "l.pmf"
+    pmf = "pmf" if features.lights.tree else "l.pmf"
     rows.append(f"s = light_chosen(s, {pmf});")
-    if weighed or grouped or VOLUME in others:
+    if weighed or features.film.layers.light_groups or VOLUME in others:
         rows.append("s.row = row;")
     if weighed:
         rows.append(f"s.chance = {pmf};")
-    if aimed:
+    if features.transport.aimed:
         rows.append(f"s.n = {'q.n' if surfaces else NOWHERE};")
     return function(head, *rows, "return s;")
 
 
-def _pdf_text(surfaces: list[str], tree: bool, moving: bool, deforming: bool) -> str:
+def _pdf_text(features: Features) -> str:
+    """`light_pdf`: of a direction in which a ray has met a light."""
+    surfaces = surfaces_of(features)
     at, along, far, front = ("p", "wi", "t", "n")
     before = ["LightRow l = light_at(scene, row);"]
-    if moving and surfaces:
+    if features.motion.lights and surfaces:
         at, along, far, front = ("rest", "along", "far", "front")
         before += [
             "Motion motion = motion_of_light(scene, row, l);",
@@ -223,30 +223,34 @@ def _pdf_text(surfaces: list[str], tree: bool, moving: bool, deforming: bool) ->
         [
             Case(
                 kind_test(kind, surfaces),
-                f"{kind}_pdf({row_text(kind, deforming)}, {at}, {along}, {far}, {front})",
+                f"{kind}_pdf({row_text(features, kind)}, {at}, {along}, {far}, {front})",
             )
             for kind in surfaces
         ],
         tuple(before),
-        f"value * {pmf_text(tree)}",
+        f"value * {pmf_text(features)}",
     ).text()
 
 
-def _brick_pdf_text(tree: bool) -> str:
-    """The same for a point of a medium that emits, at a distance t from p."""
+def _brick_pdf_text(features: Features) -> str:
+    """`brick_light_pdf`: of a point of a medium that emits, at a distance t from p."""
     head = "real brick_light_pdf(Scene scene, integer row, vec3 p, vec3 hemisphere, real t)"
     rows = ["LightRow l = light_at(scene, row);", "mask m = mask_of(1);"]
-    rows.append(f"return emissive_brick_pdf({row_text(VOLUME)}, t) * {pmf_text(tree)};")
+    pdf = f"emissive_brick_pdf({row_text(features, VOLUME)}, t)"
+    rows.append(f"return {pdf} * {pmf_text(features)};")
     return function(head, *rows)
 
 
-def pmf_text(tree: bool) -> str:
+def pmf_text(features: Features) -> str:
     """The chance of the light `l` in row `row`, for a surface at p."""
-    return "light_tree_pmf(scene, (integer)(row), p, hemisphere)" if tree else "l.pmf"
+    chosen = "light_tree_pmf(scene, (integer)(row), p, hemisphere)"
+    return chosen if features.lights.tree else "l.pmf"
 
 
-def _infinite_text(kinds: list[str], tree: bool, moving: bool) -> list[str]:
-    """`row` is the same in all lanes."""
+def _infinite_text(features: Features) -> list[str]:
+    """`infinite_light`, whose `row` is the same in all lanes, and `infinite_gather`."""
+    kinds = [kind for kind in others_of(features) if kind in INFINITE]
+    moving = features.motion.lights
     if not kinds:
         return []
     rows = [
@@ -264,12 +268,12 @@ def _infinite_text(kinds: list[str], tree: bool, moving: bool) -> list[str]:
     for kind in kinds:
         rows += masked(
             kind_test(kind, kinds),
-            f"{RECORDS[kind].name} light = {row_text(kind)};",
+            f"{RECORDS[kind].name} light = {row_text(features, kind)};",
             f"*radiance = spectrum_sel(m, {kind}_radiance(light, scene, d, lambdas), *radiance);",
             f"*pdf = sel(m, {kind}_pdf(light, scene, hemisphere, d), *pdf);",
         )
     rows += ["hemisphere = tree_hemisphere;"] if moving else []
-    rows.append(f"*pdf *= {pmf_text(tree)};")
+    rows.append(f"*pdf *= {pmf_text(features)};")
     head = (
         "void infinite_light(Scene scene, int row, vec3 p, vec3 hemisphere, vec3 d, "
         "Wavelengths lambdas, Spectrum *radiance, real *pdf)"

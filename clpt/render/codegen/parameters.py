@@ -204,19 +204,19 @@ def medium_text(sources: Mapping[str, frozenset[str]]) -> str:
 
 
 def _medium_sources(features: Features) -> dict[str, frozenset[str]]:
-    names = ("absorption", "scattering") if features.media else ("absorption",)
-    light = {"light": features.sources_of("medium")["light"]} if features.emissive_media else {}
-    return {
-        name: frozenset(source for _, found, source in features.sources if found == name)
-        for name in names
-    } | light
+    names = ("absorption", "scattering") if features.media.present else ("absorption",)
+    loaded = features.materials.sources
+    found = {name: frozenset(s for _, own, s in loaded if own == name) for name in names}
+    if features.media.emissive:
+        found["light"] = features.materials.sources_of("medium")["light"]
+    return found
 
 
 def virtual_files(features: Features) -> dict[str, str]:
     """Return the loaders of what surfaces have besides their materials' own parameters."""
-    weights = features.sources_of("mixture").get("weight")
-    bodies = features.sources_of("body").get("index")
-    maps = features.sources_of("perturbation").get("value")
+    weights = features.materials.sources_of("mixture").get("weight")
+    bodies = features.materials.sources_of("body").get("index")
+    maps = features.materials.sources_of("perturbation").get("value")
     real = Param("real", "", textured=True)
     return {
         "generated/medium_coefficients.cl": medium_text(_medium_sources(features)),

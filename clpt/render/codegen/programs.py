@@ -55,16 +55,16 @@ def _stages(
     features: Features, layout: str, lanes: int, interleaved: bool, part: bool = False
 ) -> dict[str, device.Source]:
     """The texts of a bounce but for queues and shading, see `sources`; part: of a loop."""
-    files, defines = _shared(features, layout), flags.defines(flags.SCENE, features)
+    files, defines = _shared(features, layout), flags.of_scene(features)
     make = functools.partial(_source, part=part)
     begin, join = bounce.begin_and_join(features)
     trace_lanes = bounce.trace_lanes(layout, lanes)
     join_lanes = bounce.join_lanes(features, layout, lanes, interleaved)
     rays: Files = {}
     if interleaved and layout != "brute":
-        traced = "curves" if "curves" in features.analytic else "interleaved"
+        traced = "curves" if "curves" in features.geometry.analytic else "interleaved"
         rays["generated/trace.cl"] = (f"tracing/trace_{traced}.cl",)
-    joins = {**files, **(rays if features.analytic else {})}
+    joins = {**files, **(rays if features.geometry.analytic else {})}
     if begin == "flare":
         return {
             begin: make(begin, files, defines, lanes),
@@ -82,10 +82,10 @@ def _stages(
         texts["deposit"] = make("deposit", files, defines, lanes)
     if bounce.trains(features):
         texts["train"] = make("train", files, defines, lanes)
-    if features.media:
+    if features.media.present:
         flight = bounce.flight(features)
         texts[flight] = make(flight, files, defines, lanes, "flight")
-    if features.mixtures:
+    if features.materials.mixtures:
         texts["mix"] = make("mix", files, defines, lanes)
     return texts
 
@@ -94,9 +94,9 @@ def _shading(
     features: Features, layout: str, lanes: int, *, queued: bool = False, part: bool = False
 ) -> dict[str, device.Source]:
     """The texts that shade, see `sources`; part: of a loop, for all kinds of paths of the scene."""
-    files, defines = _shared(features, layout), flags.defines(flags.SCENE, features)
+    files, defines = _shared(features, layout), flags.of_scene(features)
     texts = {}
-    for cls in features.leaves:
+    for cls in features.materials.leaves:
         own = {
             **files,
             **choices.material_files(features, cls),
@@ -106,7 +106,7 @@ def _shading(
             own["generated/shading_frame.cl"] = ("path/phase_frame.cl",)
         if cls.source is not None:
             own[f"{cls.folder}/{cls.kind}.cl"] = custom_materials.text(cls)
-        kind = {**flags.defines(flags.MATERIAL, features, cls), "QUEUED": int(queued)}
+        kind = {**flags.of_material(features, cls), "QUEUED": int(queued)}
         if part and bounce.has_both(features):
             own["generated/integrator.cl"] = BOTH
             kind["SHADES_BOTH"] = 1
@@ -148,14 +148,14 @@ def loop_sources(
         "generated/block.cl": blocks.blocks_text(features.passes),
         "generated/loop.cl": bounce.loop_text(features, layout, lanes, interleaved),
     }
-    loop = _source("loop", files, flags.defines(flags.SCENE, features), lanes)
+    loop = _source("loop", files, flags.of_scene(features), lanes)
     parts = {name: made[name].with_private(name) for name in used}
     return {**parts, "loop": loop.with_private("loop")}
 
 
 def _alone(features: Features, layout: str, *names: str) -> dict[str, device.Source]:
     """The texts of programs whose work-items serve a pixel each."""
-    files, defines = _shared(features, layout), flags.defines(flags.SCENE, features)
+    files, defines = _shared(features, layout), flags.of_scene(features)
     return {name: _source(name, files, defines, 1) for name in names}
 
 
@@ -180,7 +180,6 @@ def _source(
 
 def _shared(features: Features, layout: str) -> Files:
     """The generated files that are the same for all programs of a scene."""
-    textured = "texture" in stages.emission_sources(features)
     return {
         **shapes.virtual_files(),
         **rough_coat_table.virtual_files(),
@@ -188,29 +187,16 @@ def _shared(features: Features, layout: str) -> Files:
         **signatures.virtual_files(features, layout),
         **parameters.virtual_files(features),
         **choices.virtual_files(features, layout),
-        "generated/camera.cl": stages.camera_text(
-            features.camera,
-            features.glass_lens,
-            features.lens_losses or features.lens_ghosts,
-            "camera" in features.moving,
-        ),
+        "generated/camera.cl": stages.camera_text(features.camera, moves=features.motion.camera),
         "generated/connect.cl": stages.connect_text(features),
         "generated/screen.cl": stages.screen_text(features),
-        "generated/photon.cl": stages.photon_text(features) if features.merged else "",
-        "generated/emission.cl": emission.dispatch_text(
-            features.lights,
-            textured,
-            features.two_sided_lights,
-            features.aimed,
-            "lights" in features.moving,
-            "emitters" in features.moving,
-        ),
+        "generated/photon.cl": stages.photon_text(features) if features.transport.merged else "",
+        "generated/emission.cl": emission.dispatch_text(features),
         "generated/textures.cl": textures.dispatch_text(
             features.textures,
-            features.texture_roles,
-            features.texture_depth,
-            features.texture_mappings,
-            any(flags.filters_at_random(features, cls) for cls in features.leaves),
+            stochastic=any(
+                flags.filters_at_random(features, cls) for cls in features.materials.leaves
+            ),
         ),
         "generated/lights.cl": stages.lights_text(features),
         "generated/null_transmittance.cl": stages.null_transmittance_text(features),

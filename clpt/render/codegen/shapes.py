@@ -22,24 +22,24 @@ def virtual_files() -> dict[str, str]:
 
 def hit_text(features: Features) -> str:
     """Return `shape_hit`: meeting one analytic shape, which is the same for all lanes."""
-    if not features.analytic:
+    if not features.geometry.analytic:
         return ""
     word = {member.name: member.word for member in SHAPE.members}
-    moves = "shapes" in features.moving
+    moves = features.motion.shapes
     answer = "none =" if moves else "return"
     none = "ShapeHit none = {FAR, {0.0f, 0.0f, 1.0f}, {0.0f, 0.0f}};"
     moved = _at_rest(word["number"], none) if moves else []
     back = _in_motion() if moves else [none]
-    curves = "curves" in features.analytic
+    curves = "curves" in features.geometry.analytic
     number = f"(integer)((int)shape[{word['number']}])"
     piece = f"scene.spheres + (int)gather_i(scene.geometry, params + {_FIRST}) + CURVE_WORDS * prim"
     beside = f"if (kind == {_number('curves')} && curve_beside_one({piece}, o, d)) return none;"
     cases = [beside] * curves + [
         f"if (kind == {_number(kind)}) {answer} {ONE_OF.get(kind, kind)}_intersect("
         f"{_row_text(features, kind, 'params', number)}, o, d, tmin, tmax);"
-        for kind in features.analytic
+        for kind in features.geometry.analytic
     ]
-    many = len(ONE_OF.keys() & set(features.analytic))
+    many = len(ONE_OF.keys() & set(features.geometry.analytic))
     # What moves by itself needs its own row to be met too.
     rows = ("single", "many", "mixed")[2 if many and (moves or _keyed(features)) else many]
     signature = (
@@ -84,10 +84,10 @@ def _in_motion() -> list[str]:
 
 def points_text(features: Features) -> str:
     """Return what shading asks of points of analytic shapes, `<verb>_of_shape`, in lanes."""
-    if not features.analytic:
+    if not features.geometry.analytic:
         return ""
     functions = [_of_shape(features, "vec3", "onto", "vec3 p"), _of_shape(features, "real", "size")]
-    if features.tangents:
+    if features.geometry.tangents:
         point = ("vec3 p", "vec2 uv")
         functions += [_of_shape(features, "vec3", verb, *point) for verb in ("dpdu", "dpdv")]
     return _includes(features) + "".join(functions)
@@ -104,14 +104,16 @@ def _of_shape(features: Features, type_: str, verb: str, *parameters: str) -> st
             f"{ONE_OF.get(kind, kind)}_{verb}"
             f"({', '.join((_row_text(features, kind, *at, 'm'), *names))})",
         )
-        for kind in features.analytic
+        for kind in features.geometry.analytic
     ]
     nothing = "0.0f" if type_ == "real" else "v3(0.0f, 0.0f, 0.0f)"
     return Function(f"{type_} {verb}_of_shape({head})", nothing, cases).text()
 
 
 def _includes(features: Features) -> str:
-    files = "".join(f'#include "generated/shape/{kind}.cl"\n' for kind in features.analytic)
+    files = "".join(
+        f'#include "generated/shape/{kind}.cl"\n' for kind in features.geometry.analytic
+    )
     if not _keyed(features):
         return files
     first = f"#define SPHERES_FIRST {ROWS['sphere'].words}\n"
@@ -120,7 +122,7 @@ def _includes(features: Features) -> str:
 
 def _keyed(features: Features) -> bool:
     """Whether many spheres in one shape have a row for each key."""
-    return "spheres" in features.moving
+    return features.motion.spheres
 
 
 def _number(kind: str) -> int:

@@ -96,16 +96,16 @@ def trace_args(features: Features, layout: str) -> dict[str, str]:
     if layout == "brute":
         return {"tris": "global const float *", "triangles": "uint "}
     trees = dict.fromkeys(("nodes", "leaves"), "global const float *")
-    if features.analytic:
+    if features.geometry.analytic:
         trees |= {"shape_nodes": "global const float *", "shape_indices": "global const uint *"}
-    if features.instances:
+    if features.geometry.instances:
         trees["instance_nodes"] = "global const float *"
     return trees
 
 
 def begin_args(features: Features) -> dict[str, str]:
     """Return what the stage takes that begins paths."""
-    film = ["film", "bands"] if features.bands else ["film"]
+    film = ["film", "bands"] if features.film.bands else ["film"]
     own = {"footprints": "global long *"} if features.film_weights else {}
     rest = {"counters": "global uint *", "work_list": "global const uint *", "samples": "int2 "}
     layers = layer_args(features) | light_layer_args(features)
@@ -114,49 +114,51 @@ def begin_args(features: Features) -> dict[str, str]:
 
 def join_args(features: Features, layout: str) -> dict[str, str]:
     """Return what the stage takes that tests rays to lights or, in `splat`, to the camera."""
-    own = begin_args(features) if features.light_paths else {}
+    own = begin_args(features) if features.transport.light_paths else {}
     splats = {n: type_ for n, type_ in own.items() if n in ("film", "bands", "counters")}
     return {**trace_args(features, layout), **splats, **light_layer_args(features)}
 
 
 def deposit_args(features: Features) -> dict[str, str]:
     """Return what the stage takes that keeps light paths as photons."""
-    if features.guided and features.light_paths:
+    if features.transport.guided and features.transport.light_paths:
         return {"guide": "global uint *"}
-    if not (features.merged and features.light_paths):
+    if not (features.transport.merged and features.transport.light_paths):
         return {}
     return dict.fromkeys(("photons", "photon_numbers"), "global uint *")
 
 
 def merge_args(features: Features) -> dict[str, str]:
     """Return what shading takes that gathers photons."""
-    if features.guided and not features.light_paths:
+    if features.transport.guided and not features.transport.light_paths:
         return {"guide": "global const uint *"}
-    if not features.merged or features.light_paths:
+    if not features.transport.merged or features.transport.light_paths:
         return {}
     return dict.fromkeys(("photons", "photon_order", "photon_cells"), "global const uint *")
 
 
 def layer_args(features: Features) -> dict[str, str]:
     """Return what stages take that add to layers of the first samples, and to mattes."""
-    names = ["layers"] * (features.layer_words > 0) + ["mattes"] * bool(features.mattes)
+    names = ["layers"] * (features.film.layers.words > 0) + ["mattes"] * bool(
+        features.film.layers.mattes
+    )
     return dict.fromkeys(names, "global uint *")
 
 
 def light_layer_args(features: Features) -> dict[str, str]:
     """Return what stages take that add to layers of light."""
-    return {"light_layers": "global uint *"} if features.light_layers else {}
+    return {"light_layers": "global uint *"} if features.film.layers.lights else {}
 
 
 def shade_args(features: Features) -> dict[str, str]:
     """Return what shading takes beside slabs and scene."""
-    light = {} if features.light_paths else light_layer_args(features)
+    light = {} if features.transport.light_paths else light_layer_args(features)
     return {**merge_args(features), **layer_args(features), **light}
 
 
 def flight_args(features: Features) -> dict[str, str]:
     """Return what the stage takes that takes rays through media, beside slabs and scene."""
-    gathers = features.emissive_media and not features.light_paths
+    gathers = features.media.emissive and not features.transport.light_paths
     return light_layer_args(features) if gathers else {}
 
 

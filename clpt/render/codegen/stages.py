@@ -9,18 +9,15 @@ from clpt.records import PHOTON
 from clpt.render.codegen import emission, flags, lights, parameters, thin_films
 from clpt.render.codegen.dispatch import Case, Function, active, function
 from clpt.render.contract import camera_records
-from clpt.render.contract.features import Features
+from clpt.render.contract.features import CameraFeatures, Features, MaterialFeatures
 from clpt.render.contract.parameter_words import MIXTURE, row_words, words
 from clpt.scene.params import MEASURED, device_params, interior_params
 from clpt.scene.scatterer import Scatterer
 
 
-def camera_text(kind: str, glass: bool, losses: bool = False, moves: bool = False) -> str:
-    """Return `camera_ray`, or `camera_weighted_ray`.
-
-    glass: the lens is of one that disperses; losses: what its surfaces reflect counts; moves: the
-    camera does.
-    """
+def camera_text(features: CameraFeatures, *, moves: bool = False) -> str:
+    """Return `camera_ray`, or `camera_weighted_ray`; moves: the camera does."""
+    kind, losses = features.kind, features.losses or features.ghosts
     record = camera_records.RECORDS[kind]
     camera = f"(global const {record.name} *)(scene).camera"
     moving = '#include "camera/moved.cl"\n' * moves
@@ -37,7 +34,7 @@ def camera_text(kind: str, glass: bool, losses: bool = False, moves: bool = Fals
             f"{_moved(f'{kind}_ray(scene, {camera}, film, lens, lambdas, weight)', moves)}\n"
         )
     ray = f"{kind}_ray({camera}, film, lens)"
-    if glass:
+    if features.disperses:
         row = f"(integer)(({camera})->glass)"
         ray = f"{kind}_glass_ray({camera}, film, lens, spectra_row(scene, {row}, lambdas).x)"
     return (
@@ -53,15 +50,15 @@ def _moved(ray: str, moves: bool) -> str:
 def connect_text(features: Features) -> str:
     """Return `camera_connect`, for paths that start at lights, or what ghosts of a lens need;
     nothing where no path is joined."""
-    if features.lit_ghosts and features.light_paths:
+    if features.transport.lit_ghosts and features.transport.light_paths:
         return '#include "camera/lens_ghosts.cl"\n'
-    if not features.joined:
+    if not features.transport.joined:
         return ""
-    kind = features.camera
+    kind = features.camera.kind
     record = camera_records.RECORDS[kind]
     files = f'#include "camera/{kind}_connect.cl"\n'
     camera = f"(global const {record.name} *)(scene).camera"
-    if "camera" in features.moving:
+    if features.motion.camera:
         rest = f"{kind}_connect({camera}, (scene).settings, p, away, lens)"
         return f'{files}#include "camera/moved_connect.cl"\n' + function(
             "CameraPoint camera_connect(Scene scene, vec3 p, mask away, vec2 lens)",
@@ -80,7 +77,7 @@ def screen_text(features: Features) -> str:
     """Return `camera_screen`, where on the film a point is seen, for the layer of motion."""
     if not features.screen_motion:
         return ""
-    kind = features.camera
+    kind = features.camera.kind
     camera = f"(global const {camera_records.RECORDS[kind].name} *)(scene).camera"
     return (
         f'#include "camera/{kind}_screen.cl"\n#define camera_screen(scene, p, away, seen) '
@@ -91,47 +88,25 @@ def screen_text(features: Features) -> str:
 def photon_text(features: Features) -> str:
     """Return the struct of a photon, and `photon_met(kind)`: whether one is kept at a material, or
     at a mixture, of which no part is chosen yet."""
-    kinds = [i for i, cls in enumerate(features.leaves) if flags.gathers_photons(features, cls)]
+    kinds = [
+        i for i, cls in enumerate(features.materials.leaves) if flags.gathers_photons(features, cls)
+    ]
     met = " | ".join(f"((kind) == {kind})" for kind in [*kinds, MIXTURE])
     return f"""{PHOTON.row_text()}{PHOTON.keep_text()}#define PHOTON_WORDS {PHOTON.words}
 #define photon_met(kind) ({met})
 """
 
 
-def emission_sources(features: Features) -> frozenset[str]:
-    """Return where the emissions of all lights come from."""
-    return features.sources_of("emission").get("value", frozenset({"constant"}))
-
-
 def lights_text(features: Features) -> str:
     """Return the loader of emissions, from wherever they come in this scene, and the dispatch."""
-    emissions = emission_sources(features)
-    factors = features.sources_of("factor").get("value", frozenset())
-    densities = ""
-    if features.balanced:
-        densities = emission.densities_text(
-            features.lights,
-            features.two_sided_lights,
-            features.light_tree,
-            features.aimed,
-            "lights" in features.moving,
-            "emitters" in features.moving,
-        )
+    emissions = lights.emission_sources(features)
+    factors = features.materials.sources_of("factor").get("value", frozenset())
+    densities = emission.densities_text(features) if features.transport.balanced else ""
     return (
         ('#include "generated/textures.cl"\n' if "texture" in emissions | factors else "")
         + parameters.emission_text(emissions)
         + (parameters.factor_text(factors) if factors else "")
-        + lights.dispatch_text(
-            features.lights,
-            "texture" in emissions,
-            features.two_sided_lights,
-            features.light_tree,
-            densities,
-            features.aimed,
-            features.light_groups > 0,
-            "lights" in features.moving,
-            "emitters" in features.moving,
-        )
+        + lights.dispatch_text(features, densities)
     )
 
 
@@ -140,13 +115,13 @@ def null_transmittance_text(features: Features) -> str:
 
     A mixture's children are one level below it, since kernels cannot call themselves.
     """
-    leaves = [*enumerate(features.leaves)]
+    leaves = [*enumerate(features.materials.leaves)]
     passing = [f"(MATERIAL_KIND(word) == {i})" for i, cls in leaves if cls.is_null]
     arguments = "(Scene scene, integer word, TexturePoint point, Wavelengths lambdas, real c)"
     passes = f"sel({' | '.join(passing) or 'mask_of(0)'}, (real)(1.0f), (real)(0.0f))"
-    of = "Spectrum" if features.free_panes else "real"
+    of = "Spectrum" if features.materials.free_panes else "real"
     parts, cases = [], []
-    for i, cls in leaves if features.free_panes else ():
+    for i, cls in leaves if features.materials.free_panes else ():
         if cls.is_pane:
             parts += _pane_text(features, cls)
             load = f"{cls.__name__} r = {cls.kind}_load"
@@ -160,7 +135,7 @@ def null_transmittance_text(features: Features) -> str:
             )
     first = Function(f"{of} null_transmittance_0{arguments}", f"passage_of({passes})", cases)
     parts.append(first.text())
-    for level in range(1, features.mixtures + 1):
+    for level in range(1, features.materials.mixtures + 1):
         below = f"null_transmittance_{level - 1}"
         children = (
             f"integer row = {active('MATERIAL_ROW(word)')};",
@@ -169,16 +144,17 @@ def null_transmittance_text(features: Features) -> str:
             f"{of} second = {below}(scene, gather_i(scene.mixtures, row + 3), point, lambdas, c);",
         )
         lerp = "spectrum_add(first, spectrum_scale(spectrum_sub(second, first), w))"
-        value = lerp if features.free_panes else "first + w * (second - first)"
+        value = lerp if features.materials.free_panes else "first + w * (second - first)"
         mixed = Case(f"MATERIAL_KIND(word) == {MIXTURE:#x}", value, children)
         leaf = f"{below}(scene, word, point, lambdas, c)"
         parts.append(Function(f"{of} null_transmittance_{level}{arguments}", leaf, [mixed]).text())
-    return "".join([*parts, f"#define null_transmittance null_transmittance_{features.mixtures}\n"])
+    last = features.materials.mixtures
+    return "".join([*parts, f"#define null_transmittance null_transmittance_{last}\n"])
 
 
 def _pane_text(features: Features, cls: type[Scatterer]) -> list[str]:
     """The struct and the loader of thin glass."""
-    sources = features.sources_of(cls.kind)
+    sources = features.materials.sources_of(cls.kind)
     return [
         '#include "optics/thin_slab.cl"\n',
         parameters.struct_text(cls, sources),
@@ -195,7 +171,8 @@ def functions_text(cls: type[Scatterer], mode: str, features: Features | None = 
 
     features: where its parameters come from; without, all are constants.
     """
-    own, layer = (features.sources_of(kind) if features else {} for kind in (cls.kind, "layer"))
+    loaded = features.materials if features else MaterialFeatures()
+    own, layer = loaded.sources_of(cls.kind), loaded.sources_of("layer")
     boundary = thin_films.boundary_text(cls, mode, own, layer)
     roles = {param.role for param in device_params(cls).values()}
     for role, table in TABLES.items():
@@ -238,17 +215,17 @@ def bsdf_text(features: Features, cls: type[Scatterer]) -> str:
     verbs = ("sample", "eval", "pdf", "albedo", "load", *(("pdfs",) if cls.chromatic else ()))
     return "\n".join(
         [
-            functions_text(cls, features.mode, features),
+            functions_text(cls, features.spectra.mode, features),
             parameters.load_text(
                 cls,
-                features.sources_of(kind),
+                features.materials.sources_of(kind),
                 "materials",
                 flags.filters_at_random(features, cls),
             ),
             f"typedef {cls.__name__} Bsdf;",
             f"#define BSDF_REFLECTIVITY(m) {reflectivity}",
             *(f"#define bsdf_{verb} {kind}_{verb}" for verb in verbs),
-            *(_interior_text(cls) if features.absorption or features.media else ()),
+            *(_interior_text(cls) if features.media.absorbing else ()),
             *(_shift_text(cls) if flags.fluoresces(features, cls) else ()),
             "",
         ]

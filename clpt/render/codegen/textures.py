@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 from clpt.render.codegen.dispatch import Case, Function, active, function
+from clpt.render.contract.features import TextureFeatures
 from clpt.render.contract.texture_records import (
     END,
     IMAGES,
@@ -23,27 +22,20 @@ from clpt.scene.textures import MAPPINGS, Texture
 _LOOKED_UP = "(Scene scene, integer row, TexturePoint point, Wavelengths lambdas)"
 
 
-def dispatch_text(
-    kinds: Iterable[str],
-    roles: Iterable[tuple[str, str]],
-    depth: int = 0,
-    mappings: bool = False,
-    stochastic: bool = False,
-) -> str:
+def dispatch_text(features: TextureFeatures, *, stochastic: bool = False) -> str:
     """Return the look-ups of the (kind, role) pairs in the scene, and the loaders that call them.
 
-    depth: how many values the programs stack; mappings: some texture makes its own uv; stochastic:
-    for some material a random texel stands for a reflectance.
+    stochastic: for some material a random texel stands for a reflectance.
 
     texture_<role>(scene, row, point, lambdas)                 whose row is at a word
     spectrum_texture_<role>(scene, source, point, lambdas)     of 1 + the row, or no texture
     spectrum_texture_texel(scene, source, point, lambdas)      a reflectance, or a texel of it
     real_texture_real(scene, source, point, lambdas)           the same for a real
     """
-    pairs, used = set(roles), set(kinds)
+    pairs, used = set(features.roles), set(features.kinds)
     lines = [f"#define MAPPING_{name.upper()} {i}" for i, name in enumerate(MAPPINGS)]
     lines += [
-        f"#define USES_MAPPINGS {int(mappings)}",
+        f"#define USES_MAPPINGS {int(features.mappings)}",
         f"#define TEXTURE_PERMUTATION {RECORDS['spectral_bitmap'].words}",
     ]
     used |= {level for kind, level in MIPS.items() if kind in used}
@@ -63,7 +55,7 @@ def dispatch_text(
     for role, own in leaves.items():
         parts.append(_look_up(role, own, "texture_leaf" if programs else "texture"))
     if programs:
-        parts += _operand_text(leaves, depth)
+        parts += _operand_text(leaves, features.depth)
     for role in leaves:
         parts += [_with_programs(role, role in programs)] if programs else []
         parts.append(_parameter(role))

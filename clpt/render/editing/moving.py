@@ -19,7 +19,7 @@ from clpt import bvh, transforms
 from clpt.arrays import Points, on_device
 from clpt.geometry import analytic, shapes, strands, triangles
 from clpt.geometry.tessellate import keeps_its_kind
-from clpt.records import SHAPE
+from clpt.records import SHAPE, SHAPE_BITS
 from clpt.render.editing.cannot_move import CannotMove
 from clpt.render.editing.moving_instances import Boxes, Location, MovingInstances
 from clpt.render.editing.moving_spheres import MovingSpheres
@@ -30,7 +30,7 @@ from clpt.scene.params import fields_of
 from clpt.scene.shapes import Curves, Instance, Mesh, Shape, Spheres
 
 _ROOT = "motion/place_vertices.cl"
-_NORMALS = 1  # SHAPE_NORMALS of kernels/path/surface_flags.cl
+_NORMALS = SHAPE_BITS["normals"]
 _MOVABLE = {"to_world", "vertices", "normals", "centers"}  # fields that may change
 REBUILD_EVERY = 16  # moves of analytic shapes, each of which goes its own way
 
@@ -115,13 +115,14 @@ class Moving:
 
     def _plan(self, scene: Scene, replaced: Replacements) -> list[Action]:
         """What enqueues a move. Raises CannotMove."""
-        if any(one.light_paths for one in self.target.lowered.features.passes):
+        features = self.target.lowered.features
+        if any(one.transport.light_paths for one in features.passes):
             raise CannotMove("light is traced from lights, whose choice follows from the shapes")
         if any(shape.motion is not None for shape in scene.shapes):
             raise CannotMove("shapes move while the shutter is open")
-        if "vertices" in self.target.lowered.features.moving:
+        if features.motion.vertices:
             raise CannotMove("vertices move while the shutter is open")
-        if "spheres" in self.target.lowered.features.moving:
+        if features.motion.spheres:
             raise CannotMove("spheres move by themselves while the shutter is open")
         numbers = {id(shape): number for number, shape in enumerate(scene.shapes)}
         actions: list[Action] = []

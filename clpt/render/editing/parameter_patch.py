@@ -30,9 +30,11 @@ def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> Callable[[], N
     pairs = [] if scene.shapes is former.shapes else _pairs(former, scene)
     if pairs is None:
         return "a material is of another kind or structure"
-    if lowered.features.balanced and any(is_sharp(old) != is_sharp(new) for old, new in pairs):
+    if lowered.features.transport.balanced and any(
+        is_sharp(old) != is_sharp(new) for old, new in pairs
+    ):
         return "light paths aim at what is sharp, and a material is so now, or no more"
-    if lowered.features.bodies and pairs:
+    if lowered.features.media.bodies and pairs:
         return "bodies that overlap know each other's indices"
     camera = None
     if scene.camera is not former.camera:
@@ -40,7 +42,7 @@ def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> Callable[[], N
             return "the camera's lens is of another glass"
         film, rows_ = scene.film, lowered.glass_rows
         kind, camera = lower_camera(scene.camera, film.width, film.height, rows_)
-        if kind != lowered.features.camera or len(camera) != len(lowered.tables["camera"]):
+        if kind != lowered.features.camera.kind or len(camera) != len(lowered.tables["camera"]):
             return "the camera is of another kind"
         if _reflects(scene.camera) != _reflects(former.camera):
             return "the camera's lens reflects, or no more"

@@ -81,8 +81,8 @@ def prepare(wavefront: Wavefront, lowered: Lowered, refit: bool = False) -> Call
             "new Renderer",
             where="film",
         )
-    former, new = scene.lowered.features, lowered.features
-    if (former.layers, former.light_groups) != (new.layers, new.light_groups):
+    former, new = scene.lowered.features.film.layers, lowered.features.film.layers
+    if (former.names, former.light_groups) != (new.names, new.light_groups):
         raise SceneError("other layers need a new Renderer", where="film.layers")
     changes = _changes(wavefront, lowered, refit)
     with scene.buffers.all_or_nothing():
@@ -145,7 +145,7 @@ def _stage(wavefront: Wavefront, lowered: Lowered, changes: _Changes) -> _Staged
         which = "triangles and boxes" if changes.triangles else "boxes"
         log.info("trees are built over %s", which)
     if changes.kernels:
-        queue = paths.new_queue(changes.strategy.queued, len(lowered.features.materials))
+        queue = paths.new_queue(changes.strategy.queued, len(lowered.features.materials.kinds))
     return _Staged(tables, new_trees, queue)
 
 

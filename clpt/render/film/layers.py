@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.render.analysis.colour import output_matrix, sensor
-from clpt.render.contract.features import layer_places
+from clpt.render.contract.features.film import layer_places
 from clpt.render.film.cryptomatte import pairs_of
 from clpt.render.film.picture_form import PictureForm
 from clpt.render.film.pictures import Pictures

@@ -10,10 +10,11 @@ import numpy as np
 import pyopencl.array as cl_array
 from numpy.typing import NDArray
 
+from clpt.records import BRICK_SIZES
 from clpt.render.lowering.tables import TableStore
 from clpt.scene.media import ON_POINTS, Cloud, Grid
 
-POINT_WORDS = 365  # of a brick, see kernels/motion/brick_density.cl
+POINT_WORDS = BRICK_SIZES["words"]
 
 
 @dataclass(frozen=True, eq=False)

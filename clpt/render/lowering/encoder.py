@@ -11,7 +11,7 @@ from clpt.errors import SceneError
 from clpt.render.analysis.lights.look import Look
 from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.render.analysis.wavelengths import Density
-from clpt.render.contract.features import Sources
+from clpt.render.contract.features.materials import Sources
 from clpt.render.contract.parameter_words import (
     LAYERS_WORDS,
     ORDERS_WORDS,

@@ -1,128 +1,154 @@
-"""The features of a lowered scene: what it needs of the kernels."""
+"""The features of a lowered scene: what each step of lowering needs of the kernels."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 from clpt.geometry import shape_records
 from clpt.render.analysis.cameras import dispersive_glasses
 from clpt.render.analysis.geometry import Geometry, spheres_move
 from clpt.render.analysis.index import SceneIndex
-from clpt.render.contract.features import Features, disperses
-from clpt.render.contract.texture_records import MIPS
+from clpt.render.contract.features import (
+    CameraFeatures,
+    FilmFeatures,
+    FilterFeatures,
+    GeometryFeatures,
+    LayerFeatures,
+    LightFeatures,
+    MaterialFeatures,
+    MediaFeatures,
+    MotionFeatures,
+    TextureFeatures,
+    TransportFeatures,
+)
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.lights.lights import LightRows
 from clpt.render.lowering.materials.material_words import MaterialWords
 from clpt.scene.cameras import Lens
-from clpt.scene.media import Grid, Lattice
 
 FEW_LIGHTS = 256  # up to which one random number chooses a light and a point on it
 FEW_INSTANCES = 2  # up to which rays go to each, where some deform
 INTEGRATORS = {"direct": "path", "vcm": "path"}  # kinds that have the kernels of another one
 
 
-def features_of(
-    index: SceneIndex,
-    encoder: Encoder,
-    materials: MaterialWords,
-    geometry: Geometry,
-    lights: LightRows,
-    tabulated_density: bool,
-    profile: int,
-    aimed: bool,
-    medium_aims: int,
-    sealed: bool,
-    motion_row: int,
-) -> Features:
-    """Return the features of a scene, from what each step of its lowering has met.
-
-    profile: where in `distributions` the values of the pixel filter begin;
-    aimed: whether light paths aim;
-    medium_aims: places of lamps that flights through media aim at; sealed: whether there are media
-    that rays to lights cannot leave;
-    motion_row: where in `distributions` the table of what moves begins.
-    """
-    scene, textures = index.scene, encoder.textures
-    sources = encoder.sources
-    mips = any(kind in MIPS for kind, _ in textures.roles)
-    tangents = materials.tangents or index.normal_mapped or mips
-    uvs = materials.uvs or geometry.uvs or tangents or "uv" in index.layers
-    glass_lens = index.spectral and bool(dispersive_glasses(scene.camera))
-    return Features(
-        mode=index.mode,
-        camera=scene.camera.kind,
-        sampler=scene.sampler.kind,
-        filter=scene.film.filter.kind,
-        filter_taps=index.filter_taps,
-        filter_reach=index.filter_reach,
-        integrator=INTEGRATORS.get(scene.integrator.kind, scene.integrator.kind),
-        leaves=index.leaves,
-        transmitting=tuple(sorted(materials.transmitting)),
-        shining=index.shining,
-        lights=lights.kinds,
-        textures=tuple(sorted({kind for kind, _ in textures.roles})),
-        texture_roles=tuple(sorted(textures.roles)),
-        texture_depth=textures.depth,
-        texture_mappings=textures.mappings,
-        attributes=bool(textures.attributes),
-        analytic=tuple(kind for kind in shape_records.ANALYTIC if kind in geometry.analytic),
-        instances=bool(index.prototypes),
-        only_instances=bool(index.prototypes) and not geometry.world_vertices,
-        few_instances=_few(index, geometry),
-        normals=geometry.normals,
-        uvs=uvs,
-        tangents=tangents,
-        mixtures=materials.mixture_depth,
-        normal_mapped=index.normal_mapped,
-        null_surfaces=index.free_panes or any(cls.is_null for cls in index.leaves),
-        free_panes=index.free_panes,
-        infinite=lights.infinite > 0,
-        light_paths=index.light_paths,
-        weighed=index.weighed > 0,
-        joined=index.joined and (index.light_paths or index.weighed > 0),
-        merged=index.merged,
-        guided=index.guided,
-        aimed=aimed,
-        light_filter=(*index.spread, profile) if index.weighed else (0, 0, 0),
-        visible_lights=lights.visible,
-        two_sided_lights=lights.two_sided,
-        light_tree=lights.tree is not None,
-        many_lights=len(lights.rows) > FEW_LIGHTS,
-        absorption=materials.absorption,
-        media=index.has_media,
-        bodies=index.nested,
-        chromatic_media=any(medium.is_chromatic for medium in index.media),
-        medium_aims=medium_aims,
-        sealed_media=sealed and not (index.balanced or index.guided),
-        emissive_media=bool(index.emitting),
-        emissive_grids=index.glowing,
-        hot_grids=any(getattr(one, "temperature", None) is not None for one in index.emitting),
-        grids=any(isinstance(medium, Lattice) for medium in index.media),
-        moving=moving_parts(index, geometry),
-        motion_scales=index.motions.scales,
-        motion_row=motion_row,
-        tinted_grids=index.tinted,
-        dyed_media=index.dyed,
-        coloured_grids=index.coloured,
-        mixed_grids=index.most_parts,
-        byte_grids=any(isinstance(one, Grid) and one.bits == 8 for one in index.media),
-        dispersion=glass_lens or disperses(index.leaves, sources),
-        glass_lens=glass_lens,
-        lens_losses=isinstance(scene.camera, Lens) and scene.camera.reflects,
-        lens_ghosts=index.lit_ghosts or getattr(scene.camera, "ghosts", 0.0) > 0.0,
-        lit_ghosts=index.lit_ghosts,
-        bands=bool(scene.film.bands),
-        alpha=index.alpha,
-        layers=index.layers,
-        tabulated_density=tabulated_density,
-        spectra_size=encoder.spectra.samples,
-        spectra_step=encoder.spectra.step,
-        sources=sources,
+def of_camera(index: SceneIndex) -> CameraFeatures:
+    """Return the features of a scene's camera."""
+    camera = index.scene.camera
+    return CameraFeatures(
+        kind=camera.kind,
+        disperses=index.spectral and bool(dispersive_glasses(camera)),
+        losses=isinstance(camera, Lens) and camera.reflects,
+        ghosts=index.lit_ghosts or getattr(camera, "ghosts", 0.0) > 0.0,
     )
 
 
-def _few(index: SceneIndex, geometry: Geometry) -> int:
-    """Return how many instances there are, if so few that a tree over them does not pay."""
+def of_film(index: SceneIndex, layers: LayerFeatures) -> FilmFeatures:
+    """Return the features of the camera's film, which has these layers."""
+    film = index.scene.film
+    return FilmFeatures(
+        filter=FilterFeatures(film.filter.kind, index.filter_taps, index.filter_reach),
+        layers=layers,
+        bands=bool(film.bands),
+        alpha=index.alpha,
+    )
+
+
+def of_transport(index: SceneIndex, profile: int, *, aimed: bool) -> TransportFeatures:
+    """Return the features of what paths do.
+
+    profile: where in `distributions` the values of the pixel filter begin; aimed: whether light
+    paths aim at something.
+    """
+    integrator, weighed = index.scene.integrator.kind, index.weighed > 0
+    return TransportFeatures(
+        integrator=INTEGRATORS.get(integrator, integrator),
+        sampler=index.scene.sampler.kind,
+        light_paths=index.light_paths,
+        weighed=weighed,
+        joined=index.joined and (index.light_paths or weighed),
+        merged=index.merged,
+        guided=index.guided,
+        aimed=aimed,
+        lit_ghosts=index.lit_ghosts,
+        light_filter=(*index.spread, profile) if weighed else (0, 0, 0),
+    )
+
+
+def of_lights(lights: LightRows) -> LightFeatures:
+    """Return the features of the rows of `lights`."""
+    return LightFeatures(
+        kinds=lights.kinds,
+        infinite=lights.infinite > 0,
+        visible=lights.visible,
+        two_sided=lights.two_sided,
+        tree=lights.tree is not None,
+        few=len(lights.rows) <= FEW_LIGHTS,
+    )
+
+
+def of_media(
+    index: SceneIndex, materials: MaterialWords, aims: int, *, sealed: bool
+) -> MediaFeatures:
+    """Return the features of a scene's media.
+
+    aims: places of lamps that flights through media aim at; sealed: whether there are media that
+    rays to lights cannot leave.
+    """
+    return MediaFeatures(
+        absorption=materials.absorption,
+        present=index.has_media,
+        chromatic=any(medium.is_chromatic for medium in index.media),
+        emissive=bool(index.emitting),
+        dyed=index.dyed,
+        sealed=sealed and not (index.balanced or index.guided),
+        bodies=index.nested,
+        aims=aims,
+        grids=index.grids,
+    )
+
+
+def of_motion(index: SceneIndex, geometry: Geometry, row: int) -> MotionFeatures:
+    """Return what of a scene moves while its shutter is open.
+
+    row: where in `distributions` the table of that begins.
+    """
+    motions = index.motions
+    analytic = {one.number for one in index.placed if one.shape.kind in shape_records.ANALYTIC}
+    placed = {int(number) for prototype in index.prototypes for number in prototype.numbers}
+    lit = {int(geometry.rows[one.shape_row]["number"]) for one in geometry.emitters}
+    numbers = motions.shapes.keys()
+    found = MotionFeatures(
+        camera=motions.camera is not None,
+        instances=bool(placed & numbers),
+        shapes=bool(analytic & numbers),
+        lights=bool(motions.lamps) or bool(lit & numbers),
+        vertices=_keyed(geometry),
+        spheres=spheres_move(index),
+        emitters=any(one.keys > 1 for one in geometry.emitters),
+        scales=motions.scales,
+    )
+    return replace(found, row=row) if found.present else found
+
+
+def of_geometry(
+    index: SceneIndex, geometry: Geometry, materials: MaterialWords, textures: TextureFeatures
+) -> GeometryFeatures:
+    """Return the features of a scene's shapes, of which materials and textures ask something too.
+
+    Where the tangents lie that meshes say is known when they are lowered.
+    """
+    tangents = materials.tangents or index.normal_mapped or textures.mips
+    instances = bool(index.prototypes)
     count = len(geometry.instances.rows)
-    return count if _keyed(geometry) and count <= FEW_INSTANCES else 0
+    return GeometryFeatures(
+        analytic=tuple(kind for kind in shape_records.ANALYTIC if kind in geometry.analytic),
+        instances=instances,
+        only_instances=instances and not geometry.world_vertices,
+        few_instances=count if _keyed(geometry) and count <= FEW_INSTANCES else 0,
+        normals=geometry.normals,
+        uvs=materials.uvs or geometry.uvs or tangents or "uv" in index.layers,
+        tangents=tangents,
+    )
 
 
 def _keyed(geometry: Geometry) -> bool:
@@ -130,21 +156,25 @@ def _keyed(geometry: Geometry) -> bool:
     return any(count > 1 for count in geometry.keys.values())
 
 
-def moving_parts(index: SceneIndex, geometry: Geometry) -> tuple[str, ...]:
-    """Return what of a scene moves while its shutter is open."""
-    motions = index.motions
-    analytic = {one.number for one in index.placed if one.shape.kind in shape_records.ANALYTIC}
-    placed = {int(number) for prototype in index.prototypes for number in prototype.numbers}
-    lit = {int(geometry.rows[one.shape_row]["number"]) for one in geometry.emitters}
-    deform = any(one.keys > 1 for one in geometry.emitters)
-    numbers = motions.shapes.keys()
-    found = {
-        "camera": motions.camera is not None,
-        "instances": bool(placed & numbers),
-        "shapes": bool(analytic & numbers),
-        "lights": bool(motions.lamps) or bool(lit & numbers),
-        "vertices": _keyed(geometry),
-        "spheres": spheres_move(index),
-        "emitters": deform,
-    }
-    return tuple(name for name, moves in found.items() if moves)
+def of_textures(encoder: Encoder) -> TextureFeatures:
+    """Return the features of the textures that have been lowered."""
+    textures = encoder.textures
+    return TextureFeatures(
+        roles=tuple(sorted(textures.roles)),
+        mappings=textures.mappings,
+        depth=textures.depth,
+        attributes=bool(textures.attributes),
+    )
+
+
+def of_materials(index: SceneIndex, encoder: Encoder, materials: MaterialWords) -> MaterialFeatures:
+    """Return the features of a scene's materials, and the sources of all that is loaded."""
+    return MaterialFeatures(
+        leaves=index.leaves,
+        transmitting=tuple(sorted(materials.transmitting)),
+        shining=index.shining,
+        mixtures=materials.mixture_depth,
+        normal_mapped=index.normal_mapped,
+        free_panes=index.free_panes,
+        sources=encoder.sources,
+    )

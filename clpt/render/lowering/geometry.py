@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.geometry import analytic, shape_records, strands
-from clpt.records import SHAPE
-from clpt.render.analysis.geometry import SHAPE_TWO_SIDED, Geometry, Stored
+from clpt.records import SHAPE, SHAPE_BITS
+from clpt.render.analysis.geometry import Geometry, Stored
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.materials.material_words import MaterialWords
 from clpt.render.lowering.tables import TableStore
@@ -30,7 +30,7 @@ def lower_geometry(
         row = given.copy()
         front, back, two_sided = materials.sides(shape)
         row["front"], row["back"] = np.array([front, back], np.uint32).view(np.int32)
-        row["flags"] |= SHAPE_TWO_SIDED if two_sided else 0
+        row["flags"] |= SHAPE_BITS["two_sided"] if two_sided else 0
         if shape.kind not in shape_records.ANALYTIC:
             _store_corners(stored, store)
         elif shape.kind == "curves" and stored.many is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from clpt.geometry import instancing
 from clpt.render.analysis.geometry import Geometry
 from clpt.render.analysis.index import SceneIndex
 from clpt.render.analysis.lights.sources import row_order
+from clpt.render.contract.features import LayerFeatures
 from clpt.render.contract.layer_names import LayerNames
 from clpt.render.lowering.lights.lights import LightRows
 from clpt.render.lowering.tables import TableStore
@@ -24,15 +26,15 @@ REST = "rest"  # the group of lights that name none
 
 def lower_names(
     index: SceneIndex, geometry: Geometry, lights: LightRows, store: TableStore
-) -> tuple[LayerNames, dict[str, Any]]:
-    """Return the names that the layers of a film need, and what features say of them.
+) -> tuple[LayerNames, LayerFeatures]:
+    """Return the names that the layers of a film need, and the layers' features.
 
     The numbers of materials and groups go to `distributions`, for each row of `shapes` and of
     `lights`. Raises SceneError for more shapes than a matte can tell apart.
     """
     layers, things = index.layers, index.scene.shapes
     names: dict[str, tuple[str, ...]] = {}
-    rows: dict[str, Any] = {}
+    features = LayerFeatures(layers)
     if "crypto_object" in layers:
         if len(things) > MOST_NAMED:
             message = f"mattes are for {MOST_NAMED:,} shapes, not {len(things):,}"
@@ -41,16 +43,18 @@ def lower_names(
     if "crypto_material" in layers or "material_id" in layers:
         numbers, found = _materials(instancing.distinct(things))
         of_rows = [numbers[id(shape.material)] for _, shape, _, _ in geometry.owners]
-        rows["material_numbers"] = store.append_floats("distributions", np.array([*of_rows, 0.0]))
+        row = store.append_floats("distributions", np.array([*of_rows, 0.0]))
+        features = replace(features, material_numbers=row)
         names["materials"] = tuple(_material_name(one, i) for i, one in enumerate(found))
     if "light_groups" in layers:
         groups = _groups(index, geometry, lights)
         groups += [REST] * bool(index.emitting)  # of what rays gather in media
         names["light_groups"] = tuple(sorted({*groups})) or (REST,)
         numbers_of = np.searchsorted(names["light_groups"], np.array(groups, str))
-        rows["light_groups"] = len(names["light_groups"])
-        rows["light_group_row"] = store.append_floats("distributions", np.array([*numbers_of, 0.0]))
-    return LayerNames(**names), rows
+        row = store.append_floats("distributions", np.array([*numbers_of, 0.0]))
+        count = len(names["light_groups"])
+        features = replace(features, light_groups=count, light_group_row=row)
+    return LayerNames(**names), features
 
 
 def _materials(shapes: Iterable[Shape]) -> tuple[dict[int, int], list[mt.Material]]:

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.geometry.motion import Motions
+from clpt.records import MOTION_SIZES
 from clpt.render.lowering.tables import TableStore
 from clpt.scene import Scene
 from clpt.scene.motion import Keys, Shutter, arc, decomposed
 
-STEP = 29  # floats of a step between two keys, see kernels/tracing/motion.cl
+STEP = MOTION_SIZES["step"]
 
 
 def track(keys: Keys | None) -> NDArray[np.float32]:

@@ -12,11 +12,11 @@ from clpt import transforms
 from clpt.geometry import shape_records, shapes
 from clpt.geometry.instancing import Instances
 from clpt.geometry.refining import is_refined
+from clpt.records import SHAPE_BITS
 from clpt.render.analysis import cameras, photons
 from clpt.render.analysis.analyse import Analysis, Before, analyse
 from clpt.render.analysis.colour import sensor
 from clpt.render.analysis.geometry import (
-    SHAPE_ONE_LIGHT,
     Geometry,
     Owner,
     spheres_move,
@@ -25,25 +25,24 @@ from clpt.render.analysis.index import SceneIndex
 from clpt.render.analysis.lights.sources import Sources
 from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.render.analysis.wavelengths import Density, density, emissions
-from clpt.render.contract.features import Features
+from clpt.render.contract.features import Features, SpectraFeatures
 from clpt.render.contract.layer_names import LayerNames
 from clpt.render.contract.parameter_words import row_words
+from clpt.render.lowering import features as needs
 from clpt.render.lowering.camera import filters
 from clpt.render.lowering.camera.cameras import lower_camera
 from clpt.render.lowering.device_arrays import is_table
 from clpt.render.lowering.device_grids import DeviceGrid
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.features import features_of
 from clpt.render.lowering.geometry import lower_geometry, shape_words
 from clpt.render.lowering.layer_names import lower_names
-from clpt.render.lowering.lights.light_level import light_level
 from clpt.render.lowering.lights.lights import LightRows, light_rows
 from clpt.render.lowering.materials.material_words import MaterialWords
 from clpt.render.lowering.media.body_words import BodyWords
 from clpt.render.lowering.media.light_media import light_media_words
 from clpt.render.lowering.media.medium_words import MediumWords, medium_aims
 from clpt.render.lowering.motion import lower_motion
-from clpt.render.lowering.settings import DEEPEST, settings_of
+from clpt.render.lowering.settings import DEEPEST, Found, settings_of
 from clpt.render.lowering.textures.attributes import lower_attributes
 from clpt.scene import Scene
 from clpt.scene import materials as mt
@@ -120,7 +119,7 @@ def lower(
     Raises SceneError where the scene makes no sense: it names the shape, light or material.
     """
     cache = LoweringCache(former.cache if former else None)
-    before = Before(former.integrator, former.features.lit_ghosts) if former else None
+    before = Before(former.integrator, former.features.transport.lit_ghosts) if former else None
     return encode(analyse(scene, cache, before), cache, texture_budget)
 
 
@@ -141,7 +140,8 @@ def encode(found: Analysis, cache: LoweringCache, texture_budget: int | None = N
     lights = _lower_lights(index, encoder, geometry, found.sources, media)
     near = _lower_medium_aims(index, encoder, lights)
     camera = _lower_bodies(found, geometry, encoder, materials, media)
-    density_row, tabulated, profile = _lower_film(index, encoder, wavelengths)
+    profile = _lower_profile(index, encoder)
+    density_row, tabulated = _lower_density(index, encoder, wavelengths)
     targets = found.aims
     first_aim = encoder.store.append_floats("distributions", targets)
     lower_attributes(geometry.owners, encoder.textures, cache, geometry.single_count, geometry.keys)
@@ -152,25 +152,27 @@ def encode(found: Analysis, cache: LoweringCache, texture_budget: int | None = N
         *_warnings(index), *found.warnings, *sorted(encoder.warnings), *geometry.warnings,
         *encoder.textures.finish(),
     )  # fmt: skip
-    aimed = len(targets) > 0
-    motion_row = 0
-    if index.motions:
-        rows = list(found.sources.order)
-        rows += [-1] * ((*lights.first, len(lights.rows))[0] - len(rows))  # bricks of media
-        motion_row = lower_motion(index.motions, index.scene, rows, encoder.store)
-    features = features_of(
-        index, encoder, materials, geometry, lights, tabulated, profile, aimed, near,
-        bool(found.sealed), motion_row,
-    )  # fmt: skip
-    names, for_layers = lower_names(index, geometry, lights, encoder.store)
-    features = replace(features, **for_layers)
-    if features.tangents and geometry.tangents:
-        row = encoder.store.append_floats("distributions", _vertex_tangents(geometry))
-        features = replace(features, vertex_tangents=row + TANGENT_WORDS)
-    settings = settings_of(
-        index, geometry, lights, light_level(index, lights, found.sphere), wavelengths, density_row,
-        ambient_row, found.sphere, features.dispersion, (first_aim, len(targets)), camera,
-    )  # fmt: skip
+    motion = needs.of_motion(index, geometry, _lower_motion(found, lights, encoder))
+    spectra = SpectraFeatures(index.mode, encoder.spectra.samples, encoder.spectra.step, tabulated)
+    names, layers = lower_names(index, geometry, lights, encoder.store)
+    textures = needs.of_textures(encoder)
+    shaped = needs.of_geometry(index, geometry, materials, textures)
+    if shaped.tangents and geometry.tangents:
+        shaped = replace(shaped, vertex_tangents=_lower_tangents(geometry, encoder))
+    features = Features(
+        camera=needs.of_camera(index),
+        film=needs.of_film(index, layers),
+        transport=needs.of_transport(index, profile, aimed=len(targets) > 0),
+        lights=needs.of_lights(lights),
+        media=needs.of_media(index, materials, near, sealed=bool(found.sealed)),
+        motion=motion,
+        geometry=shaped,
+        textures=textures,
+        spectra=spectra,
+        materials=needs.of_materials(index, encoder, materials),
+    )
+    own = Found(density_row, ambient_row, (first_aim, len(targets)), camera, features.dispersion)
+    settings = settings_of(index, geometry, lights, wavelengths, found.sphere, own)
     cache.settle()
     tables = encoder.store.arrays()
     encoder.textures.images.joined(tables["images"])
@@ -197,29 +199,42 @@ def encode(found: Analysis, cache: LoweringCache, texture_budget: int | None = N
     )
 
 
-def _vertex_tangents(geometry: Geometry) -> NDArray[np.float32]:
-    """Four words for each vertex: those that shapes say, else zero. A row of zeros is before them,
-    so that they begin behind word 0."""
+def _lower_motion(found: Analysis, lights: LightRows, encoder: Encoder) -> int:
+    """Append the table of what moves, if anything does; return where in `distributions` it is."""
+    index, rows = found.index, list(found.sources.order)
+    if not index.motions:
+        return 0
+    rows += [-1] * ((*lights.first, len(lights.rows))[0] - len(rows))  # bricks of media
+    return lower_motion(index.motions, index.scene, rows, encoder.store)
+
+
+def _lower_tangents(geometry: Geometry, encoder: Encoder) -> int:
+    """Append four words for each vertex: the tangents that shapes say, else zero; return where in
+    `distributions` they are. A row of zeros is before them, so that this is never 0."""
     words = np.zeros((1 + len(geometry.vertices), TANGENT_WORDS), np.float32)
     for first, own in geometry.tangents:
         words[1 + first : 1 + first + len(own)] = own
-    return words
+    return encoder.store.append_floats("distributions", words) + TANGENT_WORDS
 
 
-def _lower_film(index: SceneIndex, encoder: Encoder, wavelengths: Density) -> tuple[int, bool, int]:
-    """Append the filter's values for light paths, and wavelengths' density if it is tabulated.
+def _lower_profile(index: SceneIndex, encoder: Encoder) -> int:
+    """Append the filter's values for light paths, if there are any; return where in
+    `distributions` they are."""
+    if not index.weighed:
+        return 0
+    return filters.lower_profile(index.scene.film.filter, encoder.store, index.splatting)
 
-    Return where the density would begin in `distributions`, whether it is there, and where the
-    filter's values begin.
+
+def _lower_density(index: SceneIndex, encoder: Encoder, wavelengths: Density) -> tuple[int, bool]:
+    """Append wavelengths' density if it is tabulated.
+
+    Return where in `distributions` it would begin, and whether it is there.
     """
-    chosen, profile = index.scene.film.filter, 0
-    if index.weighed:
-        profile = filters.lower_profile(chosen, encoder.store, index.splatting)
     density_row = encoder.store.size("distributions")
     tabulated = index.spectral and wavelengths.values is not None
     if tabulated:
         encoder.store.append_floats("distributions", wavelengths.words())
-    return density_row, tabulated, profile
+    return density_row, tabulated
 
 
 def _begin_materials(index: SceneIndex, encoder: Encoder) -> MaterialWords:
@@ -284,7 +299,7 @@ def _lower_lights(
     for emitter, first, whole in zip(geometry.emitters, lights.first, lights.whole, strict=True):
         row = geometry.rows[emitter.shape_row]
         row["light"] = first
-        row["flags"] |= SHAPE_ONE_LIGHT if whole else 0
+        row["flags"] |= SHAPE_BITS["one_light"] if whole else 0
     return lights
 
 

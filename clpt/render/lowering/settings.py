@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from clpt.render.analysis.geometry import Geometry
 from clpt.render.analysis.index import SceneIndex
 from clpt.render.analysis.wavelengths import Density
 from clpt.render.lowering import guides
+from clpt.render.lowering.lights.light_level import light_level
 from clpt.render.lowering.lights.lights import LightRows
 from clpt.spectra.cie import tanh_ends
 
@@ -25,26 +27,34 @@ DEEPEST = 4000  # path state has 12 bits for the depth
 DEPTHS = {"direct": 2}  # of integrators without the parameter
 
 
+@dataclass(frozen=True)
+class Found:
+    """What steps of lowering have found.
+
+    density_row: where the table of the density of wavelengths begins in `distributions`;
+    ambient_row: where the ambient light is in `light_params`; aims: the first of the spheres at
+    which light paths aim, and their number; around: words of the bodies and of the medium at the
+    camera; disperses: whether directions depend on wavelengths.
+    """
+
+    density_row: int
+    ambient_row: int
+    aims: tuple[int, int]
+    around: tuple[int, int]
+    disperses: bool
+
+
 def settings_of(
     index: SceneIndex,
     geometry: Geometry,
     lights: LightRows,
-    level: float,
     density: Density,
-    density_row: int,
-    ambient_row: int,
     sphere: tuple[NDArray[np.float64], float],
-    disperses: bool,
-    aims: tuple[int, int],
-    around: tuple[int, int],
+    found: Found,
 ) -> NDArray[np.void]:
     """Return the record SETTINGS of a scene; the wavefront adds what depends on the device.
 
-    level: of the scene's light, see `light_level`; density_row: where the table of
-    `density` begins in `distributions`; ambient_row: in `light_params`; sphere: centre and
-    radius of one around the scene [m]; disperses: whether directions depend on wavelengths; aims:
-    the first of the spheres at which light paths aim, and their number; around: words of the bodies
-    and of the medium at the camera.
+    density: of wavelengths; sphere: centre and radius of one around the scene [m].
     """
     scene, film, integrator = index.scene, index.scene.film, index.scene.integrator
     settings = np.zeros((), SETTINGS.dtype)
@@ -64,17 +74,17 @@ def settings_of(
     settings["alpha"] = index.alpha
     settings["light_paths"] = index.weighed
     if index.merged:
-        _set_photons(settings, index, geometry, sphere[1], disperses)
+        _set_photons(settings, index, geometry, sphere[1], found.disperses)
     if index.guided:
         settings["photon_cells"] = guides.CELLS
         settings["guide_paths"] = guides.PATHS
         settings["guide_side"] = guides.SIDE * sphere[1]
     settings["rival_area"] = rival_area(sphere[1])
-    settings["aims"], settings["aim_count"] = aims
-    settings["camera_bodies"], settings["camera_medium"] = around
+    settings["aims"], settings["aim_count"] = found.aims
+    settings["camera_bodies"], settings["camera_medium"] = found.around
     settings["light_count"] = len(lights.rows)
     settings["infinite_count"] = lights.infinite
-    settings["ambient"] = ambient_row
+    settings["ambient"] = found.ambient_row
     settings["first_analytic"] = geometry.first_analytic
     settings["analytic_count"] = len(geometry.boxes)
     settings["single_count"] = geometry.single_count
@@ -82,8 +92,11 @@ def settings_of(
     settings["lambda_min"], settings["lambda_max"] = film.lambda_min, film.lambda_max
     settings["tanh_min"], settings["tanh_max"] = tanh_ends(density.lo, density.hi)
     settings["bands"] = film.bands
-    settings["density"] = density_row
-    matrix, scale = output_matrix(film, index.mode), film_scale(film, level)
+    settings["density"] = found.density_row
+    matrix, scale = (
+        output_matrix(film, index.mode),
+        film_scale(film, light_level(index, lights, sphere)),
+    )
     settings["film_scale"] = scale
     settings["to_first"], settings["to_second"], settings["to_third"] = matrix / scale
     settings["center"], settings["scene_radius"] = sphere

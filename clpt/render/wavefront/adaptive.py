@@ -46,20 +46,22 @@ OPEN = FOREVER  # of a cell whose number of samples is not decided
 def checked(noise: float, features: Features) -> float:
     """Return a limit of noise. Raises SceneError where it makes no sense."""
     check_noise(noise)
-    if features.light_paths:
+    if features.transport.light_paths:
         message = "the integrator particle_tracer cannot choose which pixels its paths reach"
         raise SceneError(f"{message}; leave it out, or choose path", where="noise")
-    if features.weighed and features.light_layers:
-        message = f"light paths that decide of noise would be in {features.light_layers[0]}"
+    if features.transport.weighed and features.film.layers.lights:
+        message = f"light paths that decide of noise would be in {features.film.layers.lights[0]}"
         raise SceneError(f"{message}; leave it out, or choose light_paths 0", where="noise")
-    if features.merged:
+    if features.transport.merged:
         message = "neighbouring pixels share the photons of the integrator vcm"
         raise SceneError(f"{message}; leave it out, or vcm.merging", where="noise")
     if features.film_weights:
-        message = f"neighbouring pixels share samples under the filter {features.filter}"
+        message = f"neighbouring pixels share samples under the filter {features.film.filter.kind}"
         raise SceneError(f"{message}; give the scene `noise`, or film.filtering", where="noise")
-    if features.sampler not in [cls.kind for cls in PIXELWISE]:
-        message = f"neighbouring pixels share the points of the sampler {features.sampler}"
+    if features.transport.sampler not in [cls.kind for cls in PIXELWISE]:
+        message = (
+            f"neighbouring pixels share the points of the sampler {features.transport.sampler}"
+        )
         raise SceneError(f"{message}; leave it out, or choose sobol", where="noise")
     return float(noise)
 
@@ -87,7 +89,7 @@ class Adaptive:
         count = len(self._pixels)
         self._partner = _partners(self._pixels, self._meter.across)
         self._lights = (
-            LightRounds(self._meter, self._tracer) if wavefront.features.weighed else None
+            LightRounds(self._meter, self._tracer) if wavefront.features.transport.weighed else None
         )
         self.noise = 0.0
         self.next = np.zeros(count, np.int64)

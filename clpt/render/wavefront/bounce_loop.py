@@ -228,7 +228,7 @@ class BounceLoop:
         steps: list[Step] = []
         for stage in bounce.order(features, chosen.layout, self.lanes, chosen.interleaved):
             if stage.kernel == "shade" and steps[-1].bound.kernel.name != "shade":
-                steps += self._bind_queues(chosen.queued, len(features.materials))
+                steps += self._bind_queues(chosen.queued, len(features.materials.kinds))
             samples = {} if steps else {"samples": (0, 0)}
             bound = self.kernels.bind(label + stage.program, stage.kernel, **samples)
             steps.append(Step(label + stage.program, bound, *self._sizes(stage.lanes)))

@@ -48,7 +48,7 @@ class Film:
         self.stream, self._words = stream, features.film_words
         self._allocate = buffers.allocate
         self.size = int(settings["width"]), int(settings["height"])
-        self.band_count = int(settings["bands"]) if features.bands else 0
+        self.band_count = int(settings["bands"]) if features.film.bands else 0
         self._band_sums = self.band_count * features.film_groups  # of a pixel
         self.halves = int(settings["halves"])
         self._settings, self._padded_pixels = settings, int(settings["padded_pixels"])
@@ -58,11 +58,12 @@ class Film:
         words = 4 * self._padded_pixels * self.halves
         pixels, advice = math.prod(self.size), "lower the image's size"
         sums = {"film": self._words * words}
-        if features.bands:
+        if features.film.bands:
             advice += " or the number of bands"
             sums["bands"] = SUM_WORDS * self._band_sums * words
-        self._layer_words, self._mattes = features.layer_words, len(features.mattes)
-        self._light_sums = 3 * features.light_pictures * features.film_groups
+        layers = features.film.layers
+        self._layer_words, self._mattes = layers.words, layers.matte_count
+        self._light_sums = 3 * layers.light_pictures * features.film_groups
         for name, count in (
             ("layers", self._layer_words),
             ("light_layers", SUM_WORDS * self._light_sums),

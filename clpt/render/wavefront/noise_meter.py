@@ -98,7 +98,7 @@ class NoiseMeter:
         """Variance, luminance and number of pixels (3, tiles, 2) of each tile's two colours."""
         stream = self.wavefront.stream
         stream.write(self._active_cells, cells.astype(np.uint32))
-        if self.wavefront.features.weighed:
+        if self.wavefront.features.transport.weighed:
             self._kernel.set_args(light_paths=light_paths)
         stream.run(self._kernel, (self._tiles,))
         sums = stream.read(self._noise_sums, np.empty((self._tiles, 2, 3), np.float32))

@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 from clpt import device
 from clpt.device.buffers import Buffers
 from clpt.errors import MemoryBudgetError
-from clpt.records import PATH, SLABS
+from clpt.records import COUNTER_NUMBERS, PATH, PATH_BITS, SLABS
 from clpt.render.wavefront import queues, work_list
 from clpt.render.wavefront.cells import CellGrid
 
-COUNTERS = ("done", "samples", "closest", "shadow", "rejected", "full")  # kernels/film/film.cl
+COUNTERS = COUNTER_NUMBERS.names
 PADDING = 80  # words between streams: powers of two collide in a cache
 GROUP = 64  # slots are a multiple of it, and it is the local size of one-lane kernels
-FRESH = 0x2000  # kernels/path/path_state.cl
+FRESH = PATH_BITS["fresh"]
 CPU_SLOTS = 1 << 14
 UNIT_SLOTS = 1 << 14  # of a GPU's compute unit, which runs about an eighth of them at once
 MOST_SLOTS = 1 << 22  # beyond, more slots bring no speed

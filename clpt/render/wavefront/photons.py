@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 
 from clpt import device
 from clpt.device.buffers import Buffers
-from clpt.records import PHOTON
+from clpt.records import PHOTON, PHOTON_NUMBERS
 from clpt.render.wavefront.bounce_loop import Kernels, Step
 
-NONE = 0xFFFFFFFF  # kernels/merging/none.cl
-RUN = 1024  # kernels/merging/sort.cl
+NONE, RUN = (PHOTON_NUMBERS[name] for name in ("none", "run"))
 GROUP = 8  # work-items of a group
 ADVICE = "lower photon_memory"
 PROGRAM, ROOT = "photons", "merging/sort.cl"

@@ -67,7 +67,7 @@ def loop_share(on: device.Device) -> int:
 
 
 def _layout(on: device.Device, lowered: Lowered, layout: str | None) -> str:
-    instances = lowered.features.instances
+    instances = lowered.features.geometry.instances
     if layout == "brute" and instances:
         raise SceneError(f"the layout brute holds no instances; choose {' or '.join(bvh.TREES)}")
     if layout is not None:
@@ -80,18 +80,19 @@ def _layout(on: device.Device, lowered: Lowered, layout: str | None) -> str:
 
 def _queued(on: device.Device, lowered: Lowered, wanted: bool | None) -> bool:
     """Whether there are queues: only for work-items that shade one path each."""
-    several = len(lowered.features.materials) > 1
+    several = len(lowered.features.materials.kinds) > 1
     return on.lanes == 1 and (several if wanted is None else wanted)
 
 
 def can_interleave(features: Features, layout: str, lanes: int) -> bool:
     """Return whether a work-item can have several rays in flight: through `wide8`, among nothing
     but triangles, or curves that stand still."""
-    if layout != "wide8" or lanes == 1 or features.instances:
+    if layout != "wide8" or lanes == 1 or features.geometry.instances:
         return False
-    moves = {"shapes", "instances", "vertices", "spheres"} & set(features.moving)
-    curves = "curves" in features.analytic and "spheres" not in features.analytic and not moves
-    return curves or not features.analytic
+    kinds, motion = features.geometry.analytic, features.motion
+    moves = motion.shapes or motion.instances or motion.vertices or motion.spheres
+    curves = "curves" in kinds and "spheres" not in kinds and not moves
+    return curves or not kinds
 
 
 def _interleaved(on: device.Device, lowered: Lowered, layout: str) -> bool:
@@ -100,7 +101,7 @@ def _interleaved(on: device.Device, lowered: Lowered, layout: str) -> bool:
     features, count = lowered.features, len(lowered.faces)
     if not can_interleave(features, layout, on.lanes):
         return False
-    if features.analytic:
+    if features.geometry.analytic:
         others = int(lowered.settings["single_count"])
         return others <= FEW_OTHERS and len(lowered.boxes) - others >= INTERLEAVED_PIECES
     return count >= INTERLEAVED_TRIANGLES and bvh.outgrows_caches(on, layout, count)

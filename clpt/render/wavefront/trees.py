@@ -79,10 +79,10 @@ def build(
     else:
         triangles, offsets = former.triangles, former.offsets
     boxes = {}
-    if lowered.features.analytic and layout != "brute":
+    if lowered.features.geometry.analytic and layout != "brute":
         boxes["shape"] = bvh.build_boxes(buffers.device, lowered.boxes, bvh.shapes_layout(layout))
     order, rows = np.zeros(0, np.uint32), instances.rows
-    if lowered.features.instances:
+    if lowered.features.geometry.instances:
         boxes["instance"] = bvh.build_boxes(buffers.device, instances.boxes, layout)
         indices = boxes["instance"].buffers["indices"]
         order = buffers.download(indices, (len(instances.rows),), np.uint32)

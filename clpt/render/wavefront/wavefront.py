@@ -79,9 +79,13 @@ class Wavefront:
         self.timings = Timings(self.device.queue)
         features = self.features
         self.film = film = Film(self.stream, self.buffers, paths.settings, features)
-        photons = Photons(self.stream, self.buffers, paths.settings) if features.merged else None
+        photons = (
+            Photons(self.stream, self.buffers, paths.settings)
+            if features.transport.merged
+            else None
+        )
         guide = None
-        if features.guided:
+        if features.transport.guided:
             guide = Guide(self.stream, self.buffers, paths.settings, paths.pixels)
         self.photons, self.guide = photons, guide
         own = (photons.arguments if photons else {}) | (guide.arguments if guide else {})
@@ -142,10 +146,10 @@ class Wavefront:
             )
             device.compile_ahead(on, texts, "loop")
         stream, buffers = device.Stream(on.queue), device.Buffers(on)
-        settings, kinds = lowered.settings, len(lowered.features.materials)
+        settings, kinds = lowered.settings, len(lowered.features.materials.kinds)
         padded_pixels = int(settings["padded_pixels"])
         footprint = lowered.features.footprint_words
-        halves = halves or "variance" in lowered.features.layers
+        halves = halves or "variance" in lowered.features.film.layers.names
         divided = divide_film(
             on.info, padded_pixels, buffers.limit, slots, looped, halves, footprint
         )
@@ -173,12 +177,12 @@ class Wavefront:
     @property
     def has_light_paths(self) -> bool:
         """Whether the film has sums of paths that start at lights."""
-        return self.features.light_paths or self.features.weighed
+        return self.features.transport.light_paths or self.features.transport.weighed
 
     @property
     def light_group(self) -> int:
         """Which of a pixel's words is the first that light paths add to."""
-        return self.features.passes[0].film_group
+        return self.features.passes[0].film.first_word
 
     @property
     def arguments(self) -> dict[str, Any]:

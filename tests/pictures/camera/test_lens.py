@@ -92,4 +92,4 @@ def test_an_even_sky_keeps_its_brightness():
 def test_rgb_mode_warns():
     rgb = lower(with_film(scene(spectra.Constant(1.0), glass="bk7"), mode="rgb"))
     assert any("one focus" in note for note in rgb.warnings)
-    assert not rgb.features.glass_lens
+    assert not rgb.features.camera.disperses

@@ -81,10 +81,10 @@ def test_edits_take_ghosts_away() -> None:
 
 def test_what_a_scene_needs_of_the_kernels():
     spectral = dataclasses.replace(scene(Lens()), film=Film(width=8, height=8))
-    assert lower(spectral).features.glass_lens and lower(spectral).features.dispersion
+    assert lower(spectral).features.camera.disperses and lower(spectral).features.dispersion
     flat = dataclasses.replace(spectral, camera=Lens(lens="fisheye", ghosts=0.1))
     features = lower(flat).features
-    assert not features.glass_lens and features.lens_losses and features.lens_ghosts
+    assert not features.camera.disperses and features.camera.losses and features.camera.ghosts
 
 
 def test_scene_files(tmp_path):
@@ -188,7 +188,7 @@ def test_light_paths_find_the_ghosts_of_rays(
     for by_rays in (False, True):
         if by_rays:
             monkeypatch.setattr(SceneIndex, "lit_ghosts", False)
-        assert lower(whole).features.weighed != by_rays
+        assert lower(whole).features.transport.weighed != by_rays
         found = [
             clpt.render(dataclasses.replace(whole, seed=8 * by_rays + i), spp=2048)
             for i in range(8)

@@ -80,7 +80,7 @@ def test_a_shutter_without_length_is_still() -> None:
     assert np.array_equal(found.faces, still.faces)
     assert all(np.array_equal(words, still.tables[name]) for name, words in found.tables.items())
     for shutter, moves in ((at_once, ()), (Shutter(2, 3), ()), (Shutter(0, 0.1), ("vertices",))):
-        assert lower(scene([mesh()], shutter)).features.moving == moves
+        assert lower(scene([mesh()], shutter)).features.motion.parts == moves
 
 
 def test_motion_between_two_scenes() -> None:
@@ -120,7 +120,7 @@ def test_motion_between_two_scenes() -> None:
     assert np.allclose(moving.camera.motion.at(1.5)[:3, 3], [0.5, 0, -3])
     assert np.allclose(moving.shapes[5].deformation.points[1][:, :3], points[:, :3] + 1)
     parts = {"camera", "lights", "vertices", "spheres", "emitters"}
-    assert set(lower(moving).features.moving) == parts
+    assert set(lower(moving).features.motion.parts) == parts
 
 
 @pytest.mark.slow
@@ -143,7 +143,7 @@ def test_updates_move_from_the_last_to_this() -> None:
         assert np.array_equal(picture(), np.asarray(clpt.render(keyed, 4)))
         renderer.update(vertices={"ball": BALL}, motion=True)
         lowered = renderer.wavefront.scene.lowered
-        assert lowered.features.moving == ("vertices",)  # the cube has come to rest
+        assert lowered.features.motion.parts == ("vertices",)  # the cube has come to rest
         corners = lowered.vertices[-2 * len(BALL) :].reshape(-1, 2, 3)
         assert np.allclose(corners[:, 0], 3 * corners[:, 1], atol=1e-5)
         renderer.update(transforms={"cube": cube.to_world})

@@ -71,7 +71,7 @@ def test_rows_and_boxes() -> None:
     assert np.array_equal(rows[1, 0], rows[1, 1])
     assert np.allclose(lowered.boxes[0], [[-0.2, -0.2, -0.5], [1.5, 2.5, 0.5]], atol=1e-5)
     assert (lowered.boxes[0, 0] <= (rows[0, :, :3] - rows[0, :, 3:]).min(axis=0)).all()
-    assert lowered.features.moving == ("spheres",)
+    assert lowered.features.motion.parts == ("spheres",)
     still = dataclasses.replace(ball, centers=keys.at(0.25)[0], deformation=None)
     found, at_once = lower(scene([ball], Shutter(0.25, 0.25))), lower(scene([still], None))
     assert found.features == at_once.features and found.settings == at_once.settings
@@ -118,7 +118,7 @@ def test_motion_between_two_scenes() -> None:
         assert not warnings and keys.times == (0.0, 1.0)
         assert np.allclose(keys.points[0], np.column_stack([FAR, [0.1, 0.1]]))
         assert np.allclose(keys.points[1], last)
-        assert lower(moving).features.moving == ("spheres",)
+        assert lower(moving).features.motion.parts == ("spheres",)
     more = shapes.Spheres(centers=np.concatenate([FAR, FAR]))
     moving, warnings = between(scene([before]), scene([more]))
     assert "its centers do not move, as it had 2 of them" in warnings[0]

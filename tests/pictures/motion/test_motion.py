@@ -566,11 +566,17 @@ def test_a_shutter_without_length_is_still() -> None:
     a = clpt.render(scene([moved], [AMBIENT], Shutter(0.3, 0.3)), 4)
     b = clpt.render(scene([still], [AMBIENT], None), 4)
     assert np.array_equal(np.asarray(a), np.asarray(b))
-    assert not lower(scene([moved], [AMBIENT], Shutter(0.3, 0.3))).features.moving
-    assert not lower(scene([moved], [AMBIENT], Shutter(2.0, 3.0))).features.moving  # after its keys
-    assert lower(scene([moved], [AMBIENT], Shutter(0.3, 0.4))).features.moving == ("instances",)
+    assert not lower(scene([moved], [AMBIENT], Shutter(0.3, 0.3))).features.motion.parts
+    assert not lower(
+        scene([moved], [AMBIENT], Shutter(2.0, 3.0))
+    ).features.motion.parts  # after its keys
+    assert lower(scene([moved], [AMBIENT], Shutter(0.3, 0.4))).features.motion.parts == (
+        "instances",
+    )
     _, _, zoom = CASES["zoom"]  # what scales a pinhole stays a key
-    assert lower(scene([cube], [AMBIENT], Shutter(0.3, 0.3), **zoom)).features.moving == ("camera",)
+    assert lower(scene([cube], [AMBIENT], Shutter(0.3, 0.3), **zoom)).features.motion.parts == (
+        "camera",
+    )
 
 
 @pytest.mark.slow
@@ -677,7 +683,10 @@ def test_what_is_left_aside_is_told() -> None:
     for line, integrator in told.items():
         lowered = lower(dataclasses.replace(whole, integrator=integrator))
         assert sum(w.startswith(line) for w in lowered.warnings) == 1, lowered.warnings
-        assert not lowered.features.passes[0].light_paths and not lowered.features.merged
+        assert (
+            not lowered.features.passes[0].transport.light_paths
+            and not lowered.features.transport.merged
+        )
     cube = dataclasses.replace(things[0], motion=turn([0, 1, 0], 10))
     assert any(
         "the grid of its medium stays" in w

@@ -56,7 +56,7 @@ def mixed(curves: Curves) -> clpt.Scene:
 @pytest.mark.slow
 def test_every_layout_and_tubes_show_the_same():
     exact = mixed(CURVES)
-    assert {"spheres", "curves"} == set(lower(exact).features.analytic)
+    assert {"spheres", "curves"} == set(lower(exact).features.geometry.analytic)
     image = clpt.render(exact, spp=32)
     assert np.isfinite(image).all()
     for layout in ("brute", "compact"):
@@ -74,8 +74,8 @@ def test_what_becomes_tubes():
     group = Group((CURVES,))
     often = [Instance(group=group, to_world=T.translate([i, 0, 0])) for i in range(FEW + 1)]
     for things in ([shining], [stretched], often):
-        assert not lower(scene(*things)).features.analytic
-    assert lower(scene(*often[:FEW])).features.analytic == ("curves",)
+        assert not lower(scene(*things)).features.geometry.analytic
+    assert lower(scene(*often[:FEW])).features.geometry.analytic == ("curves",)
     memory = [lower(scene(one)) for one in (CURVES, as_tubes(CURVES))]
     assert memory[0].tables["spheres"].nbytes < memory[1].vertices.nbytes
 

@@ -184,5 +184,5 @@ def test_it_is_without_light_paths() -> None:
     with pytest.raises(SceneError, match="ask for no light_paths"):
         Path(guiding=True, light_paths=1)
     made = lower(dataclasses.replace(caustic(), integrator=Path(guiding=True, max_depth=5)))
-    assert made.features.guided and not made.features.weighed
+    assert made.features.transport.guided and not made.features.transport.weighed
     assert made.settings["max_depth"] == 5 and made.reason == "directions are guided"

@@ -119,7 +119,7 @@ def smooth(mode: str) -> Sphere:
 @pytest.mark.parametrize("kind", LIGHTS)
 def test_every_light_aims(kind: str, mode: str) -> None:
     scene = corner({kind: LIGHTS[kind]}, smooth(mode), mode=mode)
-    assert lower(with_light_paths(scene)).features.aimed
+    assert lower(with_light_paths(scene)).features.transport.aimed
     both(scene, 512, kind, max_depth=5)
 
 
@@ -163,7 +163,7 @@ def test_lights_chosen_by_a_tree() -> None:
         )
     ]
     scene = corner({"constant": 0.2}, *balls)
-    assert lower(scene).features.light_tree
+    assert lower(scene).features.lights.tree
     both(scene, 256, "tree", max_depth=3)
 
 
@@ -344,7 +344,7 @@ def test_aiming_finds_the_caustic(monkeypatch: pytest.MonkeyPatch) -> None:
         if not aimed:
             leave_aims_out(monkeypatch)
         made = exposures(scene, 8, 64, device=narrow())
-        assert lower(scene).features.aimed == aimed
+        assert lower(scene).features.transport.aimed == aimed
         variance.append(made.var(axis=0).mean())
     assert variance[0] < 0.1 * variance[1], variance
 
@@ -473,14 +473,14 @@ def test_update_keeps_aims() -> None:
     renderer.update(materials={ball.material: rough})
     renderer.run(2)
     dull = with_light_paths(corner({}, lamp(), dataclasses.replace(there, material=rough)))
-    assert not lower(dull).features.aimed
+    assert not lower(dull).features.transport.aimed
     assert np.array_equal(renderer.image(), picture(dull, 2))
 
 
 def test_cameras_that_cannot_be_joined_leave_it_aside() -> None:
     scene = dataclasses.replace(SPLIT, camera=Orthographic(to_world=SPLIT.camera.to_world))
     lowered = lower(with_light_paths(scene))
-    assert not lowered.features.weighed
+    assert not lowered.features.transport.weighed
     assert any("light_paths: left aside" in warning for warning in lowered.warnings)
     spectral = ThinLens(to_world=VIEW, glass="sf11")
     lens = with_light_paths(dataclasses.replace(caustic(mode="spectral"), camera=spectral))

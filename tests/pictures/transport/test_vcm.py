@@ -205,9 +205,10 @@ def beside(camera: Camera) -> Scene:
 def test_cameras_that_cannot_be_joined(camera: str) -> None:
     """Light paths leave photons alone; without merging there are none."""
     lowered = lower(with_vcm(beside(CAMERAS[camera])))
-    assert lowered.features.merged and lowered.features.weighed and not lowered.features.joined
+    own = lowered.features.transport
+    assert (own.merged, own.weighed, own.joined) == (True, True, False)
     assert [w for w in lowered.warnings if w.startswith("vcm.light_tracing: left aside")]
-    alone = lower(with_vcm(beside(CAMERAS[camera]), merging=False)).features
+    alone = lower(with_vcm(beside(CAMERAS[camera]), merging=False)).features.transport
     assert not (alone.merged or alone.weighed or alone.joined)
 
 
@@ -343,7 +344,7 @@ def test_what_cannot_be_is_refused_or_left_aside() -> None:
     paint = Rectangle(material=m.Fluorescent(reflectance=0.5), to_world=tf.scale(0.1))
     glows = with_vcm(corner({}, lamp(), paint, mode="spectral"))
     lowered = lower(glows)
-    assert not lowered.features.merged
+    assert not lowered.features.transport.merged
     assert any("vcm.merging: left aside" in warning for warning in lowered.warnings)
     with pytest.raises(SceneError, match="photons"):
         clpt.Renderer(with_vcm(caustic()), narrow()).run(4, noise=0.1)
@@ -356,7 +357,7 @@ def test_everything_is_built_before_the_first_sample(monkeypatch: pytest.MonkeyP
     assert "photons" in renderer.wavefront.programs
 
     def noted(loop: BounceLoop, *given: Any) -> bool:
-        traced.append(loop.features.light_paths)
+        traced.append(loop.features.transport.light_paths)
         return run(loop, *given)
 
     monkeypatch.setattr(BounceLoop, "run", noted)

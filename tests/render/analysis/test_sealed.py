@@ -53,14 +53,14 @@ SCENES = {
 @pytest.mark.parametrize("name", SCENES)
 def test_which_are_sealed(name: str) -> None:
     scene, sealed = SCENES[name]
-    assert lowering.lower(scene).features.sealed_media == sealed
+    assert lowering.lower(scene).features.media.sealed == sealed
 
 
 def test_not_beside_light_paths() -> None:
     """These are weighed against rays to lights."""
     scene = dataclasses.replace(glass(), integrator=PathIntegrator(guiding=True, light_paths=0))
     features = lowering.lower(scene).features
-    assert not (features.sealed_media and (features.guided or features.weighed))
+    assert not (features.media.sealed and (features.transport.guided or features.transport.weighed))
 
 
 @pytest.mark.slow
@@ -72,7 +72,7 @@ def test_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
     stages.run(4)
     np.testing.assert_array_equal(stages.image(), sealed)
     monkeypatch.setattr(lowering, "sealed_media", lambda *_: frozenset())
-    assert not lowering.lower(scene).features.sealed_media
+    assert not lowering.lower(scene).features.media.sealed
     np.testing.assert_array_equal(clpt.render(scene, 4), sealed)
     assert sealed.std() > 0.01
 
@@ -92,7 +92,7 @@ def test_a_lamp_that_moves_in_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = glass(dataclasses.replace(SMALL, radius=0.4), material=m.Null())
     plain = means(scene, 0)
     monkeypatch.setattr(lowering, "sealed_media", lambda *_: frozenset([MILK]))
-    assert lowering.lower(scene).features.sealed_media
+    assert lowering.lower(scene).features.media.sealed
     met = means(scene, 100)
     error = np.hypot(plain.std(ddof=1), met.std(ddof=1)) / np.sqrt(32.0)
     assert abs(plain.mean() - met.mean()) < 4.0 * error

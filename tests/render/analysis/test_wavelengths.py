@@ -104,7 +104,7 @@ def test_a_film_may_ask(asked: str, table: bool) -> None:
 def test_features_follow() -> None:
     """Only a table changes the kernels' text, and only a spectral film has bands."""
     plain, lines = lower(scene(1.0)).features, lower(scene(LINE)).features
-    assert (plain.tabulated_density, plain.bands) == (False, False)
-    assert (lines.tabulated_density, lines.bands) == (True, False)
-    assert lower(scene(1.0, bands=3)).features.bands
-    assert not lower(scene(LINE, mode="rgb")).features.tabulated_density
+    assert (plain.spectra.tabulated_density, plain.film.bands) == (False, False)
+    assert (lines.spectra.tabulated_density, lines.film.bands) == (True, False)
+    assert lower(scene(1.0, bands=3)).features.film.bands
+    assert not lower(scene(LINE, mode="rgb")).features.spectra.tabulated_density

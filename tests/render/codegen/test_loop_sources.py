@@ -114,7 +114,7 @@ def test_kinds_of_paths_share_what_is_the_same() -> None:
     """Light paths and photons add what only they have."""
     name = "scenes/bulb/scene.json"
     alone = features_of(name, PathTracer(light_paths=0))
-    shading = {f"shade_{kind}" for kind in alone.materials}
+    shading = {f"shade_{kind}" for kind in alone.materials.kinds}
     camera = {"generate", "intersect", "shadow", "loop", *shading}
     beside = {"emit", "splat"}
     assert programs.loop_sources(alone, "wide8", 8).keys() == camera

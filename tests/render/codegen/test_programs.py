@@ -106,11 +106,11 @@ def test_only_materials_of_lights_look_for_light() -> None:
     ]
     film = Film(width=4, height=4, mode="rgb")
     features = lower(Scene(camera=Perspective(), shapes=shapes, film=film)).features
-    assert sorted(features.shining) == ["null", "plastic"]
+    assert sorted(features.materials.shining) == ["null", "plastic"]
     texts = programs.sources(features, "wide8", 8, queued=False)
-    for kind in features.materials:
+    for kind in features.materials.kinds:
         kept = texts[f"shade_{kind}"].text
-        assert ("light_shows(scene, s.light" in kept) == (kind in features.shining), kind
+        assert ("light_shows(scene, s.light" in kept) == (kind in features.materials.shining), kind
 
 
 @pytest.mark.parametrize("mode", ["rgb", "spectral"])
@@ -143,7 +143,8 @@ def test_only_what_fluoresces_shifts_wavelengths() -> None:
 
 def test_a_material_more_does_not_change_the_others() -> None:
     one = lowered([m.Diffuse(), m.Null()], "rgb").features
-    two = dataclasses.replace(one, leaves=(m.Diffuse, m.Null))
+    leaves = dataclasses.replace(one.materials, leaves=(m.Diffuse, m.Null))
+    two = dataclasses.replace(one, materials=leaves)
     texts = programs.sources(one, "wide8", 8, queued=False)
     again = programs.sources(two, "wide8", 8, queued=False)
     assert {name: s.text for name, s in texts.items()} == {

@@ -102,7 +102,7 @@ def test_glass_from_outside_disperses_and_absorbs(mode: str) -> None:
         one = cls(int_ior="bk7", absorption=2.0, layers=[m.Layer(thickness=300.0)])
         balls = [shapes.Sphere(material=one), shapes.Sphere(material=m.Diffuse())]
         features = lower(dataclasses.replace(scene(m.Diffuse, mode), shapes=balls)).features
-        assert features.absorption and (features.dispersion or mode == "rgb")
+        assert features.media.absorption and (features.dispersion or mode == "rgb")
         text = programs.sources(features, "wide8", 8, queued=False)[f"shade_{cls.kind}"].text
         made.append(re.sub(r"^#line .*\n|BSDF_KIND \d+", "", text, flags=re.MULTILINE))
     theirs = made[1].replace("Glass", "RoughDielectric").replace("glass_", "rough_dielectric_")

@@ -1,11 +1,21 @@
-"""Features: which materials send each wavelength its own way."""
+"""Features: small records of what kernels are asked for, and which materials disperse."""
 
 from __future__ import annotations
+
+import dataclasses
+import pickle
+from typing import Any
 
 import pytest
 
 from clpt.device import kernels_folder
-from clpt.render.contract.features import disperses
+from clpt.render.contract.features import (
+    Features,
+    MaterialFeatures,
+    MediaFeatures,
+    MotionFeatures,
+)
+from clpt.render.contract.features.macros import said
 from clpt.scene import materials
 from clpt.scene.params import device_params
 
@@ -23,9 +33,10 @@ INDICES = [
 def test_glass_disperses_where_its_index_is_a_table(cls: type, name: str) -> None:
     """Metals, coats and thin sheets have tables too, and send all wavelengths one way."""
     tabulated = frozenset({(cls.kind, name, "table")})
-    assert disperses([cls], tabulated) == (cls.refracts or cls.disperses)
-    assert disperses([cls], frozenset({(cls.kind, name, "constant")})) == cls.disperses
-    assert not disperses([materials.Diffuse], tabulated)
+    assert MaterialFeatures((cls,), sources=tabulated).disperses == (cls.refracts or cls.disperses)
+    even = frozenset({(cls.kind, name, "constant")})
+    assert MaterialFeatures((cls,), sources=even).disperses == cls.disperses
+    assert not MaterialFeatures((materials.Diffuse,), sources=tabulated).disperses
 
 
 @pytest.mark.parametrize("cls", materials.LEAVES, ids=lambda cls: cls.kind)
@@ -35,3 +46,32 @@ def test_a_material_that_tells_wavelengths_apart_says_so(cls: type[materials.Mat
     told = "LOBE_DISPERSE" in text or f"{cls.kind}_pdfs(" in text
     assert told == (cls.refracts or cls.disperses)
     assert cls.chromatic == (f"{cls.kind}_pdfs(" in text)
+
+
+def records(record: Any) -> dict[str, Any]:
+    """The records of features by the names of their classes, with default values."""
+    found = {type(record).__name__: record}
+    for field in dataclasses.fields(record):
+        own = getattr(record, field.name)
+        if dataclasses.is_dataclass(own) and not isinstance(own, type):
+            found |= records(own)
+    return found
+
+
+def test_records_of_features_are_small_and_of_one_subject() -> None:
+    """At most ten fields each; their macros are told apart; they are keys, and travel."""
+    found = records(Features())
+    assert max(len(dataclasses.fields(record)) for record in found.values()) <= 10
+    names = [name for name, _ in said(Features())]
+    assert len(names) == len(set(names))
+    assert pickle.loads(pickle.dumps(Features())) == Features()
+    assert len({Features(), Features(media=MediaFeatures(present=True)), Features()}) == 2
+
+
+def test_a_macro_is_defined_where_its_field_holds() -> None:
+    """A flag where it holds, a number wherever there is one."""
+    nothing, moves = (dict(said(MotionFeatures(row=row))) for row in (None, 0))
+    assert nothing["MOTION_ROW"] is None and moves["MOTION_ROW"] == 0
+    found = dict(said(MotionFeatures(vertices=True)))
+    assert found["MOVES_VERTICES"] == 1 and found["MOVES_INSTANCES"] is None
+    assert found["MOVES_VERTICES"] is not True, "true is 1 in kernels"

@@ -14,6 +14,7 @@ import trimesh
 from clpt import device as dev
 from clpt import transforms as tf
 from clpt.errors import SceneError
+from clpt.render.contract.features import TransportFeatures
 from clpt.render.editing.moving import Moving
 from clpt.render.renderer import Renderer
 from clpt.scene import Scene
@@ -154,7 +155,7 @@ def test_where_light_is_traced_from_lights_nothing_moves_in_place(renderer: Rend
     target = renderer.wavefront.scene
     moving, lowered = Moving(target, renderer.scene), target.lowered
     assert moving.move(renderer.scene, {}, lambda: None) is None
-    features = dataclasses.replace(lowered.features, light_paths=True)
+    features = dataclasses.replace(lowered.features, transport=TransportFeatures(light_paths=True))
     target.lowered = dataclasses.replace(lowered, features=features)
     assert "traced from lights" in (moving.move(renderer.scene, {}, lambda: None) or "")
     target.lowered = lowered

@@ -9,9 +9,8 @@ import pytest
 
 import clpt
 from clpt.errors import SceneError
-from clpt.records import SETTINGS, SHAPE, TABLES
+from clpt.records import SETTINGS, SHAPE, SHAPE_BITS, TABLES
 from clpt.render.analysis import geometry
-from clpt.render.analysis.geometry import SHAPE_NORMALS, SHAPE_TWO_SIDED, SHAPE_UVS
 from clpt.render.contract.parameter_words import MIXTURE
 from clpt.render.lowering.scene import lower
 from clpt.render.lowering.settings import DEEPEST
@@ -61,8 +60,8 @@ def test_triangles_of_all_shapes_are_joined() -> None:
     assert made.faces.max() == len(made.vertices) - 1
     table = rows(made)
     assert table["prim"].tolist()[:3] == [0, 2, 3]
-    assert table["flags"][1] & SHAPE_NORMALS and table["flags"][1] & SHAPE_UVS
-    assert not table["flags"][0] & SHAPE_NORMALS
+    assert table["flags"][1] & SHAPE_BITS["normals"] and table["flags"][1] & SHAPE_BITS["uvs"]
+    assert not table["flags"][0] & SHAPE_BITS["normals"]
     assert table["kind"].tolist() == [0, 0, 0, 1]
     assert len(made.boxes) == 1
     assert table["number"].tolist() == [0, 2, 3, 1]  # which shape of the scene it was
@@ -77,7 +76,7 @@ def test_materials_are_put_in_once() -> None:
 def test_sides() -> None:
     red, blue = m.Diffuse(reflectance=(1, 0, 0)), m.Diffuse(reflectance=(0, 0, 1))
     made = rows(lower(scene(Rectangle(material=m.TwoSided(front=red, back=blue)))))
-    assert made["flags"][0] & SHAPE_TWO_SIDED
+    assert made["flags"][0] & SHAPE_BITS["two_sided"]
     assert made["front"][0] != made["back"][0]
     same = rows(lower(scene(Rectangle(material=m.TwoSided(front=red)))))
     assert same["front"][0] == same["back"][0]
@@ -89,7 +88,7 @@ def test_mixtures_name_their_parts() -> None:
     assert word >> 24 == MIXTURE
     rule = made.tables["mixtures"][word & 0xFFFFFF :][:4]
     assert rule[:1].view(np.float32)[0] == 0.25
-    kinds = [made.features.materials[w >> 24] for w in rule[2:].tolist()]
+    kinds = [made.features.materials.kinds[w >> 24] for w in rule[2:].tolist()]
     assert kinds == ["null", "diffuse"]
 
 
@@ -122,9 +121,9 @@ def test_what_is_no_material_is_refused() -> None:
 def test_principled_is_what_its_parameters_say() -> None:
     """Two-sided while it is opaque; with tangents where it is stretched."""
     opaque = lower(scene(Rectangle(material=m.TwoSided(front=m.Principled())))).features
-    assert not opaque.tangents and not opaque.dispersion
+    assert not opaque.geometry.tangents and not opaque.dispersion
     for stretched in (m.Principled(anisotropic=0.5), m.PrincipledThin(anisotropic=0.5)):
-        assert lower(scene(Rectangle(material=stretched))).features.tangents
+        assert lower(scene(Rectangle(material=stretched))).features.geometry.tangents
     for passes in (m.Principled(spec_trans=0.1), m.PrincipledThin(), m.DiffuseTransmission()):
         with pytest.raises(clpt.SceneError, match="a transmissive"):
             lower(scene(Rectangle(material=m.TwoSided(front=passes))))
@@ -136,7 +135,7 @@ def test_few_lights_are_chosen_from_a_tree_where_they_stand_apart() -> None:
     cube = Cube(emission=Area())  # twelve rows, one as good as another
 
     def tree(*shapes: Shape, lights: list) -> bool:
-        return lower(scene(*shapes, lights=lights)).features.light_tree
+        return lower(scene(*shapes, lights=lights)).features.lights.tree
 
     assert tree(lights=points) and tree(lights=far + points)
     assert not tree(lights=points[:2]) and not tree(lights=far + points[:2])

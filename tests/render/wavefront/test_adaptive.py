@@ -16,6 +16,7 @@ import clpt
 from clpt import transforms as tf
 from clpt.device import Device, choose
 from clpt.errors import SceneError
+from clpt.render.contract.features import Features, TransportFeatures
 from clpt.render.lowering.scene import lower
 from clpt.render.wavefront.adaptive import LEAST, _partners, checked
 from clpt.render.wavefront.cells import SIDE
@@ -305,7 +306,7 @@ def test_refused(integrator):
 
 
 def test_refused_where_pixels_share_points():
-    features = dataclasses.replace(lower(bulb()).features, sampler="zsobol")
+    features = Features(transport=TransportFeatures(sampler="zsobol"))
     with pytest.raises(SceneError, match="zsobol"):
         checked(0.1, features)
 

@@ -9,6 +9,7 @@ import pytest
 
 import clpt
 from clpt import device, transforms
+from clpt.render.contract.features import MotionFeatures
 from clpt.render.lowering.scene import Lowered, lower
 from clpt.render.wavefront import strategy
 from clpt.render.wavefront.strategy import Tuning
@@ -119,7 +120,7 @@ def test_many_curves_and_little_else(monkeypatch: pytest.MonkeyPatch) -> None:
         assert not interleaved(ball)
     assert not interleaved(hair, "binary")
     for what in ("camera", "shapes", "vertices"):
-        moving = dataclasses.replace(hair.features, moving=(what,))
+        moving = dataclasses.replace(hair.features, motion=MotionFeatures(**{what: True}))
         found = interleaved(dataclasses.replace(hair, features=moving))
         assert found == (on.lanes > 1 and what == "camera")
 

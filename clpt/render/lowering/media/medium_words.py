@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.records import MEDIUM_BITS
 from clpt.render.analysis.bricks import Glow, black_bodies, brick_counts
 from clpt.render.analysis.index import SceneIndex
 from clpt.render.contract.parameter_words import SPECTRUM_WORDS
@@ -23,11 +24,6 @@ from clpt.scene.shapes import Shape
 from clpt.spectra import Constant, Spectrum
 
 MOST_AIMS = 8  # lamps near which flights end, see kernels/media/equiangular.cl
-FLIES = 0x40000000  # in a medium's word: the stage `flight` takes rays through it
-BYTES = 0x10000000  # which has 8 bits for each number
-GRID = 0x20000000  # a density on a grid multiplies its coefficients
-DYED = 0x04000000  # with a dye that gives out light
-SEALED = 0x08000000  # no shadow ray leaves it, see clpt.render.analysis.sealed
 
 
 def medium_aims(lights: LightRows) -> NDArray[np.float32]:
@@ -96,19 +92,20 @@ class MediumWords:
             rows.append(self._encoder.named_words("medium", "light", light, "emission")[0])
         rows += self._part_words(phases, (absorbs, scatters))
         mixture = self._mixture_words(medium)
-        word = FLIES | (SEALED if medium in self._sealed else 0)
+        word = MEDIUM_BITS["flies"] | (MEDIUM_BITS["sealed"] if medium in self._sealed else 0)
         if isinstance(medium, Dyed) and medium.glows and spectral:
-            word |= DYED
+            word |= MEDIUM_BITS["dyed"]
         if isinstance(medium, Lattice):
             rows.append(grids.row(medium, self._encoder))
-            word |= GRID | (BYTES if getattr(medium, "bits", 16) == 8 else 0)
+            word |= MEDIUM_BITS["grid"]
+            word |= MEDIUM_BITS["bytes"] if getattr(medium, "bits", 16) == 8 else 0
         before = 2 + (SPECTRUM_WORDS if self._index.emitting else 0)
         word |= before + self._encoder.store.size("materials")
-        if isinstance(medium, Lattice) and self._index.glowing:
+        if isinstance(medium, Lattice) and self._index.grids.emissive:
             rows.append(self._glow(medium, word))
-        if isinstance(medium, Lattice) and self._index.tinted:
+        if isinstance(medium, Lattice) and self._index.grids.tinted:
             rows.append(self._tint(medium, "albedo_grid"))
-        if isinstance(medium, Lattice) and self._index.coloured:
+        if isinstance(medium, Lattice) and self._index.grids.coloured:
             rows.append(self._tint(medium, "colour_grid"))
         rows += mixture
         self._encoder.store.append("materials", np.concatenate(rows))
@@ -126,7 +123,7 @@ class MediumWords:
 
     def _mixture_words(self, medium: Medium) -> list[Words]:
         """What stands behind all: where the shares of parts begin, 0 for nowhere, and the parts."""
-        count, spectral = self._index.most_parts, self._index.spectral
+        count, spectral = self._index.grids.mixed, self._index.spectral
         if not isinstance(medium, Mixture):
             return [np.zeros(1, np.uint32)] if count and isinstance(medium, Lattice) else []
         first = self._encoder.store.append("images", grids.shares(medium, self._encoder, count))

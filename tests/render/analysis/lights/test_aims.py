@@ -49,7 +49,7 @@ def spheres_of(*shapes: Shape) -> NDArray[np.float32]:
     """Centre, radius and share (k, 5) of the spheres in the scene of these shapes."""
     lowered = lower(scene_of(*shapes))
     first, number = (int(lowered.settings[name]) for name in ("aims", "aim_count"))
-    assert lowered.features.aimed == (number > 0)
+    assert lowered.features.transport.aimed == (number > 0)
     return lowered.tables["distributions"][first : first + 5 * number].reshape(-1, 5)
 
 
@@ -173,4 +173,4 @@ def test_without_something_sharp_and_small_nothing_is_aimed() -> None:
     assert len(spheres_of(dull)) == len(spheres_of(wide)) == 0
     scene = scene_of(Sphere(center=(0, 1, 0), radius=0.5, material=GLASS))
     for integrator in (Path(light_paths=0), ParticleTracer()):
-        assert not lower(dataclasses.replace(scene, integrator=integrator)).features.aimed
+        assert not lower(dataclasses.replace(scene, integrator=integrator)).features.transport.aimed

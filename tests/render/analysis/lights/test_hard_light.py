@@ -193,7 +193,7 @@ def test_all_is_as_with_the_number(shapes: list[Shape], number: float, mode: str
     other = lower(scene_of(*shapes, mode=mode, integrator=Path(light_paths=number)))
     assert made.features == other.features and made.warnings == other.warnings
     assert made.settings == other.settings and other.reason == ""
-    assert made.features.weighed == (number > 0)
+    assert made.features.transport.weighed == (number > 0)
     for name, table in other.tables.items():
         assert np.array_equal(made.tables[name].view(np.uint32), table.view(np.uint32)), name
 
@@ -229,7 +229,7 @@ def test_the_integrator_that_suits_a_scene(scene: Scene, kind: type, number: flo
     made = lower(scene)
     assert type(made.integrator) is kind and made.reason
     assert made.settings["light_paths"] == number
-    assert made.features.merged == (kind is Vcm)
+    assert made.features.transport.merged == (kind is Vcm)
 
 
 @pytest.mark.parametrize("name", ["max_depth", "rr_depth", "hide_lights"])

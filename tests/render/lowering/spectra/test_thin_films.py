@@ -49,8 +49,8 @@ def test_layers_lie_in_a_row():
 
 
 def test_textures_of_layers_need_uvs():
-    assert lowered("spectral", m.Dielectric(layers=(m.Layer(profile=RAMP),))).features.uvs
-    assert not lowered("spectral", m.Dielectric(layers=(m.Layer(),))).features.uvs
+    assert lowered("spectral", m.Dielectric(layers=(m.Layer(profile=RAMP),))).features.geometry.uvs
+    assert not lowered("spectral", m.Dielectric(layers=(m.Layer(),))).features.geometry.uvs
 
 
 def test_rgb_mode_varies_by_one_texture():

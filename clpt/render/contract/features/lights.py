@@ -1,0 +1,32 @@
+"""Features of lights: their kinds, and how one is chosen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from clpt.render.contract.features.macros import flag, macro
+from clpt.render.contract.light_records import VOLUME
+
+
+@dataclass(frozen=True)
+class LightFeatures:
+    """The device kinds of lights, see clpt.render.contract.light_records, and what they do."""
+
+    kinds: tuple[str, ...] = ()
+    infinite: bool = False  # some light is met by rays that leave the scene
+    visible: bool = False  # some light is no delta light: a camera may see it
+    two_sided: bool = False  # some shape emits from its back too
+    tree: bool = False  # a tree chooses among the lights
+    few: bool = flag("FEW_LIGHTS", True)  # the number that chooses one also places the point on it
+
+    @property
+    @macro("USES_LIGHTS")
+    def present(self) -> bool:
+        """Whether there is a light."""
+        return bool(self.kinds)
+
+    @property
+    @macro("BRICK_LIGHTS")
+    def bricks(self) -> bool:
+        """Whether bricks of media are lights."""
+        return VOLUME in self.kinds

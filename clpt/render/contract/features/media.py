@@ -1,0 +1,41 @@
+"""Features of media, inside or outside of shapes, or around the camera."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from clpt.render.contract.features.macros import flag, macro, number
+
+
+@dataclass(frozen=True)
+class GridFeatures:
+    """Media whose density is on a grid."""
+
+    present: bool = flag("USES_GRIDS")
+    emissive: bool = flag("GRIDS_EMIT")  # some give out light
+    hot: bool = flag("GRIDS_GLOW")  # some have a temperature
+    tinted: bool = flag("GRIDS_TINTED")  # some have an albedo on a grid
+    coloured: bool = flag("GRIDS_COLOURED")  # some have colours of their extinction on a grid
+    mixed: int = flag("GRIDS_MIXED", 0)  # parts of the one that is made of most
+    bytes: bool = flag("USES_BYTES")  # some have 8 bits for each number
+
+
+@dataclass(frozen=True)
+class MediaFeatures:
+    """Media, and bodies whose insides absorb light."""
+
+    absorption: bool = False  # inside of a dielectric
+    present: bool = flag("USES_MEDIA")
+    chromatic: bool = False  # some extinction depends on the wavelength
+    emissive: bool = flag("MEDIA_EMIT")  # some give out light
+    dyed: bool = flag("USES_DYES")  # some have a dye that gives out light
+    sealed: bool = flag("SEALED_MEDIA")  # no ray to a light can leave some
+    bodies: bool = flag("USES_BODIES")  # they may overlap, of different priorities
+    aims: int = number("MEDIUM_AIMS")  # places of lamps near which flights through media end
+    grids: GridFeatures = GridFeatures()
+
+    @property
+    @macro("USES_ABSORPTION")
+    def absorbing(self) -> bool:
+        """Whether light may be lost on its way."""
+        return self.absorption or self.present

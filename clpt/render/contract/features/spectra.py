@@ -1,0 +1,35 @@
+"""Features of spectra: the mode, and the grid of tabulated ones."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from clpt.render.contract.features.macros import macro, number
+from clpt.render.contract.parameter_words import RERADIATION_STEP
+
+
+@dataclass(frozen=True)
+class SpectraFeatures:
+    """The mode, and the grid of tabulated spectra."""
+
+    mode: str = "rgb"
+    size: int = number("SPECTRA_SIZE")  # values of a spectrum
+    step: float = 1.0  # between them [nm]
+    tabulated_density: bool = False  # of wavelengths
+
+    @property
+    def spectral(self) -> bool:
+        """Whether paths have wavelengths."""
+        return self.mode == "spectral"
+
+    @property
+    @macro("SPECTRA_STEP")
+    def step_text(self) -> str:
+        """The step in the text of kernels."""
+        return f"{self.step}f"
+
+    @property
+    @macro("RERADIATION_STEP")
+    def reradiation_step(self) -> int:
+        """The step of tables of re-radiation [nm]."""
+        return RERADIATION_STEP

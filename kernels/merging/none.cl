@@ -1,2 +1,0 @@
-/* Stands for the cell of a photon where there is none. */
-#define PHOTON_NONE 0xffffffffu
