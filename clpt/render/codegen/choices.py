@@ -42,8 +42,8 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/front_motion.cl": lambda f, _: either(f.motion.camera, "path/front_motion.cl"),
     "generated/ghosts.cl": lambda f, _: either(f.transport.lit_ghosts, "path/ghosts.cl"),
     "generated/first_ray.cl": lambda f, _: (f"path/first_ray{'_weighted' * f.camera.weighs}.cl",),
-    "generated/ghosts.cl": lambda f, _: either(f.transport.lit_ghosts, "path/ghosts.cl"),
-    "generated/first_ray.cl": lambda f, _: (f"path/first_ray{'_weighted' * f.camera.weighs}.cl",),
+    "generated/sky.cl": lambda f, _: (
+        *either(f.lights.infinite, "path/sky.cl"),
         *either(f.lights.infinite and bool(f.film.layers.lights), "path/sky_layers.cl"),
     ),
     "generated/join_light.cl": lambda f, _: either(f.shows_lights, "lighting/join_light.cl"),
