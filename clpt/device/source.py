@@ -111,7 +111,7 @@ def assemble(
     virtual: name -> generated text, a Part, or the names of files that stand for it, includable by
     that name; it wins over a file of that name.
     defines: written as `#define` lines at the top.
-    library: whether another text will name what this one defines.
+    library: whether another text will name what this one defines, and its defines.
 
     The constants of clpt.records are virtual files of all texts.
 
@@ -240,7 +240,8 @@ class _Assembly:
     def source(self) -> Source:
         """Return the text, without definitions that nothing in it names."""
         defines = [macro(name, value) for name, value in self.defines.items()]
-        stay = named([*defines, *(d for _, ps in self.pieces for p in ps for d in p.definitions)])
+        own = [one for _, ps in self.pieces for p in ps for one in p.definitions]
+        stay = named([*defines, *own]) | {*(defines if self.library else ())}
         left = [(file, [p.left(stay) for p in ps]) for file, ps in self.pieces]
         files = {file for file, found in left if any(rows for rows, _ in found)}
         text = _Text([row.text for one in defines if one in stay for row in one.rows])

@@ -18,7 +18,7 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
 
     Sampler sampler = pixel_sampler(scene.settings, load_path_pixel_key(path, at), load_path_sample(path, at));
     Scattering scatter = vertex_scattering(scene, path, at, met, v, sampler);
-    if (!BSDF_IS_NULL && !BSDF_IS_PANE)
+    if (VERTEX_COUNTS)
         v.state = layers_record(scene, path, at, LAYER_PASSED, met, v, scatter, v.state);
     if (BSDF_ABSORBS) /* as the surfaces of lights mostly do */
         next = next & (spectrum_max(bsdf_albedo(scatter.bsdf)) > 0.0f);

@@ -1,6 +1,38 @@
 /* The classic ray tracer (Whitted 1980): ambient and direct light, and one ray onward where a surface mirrors: with the
  * weight of a material's `reflectivity`, or as a delta material sends it. Direct light comes from one light a sample,
  * chosen at random, so several lights converge to their sum. */
+/* `radiance` with the light of surfaces that are met. */
+inline Spectrum whitted_emission(Scene scene, mask active, Vertex v, Spectrum radiance)
+{
+    mask lit = active & (v.s.light >= 0) & light_shows(scene, v.s.light, v.front);
+    if (any(lit)) {
+        integer light = sel_i(lit, v.s.light, (integer)(0));
+        Spectrum le = emission_load(scene, light_at(scene, light).radiance, surface_texture_point(v.s), v.lambdas);
+        radiance = spectrum_sel(lit, spectrum_add(radiance, spectrum_mul(v.beta, le)), radiance);
+    }
+    return radiance;
+}
+
+#if USES_LIGHTS
+/* Puts a ray to a light into the shadow slab; own: the throughput of what is not mirrored. Returns what the path's
+ * state gains. */
+inline integer whitted_light(Scene scene, Slab shadow, uint at, mask active, Vertex v, Scattering scatter, Spectrum own)
+{
+    Frame frame = scatter.shading.frame;
+    vec2 point = sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_LIGHT);
+    vec3 side = vertex_hemisphere(frame, scatter.wo);
+    LightSample ls = light_sample(scene, v.s.p, side, scatter.choice.x, point, scatter.lambdas);
+    Spectrum f = bsdf_eval(scatter.bsdf, scatter.wo, to_local(frame, ls.wi));
+    f = spectrum_scale(f, shading_frame_share(scatter.shading, ls.wi));
+    mask shine = active & (ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
+    real w = 1.0f / sel(shine, fabs(ls.pdf), (real)(1.0f));
+    Spectrum value = spectrum_scale(spectrum_mul(spectrum_mul(own, f), ls.radiance), w);
+    value = vertex_beyond(scene, v, ls.wi, ls.t, scatter.lambdas, value);
+    shadow_toward(shadow, at, active, shine, v.s, ls, value);
+    return sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
+}
+#endif
+
 void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active)
 {
     global const Settings *settings = scene.settings;
@@ -8,14 +40,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     Surface s = v.s;
     Spectrum beta = v.beta, radiance = load_path_radiance(path, at);
     integer state = v.state, depth = v.depth;
-#if BSDF_SHINES
-    mask lit = active & (s.light >= 0) & light_shows(scene, s.light, v.front);
-    if (any(lit)) {
-        integer light = sel_i(lit, s.light, (integer)(0));
-        Spectrum le = emission_load(scene, light_at(scene, light).radiance, surface_texture_point(s), v.lambdas);
-        radiance = spectrum_sel(lit, spectrum_add(radiance, spectrum_mul(beta, le)), radiance);
-    }
-#endif
+    if (BSDF_SHINES) radiance = whitted_emission(scene, active, v, radiance);
     Sampler sampler = pixel_sampler(settings, load_path_pixel_key(path, at), load_path_sample(path, at));
     Scattering scatter = vertex_scattering(scene, path, at, active, v, sampler);
     Bsdf m = scatter.bsdf;
@@ -29,15 +54,7 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     Spectrum everywhere = spectrum_mul(spectrum_mul(own, bsdf_albedo(m)), ambient);
     radiance = spectrum_sel(active, spectrum_add(radiance, everywhere), radiance);
 #if USES_LIGHTS
-    vec2 point = sampler_pair(sampler, scatter.dimension + DIMENSION_LIGHT);
-    LightSample ls = light_sample(scene, s.p, vertex_hemisphere(frame, wo), scatter.choice.x, point, scatter.lambdas);
-    Spectrum f = spectrum_scale(bsdf_eval(m, wo, to_local(frame, ls.wi)), shading_frame_share(scatter.shading, ls.wi));
-    mask shine = active & (ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
-    real w = 1.0f / sel(shine, fabs(ls.pdf), (real)(1.0f));
-    Spectrum value = spectrum_scale(spectrum_mul(spectrum_mul(own, f), ls.radiance), w);
-    value = vertex_beyond(scene, v, ls.wi, ls.t, scatter.lambdas, value);
-    shadow_toward(shadow, at, active, shine, s, ls, value);
-    state += sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
+    state += whitted_light(scene, shadow, at, active, v, scatter, own);
 #endif
     vec3 wi = reflect_z(wo);
     beta = spectrum_scale(beta, mirror);
@@ -58,8 +75,6 @@ void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, m
     store_path_radiance(path, at, active, radiance);
     vertex_leave(path, at, next, null, v, onward, beta);
     store_path_cone(path, at, next, cone_word(v.cone));
-#if !BSDF_IS_NULL
-    store_path_pdf(path, at, next, (real)(-1.0f));
-#endif
+    if (!BSDF_IS_NULL) store_path_pdf(path, at, next, (real)(-1.0f));
     vertex_end(path, at, active, next, null, state);
 }

@@ -6,7 +6,7 @@
 #define path_hemisphere_keep(path, at, m, hemisphere) store_path_sampled_hemisphere(path, at, m, hemisphere)
 #else
 #define path_hemisphere(path, at) v3(0.0f, 0.0f, 0.0f)
-#define path_hemisphere_keep(path, at, m, hemisphere)
+#define path_hemisphere_keep(path, at, m, hemisphere) ((void)0)
 #endif
 
 /* What light paths do, over the path's own density (lighting/rivals.cl): nothing where the camera or its first surface

@@ -28,6 +28,8 @@ typedef struct {
 #define VERTEX_COSINE(n, d) fabs(dot3(n, d))
 #endif
 
+#define VERTEX_COUNTS (!BSDF_IS_NULL && !BSDF_IS_PANE) /* it is a step of its path, whatever the lobe */
+
 /* The material at a vertex, and the random numbers of the vertex. */
 typedef struct {
     Sampler sampler;

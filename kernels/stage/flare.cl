@@ -19,6 +19,7 @@
 #include "path/path_end.cl"
 #include "path/next_light_path.cl"
 #include "lighting/light_path_sampler.cl"
+#include "generated/front_motion.cl"
 
 /* Puts a ray to a light into the shadow slab of the slots that `go` on. Returns the bits of Path.state that follow. */
 inline integer begin_ghost(Scene scene, Slab path, Slab shadow, uint at, mask ended, mask go, integer pixel_index,
@@ -35,26 +36,13 @@ inline integer begin_ghost(Scene scene, Slab path, Slab shadow, uint at, mask en
     scene.time = motion_time(scene, other.x);
     store_path_time(path, at, go, scene.time);
     LensFront f = lens_front(scene, camera, sampler_pair(sampler, (natural)(DIMENSION_FILM)));
-    vec3 p = matrix_point(camera->to_world, f.p.x, f.p.y, f.p.z);
-    vec3 n = matrix_vector(camera->to_world, f.n.x, f.n.y, f.n.z);
-#if MOVES_CAMERA
-    CameraRay moved = {p, n, (real)(FAR)};
-    moved = camera_moved(scene, moved);
-    p = moved.o;
-    n = moved.d;
-#endif
-    LightSample ls = light_sample(scene, p, n, u.y, sampler_pair(sampler, (natural)(DIMENSION_LENS)), lambdas);
-    vec3 to = ls.wi;
+    CameraRay front = {matrix_point(camera->to_world, f.p.x, f.p.y, f.p.z),
+                       matrix_vector(camera->to_world, f.n.x, f.n.y, f.n.z), (real)(FAR)};
+    front = front_moved(scene, front);
+    vec2 place = sampler_pair(sampler, (natural)(DIMENSION_LENS));
+    LightSample ls = light_sample(scene, front.o, front.d, u.y, place, lambdas);
     real grows = 1.0f; /* a solid angle where the camera was lowered, over that in the world */
-#if MOVES_CAMERA
-    Motion motion = camera_motion(scene);
-    to = motion_back(motion, to);
-#if MOTION_SCALES
-    real longer = 1.0f / sqrt(max_r(dot3(to, to), (real)(1e-35f)));
-    to = scale3(to, longer);
-    grows = fabs(dot3(motion.x, cross3(motion.y, motion.z))) * longer * longer * longer;
-#endif
-#endif
+    vec3 to = front_lowered(scene, ls.wi, &grows);
     global const float *m = camera->to_world; /* rigid, so that its transpose leads back */
     vec3 d = v3(-(m[0] * to.x + m[4] * to.y + m[8] * to.z), -(m[1] * to.x + m[5] * to.y + m[9] * to.z),
                 -(m[2] * to.x + m[6] * to.y + m[10] * to.z));
@@ -68,7 +56,7 @@ inline integer begin_ghost(Scene scene, Slab path, Slab shadow, uint at, mask en
 #if USES_ABSORPTION
     value = medium_dims(scene, MEDIUM_LEFT((integer)(settings->camera_medium)), ls.t, lambdas, value);
 #endif
-    store_shadow_o(shadow, at, shine, p);
+    store_shadow_o(shadow, at, shine, front.o);
     store_shadow_d(shadow, at, shine, ls.wi);
     store_shadow_t(shadow, at, ended, sel(shine, ls.t * SHADOW_SHORTER, (real)(-1.0f)));
     store_shadow_value(shadow, at, shine, value);

@@ -24,6 +24,7 @@ ALTERNATIVES = (  # files, of each row of which a program has one at most
     ("path/first_ray*.cl",),
     ("path/vertex_bodies.cl", "path/vertex_media.cl", "path/vertex_media_none.cl"),
     ("path/vertex_bodies_ways.cl", "path/vertex_media_ways*.cl"),
+    ("path/vertex_dims.cl", "path/vertex_media_ways_none.cl"),
     ("guiding/guided_vertex.cl", "guiding/guide_none.cl"),
     ("path/pixel_sampler*.cl",),
     ("path/shadow_ray*.cl",),

@@ -46,20 +46,11 @@ def render_samples(
     It ends soon after the limit, perhaps before every pixel has a sample, and within a second of a
     signal.
     """
-    began = time.perf_counter()
     first, last, limit = renderer.first_sample, end.samples or MOST_SAMPLES, end.seconds
-    total = 0 if end.samples is None else end.samples - first
-    others = renderer.counts if renderer.samples > first else Counts()  # who rendered before
-
-    def tell(progress: Progress) -> bool:
-        seconds = time.perf_counter() - began
-        paths, rays = progress.paths - others.samples, progress.rays - others.rays
-        show(dataclasses.replace(progress, total=total, seconds=seconds, paths=paths, rays=rays))
-        over = limit is not None and seconds >= limit
-        return not (end.stopped or over)
-
     if renderer.samples >= last:
         return
+    began = time.perf_counter()
+    tell = _teller(renderer, end, show, began)
     size, now = 1 if math.isfinite(pass_seconds) else last - renderer.samples, began
     while renderer.run(size, tell, noise=end.noise):
         after_pass()
@@ -71,6 +62,24 @@ def render_samples(
         rate = size / max(now - start, 1e-9)
         done = renderer.samples - first
         size = pass_size(done, rate, samples_left, seconds_left, pass_seconds)
+
+
+def _teller(
+    renderer: AnyRenderer, end: End, show: Callable[[Progress], None], began: float
+) -> Callable[[Progress], bool]:
+    """Return what shows the progress since `began`, and tells whether the render goes on."""
+    first = renderer.first_sample
+    total = 0 if end.samples is None else end.samples - first
+    others = renderer.counts if renderer.samples > first else Counts()  # who rendered before
+
+    def tell(progress: Progress) -> bool:
+        seconds = time.perf_counter() - began
+        paths, rays = progress.paths - others.samples, progress.rays - others.rays
+        show(dataclasses.replace(progress, total=total, seconds=seconds, paths=paths, rays=rays))
+        over = end.seconds is not None and seconds >= end.seconds
+        return not (end.stopped or over)
+
+    return tell
 
 
 def pass_size(

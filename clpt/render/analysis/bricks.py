@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -85,8 +85,13 @@ class Glow:
         rising = np.argsort(self.power, kind="stable")
         faint = np.cumsum(self.power[rising]) <= FAINT * self.power.sum()
         kept = np.sort(rising[~faint])
-        own = (self.numbers, self.power, self.corners, self.edges)
-        return Glow(*(values[kept] for values in own), self.emitting)
+        return replace(
+            self,
+            numbers=self.numbers[kept],
+            power=self.power[kept],
+            corners=self.corners[kept],
+            edges=self.edges[kept],
+        )
 
 
 def _source(medium: Grid) -> Windows | None:

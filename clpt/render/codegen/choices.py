@@ -39,6 +39,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         when(f.media.bodies, "path/vertex_bodies.cl")
         or either(f.media.absorbing, "path/vertex_media.cl")
     ),
+    "generated/front_motion.cl": lambda f, _: either(f.motion.camera, "path/front_motion.cl"),
     "generated/ghosts.cl": lambda f, _: either(f.transport.lit_ghosts, "path/ghosts.cl"),
     "generated/first_ray.cl": lambda f, _: (f"path/first_ray{'_weighted' * f.camera.weighs}.cl",),
     "generated/sky.cl": lambda f, _: (
@@ -52,10 +53,15 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     ),
     "generated/layers.cl": lambda f, _: (
         when(
-            f.film.layers.words > 0, "generated/layer_args.cl", *_screen_motion(f), "path/layers.cl"
+            f.film.layers.words > 0,
+            "generated/layer_args.cl",
+            *_screen_motion(f),
+            *either(f.screen_motion, "path/screen_motion_record.cl"),
+            "path/layers.cl",
         )
         or ("path/layers_none.cl",)
     ),
+    "generated/mattes.cl": lambda f, _: either(f.film.layers.mattes, "path/mattes.cl"),
     "generated/light_layers.cl": lambda f, _: (
         *when(f.film.layers.lights, "generated/light_layer_args.cl", "generated/sampler.cl"),
         *either(f.film.layers.lights, "film/light_layers.cl"),

@@ -100,7 +100,7 @@ SCENE = frozenset({*dict(said(Features())), *_LAYERS})  # the names of flags of 
 def of_scene(features: Features) -> Defines:
     """Return the macros that features say."""
     places = features.film.layers.places
-    layers = {macro: places[name] for macro, name in _LAYERS.items() if name in places}
+    layers = {macro: places.get(name, 0) for macro, name in _LAYERS.items()}
     return layers | {name: value for name, value in said(features) if value is not None}
 
 

@@ -19,7 +19,7 @@ from clpt.scene.materials import DISTRIBUTIONS
 
 Floats = NDArray[np.float64]
 Made = Callable[[str, float, float], "Floats | float"]
-Tables = dict[str, NDArray[Any]]
+Kept = dict[str, NDArray[Any]]
 
 FILE = Path(__file__).parent / "data/rough_coat.npz"
 LARGEST = 65535  # of a table's numbers, as they are kept
@@ -181,7 +181,7 @@ def _thrown(distribution: str, alpha: float, eta: float) -> Floats:
     return 1.0 + thrown_back(distribution, alpha, eta, cos_i) - fresnel(cos_i, eta)
 
 
-def made() -> Tables:
+def made() -> Kept:
     """Return the tables by name, in the order of DOCS: a minute of work."""
     tables = {
         "passed": _rows(_passed),
@@ -197,7 +197,7 @@ def made() -> Tables:
     return found
 
 
-def kept() -> Tables:
+def kept() -> Kept:
     """Return the tables of FILE by name."""
     with np.load(FILE, allow_pickle=False) as file:
         return dict(file)
@@ -240,4 +240,5 @@ def virtual_files() -> dict[str, str]:
 
 
 if __name__ == "__main__":
-    np.savez_compressed(FILE, **made())
+    tables: Any = made()
+    np.savez_compressed(FILE, **tables)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import clpt
+from clpt.cli.render.refused import refusals
 from clpt.errors import SceneError
 from clpt.render.wavefront.film_state import FILM_WORDS, SAMPLES_WORD, SUM_WORDS, FilmState
 from clpt.render.wavefront.wavefront import Counts
@@ -284,9 +285,12 @@ def test_sums_near_their_end_are_counted():
         assert renderer.wavefront.counts.full == 0
         renderer.run(20)
         assert renderer.wavefront.counts.full > 0
+        (told,) = refusals(renderer)
+        assert told == "pixels are too bright for the film: lower film.exposure"
         renderer.update(scene=painted(2.0**45))
         renderer.run(2)
         assert renderer.wavefront.counts.rejected == 12 and not renderer.image().any()
+        assert refusals(renderer)[0].startswith("12 samples were not finite, or too bright")
 
 
 def test_the_exposure_moves_the_range():

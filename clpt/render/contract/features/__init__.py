@@ -134,13 +134,6 @@ class Features:
         return self.media.present and (own.light_paths or own.weighed) and not own.lit_ghosts
 
     @property
-    @macro("MOVES_CAMERA")
-    def ghosts_move(self) -> bool:
-        """Whether light paths that are ghosts of the lens come to a camera that moves."""
-        return self.transport.lit_ghosts and self.motion.camera
-
-    @property
-    @macro("SCREEN_MOTION")
     def screen_motion(self) -> bool:
         """Whether a layer tells how what is seen moves across the film, and anything may."""
         return "motion" in self.film.layers.names and self.motion.present

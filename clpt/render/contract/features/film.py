@@ -51,7 +51,7 @@ class LayerFeatures:
         return layer_places(self.names)
 
     @property
-    @macro("LAYER_DENOISING")
+    @macro("LAYER_DENOISING", of_number=True)
     def first_for_denoisers(self) -> int:
         """The first word of the layers for denoisers, which come last; 0 where there is none."""
         places = self.places
@@ -72,12 +72,6 @@ class LayerFeatures:
         return self.words > 0
 
     @property
-    @macro("LAYER_IDS")
-    def ids(self) -> bool:
-        """Whether some layer tells numbers of surfaces."""
-        return bool(self._of("id"))
-
-    @property
     def mattes(self) -> tuple[str, ...]:
         """The layers that are lists of names."""
         return self._of("matte")
@@ -95,13 +89,13 @@ class LayerFeatures:
         return MATTE_SLOTS if self.mattes else 0
 
     @property
-    @macro("MATTE_OBJECT")
+    @macro("MATTE_OBJECT", of_number=True)
     def matte_of_objects(self) -> int:
         """1 more than where the list of objects stands."""
         return _number("crypto_object", self.mattes)
 
     @property
-    @macro("MATTE_MATERIAL")
+    @macro("MATTE_MATERIAL", of_number=True)
     def matte_of_materials(self) -> int:
         """1 more than where the list of materials stands."""
         return _number("crypto_material", self.mattes)
@@ -119,19 +113,19 @@ class LayerFeatures:
         return len(self.lights) - 1 + groups if self.lights else 0
 
     @property
-    @macro("LIGHT_LAYER_DIRECT")
+    @macro("LIGHT_LAYER_DIRECT", of_number=True)
     def direct(self) -> int:
         """1 more than where the layer of direct light stands."""
         return _number("direct", self.lights)
 
     @property
-    @macro("LIGHT_LAYER_INDIRECT")
+    @macro("LIGHT_LAYER_INDIRECT", of_number=True)
     def indirect(self) -> int:
         """1 more than where the layer of indirect light stands."""
         return _number("indirect", self.lights)
 
     @property
-    @macro("LIGHT_LAYER_GROUPS")
+    @macro("LIGHT_LAYER_GROUPS", of_number=True)
     def groups(self) -> int:
         """1 more than where the layers of the groups of lights begin."""
         return _number("light_groups", self.lights)

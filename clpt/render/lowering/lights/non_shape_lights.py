@@ -1,4 +1,4 @@
-"""Lights that are not on shapes: their rows in `light_params`, and their power."""
+"""Lights that are not on shapes: their rows in `light_params`."""
 
 from __future__ import annotations
 
