@@ -44,7 +44,7 @@ COUNT = """        {
             store_path_radiance(path, at, alive, spectrum_add(load_path_radiance(path, at), sum));
         }
 """.replace("UNIT", f"{UNIT:.1e}f")
-KEEP = "            hero_keep(path, at, gridded, own.ratio);"
+KEEP = "            store_path_ratio(path, at, gridded, own.ratio);"
 CHANGES = {  # what is put before and after a text
     "media/grid_flight.cl": [
         ("    mask collides;", "", MEMBERS),

@@ -91,6 +91,46 @@ inline Medium grid_part_met(Scene scene, integer name, Medium m, GridWalk w, nat
 }
 #endif
 
+/* A collision where a medium is as dense as `density`: whether it is a real one, by *more, and what it weighs; own: the
+ * medium there; passed: see grid_flight. */
+inline mask grid_meet(Scene scene, integer name, Medium m, Medium own, GridWalk w, real density, real passed, real most,
+                      mask dims, mask meets, natural *more, Wavelengths lambdas, GridFlight *f)
+{
+    Spectrum scatters = spectrum_scale(own.sigma_s, density);
+#if GRIDS_VARY
+    Spectrum lacks = spectrum_sub(m.sigma_t, spectrum_scale(own.sigma_t, density));
+#else
+    Spectrum lacks = spectrum_scale(m.sigma_t, 1.0f - density);
+#endif
+#if GRIDS_MIXED
+    /* What happens is chosen by the hero wavelength, and weighed over all as distances are. */
+    grid_weigh(m, passed, spectrum_of(1.0f), spectrum_sel(dims, spectrum_of(1.0f), m.sigma_t), meets, f);
+    Spectrum whole = spectrum_add(spectrum_add(scatters, lacks), spectrum_of(1e-30f));
+    real hero = unit_interval(hash_natural(*more ^ 0x1b873593u));
+    real chance = spectrum_pick(spectrum_div(scatters, whole), f->ratio, hero);
+    natural corner = *more;
+    *more = hash_natural(*more ^ 0x2f6e2b1u);
+    mask real_one = meets & (unit_interval(*more) < chance);
+    Medium part = grid_part_met(scene, name, own, w, corner, f->ratio, hero, real_one, lambdas);
+    f->phase = sel_i(real_one, part.phase, f->phase);
+    Spectrum value = spectrum_sel(real_one, spectrum_scale(part.sigma_s, density), lacks);
+    Spectrum kept = spectrum_sub(spectrum_of(1.0f), spectrum_scale(own.sigma_t, density / most));
+    Spectrum pdf = spectrum_sel(dims, spectrum_of(1.0f), spectrum_div(value, whole));
+    grid_weigh(m, (real)(0.0f), spectrum_sel(dims, kept, value), pdf, meets, f);
+#else
+    real chance = spectrum_mean(spectrum_mul(f->ratio, spectrum_div(scatters,
+        spectrum_add(spectrum_add(scatters, lacks), spectrum_of(1e-30f)))));
+    *more = hash_natural(*more ^ 0x2f6e2b1u);
+    mask real_one = meets & (unit_interval(*more) < chance);
+    chance = 1.0f / max_r(sel(real_one, chance, 1.0f - chance), (real)(1e-30f));
+    Spectrum value = spectrum_scale(spectrum_sel(real_one, scatters, lacks), chance);
+    Spectrum kept = spectrum_sub(spectrum_of(1.0f), spectrum_scale(own.sigma_t, density / most));
+    value = spectrum_sel(dims, kept, value);
+    grid_weigh(m, passed, value, spectrum_sel(dims, spectrum_of(1.0f), m.sigma_t), meets, f);
+#endif
+    return real_one;
+}
+
 /* A flight from o along d through the medium `name`, at most t metres; u: of its first way. */
 inline GridFlight grid_flight(Scene scene, integer name, Medium m, vec3 o, vec3 d, real t, Spectrum ratio, vec2 u,
                               natural key, mask active, Wavelengths lambdas, GridOrigin origin)
@@ -124,38 +164,7 @@ inline GridFlight grid_flight(Scene scene, integer name, Medium m, vec3 o, vec3 
             natural bits = hash_natural(key + count * 0x9e3779b9u), more = hash_natural(bits ^ 0x68bc21ebu);
             real density = brick_density(scene, w, b, meets, more);
             Medium own = grid_medium(scene, name, m, w, meets, more, lambdas);
-            Spectrum scatters = spectrum_scale(own.sigma_s, density);
-#if GRIDS_VARY
-            Spectrum lacks = spectrum_sub(m.sigma_t, spectrum_scale(own.sigma_t, density));
-#else
-            Spectrum lacks = spectrum_scale(m.sigma_t, 1.0f - density);
-#endif
-#if GRIDS_MIXED
-            /* What happens is chosen by the hero wavelength, and weighed over all as distances are. */
-            grid_weigh(m, passed, spectrum_of(1.0f), spectrum_sel(dims, spectrum_of(1.0f), m.sigma_t), meets, &f);
-            Spectrum whole = spectrum_add(spectrum_add(scatters, lacks), spectrum_of(1e-30f));
-            real hero = unit_interval(hash_natural(more ^ 0x1b873593u));
-            real chance = spectrum_pick(spectrum_div(scatters, whole), f.ratio, hero);
-            natural corner = more;
-            more = hash_natural(more ^ 0x2f6e2b1u);
-            mask real_one = meets & (unit_interval(more) < chance);
-            Medium part = grid_part_met(scene, name, own, w, corner, f.ratio, hero, real_one, lambdas);
-            f.phase = sel_i(real_one, part.phase, f.phase);
-            Spectrum value = spectrum_sel(real_one, spectrum_scale(part.sigma_s, density), lacks);
-            Spectrum kept = spectrum_sub(spectrum_of(1.0f), spectrum_scale(own.sigma_t, density / most));
-            Spectrum pdf = spectrum_sel(dims, spectrum_of(1.0f), spectrum_div(value, whole));
-            grid_weigh(m, (real)(0.0f), spectrum_sel(dims, kept, value), pdf, meets, &f);
-#else
-            real chance = spectrum_mean(spectrum_mul(f.ratio, spectrum_div(scatters,
-                spectrum_add(spectrum_add(scatters, lacks), spectrum_of(1e-30f)))));
-            more = hash_natural(more ^ 0x2f6e2b1u);
-            mask real_one = meets & (unit_interval(more) < chance);
-            chance = 1.0f / max_r(sel(real_one, chance, 1.0f - chance), (real)(1e-30f));
-            Spectrum value = spectrum_scale(spectrum_sel(real_one, scatters, lacks), chance);
-            Spectrum kept = spectrum_sub(spectrum_of(1.0f), spectrum_scale(own.sigma_t, density / most));
-            value = spectrum_sel(dims, kept, value);
-            grid_weigh(m, passed, value, spectrum_sel(dims, spectrum_of(1.0f), m.sigma_t), meets, &f);
-#endif
+            mask real_one = grid_meet(scene, name, m, own, w, density, passed, most, dims, meets, &more, lambdas, &f);
             f.collides = f.collides | real_one;
             f.t = sel(real_one, w.t, f.t);
             passed = sel(meets, (real)(0.0f), passed);

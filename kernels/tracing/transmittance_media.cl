@@ -10,6 +10,22 @@
 #include "tracing/passage.cl"
 #include "generated/null_transmittance.cl"
 
+/* What is left of light after `way` metres along d in a medium. */
+inline Spectrum way_transmittance(Scene scene, integer medium, vec3 o, vec3 d, real way, natural key, mask active,
+                                  Wavelengths lambdas)
+{
+    Spectrum dims = medium_transmittance(scene, sel_i(active, medium, (integer)(0)), way, lambdas);
+#if USES_GRIDS
+    mask gridded = active & ((medium & MEDIUM_GRID) != 0);
+    if (any(gridded)) {
+        Medium m = medium_load(scene, sel_i(gridded, medium, (integer)(0)), lambdas);
+        Spectrum passed = grid_transmittance(scene, medium, m, o, d, way, key, gridded, lambdas);
+        dims = spectrum_sel(gridded, passed, dims);
+    }
+#endif
+    return dims;
+}
+
 inline Spectrum trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real t, integer medium,
                                     Wavelengths lambdas, mask active, natural key, integer into)
 {
@@ -26,17 +42,8 @@ inline Spectrum trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, rea
         TraceHit h = trace_closest(TRACE_PASSED, scene, o, d, t, active);
         mask met = active & (h.prim >= 0) & (t > 0.0f);
         real way = sel(met, h.t, max_r(t, (real)(0.0f)));
-        Spectrum dims = medium_transmittance(scene, sel_i(active, medium, (integer)(0)), way, lambdas);
-#if USES_GRIDS
-        mask gridded = active & ((medium & MEDIUM_GRID) != 0);
-        if (any(gridded)) {
-            Medium m = medium_load(scene, sel_i(gridded, medium, (integer)(0)), lambdas);
-            natural own = hash_natural(key + 1u + (uint)surfaces);
-            Spectrum passed = grid_transmittance(scene, medium, m, o, d, way, own, gridded, lambdas);
-            dims = spectrum_sel(gridded, passed, dims);
-        }
-#endif
-        passes = spectrum_mul(passes, dims);
+        natural own_key = hash_natural(key + 1u + (uint)surfaces);
+        passes = spectrum_mul(passes, way_transmittance(scene, medium, o, d, way, own_key, active, lambdas));
         active = met;
         if (any(active)) {
             integer row = sel_i(active, h.shape, (integer)(0));

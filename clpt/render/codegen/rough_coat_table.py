@@ -240,5 +240,5 @@ def virtual_files() -> dict[str, str]:
 
 
 if __name__ == "__main__":
-    tables: Any = made()
-    np.savez_compressed(FILE, **tables)
+    arrays: dict[str, Any] = made()
+    np.savez_compressed(FILE, **arrays)

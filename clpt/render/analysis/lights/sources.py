@@ -192,12 +192,11 @@ def _of_emitter(emitter: Emitter, cache: LoweringCache) -> Source:
         bright = light_power.brightness(value)
         power = np.array([strength * analytic.area(shape) * bright])
         return Source(power, light_bounds.of_shape(shape, both), power, bright)
-    if shape.kind in shape_records.ONE_OF:
+    if shape.kind in shape_records.ONE_OF and emitter.vertices is not None:
         bright = light_power.brightness(value)
-        balls: Any = emitter.vertices
-        areas = 4.0 * np.pi * balls[:, 3].astype(np.float64) ** 2
+        areas = 4.0 * np.pi * emitter.vertices[:, 3].astype(np.float64) ** 2
         power = strength * bright * areas
-        return Source(power, light_bounds.of_balls(balls), power, bright)
+        return Source(power, light_bounds.of_balls(emitter.vertices), power, bright)
     if emitter.vertices is None or emitter.faces is None:
         raise SceneError("its triangles are missing", where=shapes.where(shape))
     given = emitter.vertices, emitter.faces, emitter.keys

@@ -142,9 +142,8 @@ def _emitter_rows(emitter: Emitter, encoder: Encoder) -> np.ndarray:
     kind = "triangle"
     if is_whole(shape):
         kind, geometry = shape.kind, analytic.row(shape)[None]
-    elif shape.kind in shape_records.ONE_OF:
-        balls: Any = emitter.vertices
-        kind, geometry = "sphere", spheres.rows(shape, balls)
+    elif shape.kind in shape_records.ONE_OF and emitter.vertices is not None:
+        kind, geometry = "sphere", spheres.rows(shape, emitter.vertices)
     elif emitter.vertices is None or emitter.faces is None:
         raise SceneError("its triangles are missing", where=shapes.where(shape))
     else:
