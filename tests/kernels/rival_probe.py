@@ -61,6 +61,7 @@ inline Lamp lamp(integer row)
 #define load_path_pending(path, at) (path).pending
 #define load_path_light(path, at) (path).light
 #define load_path_sample(path, at) ((integer)(0))
+#define load_path_null_distance(path, at) ((real)(0.0f))
 #define load_path_sampled_hemisphere(path, at) v3(0.0f, 0.0f, 0.0f)
 #include "lighting/rivals.cl"
 #undef Scene

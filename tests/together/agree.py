@@ -123,8 +123,7 @@ def traced(scene: Scene) -> Scene | None:
     """From lights alone: what is sharp would be black to the camera."""
     if _kinds(scene) & {*SHARP} or scene.film.bands:
         return None
-    given = {name: value for name, value in _depth(scene).items() if name == "max_depth"}
-    return dataclasses.replace(scene, integrator=ParticleTracer(**given))
+    return dataclasses.replace(scene, integrator=ParticleTracer(**_depth(scene)))
 
 
 def other_sampler(scene: Scene) -> Scene:
