@@ -27,8 +27,9 @@ GONE = "the scheduler is gone"
 
 @dataclass(frozen=True)
 class Job:
-    """What workers render: text, from `tasks.describe_job`; the bundle of its scene; and the folder
-    that holds the files of the bundle.
+    """A render's work as workers are told it.
+
+    text: from `tasks.describe_job`; bundle: of the scene; folder: holds the files of the bundle.
     """
 
     text: str
@@ -43,7 +44,7 @@ class Job:
 
 @dataclass
 class Agreed:
-    """What renderers know alike that render side by side.
+    """State that is shared by renderers which render side by side.
 
     kind: the class of device that takes part, that of the first worker; "" before there is one.
     checked: workers whose sample was that of another one.
@@ -55,7 +56,7 @@ class Agreed:
 
 @dataclass
 class Known:
-    """What is known of workers, from one run to the next.
+    """A record of workers that is kept from one run of a render to the next.
 
     mixed: whether several classes of devices take part; patience: seconds without a worker, until
     the render ends. records: of the workers that take part, by address; refused: why others do not;

@@ -34,7 +34,7 @@ class Block:
 
 @dataclass
 class WorkerRecord:
-    """What is known of a worker; samples are of the whole picture.
+    """A record of one worker; samples are of the whole picture.
 
     kind: its class of device; workers of one kind have the same bits. rate: [samples/s], 0 when not
     known; blocks, samples: that it added; size: of its last block [samples]; failures: that it had.
@@ -76,12 +76,12 @@ class Blocks:
 
     @property
     def left(self) -> int:
-        """How many samples nobody has."""
+        """The number of samples that no worker has been given."""
         return sum(end - first for first, end in self._free)
 
     @property
     def rate(self) -> float:
-        """Of all workers together [samples/s]."""
+        """The rate of all workers together [samples/s]."""
         return sum(record.rate for record in self.workers.values())
 
     def join(self, worker: Worker, record: WorkerRecord) -> None:
@@ -122,7 +122,7 @@ class Blocks:
         return record.rate > 0.0 and self.left * record.rate < fastest
 
     def _size(self, record: WorkerRecord) -> int:
-        """How many samples the next block of a worker has."""
+        """Return the number of samples for the next block of a worker."""
         if not record.rate:
             return 1
         usual = self.seconds * record.rate

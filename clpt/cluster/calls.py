@@ -20,7 +20,7 @@ Call = concurrent.futures.Future[tasks.Reply]
 
 
 class Calls:
-    """What a run asks of workers.
+    """Calls of a run to its workers.
 
     priority: among other renders of the same cluster. film_seconds: in which a film comes in,
     beside others.

@@ -65,7 +65,7 @@ class FilmSum:
 
     @property
     def counts(self) -> Counts:
-        """What happened; rays of both kinds as one."""
+        """Counts of all films that were added; `closest` has rays of both kinds."""
         samples, rays, rejected, full = self.totals.values()
         return Counts(samples=samples, closest=rays, rejected=rejected, full=full)
 
@@ -124,7 +124,7 @@ class ClusterFilm(DevicePictures):
 
     @property
     def counts(self) -> Counts:
-        """What has happened for all blocks that were added; see `Renderer.counts`."""
+        """Counts of all blocks that were added; see `Renderer.counts`."""
         return self._sum.counts
 
     @property
@@ -193,7 +193,7 @@ class ClusterFilm(DevicePictures):
 
     @property
     def wavefront(self) -> Wavefront:
-        """What has the picture so far, for screens."""
+        """The wavefront on this machine that holds the picture so far, for screens."""
         return self.shown().wavefront
 
     # ---- saved films
@@ -272,7 +272,7 @@ class ClusterFilm(DevicePictures):
 
     @property
     def form(self) -> PictureForm:  # type: ignore[override]
-        """What makes a picture of the film; see `Renderer.form`."""
+        """The choices by which pictures are made of the film; see `Renderer.form`."""
         form = self._here.form
         return dataclasses.replace(form, adaptive=form.adaptive or self._noise is not None)
 

@@ -99,7 +99,7 @@ class ClusterRenderer(ClusterFilm):
 
     @property
     def workers(self) -> dict[str, WorkerRecord]:
-        """What is known of each worker, by its address: its rate, blocks, samples, failures."""
+        """A record of each worker, by its address: its rate, blocks, samples, failures."""
         return dict(self.farm.known.records)
 
     @property
@@ -115,7 +115,7 @@ class ClusterRenderer(ClusterFilm):
 
     @property
     def lost(self) -> int:
-        """How many workers are gone."""
+        """The number of workers that are gone."""
         return self.farm.known.lost
 
     @property

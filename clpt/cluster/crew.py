@@ -69,7 +69,7 @@ class Crew:
 
     @property
     def counts(self) -> Counts:
-        """What all devices together have done so far."""
+        """Counts of all devices together, those that were dropped included."""
         total = self._past
         for worker in self.workers:
             total = added(total, worker.counts)

@@ -23,7 +23,7 @@ _Made = TypeVar("_Made")
 
 
 class Once:
-    """What several devices need alike: made for the first that asks, and kept for the others."""
+    """Things that several devices share: each is made for the first that asks, and kept."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -94,7 +94,7 @@ class DeviceWorker:
 
     @property
     def counts(self) -> Counts:
-        """What has happened so far."""
+        """Counts of what the device has rendered so far."""
         return added(self.past, self.renderer.counts)
 
     @property

@@ -41,7 +41,7 @@ MOST_FAILURES = 3  # of a block, before the render ends; of a worker in a row, b
 
 @dataclass(frozen=True)
 class Film:
-    """What a worker sent.
+    """A film that a worker sent.
 
     counts: samples, rays, rejected, full; whole: whether all pixels have the samples of its ranges,
     as they have unless a stop cut the block.

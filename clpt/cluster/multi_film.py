@@ -105,7 +105,7 @@ class MultiFilm(DevicePictures):
 
     @property
     def form(self) -> PictureForm:  # type: ignore[override]
-        """What makes a picture of the film; see `Renderer.form`."""
+        """The choices by which pictures are made of the film; see `Renderer.form`."""
         form = self._crew.first.renderer.form
         return dataclasses.replace(form, adaptive=form.adaptive or self._noise is not None)
 
@@ -154,7 +154,7 @@ class MultiFilm(DevicePictures):
         return self._film_with(dataclasses.replace(state, taken=self.contents.taken), so_far)
 
     def _so_far_on(self, first: DeviceWorker) -> dict[str, Any]:
-        """What a saved film has beside its words and origin; first: the device that it is of."""
+        """Return the part of a saved film beside its words and origin; first: the device that it is of."""
         return self._progress_so_far(first.renderer.device_class())
 
     def _film_with(self, state: FilmState, so_far: Mapping[str, Any]) -> SavedFilm:

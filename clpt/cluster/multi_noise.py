@@ -111,7 +111,10 @@ class AdaptiveCrew:
         return all(self._call(call, tick) for call in self._calls)
 
     def _call(self, call: Call, tick: Callable[[], bool]) -> bool:
-        """What one `run` adds. Raises LostPicture when the first device fails."""
+        """Add the samples of one call of `run`; return whether it was not stopped.
+
+        Raises LostPicture when the first device fails.
+        """
         first, end, noise = call
         crew = self.crew
         keeper = crew.first

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class DeviceShare:
-    """What a device has done for a picture.
+    """A device's part in a picture.
 
     name: of the device; share: of all paths, 0 to 1; rate: of paths [1/s]; failure: why it was left
     out, None where it was not.
@@ -132,7 +132,7 @@ class MultiRenderer(MultiFilm):
 
     @property
     def shares(self) -> tuple[DeviceShare, ...]:
-        """What each device has done so far, those that failed last."""
+        """The part of each device in the picture so far, those that failed last."""
         failed = {id(worker): str(error) for worker, error in self._crew.failed}
         workers = [*self._crew.workers, *(worker for worker, _ in self._crew.failed)]
         paths = max(sum(worker.paths for worker in workers), 1)
@@ -143,7 +143,7 @@ class MultiRenderer(MultiFilm):
 
     @property
     def warnings(self) -> list[str]:  # type: ignore[override]
-        """Of the scene, and of devices that failed."""
+        """Warnings of the scene, and one of each device that failed."""
         crew = self._crew
         failed = [f"{worker.name} failed and is left out: {error}" for worker, error in crew.failed]
         of_scene = crew.workers[0].renderer.warnings if crew.workers else []
@@ -151,7 +151,7 @@ class MultiRenderer(MultiFilm):
 
     @property
     def counts(self) -> Counts:
-        """What has happened so far; see `Renderer.counts`."""
+        """Counts of all devices so far; see `Renderer.counts`."""
         return self._crew.counts
 
     @property

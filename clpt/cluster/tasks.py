@@ -1,4 +1,4 @@
-"""What a worker does: the functions that a client calls by their names, one process a worker.
+"""Functions of a worker that a client calls by their names, one process a worker.
 
 They take and return numbers, texts, bytes and arrays, and keep what was opened for the next call.
 What goes wrong comes back as a text: a worker outlives whatever it is asked.
