@@ -154,7 +154,7 @@ class MultiFilm(DevicePictures):
         return self._film_with(dataclasses.replace(state, taken=self.contents.taken), so_far)
 
     def _so_far_on(self, first: DeviceWorker) -> dict[str, Any]:
-        """Return the part of a saved film beside its words and origin; first: the device that it is of."""
+        """Return a saved film's parts beside its words and origin; first: the device it is of."""
         return self._progress_so_far(first.renderer.device_class())
 
     def _film_with(self, state: FilmState, so_far: Mapping[str, Any]) -> SavedFilm:

@@ -1,4 +1,4 @@
-"""What a film holds, and what its renderer says of it: one value, which changes at one point.
+"""Contents of a film with what its renderer says of it: one value, which changes at one point.
 
 An exception can come at any line: Ctrl-C raises one wherever the main thread is. So while a film
 changes, a `Change` stands in the place of its `Contents`. The new ones take its place by one
@@ -33,7 +33,7 @@ def _now() -> str:
 
 @dataclass(frozen=True, eq=False)
 class Contents:
-    """What a film holds.
+    """The contents of a film: which samples it holds, and how they came to be.
 
     taken: first and end of each range of its samples' numbers; adaptive: which pixels get more;
     sessions: of those who rendered it before; began: when it was empty, or was gone on with.
@@ -126,14 +126,14 @@ class FilmOwner(DeviceOwner):
 
     @property
     def contents(self) -> Contents:
-        """What the film holds. Raises DeviceError while that changes."""
+        """The contents of the film. Raises DeviceError while they change."""
         if isinstance(self._contents, Change):
             raise self._contents.unfinished()
         return self._contents
 
     @property
     def _known(self) -> Contents:
-        """What the film holds, or held before the change that is under way."""
+        """The contents of the film; while they change, those before."""
         now = self._contents
         if not isinstance(now, Change):
             return now

@@ -37,8 +37,11 @@ from clpt.scene.media import Medium
 
 @dataclass(frozen=True)
 class Before:
-    """What was decided before an edit, and stays: the integrator, whose film has a place for light
-    paths or none, and whether light paths were ghosts of a lens."""
+    """Decisions that were made before an edit, and stay.
+
+    integrator: its film has a place for light paths, or none; lit_ghosts: whether light paths were
+    ghosts of a lens.
+    """
 
     integrator: Integrator
     lit_ghosts: bool
@@ -46,12 +49,12 @@ class Before:
 
 @dataclass(frozen=True)
 class Analysis:
-    """What a scene is.
+    """A scene with everything that was found in it before it is lowered.
 
     index: with the integrator that renders it; reason: why that one, "" where there was no choice;
-    sphere: centre and radius of one around it [m]; sources: what its lights send; sealed: media
-    that rays to lights cannot leave; light_media: what is around lights; around: the media, or the
-    matter of bodies, at the camera; aims (k, 5): spheres at which light paths aim, see `aims`;
+    sphere: centre and radius of one around the scene [m]; sources: what its lights send; sealed:
+    media that rays to lights cannot leave; light_media: media around lights; around: the media, or
+    the matter of bodies, at the camera; aims (k, 5): spheres at which light paths aim, see `aims`;
     warnings: of media.
     """
 

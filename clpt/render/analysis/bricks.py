@@ -81,7 +81,7 @@ class Glow:
     emitting: NDArray[np.intp]
 
     def brightest(self) -> Glow:
-        """Those without the faintest, which emit FAINT of all light together."""
+        """Return the bricks without the faintest, which emit FAINT of all light together."""
         rising = np.argsort(self.power, kind="stable")
         faint = np.cumsum(self.power[rising]) <= FAINT * self.power.sum()
         kept = np.sort(rising[~faint])
@@ -95,7 +95,7 @@ class Glow:
 
 
 def _source(medium: Grid) -> Windows | None:
-    """What tells where a density emits; None: all of it does."""
+    """Return the grid that says where a density emits; None: all of it does."""
     hot = medium.temperature is not None
     source = medium.temperature if hot else medium.emission_grid
     return None if source is None else Windows(source)

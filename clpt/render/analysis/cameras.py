@@ -37,7 +37,7 @@ def is_connected(camera: Camera, mode: str) -> bool:
 
 @dataclass(frozen=True)
 class View:
-    """What a camera sees from a point.
+    """The view of a camera that sees from a point.
 
     place: that point (3,) [m]; axis: from it to the middle of the film (3,), unit length; width: of
     the film a metre away [m]; angle: from the axis to the film's corners [rad].

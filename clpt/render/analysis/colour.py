@@ -39,7 +39,7 @@ def output_matrix(film: Film, mode: str) -> NDArray[np.float64]:
 
 
 def film_scale(film: Film, level: float) -> float:
-    """What a film's sums have of a value of 1: a power of two.
+    """Return the number, a power of two, that a value of 1 adds to a film's sums.
 
     level: of the scene's light [W m^-2 sr^-1 nm^-1], see `light_level`. The scale is the power of
     two next to the film's exposure: what is seen well is near 1. Where the light is too dim or too

@@ -1,4 +1,4 @@
-"""How far pixel filters reach."""
+"""Reach of pixel filters, in pixels."""
 
 from __future__ import annotations
 

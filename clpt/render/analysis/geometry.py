@@ -57,10 +57,10 @@ class Emitter:
 
 @dataclass(frozen=True)
 class Stored:
-    """What a shape has beside its row, for tables.
+    """Arrays of a shape that go to tables beside its row.
 
-    vertices: how many it has; normals, uvs: theirs, or None; many: balls (n, 4) or (n, k, 4), or
-    pieces of curves, of what is many in one shape.
+    vertices: how many it has; normals, uvs: of the vertices, or None; many: balls (n, 4) or
+    (n, k, 4), or pieces of curves, where one shape stands for many.
     """
 
     vertices: int = 0
@@ -71,17 +71,17 @@ class Stored:
 
 @dataclass(frozen=True)
 class Geometry:
-    """What the shapes of a scene became.
+    """The shapes of a scene as triangles, boxes and instances, with their rows of `shapes`.
 
-    rows: of `shapes`, those of analytic shapes last, with what is known before lowering: number,
-    kind, first primitive and flags; owners: of each row, with its first vertex and face; stored:
-    for each row, what goes to other tables; vertices (n, 3) float32, faces (m, 3) uint32 and tags
-    (m,) uint32, the shape of each triangle: the world's before those of groups; boxes (k, 2, 3)
-    float32: of analytic shapes;
-    world_vertices: how many vertices are not a group's; first_analytic: a row; single_count:
-    analytic shapes that are one each; analytic: their kinds; normals, uvs: whether a shape needs
-    them; tangents: of shapes that say their own, each with its first vertex; keys: by the first
-    vertex of a shape how many rows each of its vertices has, where that is not one.
+    rows: those of analytic shapes last, with what is known before lowering: number, kind, first
+    primitive and flags; owners: the shape of each row, with its first vertex and face; stored: for
+    each row, arrays for other tables; vertices (n, 3) float32, faces (m, 3) uint32 and tags (m,)
+    uint32, the shape of each triangle: the world's before those of groups; boxes (k, 2, 3) float32:
+    of analytic shapes; world_vertices: number of vertices that are not a group's; first_analytic:
+    the first row of an analytic shape; single_count: number of analytic shapes that are one each;
+    analytic: their kinds; normals, uvs: whether a shape needs them; tangents: of shapes that have
+    their own, each with its first vertex; keys: by the first vertex of a shape how many rows each
+    of its vertices has, where that is not one.
     """
 
     rows: tuple[np.ndarray, ...]
@@ -184,7 +184,7 @@ def spheres_move(index: SceneIndex) -> bool:
 
 @dataclass
 class _Builder:
-    """What `assembled` has found so far."""
+    """The parts of a `Geometry` that `assembled` has found so far."""
 
     cache: LoweringCache
     single_count: int

@@ -84,7 +84,7 @@ class SceneIndex:
 
     @property
     def emitting(self) -> tuple[Medium, ...]:
-        """Those of them that give out light."""
+        """The media that give out light."""
         return tuple(medium for medium in self.media if medium.light is not None)
 
     @property
@@ -95,7 +95,7 @@ class SceneIndex:
 
     @property
     def grids(self) -> GridFeatures:
-        """What the media are whose density is on a grid."""
+        """Features of the media whose density is on a grid."""
         media, emitting = self.media, self.emitting
         return GridFeatures(
             present=any(isinstance(medium, Lattice) for medium in media),
@@ -137,7 +137,7 @@ class SceneIndex:
 
     @property
     def balanced(self) -> float:
-        """Those that are weighed against the sample."""
+        """Light paths for each camera sample that are weighed against it; 0: there are none."""
         wanted: float = getattr(self.scene.integrator, "light_paths", 0)
         return wanted if (self.joined or self.merged) and self.lights_reach else 0
 
@@ -196,7 +196,7 @@ class SceneIndex:
 
     @property
     def layers(self) -> tuple[str, ...]:
-        """What the film has beside the picture, in the order of LAYERS."""
+        """The layers that the film has beside the picture, in the order of LAYERS."""
         return tuple(name for name in LAYERS if name in self.scene.film.layers)
 
     @property
@@ -215,18 +215,20 @@ class SceneIndex:
 
     @property
     def spread(self) -> tuple[int, int]:
-        """How many pixels of an axis the light of a point may serve, and how far these are from
-        its own."""
+        """The spread of light along an axis [pixels]: how many it may serve, and how far away."""
         return filters.taps(self.scene.film.filter), filters.reach(self.scene.film.filter)
 
     @property
     def filter_taps(self) -> int:
-        """How many pixels of an axis a path's light may serve; 0 without splatting."""
+        """The number of pixels of an axis that a path's light may serve; 0 without splatting."""
         return self.spread[0] if self.splatting else 0
 
     @property
     def filter_reach(self) -> int:
-        """How far these are from the light's own pixel."""
+        """The distance to the farthest pixel of an axis that a path's light may serve [pixels].
+
+        It is 0 without splatting.
+        """
         return self.spread[1] if self.splatting else 0
 
     @property

@@ -1,4 +1,4 @@
-"""What is costly in a lowering, kept for the next: after an edit most of a scene is the same."""
+"""A cache of costly parts of lowerings: after an edit most of a scene is the same."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ _BY_VALUE = (str, bytes, int, float, bool, type(None), type)
 
 
 class LoweringCache:
-    """What pure functions made, by what they were given.
+    """A cache of the results of pure functions, by their arguments.
 
     Numbers and texts count by value, whatever else by identity: an array that is the same object is
-    taken to hold the same. former: of the lowering before, whose pieces are taken on when they are
-    asked for again; `settle` lets go of the others.
+    taken to hold the same. former: the cache of the lowering before, whose results are taken on
+    when they are asked for again; `settle` lets go of the others.
     """
 
     def __init__(self, former: LoweringCache | None = None):
@@ -48,7 +48,10 @@ class LoweringCache:
 
 
 def _mark(given: Any) -> Any:
-    """What a thing is known by; device memory by nothing: kernels may have written there."""
+    """Return the key of an argument; memory of a device has a new one each time.
+
+    Kernels may have written there since.
+    """
     if isinstance(given, _BY_VALUE):
         return given
     return object() if on_device(given) else (id(given),)

@@ -56,7 +56,7 @@ def warnings_of(index: SceneIndex, cached: Callable[..., Any] | None = None) -> 
 
 
 def _insides(shape: Shape) -> Iterator[Any]:
-    """What is inside of a shape: its medium, or what its materials absorb there."""
+    """Yield the insides of a shape: its medium, or the absorptions of its materials."""
     if shape.interior is not None:
         yield shape.interior
         return

@@ -101,7 +101,7 @@ def _median_distance(triangles: NDArray[np.float64], axis: NDArray, angle: float
 
 
 def _measures(triangles: NDArray[np.float64]) -> tuple[NDArray, NDArray, NDArray]:
-    """Of triangles their middles, the distance of these from the origin, and the longest side."""
+    """Return the middles of triangles, their distances from the origin, and the longest sides."""
     middles = triangles.mean(axis=1)
     sides = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2)
     return middles, np.maximum(np.linalg.norm(middles, axis=1), 1e-30), sides.max(axis=1)

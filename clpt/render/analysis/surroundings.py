@@ -250,7 +250,7 @@ def _swept_box(
 def _winding(
     shape: Shape, p: NDArray[np.float64], cached: Callable[..., Any] | None, time: float
 ) -> float:
-    """How often a shape winds around a point: 1 inside of one that is closed and faces outward."""
+    """Return how often a shape winds around a point: 1 inside, if closed and facing outward."""
     then = _then(shape, time)
     if shape.motion is not None:
         p = transforms.transform_points(transforms.inverse(shape.motion.at(time)), p)

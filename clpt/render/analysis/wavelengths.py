@@ -1,4 +1,4 @@
-"""How the camera draws wavelengths: a density over those to which its film responds.
+"""Wavelengths of the camera: a density over those to which its film responds.
 
 Visible importance, in closed form, is good where lights are smooth and the sensor is an eye. For
 line spectra, cameras beyond the visible and films of bands the density is tabulated instead, from
@@ -35,7 +35,7 @@ GUIDES = DENSITY_SIZES["guides"]
 
 @dataclass(frozen=True)
 class Density:
-    """Of the camera's wavelengths between lo and hi [nm]; zero outside.
+    """A density of the camera's wavelengths between lo and hi [nm]; zero outside.
 
     values: its nodes (n + 1,) at equal distances, linear between them, whose integral is 1; None
     for visible importance, which needs no table.
@@ -112,12 +112,15 @@ def _support(film: Film) -> tuple[float, float]:
 
 
 def _second_moment(density: Density, nodes: Values, light: Values) -> float:
-    """Of one wavelength's estimate of the integral of `light` (n,), given at nodes."""
+    """Return the second moment of an estimate of the integral of `light` (n,) from one wavelength.
+
+    nodes (n,): the wavelengths at which light is given [nm].
+    """
     return _integral(light**2 / density.pdf(nodes), nodes)
 
 
 def _integral(values: Values, nodes: Values) -> float:
-    """Of what is linear between nodes."""
+    """Return the integral of a function that is linear between nodes."""
     return float(((values[1:] + values[:-1]) / 2.0) @ np.diff(nodes))
 
 
@@ -126,7 +129,7 @@ def _normalised(values: Values, nodes: Values) -> Values:
 
 
 def _glow(index: SceneIndex, nodes: Values) -> Callable[[Spectrum], Values]:
-    """What fluorescent materials give out at nodes [nm] under a light: all of them together."""
+    """Return a function of a light: what all fluorescent materials emit under it at nodes [nm]."""
     film = index.scene.film
     cells = int(np.ceil((film.lambda_max - film.lambda_min) / STEP - 1e-9))
     into = np.linspace(film.lambda_min, film.lambda_max, cells + 1)
@@ -141,7 +144,7 @@ def _glow(index: SceneIndex, nodes: Values) -> Callable[[Spectrum], Values]:
 
 
 def _fluorescent(material: Any) -> Iterator[Reradiation]:
-    """What a material, and those inside it, give out at other wavelengths."""
+    """Yield the reradiation matrices of a material and of those inside it."""
     declared = params(type(material)) if isinstance(material, Material) else {}
     for name in declared:
         value = getattr(material, name)
@@ -152,7 +155,7 @@ def _fluorescent(material: Any) -> Iterator[Reradiation]:
 
 
 def emissions(index: SceneIndex) -> Iterator[Spectrum]:
-    """What the lights of a scene emit; an image of colours stands for D65."""
+    """Yield the emissions of a scene's lights; an image of colours stands for D65."""
     scene = index.scene
     sources: list[Any] = [
         *scene.lights,

@@ -71,12 +71,15 @@ def flight(features: Features) -> str:
 
 
 def trace_lanes(layout: str, lanes: int) -> int:
-    """How many rays a work-item traces: those of one path, but where there is no tree."""
+    """Return the number of rays that a work-item traces: one, or `lanes` where there is no tree."""
     return lanes if layout == "brute" else 1
 
 
 def join_lanes(features: Features, layout: str, lanes: int, interleaved: bool) -> int:
-    """How many rays a work-item tests that join paths: interleaved ones where there are curves."""
+    """Return the number of rays that a work-item tests to join paths.
+
+    Where shapes are analytic, a work-item tests interleaved rays, those of `lanes` paths.
+    """
     return lanes if interleaved and features.geometry.analytic else trace_lanes(layout, lanes)
 
 
@@ -162,8 +165,11 @@ def _call(features: Features, own: Features, layout: str, stage: Stage, which: i
 
 
 def _same(bounces: list[list[_Call]]) -> int:
-    """How many calls all kinds of paths have first, before they shade. What is called in one place
-    alone compilers put into the loop, which saves some hundredths of the time."""
+    """Return the number of calls before shading that all kinds of paths have in common.
+
+    Compilers put into the loop what is called in one place alone, which saves some hundredths of
+    the time.
+    """
     first, *others = bounces
     same = 0
     while first[same].stage.kernel != "shade" and all(o[same] == first[same] for o in others):

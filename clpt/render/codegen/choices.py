@@ -198,7 +198,7 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
 
 
 def _screen_motion(features: Features) -> tuple[str, ...]:
-    """How what is seen moves across the film, where a layer tells it."""
+    """Return the files of the motion of points on the film, for the layer that shows it."""
     files = ("interface/camera.cl", "generated/camera.cl", "generated/screen.cl")
     needed = when(features.screen_motion, *files)
     return (*needed, *either(features.screen_motion, "path/screen_motion.cl"))
@@ -210,7 +210,7 @@ def _corners_move(features: Features) -> bool:
 
 
 def _passing(features: Features) -> str:
-    """How the name of what tells which light passes ends."""
+    """Return the end of the name of the file that tells which light passes."""
     if features.shadow_media:
         return "_media"
     return "" if features.materials.null_surfaces else "_opaque"

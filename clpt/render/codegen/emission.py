@@ -190,7 +190,7 @@ _BACK = (
 
 
 def _pdf_arguments(kind: str, moving: bool) -> str:
-    """What `<kind>_pdf` is given, "" for delta lights, which have none."""
+    """Return the arguments of `<kind>_pdf`, "" for delta lights, which have none."""
     if kind in shape_records.RECORDS:
         return "rest, along, far, front" if moving else "p, wi, t, n"
     if kind in INFINITE:

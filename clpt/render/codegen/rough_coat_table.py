@@ -124,7 +124,7 @@ def reflectance(distribution: str, alpha: float, eta: float, cos_i: Floats) -> F
 
 
 def inside_reflectance(distribution: str, alpha: float, eta: float) -> float:
-    """What a coat reflects of a diffuse light below it, less what facets mask.
+    """Return the share of diffuse light from below that a coat reflects, less what facets mask.
 
     A mean over 64 cosines, ends included, as Mitsuba 3 takes it: of a smooth coat of index 1.5 that
     is 1.5 % less than the integral.
@@ -134,7 +134,7 @@ def inside_reflectance(distribution: str, alpha: float, eta: float) -> float:
 
 
 def bounce(distribution: str, alpha: float) -> float:
-    """What leaves facets that reflect all, of light of cosine BOUNCE."""
+    """Return the share of light of cosine BOUNCE that leaves facets which reflect all."""
 
     def kept(cos_i: Floats, c: Floats, cos_h: Floats) -> Floats:
         return masking(distribution, alpha, 2.0 * c * cos_h - cos_i)
@@ -148,7 +148,7 @@ def within(cos_i: Floats, eta: float) -> Floats:
 
 
 def thrown_back(distribution: str, alpha: float, eta: float, cos_i: Floats) -> Floats:
-    """What a smooth coat throws back of light that facets below it, which reflect all, send up.
+    """Return the share of light from facets below that a smooth coat throws back; they reflect all.
 
     cos_i (n,): the cosines at which the light came to the coat.
     """

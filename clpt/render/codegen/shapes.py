@@ -126,7 +126,7 @@ def _keyed(features: Features) -> bool:
 
 
 def _number(kind: str) -> int:
-    """What ShapeRow.kind is for an analytic shape."""
+    """Return the value of ShapeRow.kind for an analytic shape."""
     return 1 + ANALYTIC.index(kind)
 
 

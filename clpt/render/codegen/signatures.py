@@ -1,4 +1,4 @@
-"""What kernels take, as macros: records, tables and slabs; trees; film and counters.
+"""Arguments of kernels, as macros: records, tables and slabs; trees; film and counters.
 
 Each group of arguments is declared here once. From it follow the macro that declares it in a
 kernel, the one that passes it on, and what the host binds.

@@ -1,4 +1,4 @@
-"""How many words each parameter takes in a row, and other sizes that lowering and kernels share."""
+"""Sizes that lowering and kernels share, such as the words of each parameter in a row."""
 
 from __future__ import annotations
 

@@ -114,7 +114,7 @@ class Moving:
         return None
 
     def _plan(self, scene: Scene, replaced: Replacements) -> list[Action]:
-        """What enqueues a move. Raises CannotMove."""
+        """Return the actions that enqueue a move. Raises CannotMove."""
         features = self.target.lowered.features
         if any(one.transport.light_paths for one in features.passes):
             raise CannotMove("light is traced from lights, whose choice follows from the shapes")
@@ -165,7 +165,7 @@ class Moving:
     def _plan_shape(
         self, ranges: _Ranges, old: Any, new: Any, device_matrix: Location | None
     ) -> list[Action]:
-        """What moves a shape. Raises CannotMove."""
+        """Return the actions that move a shape. Raises CannotMove."""
         name = _name(new)
         if ranges.shape.emission is not None:
             raise CannotMove(f"{name} emits light: lights follow from it")
@@ -197,7 +197,7 @@ class Moving:
         return [lambda: self._move_vertices(ranges, new, points, matrix, device_matrix)]
 
     def _plan_analytic(self, ranges: _Ranges, new: Any) -> list[Action]:
-        """What moves an analytic shape. Raises CannotMove where that is another kind then."""
+        """Return the actions that move an analytic shape. Raises CannotMove if its kind changes."""
         shape = ranges.shape if isinstance(new, Instance) else new
         matrix = shapes.placement(new) @ ranges.own
         in_world = dataclasses.replace(shape, to_world=matrix)
@@ -218,7 +218,7 @@ class Moving:
         return [move]
 
     def _plan_single(self, ranges: _Ranges, shape: Shape) -> Callable[[Boxes], None]:
-        """What gives a sphere, disk or cylinder other parameters and another box."""
+        """Return the action that gives a sphere, disk or cylinder new parameters and a new box."""
         lowered, first_word = self.target.lowered, int(ranges.row["params"])
         words, box = analytic.row(shape), np.stack(analytic.bounds(shape))
         rows = lowered.tables["shapes"].view(SHAPE.dtype)
@@ -234,7 +234,7 @@ class Moving:
         return act
 
     def _plan_curves(self, ranges: _Ranges, shape: Any) -> Callable[[Boxes], None]:
-        """What gives curves other pieces, as many as they were lowered to, and other boxes."""
+        """Return the action that gives curves other pieces, as many as before, and other boxes."""
         owners = self.target.lowered.owners
         lowered: Any = next(owner for row, owner, _, _ in owners if row is ranges.row)
         pieces, prim = strands.pieces(shape, cut_as=lowered), int(ranges.row["prim"])

@@ -91,7 +91,7 @@ class MovingSpheres:
             self._common[first] = common
 
     def _count(self, row: Any) -> int:
-        """How many spheres a row of `shapes` stands for."""
+        """Return the number of spheres that a row of `shapes` stands for."""
         lowered = self.scene.lowered
         rows = lowered.tables["shapes"].view(SHAPE.dtype)
         behind = rows["prim"][(rows["kind"] > 0) & (rows["prim"] > row["prim"])]

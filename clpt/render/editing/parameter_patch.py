@@ -56,7 +56,7 @@ def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> Callable[[], N
 
 
 def _reflects(camera: Camera) -> tuple[bool, bool]:
-    """What of reflections in its lens a camera's text has."""
+    """Return whether a camera's lens reflects in its kernels, and whether it has ghosts."""
     return (camera.reflects, camera.ghosts > 0.0) if isinstance(camera, Lens) else (False, False)
 
 

@@ -42,7 +42,7 @@ FIXED = (
 
 @dataclass(frozen=True)
 class _Changes:
-    """What another lowering needs: new kernels, new trees over triangles or boxes, or a refit."""
+    """The changes by another lowering: new kernels, new trees of triangles or boxes, or a refit."""
 
     strategy: Strategy
     kernels: bool
@@ -106,7 +106,7 @@ def prepare(wavefront: Wavefront, lowered: Lowered, refit: bool = False) -> Call
 
 
 def _changes(wavefront: Wavefront, lowered: Lowered, refit: bool) -> _Changes:
-    """What another lowering needs."""
+    """Return the changes that another lowering needs."""
     scene = wavefront.scene
     former, strategy = scene.lowered, wavefront.choose_strategy(lowered)
     groups = former.instances.triangles != lowered.instances.triangles

@@ -26,7 +26,7 @@ Replacements: TypeAlias = dict[int, tuple[Any, Any]]
 
 
 class Successors:
-    """What has replaced the shapes and materials that a renderer had at first.
+    """Present shapes and materials, by those that a renderer had at first.
 
     Shapes are plain data: an edit replaces one by another object. Who holds the first can go on to
     use it as a key.
@@ -166,11 +166,11 @@ class _Edit:
         return dataclasses.replace(self.scene, shapes=edited)
 
     def replacements(self) -> Replacements:
-        """What was replaced, once the scene is edited."""
+        """Return pairs of the objects that were replaced, old and new, once the scene is edited."""
         return {key: (old, new) for key, (old, new) in self.edited.items() if old is not new}
 
     def _edited(self, thing: Any) -> Any:
-        """What a shape, group or material is afterwards; itself where nothing changes."""
+        """Return a shape, group or material as the edit leaves it; itself if nothing changes."""
         if id(thing) not in self.edited:
             fields = self._fields(thing)
             fields = {n: value for n, value in fields.items() if value is not getattr(thing, n)}
@@ -178,7 +178,7 @@ class _Edit:
         return self.edited[id(thing)][1]
 
     def _fields(self, thing: Any) -> dict[str, Any]:
-        """What those fields of a thing are afterwards that may change."""
+        """Return the fields of a thing that may change, as they are after the edit."""
         if isinstance(thing, Material):
             return {name: self._edited(part) for name, part in inner(thing)}
         if isinstance(thing, Group):

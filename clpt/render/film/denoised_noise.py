@@ -1,4 +1,4 @@
-"""What is left of noise after denoising, cell by cell, for adaptive sampling.
+"""Noise that is left after denoising, cell by cell, for adaptive sampling.
 
 Both halves of the samples are denoised. The noise of a half is independent of the other half, so
 the distance of a denoised half from the other one tells its error, blur included: with halves a

@@ -86,11 +86,14 @@ class DenoisedPicture(Still):
 
     @cached_property
     def error(self) -> Image | None:
-        """What is left in the colours, relative to their light, (h, w) float32; None of `oidn`."""
+        """The noise that is left in the colours, relative to their light, (h, w) float32.
+
+        It is None of the denoiser `oidn`.
+        """
         return None if self._made is None else self._made.error()
 
     @property
     def beside(self) -> dict[str, Image]:
-        """What files have beside the picture: `noisy`, and `denoised_error` where it is known."""
+        """Pictures that files have beside this one: `noisy`, and `denoised_error` if known."""
         error = {} if self.error is None else {"denoised_error": self.error}
         return {"noisy": self._noisy} | error

@@ -79,7 +79,10 @@ def read_header(path: str | Path) -> dict[str, Any]:
 
 
 def _read(path: Path, made: Callable[[dict[str, Any], _Parts], _T], **options: bool) -> _T:
-    """What is made of a file's header and its parts, whose seal is whole. Raises SceneError."""
+    """Return what `made` makes of the header and the parts of a file whose seal is whole.
+
+    Raises SceneError for a file that is damaged, or no film.
+    """
     _check_seal(path)
     try:
         with exr_files.opened(path, **options) as stored:
@@ -183,7 +186,7 @@ def _header_of(saved: SavedFilm) -> dict[str, Any]:
 
 
 def _header_of_part(saved: SavedFilm, compression: Any) -> dict[str, Any]:
-    """What every part says: those of one file have one display window."""
+    """Return the header that every part has: parts of one file have one display window."""
     height, width = saved.film.words.shape[-2:]
     window = np.zeros(2, np.int32), np.array([width - 1, height - 1], np.int32)
     return {"compression": compression, "type": OpenEXR.scanlineimage, "displayWindow": window}

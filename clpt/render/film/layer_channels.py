@@ -101,7 +101,7 @@ def _owner(name: str) -> str:
 
 
 def _prefix(name: str, names: str) -> str:
-    """What the channels of a layer begin with."""
+    """Return the beginning of the names of a layer's channels."""
     layer = LAYERS[_owner(name)]
     if names == "blender":
         group = "" if name in LAYERS else f"_{name.removeprefix(GROUP)}"

@@ -21,7 +21,7 @@ MOST_NAMED = 8  # differences that an error names
 
 @dataclass(frozen=True)
 class Session:
-    """What one process added to a film.
+    """A session of rendering: what one process added to a film.
 
     began: when, as ISO 8601 in UTC; seconds: that it rendered; clpt: its version; device: by a
     label, driver, lanes of its kernels and layout of its trees: what decides the last bits.
@@ -35,9 +35,9 @@ class Session:
 
 @dataclass(frozen=True)
 class Origin:
-    """What the samples of a film are of.
+    """The origin of a film's samples.
 
-    scene: as `clpt.scene.fingerprint` has it; settings: what was chosen for it, such as the
+    scene: as `clpt.scene.fingerprint` has it; settings: choices that were made for it, such as the
     integrator of `auto`; kernels: the digest of their texts; clpt: the version that has them.
     """
 
@@ -91,7 +91,7 @@ class SavedFilm(Pictures):
 
     @property
     def seconds(self) -> float:
-        """How long all sessions have rendered."""
+        """The time that all sessions have rendered [s]."""
         return sum(session.seconds for session in self.sessions)
 
     def merged(self, other: SavedFilm) -> SavedFilm:

@@ -116,7 +116,7 @@ def _pieces(middles: NDArray[np.float64], reach: NDArray[np.float64]) -> Pieces:
 
 
 def _in_boxes(boxes: NDArray[np.float64], round_: bool) -> Pieces:
-    """What is in boxes (n, 2, 3); round_: a sphere each."""
+    """Return a piece around each of boxes (n, 2, 3); round_: a sphere fills each."""
     half = (boxes[:, 1] - boxes[:, 0]) / 2
     return _pieces(boxes.mean(axis=1), half.max(axis=1) if round_ else np.linalg.norm(half, axis=1))
 
@@ -128,7 +128,7 @@ def _of_triangles(geometry: Geometry, face: int, end: int) -> Pieces:
 
 
 def _placed(geometry: Geometry, pieces: Pieces, prototype: int, moving: Collection[int]) -> Pieces:
-    """What is around these in each instance of a prototype."""
+    """Return a piece around each instance of a prototype, given the pieces of the prototype."""
     own = geometry.instances.prototypes == prototype
     rows = geometry.instances.rows[own]
     linear = np.linalg.inv(np.stack([rows[name] for name in "xyz"], axis=1).astype(np.float64))

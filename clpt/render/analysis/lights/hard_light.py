@@ -1,4 +1,4 @@
-"""What helps with hard light: what the integrator `auto` becomes, and "auto" light paths of `path`.
+"""Choices for hard light: an integrator in place of `auto`, and "auto" light paths of `path`.
 
 Light paths find the light that something sharp has gathered on something dull. Where the lamp is
 large, paths from the camera find that light too, and sooner. Photons find it also where it is seen
@@ -49,7 +49,7 @@ Ball = tuple[NDArray[np.float64], float]  # centre and radius
 
 @dataclass(frozen=True)
 class Lit:
-    """What the choice looks at.
+    """The parts of a scene by which the choice of an integrator is made.
 
     sphere: centre and radius of one around the scene [m]; extinction (n,): of the medium around
     each row of `lights` where it scatters, else 0, and nan on a grid [1/m]; () without media.
@@ -229,7 +229,7 @@ def _small_lights(lit: Lit) -> Iterator[tuple[str, NDArray[np.float64] | None, f
 
 
 def _small_rows(lit: Lit) -> Iterator[tuple[str, NDArray[np.float64] | None, float, slice]]:
-    """The same, and their rows in `lights`."""
+    """Yield small lights as `_small_lights` does, each with its rows in `lights`."""
     motions, geometry = lit.index.motions, lit.geometry
     sources, (middle, radius) = lit.sources, lit.sphere
     lamps, share = lit.index.scene.lights, sources.power / max(sources.power.sum(), 1e-300)

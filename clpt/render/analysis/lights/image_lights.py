@@ -38,11 +38,11 @@ _TALL = ((2, 1), (0, 1), (1, 0), (1, 2), (1, 1), (1, 3))
 
 
 class Content(NamedTuple):
-    """What an image light is made of: texels, and cells to choose among by their mean weights.
+    """An image light as texels, and cells to choose among by their mean weights.
 
     grid: how blocks of cells and the cells in them are chosen; bands, number: of texels that are
-    spectra: how many values they have, which one by wavelength; notes: what files say that is left
-    out.
+    spectra, how many values they have, and which one by wavelength; notes: warnings of parts of
+    files that are left out.
     """
 
     width: int

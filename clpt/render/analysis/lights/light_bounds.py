@@ -22,7 +22,7 @@ NARROW = 0.02  # [rad] around a cone of directions that is known to hold all lig
 
 @dataclass(frozen=True)
 class Bounds:
-    """Of n lights: boxes, and cones as Conty Estevez and Kulla 2018 (4.1) have them.
+    """Bounds of n lights: boxes, and cones as Conty Estevez and Kulla 2018 (4.1) have them.
 
     low, high (n, 3) [m]; axis (n, 3) unit length; theta_o (n,): how far normals lean from it [rad];
     theta_e (n,): how far light leans from a normal [rad], up to pi / 2; both (n,) bool: light
@@ -117,7 +117,7 @@ def _one(
     both: bool = False,
     placed: bool = True,
 ) -> Bounds:
-    """Of a single light; by default one that shines everywhere."""
+    """Return the bounds of a single light; by default it shines everywhere."""
     high = low if high is None else high
     angles = (np.array([theta_o]), np.array([theta_e]))
     return Bounds(

@@ -127,7 +127,7 @@ def _extinction(around: Around) -> float:
 
 
 class _Known:
-    """What is at points of a scene."""
+    """A scene as it is asked which media or matter are at its points."""
 
     def __init__(self, scene: Scene, nested: bool, cache: LoweringCache, motions: Motions):
         self.scene = surroundings.boundaries(scene, matter_of if nested else None)
@@ -172,7 +172,7 @@ class _Known:
 
 
 def _around_shape(emitter: Emitter, known: _Known, motions: Motions, number: int) -> Around | None:
-    """What a shape shines into, None if that is not the same everywhere, at all times."""
+    """Return the media that a shape shines into, None if they differ between places or times."""
     shape: Any = emitter.shape
     both = getattr(shape.emission, "two_sided", False)
     if known.nested and matter_of(shape) is not None:

@@ -1,4 +1,4 @@
-"""What a light sends, and how much it counts; and whether it has a place."""
+"""Power and importance of lights that are not on shapes, and checks of their places."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a film looks at lights."""
+"""The way in which a film looks at lights: in spectra or in colours."""
 
 from __future__ import annotations
 

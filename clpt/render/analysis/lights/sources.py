@@ -1,4 +1,4 @@
-"""What each light of a scene sends, and where: before it has a row in the tables."""
+"""Power and place of each light of a scene, before it has a row in the tables."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ Around: TypeAlias = Callable[[int | Emitter, light_bounds.Bounds], light_bounds.
 
 @dataclass(frozen=True)
 class Source:
-    """What the rows of a lamp, of a medium or of a shape send.
+    """The light that the rows of a lamp, of a medium or of a shape send.
 
-    power (n,) [W/nm]; bounds (n): where they are and shine; importance (n,): how much they count in
+    power (n,) [W/nm]; bounds (n): where rows are and shine; importance (n,): how much they count in
     a tree; radiance: of a shape, the largest mean one [W m^-2 sr^-1 nm^-1].
     """
 
@@ -70,7 +70,7 @@ class Sources:
 
     @cached_property
     def power(self) -> NDArray[np.float64]:
-        """What each row sends (n,) [W/nm]."""
+        """The power that each row sends (n,) [W/nm]."""
         return np.concatenate([np.zeros(0), *(one.power for one in self.every)])
 
     @cached_property
@@ -142,7 +142,7 @@ def emissions_of(lamp: Light) -> dict[str, Any]:
 
 
 def _of_lamp(lamp: Light, scene_radius: float, look: Look) -> Source:
-    """What a light that is not on a shape sends."""
+    """Return the source of a light that is not on a shape."""
     _check_place(lamp)
     if isinstance(lamp, (lights.Envmap, lights.CubeMap)):
         strength = image_lights.mean_radiance(lamp, image_lights.content(lamp, look))
@@ -181,7 +181,7 @@ def _of_bricks(glow: Glow) -> Bounds:
 
 
 def _of_emitter(emitter: Emitter, cache: LoweringCache) -> Source:
-    """What a shape that emits sends."""
+    """Return the source of a shape that emits."""
     shape = emitter.shape
     emission: Any = shape.emission  # an area light, of either kind
     along = isinstance(emission, DirectionalArea)
@@ -211,7 +211,7 @@ def _of_emitter(emitter: Emitter, cache: LoweringCache) -> Source:
 
 
 def _face_attributes(shape: Shape, value: Any) -> dict[str, NDArray[np.float32]]:
-    """What an emission reads of each triangle."""
+    """Return the attributes of a shape's triangles that its emission reads, by their names."""
     names = {one.name for one in textures_in(value) if isinstance(one, MeshAttribute)}
     return {name: triangles.attribute(shape, name) for name in names if triangles.per_face(name)}
 
@@ -238,7 +238,7 @@ def _triangle_bounds(vertices: Points, faces: Faces, keys: int, two_sided: bool)
 
 
 def _around(index: SceneIndex, geometry: Geometry) -> Around:
-    """What makes bounds of lights hold while they move: boxes of their ways, and all directions."""
+    """Return a function that widens the bounds of a light to hold while it moves."""
     motions = index.motions
 
     def around(light: int | Emitter, bounds: Bounds) -> Bounds:

@@ -1,4 +1,4 @@
-"""How bright an emitter's texture is over each of its triangles, to choose among them by it."""
+"""Mean brightness of an emitter's texture over each triangle, to choose among triangles by it."""
 
 from __future__ import annotations
 
