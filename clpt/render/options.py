@@ -1,4 +1,4 @@
-"""How a scene is rendered: what `clpt.render` and `Renderer` take beside the scene and a device."""
+"""Options of a render: what `clpt.render` and `Renderer` take beside the scene and a device."""
 
 from __future__ import annotations
 

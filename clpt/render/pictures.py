@@ -102,5 +102,5 @@ class DevicePictures(FilmRenderer):
         return image if dtype is None else image.astype(dtype, copy=False)
 
     def _repr_png_(self) -> bytes:
-        """What a notebook shows of a renderer: its picture so far; waits."""
+        """Return the picture so far as PNG, which a notebook shows of a renderer; waits."""
         return images.png(self.resolve().get()[..., :3])

@@ -1,4 +1,4 @@
-"""What a render tells of its progress."""
+"""The progress of a render, as a caller's `progress` is told it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a render is.
+    """The progress of a render at some time.
 
     samples, total: per pixel, in the mean; paths: samples of all pixels; rays: traced so far;
     seconds: since the first; active: the share of the pixels that are not finished.

@@ -147,7 +147,7 @@ class Renderer(Resumable):
 
     @property
     def wavefront(self) -> Wavefront:
-        """What renders on the device. Raises DeviceError after `close`."""
+        """The wavefront that renders on the device. Raises DeviceError after `close`."""
         wavefront = self._wavefront
         if wavefront is None:
             raise self._closed_error()
@@ -243,7 +243,7 @@ class Renderer(Resumable):
         return finished
 
     def _with(self, first: int, end: int) -> Contents:
-        """What the film holds with more samples."""
+        """Return the contents of the film with the samples from `first` to `end` added."""
         now = self.contents
         return dataclasses.replace(now, taken=join_ranges(now.taken, ((first, end),)))
 
@@ -284,7 +284,7 @@ class Renderer(Resumable):
 
     @property
     def counts(self) -> Counts:
-        """What has happened so far."""
+        """Counts of samples and rays so far, and of those that the film refused."""
         return self.wavefront.counts
 
     def cancel(self, *, discard: bool = False) -> None:
@@ -554,7 +554,7 @@ class Renderer(Resumable):
     @property
     @synchronized
     def stats(self) -> RenderStats:
-        """What the render took so far: numbers of things, bytes by table and tree, seconds."""
+        """Figures of the render so far: numbers of things, bytes by table and tree, seconds."""
         return collect(self.wavefront, *self._built, dict(self._seconds))
 
 

@@ -1,4 +1,4 @@
-"""What a render took: numbers of things, bytes, seconds."""
+"""Figures of a renderer: numbers of things, bytes, seconds."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ class Encoder:
 
     @property
     def look(self) -> Look:
-        """How the film looks at lights that are images."""
+        """The way in which the film looks at lights that are images."""
         return Look(self.spectra.spectral, *self.spectra.range, self.cache)
 
     @property
@@ -219,7 +219,7 @@ class Encoder:
 
 
 def _where(kind: Kind, name: str) -> str:
-    """How a message names a parameter of a kind, and of which material it is."""
+    """Return the name of a parameter for messages, with the name of its material."""
     named = getattr(kind, "name", "")
     return f"{kind.kind}.{name}" + (f" of {named!r}" if named else "")
 

@@ -1,4 +1,4 @@
-"""How fine a guide is: see kernels/guiding/guide.cl."""
+"""Fineness of a guide: see kernels/guiding/guide.cl."""
 
 CELLS = 1 << 15  # rows, a power of two
 SIDE = 0.14  # of a cell, over the scene's radius

@@ -1,4 +1,4 @@
-"""What layers call shapes, materials and groups of lights."""
+"""Names that layers give to shapes, materials and groups of lights."""
 
 from __future__ import annotations
 

@@ -324,7 +324,7 @@ def _lower_ambient(index: SceneIndex, encoder: Encoder) -> int:
 
 
 def _warnings(index: SceneIndex) -> list[str]:
-    """What of the scene is not rendered as it says."""
+    """Return warnings of parts of the scene that are not rendered as it says."""
     scene, film = index.scene, index.scene.film
     warnings = list(index.warnings)
     if index.mode == "rgb" and cameras.dispersive_glasses(scene.camera):
@@ -351,7 +351,7 @@ def _warnings(index: SceneIndex) -> list[str]:
 
 
 def _of_motion(index: SceneIndex) -> list[str]:
-    """What does not move as it would."""
+    """Return warnings of grids of media that stay where a shape moves."""
     warnings: list[str] = []
     for i in index.motions.shapes:
         shape: Any = index.scene.shapes[i]
@@ -364,7 +364,7 @@ def _of_motion(index: SceneIndex) -> list[str]:
 
 
 def _left_to_the_camera(index: SceneIndex) -> list[str]:
-    """What light paths and photons do not do, and paths from the camera do alone."""
+    """Return warnings of light that only paths from the camera find, not light paths or photons."""
     scene, integrator = index.scene, index.scene.integrator
     kind, warnings = integrator.kind, []
     if getattr(integrator, "light_tracing", True) and not index.joined:

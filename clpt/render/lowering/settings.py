@@ -29,7 +29,7 @@ DEPTHS = {"direct": 2}  # of integrators without the parameter
 
 @dataclass(frozen=True)
 class Found:
-    """What steps of lowering have found.
+    """Findings of earlier steps of lowering that the settings need.
 
     density_row: where the table of the density of wavelengths begins in `distributions`;
     ambient_row: where the ambient light is in `light_params`; aims: the first of the spheres at

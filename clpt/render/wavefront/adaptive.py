@@ -67,7 +67,7 @@ def checked(noise: float, features: Features) -> float:
 
 
 class Adaptive:
-    """How many samples each cell of a wavefront's film gets, see `NoiseMeter`.
+    """The number of samples that each cell of a wavefront's film gets, see `NoiseMeter`.
 
     A cell's partner is the other colour of its square or, where that has no pixel, of a square
     beside it.

@@ -258,7 +258,7 @@ class BounceLoop:
         return device.link(self.device, texts, "loop", known)
 
     def _batch(self) -> list[Step]:
-        """What `run` enqueues between two reads of the counters."""
+        """Return the steps that `run` enqueues between two reads of the counters."""
         if self.looped:
             return [Step(f"{self._label}loop", self.loop, *self._loop_sizes())]
         return self.stages * BATCH
@@ -279,10 +279,10 @@ class BounceLoop:
         return max(BATCH, CORE_BOUNCES * info.compute_units // slots) if info.is_cpu else BATCH
 
     def _loop_sizes(self) -> tuple[tuple[int], tuple[int]]:
-        """How many work-items of the loop serve all slots, and how many of them are a group."""
+        """Return the numbers of work-items of the loop that serve all slots, and of a group."""
         items = -(-self.paths.slots // self._share)
         return (items,), (1 if self._share > self.lanes else GROUP,)
 
     def _sizes(self, lanes: int) -> tuple[tuple[int], tuple[int]]:
-        """How many work-items serve all slots, `lanes` each, and how many of them are a group."""
+        """Return the numbers of work-items that serve all slots, `lanes` each, and of a group."""
         return (self.paths.slots // lanes,), (GROUP // lanes,) if lanes > 1 else (GROUP,)

@@ -1,4 +1,4 @@
-"""What a film holds, on the host: sums of samples that add to the bit, and their numbers."""
+"""The state of a film on the host: sums of samples that add to the bit, and their numbers."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class FilmState:
 
     @property
     def samples(self) -> NDArray[np.uint32]:
-        """How many samples each pixel has, (h, w) uint32."""
+        """The number of samples of each pixel, (h, w) uint32."""
         counts: NDArray[np.uint32] = self.words[:, SAMPLES_WORD].sum(axis=0, dtype=np.uint32)
         return counts
 

@@ -1,4 +1,4 @@
-"""What a guide has learned of where light comes from, see kernels/guiding/guide.cl."""
+"""A guide on the device: it learns where light comes from, see kernels/guiding/guide.cl."""
 
 from __future__ import annotations
 

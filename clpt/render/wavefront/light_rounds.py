@@ -1,4 +1,4 @@
-"""How many light paths adaptive sampling takes: one number for all pixels, as each may reach any.
+"""Light paths of adaptive sampling: one number for all pixels, as each may reach any.
 
 The number must not depend on what these paths bring, or their mean would be too dark where the
 noise seems to be low by chance. So others decide, which stay out of the picture: beside each four
@@ -73,7 +73,7 @@ class LightRounds:
 
     @property
     def wanted(self) -> int:
-        """How many samples both colours have enough with."""
+        """The number of samples with which both colours have enough."""
         return int(self.stop.max())
 
     @property
@@ -146,7 +146,7 @@ class LightRounds:
         return (self.next < self.wanted) & (self._needed(limit, camera) > self.next)
 
     def _needed(self, limit: float, camera: Values) -> Values:
-        """How many samples' light paths each cell wants, (cells,)."""
+        """Return the number of samples whose light paths each cell wants, (cells,)."""
         return (self.variance + np.sqrt(self.variance * camera)) / limit
 
     def _of_colours(self, values: Values) -> Values:

@@ -1,4 +1,4 @@
-"""How much noise each cell of a film has; see clpt.render.wavefront.cells."""
+"""A meter of the noise in each cell of a film; see clpt.render.wavefront.cells."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a device renders a scene: the layout of its trees, its queues, and who runs the bounce loop.
+"""The way a device renders a scene: layout of trees, queues, and who runs the bounce loop.
 
 Every choice is made before anything is compiled or allocated. No choice changes the picture's
 expectation, and queues and the loop do not change a bit of it.
@@ -22,7 +22,7 @@ SHARE = 512  # slots of a work-item of the loop on a CPU, which fit into the sec
 
 @dataclass(frozen=True)
 class Tuning:
-    """What the caller wants of a `Strategy`; None for what suits the device and the scene.
+    """Wishes of the caller for a `Strategy`; None for what suits the device and the scene.
 
     Members are those of `Strategy`; cancel_seconds: in which a run is to end that is stopped [s].
     """
@@ -34,7 +34,7 @@ class Tuning:
 
 @dataclass(frozen=True)
 class Strategy:
-    """How kernels trace and shade the paths of a scene.
+    """The way in which kernels trace and shade the paths of a scene.
 
     layout: of the trees over triangles, a name in clpt.bvh.LAYOUTS; queued: whether stages that the
     host enqueues shade along queues by material; interleaved: whether a work-item traces the rays

@@ -36,7 +36,7 @@ TURN_PATHS = 1 << 20
 
 @dataclass(frozen=True)
 class Counts:
-    """What has happened so far: samples put on the film, rays traced, what the film refused.
+    """Counts so far: samples put on the film, rays traced, samples that the film refused.
 
     rejected: samples that were not finite, or brighter than a film takes; full: how often a sum of
     a pixel was found near the end of its range.
@@ -200,7 +200,7 @@ class Wavefront:
 
     @property
     def program_seconds(self) -> float:
-        """How long building took."""
+        """The time that building the programs took [s]."""
         return self.kernels.seconds
 
     @property

@@ -1,4 +1,4 @@
-"""How bright a scene is: it tells the film which numbers to expect."""
+"""Estimate of a scene's brightness: it tells the film which numbers to expect."""
 
 from __future__ import annotations
 

@@ -89,7 +89,7 @@ def _widened(nodes: np.ndarray, apart: bool) -> Tree:
 
 @dataclass
 class _Level:
-    """What the nodes of a level hold: sums and bounds (k,) over segments of lights."""
+    """The sums and bounds (k,) that the nodes of a level hold, over segments of lights."""
 
     low: Floats
     high: Floats

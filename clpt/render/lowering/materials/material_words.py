@@ -39,7 +39,7 @@ class _Side:
 
     @property
     def key(self) -> tuple[Any, ...]:
-        """What makes two the same."""
+        """A key that is equal for sides which are shaded alike."""
         return self.front, self.two_sided, self.inside, self.perturbation.key
 
 

@@ -40,7 +40,7 @@ class NormalPerturbation:
 
     @property
     def key(self) -> tuple[int, int, bool]:
-        """What makes two the same."""
+        """A key that is equal for perturbations by the same maps."""
         return id(self.normal), id(self.bump), self.inside
 
     def words(self, encoder: Encoder) -> Words:

@@ -122,7 +122,10 @@ class MediumWords:
         return words
 
     def _mixture_words(self, medium: Medium) -> list[Words]:
-        """What stands behind all: where the shares of parts begin, 0 for nowhere, and the parts."""
+        """Return the words behind all others of a medium: its shares of parts, and the parts.
+
+        The first word tells where the shares begin, 0 for nowhere.
+        """
         count, spectral = self._index.grids.mixed, self._index.spectral
         if not isinstance(medium, Mixture):
             return [np.zeros(1, np.uint32)] if count and isinstance(medium, Lattice) else []
@@ -136,7 +139,11 @@ class MediumWords:
         return words
 
     def _tint(self, medium: Lattice, name: str) -> Words:
-        """What stands behind that: where the colours of its bricks begin, 0 for nowhere."""
+        """Return the word that tells where the colours of a grid's bricks begin, 0 for nowhere.
+
+        It is negative for an albedo that is trilinear apart from the density, see
+        `Grid.albedo_with_density`. name: of the medium's field that has the colours.
+        """
         colours = getattr(medium, name, None)
         if not isinstance(medium, Grid) or colours is None:
             return np.zeros(1, np.uint32)
@@ -146,7 +153,7 @@ class MediumWords:
         return np.array([-first if apart else first], np.int32).view(np.uint32)
 
     def _glow(self, medium: Lattice, word: int) -> Words:
-        """What stands behind the row of a grid: what its bricks emit, and which lights they are."""
+        """Return the words behind a grid's row: its bricks' light and their rows of `lights`."""
         words = np.zeros(grids.GLOW_WORDS, np.uint32)
         light: Any = medium.light
         store = self._encoder.store

@@ -23,7 +23,7 @@ def nodes(low: float, high: float) -> Values:
 
 
 def expected(lights: Iterable[Spectrum], at: Values) -> Values:
-    """How much light to expect at nodes, mean about 1: it decides where to look for it.
+    """Return the light to expect at nodes, mean about 1: it decides where light is looked for.
 
     Every light counts the same, whatever its power: which one a surface sees is not known here.
     """

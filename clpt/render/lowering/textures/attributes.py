@@ -1,4 +1,4 @@
-"""What meshes say per vertex or face: the table `attributes`.
+"""Attributes of meshes per vertex or face: the table `attributes`.
 
 It begins with a directory of zeros, for what has no attributes. A mesh has a directory of its own:
 per (name, role) that textures ask for, where its values would begin for vertex or face 0 of the

@@ -39,9 +39,11 @@ THREADS = 8
 
 @dataclass
 class _Form:
-    """What an image is, without its pixels: (h, w, c), whether of bytes, and `Stored.encoded`.
+    """The form of an image, without its pixels.
 
-    profiled: its colours are floats, of no transfer; notes: of whoever takes it as colours, or raw.
+    shape: (h, w, c); bytes: whether it is of bytes; encoded: see `Stored.encoded`; profiled:
+    whether its colours are floats, of no transfer; notes: warnings when it is taken raw, and when
+    as colours.
     """
 
     shape: tuple[int, ...]
@@ -79,7 +81,7 @@ class _Pixels:
 
     @property
     def form(self) -> _Form:
-        """What is known of it even after `let_go`. Raises SceneError."""
+        """The form of the image, which is known even after `let_go`. Raises SceneError."""
         if self._form is None:
             stored = self.stored
             self._form = _Form(
@@ -125,7 +127,7 @@ class _Image:
 
     @property
     def form(self) -> _Form:
-        """What the image is as the texture means it: as data, or as colours."""
+        """The form of the image as the texture means it: as data, or as colours."""
         form = self.pixels.form
         if self.texture.raw or not form.profiled:
             return form
@@ -279,7 +281,7 @@ class Images:
 
 
 def identity(texture: Bitmap) -> Any:
-    """What makes two images the same: the file's name, or being one object."""
+    """Return a key that is equal for the same images: a file's name, or an object's id."""
     image = texture.image
     return str(image) if isinstance(image, (str, Path)) else id(image)
 
@@ -342,7 +344,7 @@ def _size(image: _Image, spectral: bool) -> int:
 
 
 def _left_out(wanted: Iterable[_Image]) -> list[str]:
-    """What the files of images say that is left out, each once."""
+    """Return warnings of parts of image files that are left out, each once."""
     said = [
         f"{image.texture.image}: {note}"
         for image in wanted
@@ -360,7 +362,7 @@ def _note(image: _Image) -> str:
 
 
 def _meaning(curved: bool) -> NDArray[np.float32]:
-    """What the 256 bytes mean."""
+    """Return the values (256,) that bytes stand for; curved: encoded as by sRGB."""
     return Stored(np.arange(256, dtype=np.uint8).reshape(-1, 1, 1), curved).decoded().reshape(-1)
 
 

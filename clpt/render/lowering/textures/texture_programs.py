@@ -112,7 +112,10 @@ def _scaled(spectrum: Spectrum, factors: list[Any]) -> Any:
 
 
 def _factors(value: Any, number: int) -> list[Any]:
-    """What a channel of a product of colours is the product of: textures in the role "real"."""
+    """Return factors whose product is a channel of a product of colours.
+
+    They are numbers, and textures in the role "real". number: of the channel, 0 to 2.
+    """
     if isinstance(value, Product):
         return [*_factors(value.first, number), *_factors(value.second, number)]
     if isinstance(value, (Bitmap, MeshAttribute)):

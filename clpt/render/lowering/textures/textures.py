@@ -125,7 +125,10 @@ class TextureTable:
 
 
 def _identity(texture: Texture) -> Any:
-    """What makes two textures the same: of bitmaps their parameters, else being one object."""
+    """Return a key that is equal for the same textures.
+
+    It has the parameters of a bitmap, else the id of the object.
+    """
     if isinstance(texture, Bitmap):
         values = (getattr(texture, name) for name in ("raw", "filter", "wrap", "wrap_v", "channel"))
         to_texture = np.asarray(texture.to_texture).tobytes()
