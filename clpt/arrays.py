@@ -17,6 +17,9 @@ Points = NDArray[np.float32]  # (n, 3), or (n, 2) for uv
 Faces = NDArray[np.uint32]  # (n, 3)
 Image = NDArray[np.float32]  # (height, width, channels)
 Matrix = NDArray[np.float64]  # (rows, columns)
+Matrices = NDArray[np.floating]  # (..., rows, columns)
+Boxes = NDArray[np.float32]  # (n, 2, 3): lowest and highest corners
+Balls = NDArray[np.float32]  # (n, 4): centre and radius
 
 
 def on_host(values: Any) -> Any:

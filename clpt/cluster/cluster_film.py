@@ -41,7 +41,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class FilmSum:
-    """Films that were added up, None before there is one, and what happened for all of them."""
+    """The sum of films, None before there is one, and counts of what all of them took."""
 
     film: FilmState | None = None
     totals: Mapping[str, int] = field(
@@ -188,7 +188,7 @@ class ClusterFilm(DevicePictures):
 
     @property
     def devices(self) -> tuple[dev.Device, ...]:
-        """That device, once it is in use."""
+        """The device of this machine, once it is in use."""
         return () if self._local is None else self._local.devices
 
     @property

@@ -110,7 +110,7 @@ class ClusterRenderer(ClusterFilm):
 
     @property
     def refused(self) -> dict[str, str]:
-        """Why workers take no part, by their addresses."""
+        """The reasons why workers take no part, by their addresses."""
         return dict(self.farm.known.refused)
 
     @property

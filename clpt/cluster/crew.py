@@ -64,7 +64,7 @@ class Crew:
 
     @property
     def has_losses(self) -> bool:
-        """Whether there is something that no film holds any more."""
+        """Whether there are samples that no film holds any more."""
         return bool(self.lost) or not (self.keeper is None or self.keeper in self.workers)
 
     @property

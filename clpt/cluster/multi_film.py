@@ -98,7 +98,7 @@ class MultiFilm(DevicePictures):
     @property
     @synchronized
     def wavefront(self) -> Wavefront:
-        """That of the first device, whose film then holds the picture of all."""
+        """The wavefront of the first device, whose film then holds the picture of all."""
         return self._on_first(lambda first: first.renderer.wavefront)
 
     # ---- saved films

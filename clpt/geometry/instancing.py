@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
-from clpt.arrays import Points, on_host, single
+from clpt.arrays import Matrices, Points, on_host, single
 from clpt.errors import SceneError
 from clpt.geometry import analytic, shape_records, shapes
 from clpt.geometry.tessellate import keeps_its_kind, tessellate
@@ -23,7 +23,6 @@ from clpt.geometry.tubes import Tubes, as_tubes
 from clpt.records import INSTANCE
 from clpt.scene.shapes import Curves, Cylinder, Group, Instance, Shape, Sphere
 
-Matrices = NDArray[np.floating]
 CELLS = 16  # columns along a side, see `outline`
 FEW = 16  # instances of curves up to which each has its own, as tubes would take more memory
 ROUNDING = 4e-6  # of its coordinates, by which a box is larger than what float32 makes of it
@@ -243,7 +242,7 @@ def place(
 ) -> tuple[NDArray[Any], NDArray[np.float32]]:
     """Return a row of INSTANCE and a box (2, 3) float32 in the world per instance.
 
-    to_world, numbers: as of a Prototype; outline_, middle: of its vertices, see `outline` and
+    to_world, numbers: as of a Prototype; points, centre: of its vertices, see `outline` and
     `centred`. Of the rows, nodes, leaves and prim are 0. Raises SceneError where float32 does not
     reach.
     """

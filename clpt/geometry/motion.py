@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
+from clpt.arrays import Boxes
 from clpt.errors import SceneError
 from clpt.geometry import shapes, triangles
 from clpt.scene import Scene
@@ -27,8 +28,6 @@ EVEN = 1e-5  # relative difference of scales from which a motion stretches
 
 ROUND = (Sphere, Cylinder)
 AT_ONCE = Shutter(0.0, 0.0)
-
-Boxes = NDArray[np.float32]
 
 
 @dataclass(frozen=True)

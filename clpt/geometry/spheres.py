@@ -14,14 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
-from clpt.arrays import Words, on_host, single
+from clpt.arrays import Balls, Words, on_host, single
 from clpt.errors import SceneError
 from clpt.geometry import analytic, shapes, triangles
 from clpt.scene.shapes import Shape, Spheres
 
 FARTHEST = 1e38  # [m], of a centre or a radius: a box around them is float32
-
-Balls = NDArray[np.float32]  # (n, 4): centre and radius
 
 
 def balls(shape: Spheres) -> Balls:

@@ -172,7 +172,7 @@ class FilmOwner(DeviceOwner):
 
     @property
     def devices(self) -> tuple[Device, ...]:
-        """Where it renders."""
+        """The devices that render."""
         raise NotImplementedError
 
     def _check_open(self) -> None:

@@ -14,13 +14,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from clpt.arrays import Image
 from clpt.errors import SceneError
 from clpt.render.contents import FilmOwner
 from clpt.render.contract.features import Features
 from clpt.render.film import film_file
 from clpt.render.film.denoised_picture import DenoisedPicture
 from clpt.render.film.developed import Developed
-from clpt.render.film.pictures import Image, Pictures
+from clpt.render.film.pictures import Pictures
 from clpt.render.film.saved_film import Origin, SavedFilm, Session
 from clpt.render.locking import Stop, synchronized
 from clpt.render.progress import Progress

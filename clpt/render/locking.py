@@ -96,5 +96,5 @@ class Stop:
         self._wanted = False
 
     def is_set(self) -> bool:
-        """Whether it is to stop."""
+        """Return whether a stop is wanted."""
         return self._wanted

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import pyopencl as cl
 
 from clpt import device as dev
+from clpt.arrays import Image
 from clpt.denoise import needs
 from clpt.errors import DeviceError, MemoryBudgetError, SceneError
 from clpt.render.analysis.bodies import matter_of
@@ -29,7 +30,6 @@ from clpt.render.editing.scene_edit import (
     match_replacements,
     resolve_device_arrays,
 )
-from clpt.render.film.pictures import Image
 from clpt.render.film_renderer import Watch, checked_number, checked_samples, next_range
 from clpt.render.locking import healing, synchronized
 from clpt.render.lowering.scene import Lowered, lower
@@ -279,7 +279,7 @@ class Renderer(Resumable):
 
     @property
     def devices(self) -> tuple[dev.Device, ...]:
-        """Where it renders: its device."""
+        """The devices that render: only its own."""
         return (self.device,)
 
     @property

@@ -81,7 +81,7 @@ def collect(
 
 
 def _light_paths_end(features: Features) -> tuple[str, ...]:
-    """Where paths that are weighed against those from the camera end."""
+    """Return the kinds of materials where paths from lights end that are weighed."""
     if not features.transport.balanced:
         return ()
     kinds = [cls.kind for cls in features.materials.leaves if ends_light_paths(features, cls)]

@@ -9,12 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import images, spectra, spectral_exr
-from clpt.arrays import on_host
+from clpt.arrays import Floats32, on_host
 from clpt.errors import SceneError
 from clpt.scene.textures import Bitmap
 from clpt.spectral_exr import SpectralImage
-
-Floats = NDArray[np.float32]
 
 
 def spectral_image(texture: Any, role: str) -> SpectralImage | None:
@@ -24,7 +22,7 @@ def spectral_image(texture: Any, role: str) -> SpectralImage | None:
     return spectral_exr.find(texture.image, emissive=role == "emission", where="bitmap.image")
 
 
-def pixels(texture: Bitmap, role: str) -> Floats:
+def pixels(texture: Bitmap, role: str) -> Floats32:
     """Return a bitmap's image, (h, w, 1 or 3) float32, top row first; for "real" (h, w, 1).
 
     role: "reflectance", "emission", "index" or "real"; of spectra it chooses the colour that stands

@@ -155,8 +155,7 @@ def _spherical(camera: Spherical, width: int, height: int) -> dict[str, Any]:
 
 
 def _unprojection(camera: Matrix, width: int, height: int) -> dict[str, Any]:
-    """Both the ray's direction and its homogeneous point on the near plane are affine in x and y.
-
+    """Return a ray's direction and homogeneous point on the near plane, both affine in x and y.
     A clip point at depth z comes from p(z) = A + z B, A = M (x, y, 0, 1), B = M (0, 0, 1, 0), M the
     inverse; the derivative of p.xyz / p.w by z is a positive multiple of B A.w - A B.w, which holds
     no z: so it needs no far plane, and the large terms cancel here in float64.

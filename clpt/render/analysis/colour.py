@@ -1,4 +1,4 @@
-"""From what a film has gathered to the colours of its picture: one matrix, a Setting."""
+"""The way from a film's sums to the colours of its picture: one matrix, a Setting."""
 
 from __future__ import annotations
 

@@ -5,17 +5,13 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 
-import numpy as np
-from numpy.typing import NDArray
-
+from clpt.arrays import Floats
 from clpt.errors import SceneError
 from clpt.lenses import Prescription
 from clpt.lenses.paraxial import film_distance, stop_radius
 from clpt.lenses.pupils import axis_solid_angle, zones
 from clpt.scene.cameras import Lens
 from clpt.spectra import Constant, Spectrum
-
-Values = NDArray[np.float64]
 
 MARGIN = 1.05  # of the film's radius that has zones, as filters reach beyond the film
 
@@ -29,7 +25,7 @@ def glasses(camera: Lens) -> tuple[Spectrum, ...]:
 @lru_cache(maxsize=64)
 def _placed(
     lens: Prescription, f_number: float, focus: float, shift: float, radius: float
-) -> tuple[Prescription, float, Values, float]:
+) -> tuple[Prescription, float, Floats, float]:
     """A lens at an f-number, the way from it to its film [mm], what its film sees, at its middle
     the projected solid angle [sr]. focus, shift, radius of the film [mm]."""
     try:
@@ -47,7 +43,7 @@ def _placed(
     return made, distance, zones(made, distance, radius), axis_solid_angle(made, distance)
 
 
-def focused(camera: Lens, aspect: float) -> tuple[Prescription, float, Values, float, float]:
+def focused(camera: Lens, aspect: float) -> tuple[Prescription, float, Floats, float, float]:
     """Return what `_placed` tells of a camera, and the radius of the film that has zones [mm].
 
     aspect: of the film, height over width. Raises SceneError for a lens that cannot be used.

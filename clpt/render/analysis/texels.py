@@ -5,19 +5,17 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from clpt import spectra
+from clpt.arrays import Floats32
 from clpt.errors import SceneError
 from clpt.spectra import Tabulated
 from clpt.spectral_exr import SpectralImage
 
-Floats = NDArray[np.float32]
-
 FAR = 1000.0  # bands: how far beyond its ends a spectral image's bands are numbered
 
 
-def texels(image: Floats, role: str, spectral: bool) -> Floats:
+def texels(image: Floats32, role: str, spectral: bool) -> Floats32:
     """Return what stands in `texels` for an image of `pixels`, row by row from the top.
 
     (h * w, 4): rgb, or sigmoid coefficients and a factor where `spectral`; (h * w,) for "real".
@@ -36,7 +34,7 @@ def texels(image: Floats, role: str, spectral: bool) -> Floats:
     return made
 
 
-def bands(image: SpectralImage, lo: float, hi: float) -> tuple[Floats, Tabulated]:
+def bands(image: SpectralImage, lo: float, hi: float) -> tuple[Floats32, Tabulated]:
     """Return what stands in `texels` for a spectral image seen from `lo` to `hi` [nm].
 
     (h * w, n) float32 and the number of the band by wavelength: whole at the bands' wavelengths,
@@ -58,7 +56,7 @@ def bands(image: SpectralImage, lo: float, hi: float) -> tuple[Floats, Tabulated
     return np.clip(values, 0.0, None if image.emissive else 1.0), number
 
 
-def _palette(colours: Floats) -> tuple[Floats, Any]:
+def _palette(colours: Floats32) -> tuple[Floats32, Any]:
     """Distinct colours (k, 3), and which of them each of (n, 3) is, if channels have few values.
 
     The channels of an 8-bit image have at most 256. Other images come back as they are.

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt import spectra, spectral_exr
+from clpt.arrays import Floats
 from clpt.records import DENSITY_SIZES
 from clpt.render.analysis.colour import sensor
 from clpt.render.analysis.index import SceneIndex
@@ -24,8 +25,6 @@ from clpt.scene.params import params
 from clpt.spectra import RGB, RGBIlluminant, Spectrum
 from clpt.spectra.reradiation import Reradiation
 from clpt.spectra.spectrum import d65, gridded
-
-Values = NDArray[np.float64]
 
 STEP = 1.0  # [nm] at most, between the nodes of a table
 LIGHTS, SENSOR = 0.5, 0.45  # shares of a table; the rest is even, so that nothing is left out
@@ -43,17 +42,17 @@ class Density:
 
     lo: float
     hi: float
-    values: Values | None = None
+    values: Floats | None = None
 
-    def pdf(self, lambdas: ArrayLike) -> Values:
+    def pdf(self, lambdas: ArrayLike) -> Floats:
         """The density [1/nm] at `lambdas`."""
         if self.values is None:
             return spectra.wavelength_pdf(lambdas, self.lo, self.hi)
         return np.interp(np.asarray(lambdas, np.float64), self.nodes, self.values, 0.0, 0.0)
 
     @property
-    def nodes(self) -> Values:
-        """Where the values of a table stand [nm]."""
+    def nodes(self) -> Floats:
+        """The wavelengths at which a table's values stand [nm]."""
         count = 2 if self.values is None else len(self.values)
         return np.linspace(self.lo, self.hi, count)
 
@@ -111,7 +110,7 @@ def _support(film: Film) -> tuple[float, float]:
     return float(nodes[max(seen[0] - 1, 0)]), float(nodes[min(seen[-1] + 1, len(nodes) - 1)])
 
 
-def _second_moment(density: Density, nodes: Values, light: Values) -> float:
+def _second_moment(density: Density, nodes: Floats, light: Floats) -> float:
     """Return the second moment of an estimate of the integral of `light` (n,) from one wavelength.
 
     nodes (n,): the wavelengths at which light is given [nm].
@@ -119,16 +118,16 @@ def _second_moment(density: Density, nodes: Values, light: Values) -> float:
     return _integral(light**2 / density.pdf(nodes), nodes)
 
 
-def _integral(values: Values, nodes: Values) -> float:
+def _integral(values: Floats, nodes: Floats) -> float:
     """Return the integral of a function that is linear between nodes."""
     return float(((values[1:] + values[:-1]) / 2.0) @ np.diff(nodes))
 
 
-def _normalised(values: Values, nodes: Values) -> Values:
+def _normalised(values: Floats, nodes: Floats) -> Floats:
     return values / _integral(values, nodes)
 
 
-def _glow(index: SceneIndex, nodes: Values) -> Callable[[Spectrum], Values]:
+def _glow(index: SceneIndex, nodes: Floats) -> Callable[[Spectrum], Floats]:
     """Return a function of a light: what all fluorescent materials emit under it at nodes [nm]."""
     film = index.scene.film
     cells = int(np.ceil((film.lambda_max - film.lambda_min) / STEP - 1e-9))

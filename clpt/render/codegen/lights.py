@@ -50,12 +50,12 @@ def kinds_of(features: Features) -> list[str]:
 
 
 def surfaces_of(features: Features) -> list[str]:
-    """Return those of these kinds that are shapes."""
+    """Return the kinds of the scene's lights that are shapes."""
     return [kind for kind in kinds_of(features) if kind in shape_records.RECORDS]
 
 
 def others_of(features: Features) -> list[str]:
-    """Return those of these kinds that have parameters of their own, off all shapes."""
+    """Return the kinds of the scene's lights that have parameters of their own, off all shapes."""
     return [kind for kind in kinds_of(features) if kind in RECORDS]
 
 

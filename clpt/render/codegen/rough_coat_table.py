@@ -15,9 +15,9 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
+from clpt.arrays import Floats
 from clpt.scene.materials import DISTRIBUTIONS
 
-Floats = NDArray[np.float64]
 Made = Callable[[str, float, float], "Floats | float"]
 Kept = dict[str, NDArray[Any]]
 

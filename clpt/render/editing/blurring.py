@@ -46,7 +46,7 @@ def between(former: Scene, scene: Scene) -> tuple[Scene, list[str]]:
 
 
 class _Way:
-    """From one scene to the next, between two times [s]."""
+    """The motion from one scene to the next, between two times [s]."""
 
     def __init__(self, times: tuple[float, float]):
         self.times, self.warnings = times, list[str]()

@@ -1,4 +1,4 @@
-"""Why shapes cannot move on the device."""
+"""The reason why shapes cannot move on the device, as an exception."""
 
 
 class CannotMove(Exception):

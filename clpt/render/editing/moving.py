@@ -252,7 +252,7 @@ class Moving:
         return act
 
     def _boxes_of(self, tree: str, lowered: NDArray[np.float32]) -> Boxes:
-        """The boxes that a tree is over, which will be fitted to them."""
+        """Return the boxes that a tree is over, which will be fitted to them."""
         if tree not in self._boxes:
             host = lowered.copy()
             self._boxes[tree] = host, self.target.buffers.upload("boxes of what moves", host)
@@ -319,7 +319,7 @@ class Moving:
         return ranges.matrix, 0
 
     def _local(self, ranges: _Ranges, name: str) -> Location:
-        """Where vertices or normals of a shape are, before its transform."""
+        """Return where vertices or normals of a shape are on the device, before its transform."""
         shape = ranges.shape
         values = getattr(shape, name, None)
         if on_device(values):
@@ -337,7 +337,7 @@ class Moving:
         return buffers[name], 0
 
     def _locate(self, values: Any, shape: tuple[int, ...], what: str) -> Location:
-        """Where a float32 array on the device begins. Raises CannotMove for another form."""
+        """Return where a float32 array on the device begins. Raises CannotMove for another form."""
         if isinstance(values, cl.Buffer):
             fits, location = values.size == 4 * np.prod(shape), (values, 0)
         else:

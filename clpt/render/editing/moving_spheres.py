@@ -11,7 +11,7 @@ import pyopencl as cl
 from numpy.typing import NDArray
 
 from clpt import transforms
-from clpt.arrays import on_device
+from clpt.arrays import Balls, on_device
 from clpt.bvh import Building
 from clpt.geometry import analytic, shapes, spheres
 from clpt.records import SHAPE
@@ -98,7 +98,7 @@ class MovingSpheres:
         end = int(behind.min()) if len(behind) else len(lowered.boxes)
         return end - int(row["prim"])
 
-    def _upload(self, prim: int, balls: spheres.Balls) -> cl.Buffer:
+    def _upload(self, prim: int, balls: Balls) -> cl.Buffer:
         """A buffer with centres and radii that come from the host."""
         if prim not in self._sources:
             buffers = self.scene.buffers

@@ -191,12 +191,12 @@ def _write_tables(scene: DeviceScene, lowered: Lowered, new: dict[str, cl.Buffer
 
 
 def _room(lowered: Lowered) -> list[tuple[int, tuple[int, ...]]]:
-    """Where kernels write bricks of densities into `images`."""
+    """Return the places in `images` where kernels write bricks of densities."""
     return [(grid.first, grid.bricks) for grid in lowered.device_grids]
 
 
 def _refit(scene: DeviceScene, changes: _Changes) -> None:
-    """Refit the tree over triangles to them, if it is not a new one."""
+    """Refit the tree over triangles to their vertices, if it is not a new one."""
     if changes.refit:
         building = bvh.Building(scene.device, stream=scene.stream)
         triangles = scene.trees.triangles

@@ -12,13 +12,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Image, Words
+
 RANKS = 6  # pairs of a pixel in a file
 COUNT_BITS = 7  # of a word of a list, kernels/film/layers.cl
 LETTERS = ("red", "green", "blue", "alpha")  # of two pairs in a file
 SHORT_LETTERS = ("r", "g", "b", "a")  # the same in Blender
-
-Words = NDArray[np.uint32]
-Image = NDArray[np.float32]
 
 
 def murmur3_32(text: str) -> int:

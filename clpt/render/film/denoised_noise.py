@@ -19,14 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import device
+from clpt.arrays import Floats, Image
 from clpt.denoise import needs
 from clpt.denoise.oidn import LUMINANCE, Oidn
 from clpt.denoise.statistical import Statistical
-from clpt.render.film.pictures import Image, Pictures
+from clpt.render.film.pictures import Pictures
 from clpt.render.wavefront.cells import SIDE
 from clpt.render.wavefront.noise_meter import DARK, divide
-
-Values = NDArray[np.float64]
 
 SURE = {"oidn": 0.02, "statistical": 0.1}  # of the noise before: less is not believed to be left
 BESIDE = 2  # squares around those that are asked for, which are denoised with them
@@ -44,7 +43,7 @@ class DenoisedNoise:
         self._renderer, self._device, self._method = renderer, on, method
         self._oidn: dict[int, tuple[list[Image | None], Oidn]] = {}  # of each colour
 
-    def measure(self, cells: NDArray[np.bool_]) -> Values:
+    def measure(self, cells: NDArray[np.bool_]) -> Floats:
         """Return the mean square of the relative error of luminance left in cells, (cells,).
 
         cells: that are asked for; others may be 0. An error is relative to the denoised light;
@@ -85,7 +84,7 @@ class DenoisedNoise:
         halves: tuple[Image, Image],
         surfaces: list[Image | None],
         dark: float,
-    ) -> tuple[Values, Values]:
+    ) -> tuple[Floats, Floats]:
         """Squares of the relative error after denoising and before, (h, w) float64 each."""
         denoised = self._denoised(colour, halves, surfaces)
         a, b, da, db = ((image @ LUMINANCE).astype(float) for image in (*halves, *denoised))
@@ -128,7 +127,7 @@ def _pixels(height: int, width: int, colour: int) -> tuple[Any, Any, NDArray[np.
     return y, np.where(inside, x, np.maximum(x - 2, 0)), inside
 
 
-def _around(sums: NDArray[Any]) -> Values:
+def _around(sums: NDArray[Any]) -> Floats:
     """The sums of squares (rows, columns), with those around each."""
     padded = np.pad(sums, 1)
     rows = sum(AROUND[i] * padded[i : i + sums.shape[0]] for i in range(3))

@@ -7,11 +7,12 @@ from functools import cached_property
 import numpy as np
 
 from clpt import device
+from clpt.arrays import Image
 from clpt.denoise import needs
 from clpt.denoise.oidn import Oidn
 from clpt.denoise.statistical import Statistical
 from clpt.errors import SceneError
-from clpt.render.film.pictures import Image, Pictures, Still
+from clpt.render.film.pictures import Pictures, Still
 
 
 class DenoisedPicture(Still):

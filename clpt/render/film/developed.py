@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Image, Words
 from clpt.errors import SceneError
 from clpt.render.contract.features import SUM_WORDS
 from clpt.render.film.layers import layers_of
 from clpt.render.film.picture_form import PictureForm
-from clpt.render.film.pictures import Image, Still
+from clpt.render.film.pictures import Still
 from clpt.render.wavefront.film_state import (
     FILM_WORDS,
     SAMPLES_WORD,
     FilmState,
-    Words,
     add_films,
     add_sums,
     light_group,
@@ -107,13 +107,13 @@ class Developed(Still):
         return np.full(words.shape[1:], self._light_paths(words), np.float32)
 
     def _mean(self, words: Words) -> Image:
-        """One over what a pixel's sums are divided by, 0 where that is nothing."""
+        """Return one over the divisor of each pixel's sums, 0 where that is 0."""
         weighed = self.form.weights
         by = numbers(words[FILM_WORDS:][:SUM_WORDS]) if weighed else self._samples(words)
         return _inverse(by)
 
     def _light_mean(self, words: Words) -> Image:
-        """One over the number of light paths; 0 where a pixel has no samples of the camera."""
+        """Return one over the number of light paths; 0 in pixels without samples of the camera."""
         inverse = _inverse(np.full((), self._light_paths(words), np.float32))
         return np.where(words[SAMPLES_WORD] > 0, inverse, np.float32(0.0))
 

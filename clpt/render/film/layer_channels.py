@@ -6,11 +6,12 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from clpt import images, spectral_exr
+from clpt.arrays import Image
 from clpt.render.film import cryptomatte
 from clpt.render.film.denoised_picture import DenoisedPicture
 from clpt.render.film.layers import GROUP, matte_names
 from clpt.render.film.picture_form import PictureForm
-from clpt.render.film.pictures import Image, Pictures
+from clpt.render.film.pictures import Pictures
 from clpt.scene.layers import LAYERS
 from clpt.spectra.spaces import chromaticities
 

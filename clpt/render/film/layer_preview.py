@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Image = NDArray[np.float32]
+from clpt.arrays import Image
 
 
 def viewable(name: str, layer: Image) -> Image:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Image, Words
 from clpt.render.analysis.colour import output_matrix, sensor
 from clpt.render.contract.features.film import layer_places
 from clpt.render.film.cryptomatte import pairs_of
@@ -16,9 +17,6 @@ from clpt.render.wavefront.film_state import numbers
 from clpt.scene.integrators import Film
 from clpt.scene.layers import LAYERS
 from clpt.spectra import cie
-
-Words = NDArray[np.uint32]
-Image = NDArray[np.float32]
 
 UNITS = 2.0**22  # kernels/film/layers.cl
 LONG_UNITS = (2.0**8, 2.0**-16, 2.0**-40)

@@ -5,9 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
+from clpt.arrays import Image
 from clpt.errors import SceneError
 from clpt.render.film.picture_form import PictureForm
 from clpt.spectral_exr import SpectralImage
@@ -15,7 +13,6 @@ from clpt.spectral_exr import SpectralImage
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-Image = NDArray[np.float32]
 
 LIGHT_LAYERS = ("layers", "light_layers", "mattes")  # words of layers, as `FilmState` has them
 

@@ -31,8 +31,7 @@ _IMAGE_TYPES: dict[Any, np.dtype] = {
 
 @dataclass(frozen=True)
 class _Target:
-    """Where a picture goes.
-
+    """The memory that a picture goes to.
     memory: the Array or Image that the caller gets; data: its OpenCL memory; offset: where the
     picture begins there [elements].
     """
@@ -134,7 +133,7 @@ class Resolve:
         return self._bound[kernel]
 
     def _target(self, film: Array, into: Any, dtype: Any) -> _Target:
-        """Where a picture goes. Raises DeviceError, which says what would fit."""
+        """Return the memory for a picture. Raises DeviceError, which says what would fit."""
         wanted = None if dtype is None else np.dtype(dtype)
         if wanted is not None and wanted not in (BYTES, FLOATS):
             raise DeviceError(f"a picture is of uint8 or float32, not {wanted}")

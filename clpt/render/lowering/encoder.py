@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from clpt.arrays import Words
 from clpt.errors import SceneError
 from clpt.render.analysis.lights.look import Look
 from clpt.render.analysis.lowering_cache import LoweringCache
@@ -20,7 +21,7 @@ from clpt.render.contract.parameter_words import (
 )
 from clpt.render.lowering.spectra import thin_films
 from clpt.render.lowering.spectra.spectra_table import SpectraTable
-from clpt.render.lowering.tables import TableStore, Words, as_words
+from clpt.render.lowering.tables import TableStore, as_words
 from clpt.render.lowering.textures.bitmaps import Images
 from clpt.render.lowering.textures.textures import TextureTable
 from clpt.scene.params import Kind, Param, device_params, interior_params, params
@@ -63,7 +64,7 @@ class Encoder:
 
     @property
     def sources(self) -> Sources:
-        """Where values come from: (kind, parameter, source).
+        """The sources of the values of parameters: (kind, parameter, source).
 
         A source is one of those in clpt.render.codegen.parameters.
         """

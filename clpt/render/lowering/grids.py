@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.arrays import on_host
+from clpt.arrays import Words, on_host
 from clpt.render.analysis.bricks import POINTS, Windows, brick_counts, parts_of, to_lattice
 from clpt.render.lowering import device_grids
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.tables import Words, as_words
+from clpt.render.lowering.tables import as_words
 from clpt.scene.media import Cloud, Grid, Lattice, Medium, Mixture
 from clpt.scene.volumes import check_density, resampled
 from clpt.spectra import Spectrum, uplift
@@ -78,7 +78,7 @@ def colours(density: object, values: NDArray[Any], spectral: bool) -> Words:
 
 
 def _on_used(density: object, values: NDArray[Any]) -> tuple[Words, NDArray[np.float32]]:
-    """Where the points begin of each brick that has a density, 0 of others; and what these hold.
+    """Return the place of each brick's points, 0 without a density, and the values of the points.
 
     values: some channels at the points of the density.
     """

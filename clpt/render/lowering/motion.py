@@ -85,8 +85,11 @@ def lower_motion(motions: Motions, scene: Scene, rows: list[int], store: TableSt
 
 
 def _deformations(motions: Motions, count: int, first: int) -> NDArray[np.float32]:
-    """For each shape the word of its steps, and these: how many, and for each when it begins and
-    one over how long it takes; none for what does not deform: kernels/tracing/vertex_keys.cl."""
+    """Return for each shape the word where its steps begin, and the steps of all shapes.
+
+    Of a shape: how many steps, and for each when it begins and one over how long it takes; none
+    where it does not deform. See kernels/tracing/vertex_keys.cl.
+    """
     places, parts, at = np.full(count, first + count, np.int32), [np.zeros(3, np.float32)], 3
     made: dict[tuple[float, ...], int] = {}
     for number, times in motions.deforming.items():

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from clpt.arrays import Words
 from clpt.errors import SceneError
 from clpt.records import TABLES
 
-Words = NDArray[np.uint32]
 MOST_ELEMENTS = 2**31 - 1  # of a table: kernels have indices of 32 bits with a sign
 DTYPES = {"float": np.float32, "uint": np.uint32}
 

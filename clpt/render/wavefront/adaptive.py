@@ -26,11 +26,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Floats
 from clpt.errors import SceneError
 from clpt.render.contract.features import Features
 from clpt.render.wavefront.cells import Cells
 from clpt.render.wavefront.light_rounds import LightRounds
-from clpt.render.wavefront.noise_meter import NoiseMeter, Values, divide
+from clpt.render.wavefront.noise_meter import NoiseMeter, divide
 from clpt.render.wavefront.tracer import OnBatch, Selection, Tracer
 from clpt.render.wavefront.wavefront import Wavefront
 from clpt.render.wavefront.work_list import FOREVER
@@ -81,7 +82,7 @@ class Adaptive:
         self,
         wavefront: Wavefront,
         tracer: Tracer | None = None,
-        left: Callable[[NDArray[np.bool_]], Values] | None = None,
+        left: Callable[[NDArray[np.bool_]], Floats] | None = None,
     ):
         self.wavefront, self._meter = wavefront, NoiseMeter(wavefront)
         self._tracer, self._left = tracer or Tracer(wavefront), left
@@ -110,7 +111,7 @@ class Adaptive:
         return float(self._pixels[active].sum() / self._pixels.sum())
 
     @property
-    def _known_variance(self) -> Values:
+    def _known_variance(self) -> Floats:
         """The variance of a sample where it is known, else 0."""
         return np.where(np.isfinite(self._variance), self._variance, 0.0)
 

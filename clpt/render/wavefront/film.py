@@ -11,16 +11,11 @@ import pyopencl as cl
 from numpy.typing import NDArray
 
 from clpt import device
+from clpt.arrays import Words
 from clpt.device.buffers import Buffers
 from clpt.render.contract.features import GROUP_WORDS, SUM_WORDS, Features
 from clpt.render.wavefront import work_list
-from clpt.render.wavefront.film_state import (
-    NO_LAYERS,
-    NO_LIGHT_LAYERS,
-    NO_MATTES,
-    SAMPLES_WORD,
-    Words,
-)
+from clpt.render.wavefront.film_state import NO_LAYERS, NO_LIGHT_LAYERS, NO_MATTES, SAMPLES_WORD
 from clpt.scene.layers import MATTE_SLOTS
 
 NONE = {"layers": NO_LAYERS, "light_layers": NO_LIGHT_LAYERS, "mattes": NO_MATTES}
@@ -198,5 +193,5 @@ class Film:
         return count
 
     def _word_at(self, half: int, word: int) -> int:
-        """Where a word of the pixels begins [bytes]."""
+        """Return the place where a word of the pixels begins [bytes]."""
         return 4 * (half * self._words + word) * self._padded_pixels

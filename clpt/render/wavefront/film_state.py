@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Words
 from clpt.errors import SceneError
 from clpt.render.contract.features import GROUP_WORDS, SUM_WORDS
 
@@ -18,7 +19,6 @@ LEAST_WITH_LIGHT_PATHS = 2 * FILM_WORDS  # from which a pixel's last words are t
 UNIT = 2.0**-48  # of a sum, kernels/core/fixed.cl
 STRIP = 16384  # pixels whose words are added at a time
 
-Words = NDArray[np.uint32]
 Ranges = tuple[tuple[int, int], ...]
 
 

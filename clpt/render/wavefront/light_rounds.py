@@ -23,7 +23,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.render.wavefront.noise_meter import NoiseMeter, Values, divide
+from clpt.arrays import Floats
+from clpt.render.wavefront.noise_meter import NoiseMeter, divide
 from clpt.render.wavefront.tracer import Selection, Tracer
 from clpt.render.wavefront.work_list import FOREVER
 
@@ -124,7 +125,7 @@ class LightRounds:
             self._measured_at[self.stop == FOREVER] = look
         return True
 
-    def decide(self, limit: float, camera: Values, ahead: int, steps: int) -> None:
+    def decide(self, limit: float, camera: Floats, ahead: int, steps: int) -> None:
         """Decide how many are wanted.
 
         limit: of a pixel's relative variance; camera: (cells,) that of a sample of the camera, as
@@ -136,19 +137,19 @@ class LightRounds:
         wanted = np.maximum(np.ceil(np.where(sure, needed, 0.0) / step) * step, at)
         self.stop[sure] = wanted[sure]
 
-    def left_over(self, limit: float, camera: Values) -> Values:
+    def left_over(self, limit: float, camera: Floats) -> Floats:
         """Return the variance that light paths leave to the camera's samples, (cells,) float64."""
         taken = np.maximum(self._of_colours(self._needed(limit, camera)), self._measured_at)
         return limit - divide(self.variance, np.tile(taken, len(self.variance) // 2))
 
-    def noisy(self, limit: float, camera: Values) -> NDArray[np.bool_]:
+    def noisy(self, limit: float, camera: Floats) -> NDArray[np.bool_]:
         """Return whether a cell wants more light paths than there are so far, (cells,) bool."""
         return (self.next < self.wanted) & (self._needed(limit, camera) > self.next)
 
-    def _needed(self, limit: float, camera: Values) -> Values:
+    def _needed(self, limit: float, camera: Floats) -> Floats:
         """Return the number of samples whose light paths each cell wants, (cells,)."""
         return (self.variance + np.sqrt(self.variance * camera)) / limit
 
-    def _of_colours(self, values: Values) -> Values:
+    def _of_colours(self, values: Floats) -> Floats:
         """The largest value among the cells of each colour, (2,)."""
         return values.reshape(-1, 2).max(axis=0)

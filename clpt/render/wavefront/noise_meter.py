@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Floats
 from clpt.render.codegen import programs
 from clpt.render.wavefront.cells import SIDE
 from clpt.render.wavefront.wavefront import Wavefront
 
 DARK = 0.01  # of the picture's mean luminance: a darker tile counts as if it were as bright
-
-Values = NDArray[np.float64]
 
 
 class NoiseMeter:
@@ -27,7 +26,7 @@ class NoiseMeter:
         self.wavefront = wavefront
         grid = wavefront.paths.cells
         self.across, self.cell, self.pixels = grid.across, grid.cell, grid.pixels
-        self._dark: Values | None = None  # luminance, for each of the two colours
+        self._dark: Floats | None = None  # luminance, for each of the two colours
         self._allocate(len(self.cell), len(self.pixels))
 
     def _allocate(self, padded_pixels: int, count: int) -> None:
@@ -65,7 +64,7 @@ class NoiseMeter:
         self.wavefront.stream.write(self._previous_mean, mean)
         self._dark = dark if len(dark) else None
 
-    def measure(self, cells: NDArray[np.bool_]) -> Values:
+    def measure(self, cells: NDArray[np.bool_]) -> Floats:
         """Return the relative variance of what the camera's paths bring, (cells,) float64.
 
         It is that of the pixels' means, on average over each of the cells that are asked for.
@@ -76,11 +75,11 @@ class NoiseMeter:
             self._dark = DARK * luminance.sum(axis=0) / np.maximum(pixels.sum(axis=0), 1)
         return self._of_cells(sums)
 
-    def measure_lights(self, cells: NDArray[np.bool_], light_paths: float) -> Values:
+    def measure_lights(self, cells: NDArray[np.bool_], light_paths: float) -> Floats:
         """Likewise of what light paths bring; light_paths: of each pixel, that the film holds."""
         return self._of_cells(self._sums_of_tiles(cells, light_paths))
 
-    def _of_cells(self, sums: Values) -> Values:
+    def _of_cells(self, sums: Floats) -> Floats:
         """The mean over each cell's pixels of their relative variance."""
         variance, luminance, pixels = sums
         dark = np.zeros(2) if self._dark is None else self._dark
@@ -94,7 +93,7 @@ class NoiseMeter:
         relative = divide(variance, bright**2)
         return np.bincount(cell.ravel(), relative.ravel(), len(count)) / count
 
-    def _sums_of_tiles(self, cells: NDArray[np.bool_], light_paths: float) -> Values:
+    def _sums_of_tiles(self, cells: NDArray[np.bool_], light_paths: float) -> Floats:
         """Variance, luminance and number of pixels (3, tiles, 2) of each tile's two colours."""
         stream = self.wavefront.stream
         stream.write(self._active_cells, cells.astype(np.uint32))
@@ -105,7 +104,7 @@ class NoiseMeter:
         return np.moveaxis(sums.astype(float), 2, 0)
 
 
-def divide(a: Any, b: Any) -> Values:
+def divide(a: Any, b: Any) -> Floats:
     """Return a / b, and 0 where b is 0."""
     a, b = np.broadcast_arrays(a, b)
     return np.divide(a, b, out=np.zeros(a.shape), where=b > 0.0)

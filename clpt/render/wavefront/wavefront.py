@@ -16,6 +16,7 @@ import pyopencl as cl
 from numpy.typing import NDArray
 
 from clpt import bvh, device
+from clpt.arrays import Words
 from clpt.device.timing import Timings
 from clpt.render.codegen import programs
 from clpt.render.contract.features import Features
@@ -24,7 +25,7 @@ from clpt.render.wavefront import strategy
 from clpt.render.wavefront.bounce_loop import BounceLoop, Kernels, Step
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.render.wavefront.film import Film
-from clpt.render.wavefront.film_state import SAMPLES_WORD, Words
+from clpt.render.wavefront.film_state import SAMPLES_WORD
 from clpt.render.wavefront.guide import Guide
 from clpt.render.wavefront.path_buffers import COUNTERS, PathBuffers, divide_film
 from clpt.render.wavefront.photons import Photons

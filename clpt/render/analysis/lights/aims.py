@@ -122,7 +122,7 @@ def _in_boxes(boxes: NDArray[np.float64], round_: bool) -> Pieces:
 
 
 def _of_triangles(geometry: Geometry, face: int, end: int) -> Pieces:
-    """Triangles; coordinates as `vertices` has them."""
+    """Return triangles as pieces; coordinates as `vertices` has them."""
     corners = geometry.vertices[geometry.faces[face:end]].astype(np.float64)
     return np.hstack([corners.reshape(-1, 9), np.zeros((len(corners), 1))])
 
@@ -182,7 +182,7 @@ def _cut(pieces: Pieces) -> tuple[tuple[Pieces, ...], bool]:
 
 
 def _fewer(pieces: Pieces) -> Pieces:
-    """Around pieces, one for each cell of a grid, where there are more than these."""
+    """Return one piece around all in each cell of a grid, where there are more than cells."""
     if len(pieces) <= CELLS**3:
         return pieces
     lows, highs = _ends(pieces)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt import images, spectral_exr, transforms
-from clpt.arrays import fits_single, on_host
+from clpt.arrays import Floats32, fits_single, on_host
 from clpt.errors import SceneError
 from clpt.render.analysis.lights import block_grids
 from clpt.render.analysis.lights.look import Look
@@ -25,8 +25,6 @@ from clpt.render.analysis.texels import bands, texels
 from clpt.scene.lights import CubeMap, Envmap, Sky
 from clpt.spectra import Tabulated, luminance
 from clpt.spectral_exr import SpectralImage
-
-Array = NDArray[np.float32]
 
 PARTS = 128  # of an image's side, in which bright directions are told from dark ones
 UNSEEN = 0.1  # share of the mean over bands in the weight of a texel: light of no colour counts too
@@ -47,7 +45,7 @@ class Content(NamedTuple):
 
     width: int
     height: int
-    texels: Array
+    texels: Floats32
     corners: NDArray[Any]
     grid: block_grids.BlockGrid
     bands: int = 0
@@ -153,7 +151,7 @@ def axes_of(lamp: Envmap | CubeMap | Sky) -> NDArray[np.float64]:
     return axes
 
 
-def _at_least_two_rows(values: Array) -> Array:
+def _at_least_two_rows(values: Floats32) -> Floats32:
     """An image (h, w, n) with a row for each pole."""
     return np.repeat(values, 2, axis=0) if len(values) == 1 else values
 
@@ -166,7 +164,7 @@ def _scaled(image: SpectralImage, scale: float, where: str) -> SpectralImage:
     return dataclasses.replace(image, values=np.maximum(values, np.float32(0.0)))
 
 
-def _loaded(image: Any, where: str, notes: list[str]) -> Array:
+def _loaded(image: Any, where: str, notes: list[str]) -> Floats32:
     """An image as (h, w, 3) float32 without negative values. Raises SceneError.
 
     notes: gets what its file says that is left out.
@@ -195,7 +193,7 @@ def _loaded(image: Any, where: str, notes: list[str]) -> Array:
     return np.maximum(values, np.float32(0.0))
 
 
-def _faces(image: Any, where: str, notes: list[str]) -> Array:
+def _faces(image: Any, where: str, notes: list[str]) -> Floats32:
     """The six faces of a cube map (6, n, n, 3), in the order of FACES; notes: as of `_loaded`."""
     if isinstance(image, (list, tuple)) or (isinstance(image, np.ndarray) and image.ndim == 4):
         if len(image) != 6:
@@ -263,7 +261,7 @@ def face_coordinates(d: ArrayLike) -> tuple[NDArray[np.int64], Any, Any]:
     return face, a, b
 
 
-def _bordered(faces: Array) -> Array:
+def _bordered(faces: Floats32) -> Floats32:
     """The faces (6, n + 2, n + 2, 3) with the nearest texels of their neighbours around them."""
     n = faces.shape[1]
     centers = (np.arange(-1, n + 1) + 0.5) / n * 2.0 - 1.0
@@ -272,13 +270,13 @@ def _bordered(faces: Array) -> Array:
     return faces[face, row, column]
 
 
-def _brightness(image: Array) -> Array:
+def _brightness(image: Floats32) -> Floats32:
     """The mean over the last axis; a product is many times faster than a sum over few."""
     count = image.shape[-1]
     return image @ np.full(count, 1.0 / count, np.float32)
 
 
-def _latitude_weights(bright: Array) -> Array:
+def _latitude_weights(bright: Floats32) -> Floats32:
     """Weights (h, w + 1) at the texels' centres; the first column comes again at the end."""
     height, width = bright.shape
     rows = np.arange(height, dtype=np.float64)
@@ -290,7 +288,7 @@ def _latitude_weights(bright: Array) -> Array:
     return weights
 
 
-def _cube_weights(bright: Array) -> NDArray[np.float64]:
+def _cube_weights(bright: Floats32) -> NDArray[np.float64]:
     """Weights (6, 2n + 1, 2n + 1) at the texels' edges and centres, of bordered faces."""
     n = bright.shape[1] - 2
     wide = np.empty((6, 2 * n + 1, n + 2))

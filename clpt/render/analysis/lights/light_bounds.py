@@ -1,4 +1,4 @@
-"""Where each light is and where it shines: boxes and cones, what a tree over lights is built of."""
+"""Bounds of where lights are and shine: boxes and cones, of which a tree over lights is built."""
 
 from __future__ import annotations
 
@@ -9,13 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt.arrays import Faces, Points
+from clpt.arrays import Faces, Floats, Points
 from clpt.geometry import analytic
 from clpt.scene import lights
 from clpt.scene.lights import Light
 from clpt.scene.shapes import Shape
-
-Floats = NDArray[np.float64]
 
 NARROW = 0.02  # [rad] around a cone of directions that is known to hold all light
 

@@ -36,10 +36,12 @@ Around = tuple[Any, ...]  # media, or the matter of bodies
 
 
 class LightMedia(NamedTuple):
-    """around: of each lamp and shape that shines what is around it, and how many rows it has;
-    refusal: why no paths can start
-    at some light, "" if they can; extinction: of each row, of the medium that scatters its light,
-    else 0 (n,) [1/m]; nan where its density is on a grid."""
+    """The media around the lights of a scene.
+
+    around: of each lamp and shape that shines the media around it, and how many rows it has;
+    refusal: why no paths can start at some light, "" if they can; extinction (n,): of each row,
+    that of the medium that scatters its light, else 0 [1/m]; nan where its density is on a grid.
+    """
 
     around: tuple[tuple[Around, int], ...]
     refusal: str

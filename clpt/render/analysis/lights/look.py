@@ -9,7 +9,10 @@ from clpt.render.analysis.lowering_cache import LoweringCache
 
 @dataclass(frozen=True)
 class Look:
-    """spectral: whether in spectra, from lo to hi [nm], or in colours; cache: of costly pieces."""
+    """The way in which a film looks at lights.
+
+    spectral: whether in spectra, from lo to hi [nm], or in colours; cache: of costly pieces.
+    """
 
     spectral: bool
     lo: float

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Floats
 from clpt.render.analysis.lights import block_grids, image_lights
 from clpt.render.analysis.lights.look import Look
 from clpt.render.analysis.texels import bands, texels
@@ -26,8 +27,6 @@ from clpt.sky.dome import (
 from clpt.spectra import Tabulated, luminance
 from clpt.spectra.air import LAMBDAS
 from clpt.spectral_exr import SpectralImage
-
-Floats = NDArray[np.float64]
 
 MOST = 0.75  # share of samples that the sun may take
 

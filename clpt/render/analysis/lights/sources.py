@@ -65,7 +65,7 @@ class Sources:
 
     @property
     def every(self) -> tuple[Source, ...]:
-        """All of them, in the order of their rows."""
+        """All sources, in the order of their rows."""
         return (*self.lamps, *self.media, *self.emitters)
 
     @cached_property

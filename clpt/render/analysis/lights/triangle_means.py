@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Floats
 from clpt.render.analysis.lights.light_power import brightness
 from clpt.scene.pixels import pixels
 from clpt.scene.textures import Bitmap, Checkerboard, MeshAttribute, Mix, Product
-
-Floats = NDArray[np.float64]
 
 LOOKS = 1 << 18  # at a texture, all triangles together
 FEWEST, MOST = 16, 1024  # of them for one triangle

@@ -89,7 +89,7 @@ class Features:
     @property
     @macro("USES_DISPERSION")
     def told_dispersion(self) -> bool:
-        """Whether it does for paths, which have wavelengths."""
+        """Whether the direction of light depends on the wavelengths that paths have."""
         return self.dispersion and self.spectra.spectral
 
     @property
@@ -169,7 +169,7 @@ class Features:
     @property
     @macro("FILM_GROUP", of_number=True)
     def group_begins(self) -> int | None:
-        """Where the words of a pixel begin that paths add to, where a film has two groups."""
+        """The first word of a pixel that paths add to, where a film has two groups."""
         return self.film.first_word if self.transport.weighed else None
 
     @property

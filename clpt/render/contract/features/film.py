@@ -32,7 +32,7 @@ class FilterFeatures:
     @property
     @macro("FILTER_BOX")
     def is_box(self) -> bool:
-        """Whether it weighs all light alike."""
+        """Whether the filter weighs all light alike."""
         return self.kind == "box"
 
 

@@ -10,7 +10,7 @@ from clpt.render.contract.texture_records import MIPS
 
 @dataclass(frozen=True)
 class TextureFeatures:
-    """roles: (kind, role) pairs of the textures, in their order."""
+    """The textures of a scene; roles: their (kind, role) pairs, in their order."""
 
     roles: tuple[tuple[str, str], ...] = ()
     mappings: bool = False  # some texture makes uv of the place

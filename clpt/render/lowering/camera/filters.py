@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from clpt.arrays import Floats
 from clpt.errors import SceneError
 from clpt.render.analysis.filters import radius
 from clpt.render.lowering.tables import TableStore
@@ -19,8 +20,6 @@ from clpt.scene.integrators import (
     Mitchell,
     Tent,
 )
-
-Values = NDArray[np.float64]
 
 CELLS = 1024  # of equal probability, on one side
 STEPS = 1 << 16  # in which a filter is integrated
@@ -45,7 +44,7 @@ def lower_profile(chosen: Filter, store: TableStore, splatting: bool) -> int:
     return 0 if splatting else store.append_floats("distributions", profile(chosen))
 
 
-def value(chosen: Filter, distance: ArrayLike) -> Values:
+def value(chosen: Filter, distance: ArrayLike) -> Floats:
     """Return a filter at distances from its centre along one axis [pixels], not normalised.
 
     The definitions are Mitsuba 3's, so that the same names give the same images.
@@ -87,17 +86,17 @@ def profile(chosen: Filter) -> NDArray[np.float32]:
     return np.concatenate([[radius(chosen), PROFILE], values / area]).astype(np.float32)
 
 
-def _tent(chosen: Tent, x: Values) -> Values:
+def _tent(chosen: Tent, x: Floats) -> Floats:
     return 1.0 - x / chosen.radius
 
 
-def _gaussian(chosen: Gaussian, x: Values) -> Values:
+def _gaussian(chosen: Gaussian, x: Floats) -> Floats:
     """Lowered by its value at the radius, so that it ends at zero."""
     end = radius(chosen) / chosen.stddev
     return np.exp(-0.5 * (x / chosen.stddev) ** 2) - np.exp(-0.5 * end**2)
 
 
-def _mitchell(chosen: Mitchell, x: Values) -> Values:
+def _mitchell(chosen: Mitchell, x: Floats) -> Floats:
     """Mitchell and Netravali 1988 eq. 8."""
     b, c, x = chosen.b, chosen.c, x * (2.0 / chosen.radius)
     near = (12 - 9 * b - 6 * c) * x**3 + (-18 + 12 * b + 6 * c) * x**2 + (6 - 2 * b)
@@ -105,18 +104,18 @@ def _mitchell(chosen: Mitchell, x: Values) -> Values:
     return np.where(x < 1.0, near, far) / 6.0
 
 
-def _lanczos(chosen: Lanczos, x: Values) -> Values:
+def _lanczos(chosen: Lanczos, x: Floats) -> Floats:
     """Windowed by the main lobe of a sinc `lobes` wide (Duchon 1979)."""
     return np.sinc(x) * np.sinc(x / chosen.lobes)
 
 
-def _blackman_harris(chosen: BlackmanHarris, x: Values) -> Values:
+def _blackman_harris(chosen: BlackmanHarris, x: Floats) -> Floats:
     """The four-term window of Harris 1978, -92 dB."""
     t = np.pi * (x / chosen.radius + 1.0)
     return 0.35875 - 0.48829 * np.cos(t) + 0.14128 * np.cos(2 * t) - 0.01168 * np.cos(3 * t)
 
 
-FUNCTIONS: dict[type[Filter], Callable[..., Values]] = {
+FUNCTIONS: dict[type[Filter], Callable[..., Floats]] = {
     Box: lambda chosen, x: np.ones_like(x),
     Tent: _tent,
     Gaussian: _gaussian,

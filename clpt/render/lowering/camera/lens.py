@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Floats
 from clpt.errors import SceneError
 from clpt.lenses import COATINGS, Prescription
 from clpt.lenses.coatings import DESIGN, reflectance
@@ -23,8 +24,6 @@ from clpt.render.analysis.lens import focused
 from clpt.render.contract.camera_records import GHOST_CELLS, LENS_SURFACE, RECORDS
 from clpt.scene.cameras import Lens
 from clpt.spectra import Constant, Spectrum
-
-Values = NDArray[np.float64]
 
 GHOST_LAMBDAS = np.linspace(420.0, 680.0, 14)  # [nm], for which pairs of surfaces are weighed
 EVEN = 0.1  # part of the ghosts' samples that all pairs share alike
@@ -120,7 +119,7 @@ def _surfaces(
     return made
 
 
-def ghost_pairs(lens: Prescription) -> tuple[NDArray[np.int64], Values] | None:
+def ghost_pairs(lens: Prescription) -> tuple[NDArray[np.int64], Floats] | None:
     """Return pairs of surfaces that reflect (n, 2), from the film on, nearer one first, and the
     share (n,) of the samples that each gets; None where there are none.
 
@@ -142,7 +141,7 @@ def ghost_pairs(lens: Prescription) -> tuple[NDArray[np.int64], Values] | None:
     return np.array(pairs), shares
 
 
-def _cells(pairs: NDArray[np.int64], shares: Values) -> Values:
+def _cells(pairs: NDArray[np.int64], shares: Floats) -> Floats:
     """Rows (GHOST_CELLS, 3) of equal probability: the pair, and 1 over its probability."""
     if len(pairs) > GHOST_CELLS // 2:  # of the weakest none is drawn
         kept = np.argsort(shares)[-GHOST_CELLS // 2 :]

@@ -7,7 +7,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt.render.analysis.lights.light_bounds import Bounds, Floats
+from clpt.arrays import Floats
+from clpt.render.analysis.lights.light_bounds import Bounds
 
 EMPTY = -1.0  # theta_o of a cone that holds nothing
 

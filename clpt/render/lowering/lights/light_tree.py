@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.render.analysis.lights.light_bounds import Bounds, Floats
+from clpt.arrays import Floats
+from clpt.render.analysis.lights.light_bounds import Bounds
 from clpt.render.contract.light_records import LINE, NODE, WIDTH
 from clpt.render.lowering.lights.light_cones import Cones, around, measure, merged
 

@@ -8,10 +8,10 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from clpt.arrays import Words
 from clpt.errors import SceneError
 from clpt.render.contract.parameter_words import NORMAL_MAP_WORDS
 from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.tables import Words
 from clpt.scene.materials import BumpMap, NormalMap
 from clpt.scene.textures import Bitmap
 

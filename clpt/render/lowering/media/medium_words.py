@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Words
 from clpt.records import MEDIUM_BITS
 from clpt.render.analysis.bricks import Glow, black_bodies, brick_counts
 from clpt.render.analysis.index import SceneIndex
@@ -18,7 +19,7 @@ from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.lights.brick_lights import BrickLights
 from clpt.render.lowering.lights.lights import LightRows
 from clpt.render.lowering.materials.material_words import MaterialWords
-from clpt.render.lowering.tables import Words, as_words
+from clpt.render.lowering.tables import as_words
 from clpt.scene.media import Dyed, Grid, Lattice, Medium, Mixture, Phase
 from clpt.scene.shapes import Shape
 from clpt.spectra import Constant, Spectrum

@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import measured
+from clpt.arrays import Floats32
 from clpt.measured import Measurement, MerlTable, merl
 from clpt.measured.fit import hemispherical
 from clpt.render.lowering.spectra.warp_tables import halves, scaled, warp_words
 from clpt.spectra import cie
 from clpt.spectra.spectrum import d65, primaries
-
-Values = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -25,13 +24,13 @@ class Rows:
     counts: those at their head; wavelengths: [nm] of its colours, of rgb none.
     """
 
-    values: Values
+    values: Floats32
     counts: tuple[int, ...]
     wavelengths: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
     @property
     def source(self) -> str:
-        """Where it comes from, by which kernels are made for its counts."""
+        """The source of the measurement, by which kernels are made for its counts."""
         return "table " + " ".join(map(str, self.counts))
 
 
@@ -59,11 +58,11 @@ def rows(value: Measurement | None, film: tuple[float, float] | None) -> Rows:
     return Rows(_joined(*parts), tuple(counts), np.asarray(shown.wavelengths, np.float64))
 
 
-def _joined(*parts: Any) -> Values:
+def _joined(*parts: Any) -> Floats32:
     return np.concatenate([np.asarray(part, np.float32).ravel() for part in parts])
 
 
-def _guided(nodes: Values) -> Values:
+def _guided(nodes: Floats32) -> Floats32:
     """Angles as `warp_node` of kernels/optics/warp_table.cl reads them."""
     if len(nodes) == 1:
         return np.array([0.0, nodes[0]], np.float32)
@@ -74,7 +73,7 @@ def _guided(nodes: Values) -> Values:
     return np.concatenate([first, nodes]).astype(np.float32)
 
 
-def _pairs(spectra: NDArray[Any]) -> Values:
+def _pairs(spectra: NDArray[Any]) -> Floats32:
     """Pairs of neighbouring colours (phi, pairs, rows, columns, theta), two halves in a word."""
     if spectra.shape[2] == 1:
         spectra = np.repeat(spectra, 2, axis=2)

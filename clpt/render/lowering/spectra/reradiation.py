@@ -5,24 +5,22 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from clpt.arrays import Floats
 from clpt.render.contract.parameter_words import RERADIATION_STEP
 from clpt.spectra import Reradiation, Spectrum
 from clpt.spectra.spectrum import gridded
 
 EVEN = 0.25  # share of the light to expect that is the same at all wavelengths
 
-Values = NDArray[np.float64]
 
-
-def nodes(low: float, high: float) -> Values:
+def nodes(low: float, high: float) -> Floats:
     """The wavelengths [nm] between which a film's matrices are linear."""
     count = int(np.ceil((high - low) / RERADIATION_STEP - 1e-9)) + 1
     return np.asarray(low + RERADIATION_STEP * np.arange(count), np.float64)
 
 
-def expected(lights: Iterable[Spectrum], at: Values) -> Values:
+def expected(lights: Iterable[Spectrum], at: Floats) -> Floats:
     """Return the light to expect at nodes, mean about 1: it decides where light is looked for.
 
     Every light counts the same, whatever its power: which one a surface sees is not known here.
@@ -34,7 +32,7 @@ def expected(lights: Iterable[Spectrum], at: Values) -> Values:
     return EVEN + (1.0 - EVEN) * (np.mean(found, axis=0) if found else np.ones_like(at))
 
 
-def table(value: Reradiation | None, at: Values, light: Values) -> tuple[Values, Values]:
+def table(value: Reradiation | None, at: Floats, light: Floats) -> tuple[Floats, Floats]:
     """Return what stands in `distributions` for a matrix, and the integrals of its rows (n,) [1].
 
     at: nodes (n,) [nm]; light: what to expect there, see `expected`.
@@ -48,6 +46,6 @@ def table(value: Reradiation | None, at: Values, light: Values) -> tuple[Values,
     return flat, _running(rows)[:, -1]
 
 
-def _running(rows: Values) -> Values:
+def _running(rows: Floats) -> Floats:
     """Integrals from the first node to each other one, of rows that are linear between nodes."""
     return np.cumsum(0.5 * RERADIATION_STEP * (rows[:, 1:] + rows[:, :-1]), axis=1)

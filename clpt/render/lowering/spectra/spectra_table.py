@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import spectra
+from clpt.arrays import Words
 from clpt.errors import SceneError
 from clpt.measured import Measurement, MerlTable
 from clpt.render.analysis.wavelengths import Density
@@ -19,7 +20,7 @@ from clpt.render.contract.parameter_words import (
     SPECTRUM_WORDS,
 )
 from clpt.render.lowering.spectra import measurements, reradiation
-from clpt.render.lowering.tables import TableStore, Words, as_words
+from clpt.render.lowering.tables import TableStore, as_words
 from clpt.spectra import (
     RGB,
     Constant,

@@ -59,7 +59,7 @@ def _slices_last(part: NDArray[Any]) -> NDArray[np.float32]:
 
 
 def _ends(sums: Floats) -> Floats:
-    """Where even shares of sums (..., n), from 0 to 1, begin and end, (..., n, 2) from 0 to 1."""
+    """Return begin and end (..., n, 2) of even shares of sums (..., n), all from 0 to 1."""
     n = sums.shape[-1]
     flat = sums.reshape(-1, n)
     apart = 2.0 * np.arange(len(flat))[:, None]

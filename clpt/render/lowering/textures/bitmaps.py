@@ -22,13 +22,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import images, spectra
-from clpt.arrays import on_host
+from clpt.arrays import Words, on_host
 from clpt.errors import SceneError
 from clpt.images import Stored
 from clpt.render.analysis.lowering_cache import LoweringCache, version
 from clpt.render.analysis.texels import texels
 from clpt.render.contract.texture_records import KINDS, MIPS
-from clpt.render.lowering.tables import TableStore, Words
+from clpt.render.lowering.tables import TableStore
 from clpt.scene.pixels import channel, spectral_image
 from clpt.scene.textures import Bitmap
 
@@ -64,7 +64,7 @@ class _Pixels:
         self.begin()
 
     def begin(self) -> None:
-        """Have them, or begin to read them."""
+        """Take the pixels of an array, or begin to read those of a file."""
         if self._is_file:
             self._stored = _pool(os.getpid()).submit(images.read_stored, self._image)
         else:

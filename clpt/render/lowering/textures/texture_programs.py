@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 
 from clpt import spectra
+from clpt.arrays import Words
 from clpt.render.contract.parameter_words import SPECTRUM_WORDS
 from clpt.render.contract.texture_records import END, OPERANDS, OPERATIONS
 from clpt.render.lowering.spectra.spectra_table import SpectraTable
-from clpt.render.lowering.tables import TableStore, Words
+from clpt.render.lowering.tables import TableStore
 from clpt.scene.textures import Bitmap, Checkerboard, MeshAttribute, Mix, Product, Texture
 from clpt.spectra import RGB, Constant, RGBIlluminant, RGBUnbounded, Spectrum, Tabulated, cie
 from clpt.spectra.spectrum import d65, primaries
