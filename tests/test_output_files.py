@@ -116,6 +116,7 @@ ELSEWHERE = {
     ("cluster/keys.py", "open"),
     ("device/compiler_process.py", "fdopen"),  # to a pipe
     ("images/exr_files.py", "write"),  # of films, in their `replacing`
+    ("render/codegen/rough_coat_table.py", "savez_compressed"),  # its table, made by maintainers
     ("view/saving.py", "write_bytes"),  # of new files, in their `replacing`
     ("view/saving.py", "write_text"),
 }
