@@ -110,7 +110,7 @@ WRITES = {
 }  # fmt: skip
 MODULES = {"np", "shutil", "os", "tempfile"}  # whose functions of these names write
 ELSEWHERE = {
-    ("cli/standard_output.py", "copyfileobj"),  # to the standard output
+    ("cli/files/standard_output.py", "copyfileobj"),  # to the standard output
     ("cluster/bundle.py", "copyfile"),  # into a folder of its own, in the place of a link
     ("cluster/keys.py", "mkstemp"),  # which nobody else may read, not even in part
     ("cluster/keys.py", "open"),
