@@ -64,8 +64,9 @@ def configure() -> None:
 
 
 def _is_no_left_over(record: logging.LogRecord) -> bool:
-    """Whether a record is of something else than a wait that Dask leaves behind: it does so when a
-    film is no longer wanted whose worker has gone.
+    """Return whether a record is of something else than a wait that Dask leaves behind.
+
+    Dask does so when a film is no longer wanted whose worker has gone.
     """
     return not (record.exc_info and getattr(record.exc_info[0], "__name__", "") == "AllExit")
 

@@ -337,11 +337,9 @@ def _parsed(job: str) -> dict[str, Any]:
 
 
 def _wanted() -> tuple[Callable[[], bool], str]:
-    """Return a function that tells whether somebody waits for the task of this thread, and the
-    address of this worker.
+    """Return a function that tells whether somebody waits for a task, and the worker's address.
 
-    A task whose client is gone, or has the block from another worker, is told so by nothing but the
-    state that Dask's worker has noted for it.
+    The task is that of this thread.
     """
     from distributed.core import Status
     from distributed.worker import get_worker, thread_state

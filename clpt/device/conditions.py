@@ -43,7 +43,7 @@ class Macros:
     """The macros of a text up to some row of it: defined, not defined, or open."""
 
     def __init__(self, defines: Mapping[str, str]):
-        """defines: each with its value; the name may have arguments."""
+        """Note the defines, each with its value; the name may have arguments."""
         self._values: dict[str, str | None] = {}  # None: not a value for conditions
         self._open: set[str] = set()
         for name, value in defines.items():

@@ -9,7 +9,7 @@ import pyopencl as cl
 
 @dataclass
 class Timing:
-    """calls: how often a kernel ran; seconds: how long in all."""
+    """The time of a kernel; calls: how often it ran; seconds: how long in all."""
 
     calls: int = 0
     seconds: float = 0.0

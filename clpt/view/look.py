@@ -26,10 +26,12 @@ GRID: Final = np.arange(LAMBDA_MIN, LAMBDA_MAX + 1.0)
 
 @dataclasses.dataclass(frozen=True)
 class Look:
-    """hidden: indices of shapes; lamp: whose spectrum all lights have, each as bright as its own;
+    """The way in which a viewer looks at a scene.
+
+    hidden: indices of shapes; lamp: whose spectrum all lights have, each as bright as its own;
     wavelength, width: [nm] of the only light, None for all; region: of the film, see `Film.crop`;
-    shows: what of clpt.view.maps; layers: that the film has for it, beside the scene's own;
-    denoises: whether the film is one for denoisers.
+    shows: the picture or a map of clpt.view.maps; layers: that the film has for it, beside the
+    scene's own; denoises: whether the film is one for denoisers.
     """
 
     hidden: frozenset[int] = frozenset()

@@ -53,7 +53,10 @@ def parts(contents: Contents, *, whole: bool = False) -> Iterator[Part]:
 def _part(
     contents: Contents, material: int, named: NDArray[np.int32], groups: NDArray[Any]
 ) -> Part:
-    """named: (t, 3, 3) vertex, uv and normal of each corner; groups: (t,) smoothing groups."""
+    """Return a part of the mesh from its triangles.
+
+    named: (t, 3, 3) vertex, uv and normal of each corner; groups: (t,) smoothing groups.
+    """
     normals, named = _with_normals(contents, named, groups)
     corners = named.reshape(-1, 3)
     rows, faces = _unique(corners)

@@ -53,7 +53,10 @@ class Element:
 
 @dataclass
 class Header:
-    """order: of bytes, "" for ascii; textures: names of image files; length [bytes]."""
+    """The header of a file.
+
+    order: of bytes, "" for ascii; textures: names of image files; length [bytes].
+    """
 
     order: str
     elements: list[Element]

@@ -67,10 +67,10 @@ def view_of(camera: Camera, width: int, height: int) -> View | None:
 
 
 def origin_of(camera: Camera, width: int, height: int) -> NDArray[np.float64]:
-    """Return the point (3,) [m] from which a camera sees before it moves: of one without, that in
-    the middle of its film; of a lens, its front. width, height: of the film [pixels].
+    """Return the point (3,) [m] from which a camera sees before it moves.
 
-    Raises SceneError for a matrix or a lens that cannot be used.
+    Of a camera without one it is the middle of its film; of a lens, its front. width, height: of
+    the film [pixels].
     """
     if isinstance(camera, Lens):
         front = [0.0, 0.0, lens.front(camera, height / width)]
@@ -156,6 +156,7 @@ def _spherical(camera: Spherical, width: int, height: int) -> dict[str, Any]:
 
 def _unprojection(camera: Matrix, width: int, height: int) -> dict[str, Any]:
     """Return a ray's direction and homogeneous point on the near plane, both affine in x and y.
+
     A clip point at depth z comes from p(z) = A + z B, A = M (x, y, 0, 1), B = M (0, 0, 1, 0), M the
     inverse; the derivative of p.xyz / p.w by z is a positive multiple of B A.w - A B.w, which holds
     no z: so it needs no far plane, and the large terms cancel here in float64.

@@ -26,8 +26,11 @@ def glasses(camera: Lens) -> tuple[Spectrum, ...]:
 def _placed(
     lens: Prescription, f_number: float, focus: float, shift: float, radius: float
 ) -> tuple[Prescription, float, Floats, float]:
-    """A lens at an f-number, the way from it to its film [mm], what its film sees, at its middle
-    the projected solid angle [sr]. focus, shift, radius of the film [mm]."""
+    """Return a lens at an f-number, and how it stands before its film.
+
+    It is followed by the way from it to its film [mm], the zones that the film sees, and the
+    projected solid angle [sr] at its middle. focus, shift, radius of the film [mm].
+    """
     try:
         made = lens if f_number == 0.0 else lens.with_stop(stop_radius(lens, f_number))
     except SceneError as error:

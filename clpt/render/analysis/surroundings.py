@@ -183,8 +183,10 @@ def contested(
 
 
 def every(scene: Scene, bounds: Callable[[Shape], bool] = bounds_media) -> Iterator[Shape]:
-    """Return the shapes of a scene that may bound media, those of instances where they are
-    placed, with their motion."""
+    """Return the shapes of a scene that may bound media.
+
+    Those of instances are where they are placed, with their motion.
+    """
     for thing in scene.shapes:
         if not isinstance(thing, Instance):
             yield thing

@@ -62,8 +62,10 @@ def _has(features: Features, name: str) -> bool:
 
 
 def members(features: Features) -> dict[str, list[str]]:
-    """Return the members of each slab that a block takes, and as "changed" those of a path that
-    shading may change, which come first."""
+    """Return the members of each slab that a block takes.
+
+    As "changed" it has those of a path that shading may change, which come first.
+    """
 
     def there(names: Iterable[str]) -> list[str]:
         return [name for name in names if _has(features, name)]
@@ -79,8 +81,10 @@ def members(features: Features) -> dict[str, list[str]]:
 
 
 def blocks_text(kinds: Sequence[Features]) -> str:
-    """Return `blocks_0` and further, for each kind of paths: the words of a slot's state that a
-    block takes, of a path first those that shading may change."""
+    """Return `blocks_0` and further, one a kind of paths: the words of a slot that a block takes.
+
+    They are of the slot's state; of a path those that shading may change are first.
+    """
     numbers = "".join(f"    uint {name};\n" for name in ("path", "changed", "hit", "shadow"))
     arrays = "".join(f"    uchar {r.name.lower()}_words[{r.words}];\n" for r in SLABS)
     t = next(m.word for m in SHADOW.members if m.name == "t")

@@ -43,8 +43,10 @@ def order(features: Features, layout: str, lanes: int, interleaved: bool = False
 
 
 def begin_and_join(features: Features) -> tuple[str, str]:
-    """Return the stage that begins paths, and the one that tests the rays that join them to a light
-    or, of paths that start at lights, to the camera."""
+    """Return the stage that begins paths, and the one that tests the rays that join them.
+
+    Rays join paths to a light or, if the paths start at lights, to the camera.
+    """
     if not features.transport.light_paths:
         return "generate", "shadow"
     return "flare" if features.transport.lit_ghosts else "emit", "splat"
@@ -89,8 +91,11 @@ def has_both(features: Features) -> bool:
 
 
 def loop_text(features: Features, layout: str, lanes: int, interleaved: bool) -> str:
-    """Return what stage/loop.cl calls: `loop_begin`, and `loop_bounce`, all other stages in their
-    order; of the kind of paths `which`, where a scene has two."""
+    """Return the functions that stage/loop.cl calls: `loop_begin` and `loop_bounce`.
+
+    `loop_bounce` has all other stages in their order; of the kind of paths `which`, where a scene
+    has two.
+    """
     bounces = [
         [
             _call(features, own, layout, stage, which)
@@ -188,8 +193,10 @@ def _of_each(texts: list[list[str]]) -> list[str]:
 
 
 def _bounce_text(calls: list[_Call], walk: list[str], words: str) -> list[str]:
-    """Statements that take slots through stages; walk: what is done before shading; words: of a
-    slot's state, which are sorted."""
+    """Return statements that take slots through stages.
+
+    walk: what is done before shading; words: of a slot's state, which are sorted.
+    """
     shading = [call for call in calls if call.stage.kernel == "shade"]
     sort = "queue_sort(path, hit, queue, starts, first, end);"
     lines = []
@@ -222,8 +229,11 @@ def _return_text(slab: str, words: str, ends: str) -> str:
 
 
 def _walk_text(own: Features, calls: list[_Call], words: str) -> list[str]:
-    """Statements that take the camera's paths in media from collision to collision, in a block,
-    while most of its lanes have one; own: their features; calls: all of a bounce."""
+    """Return statements that take the camera's paths in media from collision to collision.
+
+    They do so in a block while most of its lanes have one; own: the paths' features; calls: all
+    of a bounce.
+    """
     shading = [call for call in calls if call.stage.kernel == "shade"]
     if not shading:
         return []

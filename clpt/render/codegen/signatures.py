@@ -33,8 +33,10 @@ def args_text(name: str, args: dict[str, str], behind: bool = False) -> list[str
 
 
 def virtual_files(features: Features, layout: str) -> dict[str, str]:
-    """Return the generated files that define the groups of arguments: a file each, so that a stage
-    that takes none of a group has the same text whatever is in it."""
+    """Return the generated files that define the groups of arguments, a file for each group.
+
+    So a stage that takes none of a group has the same text whatever is in it.
+    """
     groups = {
         "trace": (trace_args(features, layout), False),
         "begin": (begin_args(features), False),

@@ -48,8 +48,10 @@ def _moved(ray: str, moves: bool) -> str:
 
 
 def connect_text(features: Features) -> str:
-    """Return `camera_connect`, for paths that start at lights, or what ghosts of a lens need;
-    nothing where no path is joined."""
+    """Return `camera_connect` for paths that start at lights, or what ghosts of a lens need.
+
+    It is nothing where no path is joined.
+    """
     if features.transport.lit_ghosts and features.transport.light_paths:
         return '#include "camera/lens_ghosts.cl"\n'
     if not features.transport.joined:
@@ -86,8 +88,10 @@ def screen_text(features: Features) -> str:
 
 
 def photon_text(features: Features) -> str:
-    """Return the struct of a photon, and `photon_met(kind)`: whether one is kept at a material, or
-    at a mixture, of which no part is chosen yet."""
+    """Return the struct of a photon, and `photon_met(kind)`: whether one is kept at a material.
+
+    At a mixture one is kept while no part is chosen yet.
+    """
     kinds = [
         i for i, cls in enumerate(features.materials.leaves) if flags.gathers_photons(features, cls)
     ]

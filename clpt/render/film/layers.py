@@ -97,8 +97,10 @@ def _light(form: PictureForm, words: Words, picture: Pictures) -> dict[str, dict
 
 
 def white_paper(film: Film, mode: str) -> NDArray[np.float64]:
-    """The matrix (3, 3) from what the sensor sees of a reflectance to colours of the film's output
-    space, in which what reflects all light is (1, 1, 1)."""
+    """Return the matrix (3, 3) from reflectances that the sensor sees to the film's output space.
+
+    A thing that reflects all light is (1, 1, 1) there.
+    """
     matrix = output_matrix(film, mode)
     seen = np.ones(3)
     if mode == "spectral":

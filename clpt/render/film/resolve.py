@@ -32,6 +32,7 @@ _IMAGE_TYPES: dict[Any, np.dtype] = {
 @dataclass(frozen=True)
 class _Target:
     """The memory that a picture goes to.
+
     memory: the Array or Image that the caller gets; data: its OpenCL memory; offset: where the
     picture begins there [elements].
     """

@@ -1,5 +1,7 @@
-"""Densities that kernels put into bricks, for which lowering leaves room: those that lie on a
-device, and those of clouds, which are worked out there."""
+"""Densities that kernels put into bricks, for which lowering leaves room.
+
+They lie on a device, or are those of clouds, which are worked out there.
+"""
 
 from __future__ import annotations
 
@@ -41,8 +43,10 @@ class DeviceGrid:
 
 
 def stays_there(medium: Grid) -> bool:
-    """Return whether kernels read a density where it is: float32 on a device, z fastest, in 16 bits
-    a point, without colours or light."""
+    """Return whether kernels read a density where it is.
+
+    They do if it is float32 on a device, z fastest, in 16 bits a point, without colours or light.
+    """
     density: Any = medium.density
     more = [getattr(medium, name) for name in ON_POINTS]
     plain = medium.bits == 16 and medium.light is None and all(one is None for one in more)

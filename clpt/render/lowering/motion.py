@@ -36,8 +36,11 @@ def track(keys: Keys | None) -> NDArray[np.float32]:
 
 
 def shutter_words(shutter: Shutter) -> NDArray[np.float32]:
-    """Return the number of steps of a shutter, when it opens and for how long it is open, and for
-    each step the share of light before it and its density at both ends."""
+    """Return the words of a shutter.
+
+    They are its number of steps, when it opens and for how long it is open, and for each step the
+    share of light before it and its density at both ends.
+    """
     density = shutter.density()
     shares = (density[1:] + density[:-1]) / 2.0
     shares, density = shares / shares.sum(), density / shares.mean()

@@ -209,8 +209,11 @@ def _lower_motion(found: Analysis, lights: LightRows, encoder: Encoder) -> int:
 
 
 def _lower_tangents(geometry: Geometry, encoder: Encoder) -> int:
-    """Append four words for each vertex: the tangents that shapes say, else zero; return where in
-    `distributions` they are. A row of zeros is before them, so that this is never 0."""
+    """Append four words for each vertex; return where in `distributions` they are.
+
+    They are the tangents that shapes say, else zero. A row of zeros is before them, so that the
+    place is never 0.
+    """
     words = np.zeros((1 + len(geometry.vertices), TANGENT_WORDS), np.float32)
     for first, own in geometry.tangents:
         words[1 + first : 1 + first + len(own)] = own
@@ -218,8 +221,7 @@ def _lower_tangents(geometry: Geometry, encoder: Encoder) -> int:
 
 
 def _lower_profile(index: SceneIndex, encoder: Encoder) -> int:
-    """Append the filter's values for light paths, if there are any; return where in
-    `distributions` they are."""
+    """Append the filter's values for light paths, if any; return their place in `distributions`."""
     if not index.weighed:
         return 0
     return filters.lower_profile(index.scene.film.filter, encoder.store, index.splatting)

@@ -139,8 +139,10 @@ def add_sums(a: Words, b: Words) -> Words:
 
 
 def add_mattes(a: Words, b: Words) -> Words:
-    """Return the lists of names, (..., slots, h, w) each, of two films: see matte_add in
-    kernels/film/layers.cl."""
+    """Return the lists of names, (..., slots, h, w) each, of two films.
+
+    See matte_add in kernels/film/layers.cl.
+    """
     total = np.empty_like(a)
     for rows in _strips(a):
         both = np.concatenate([a[rows], b[rows]], axis=-3)

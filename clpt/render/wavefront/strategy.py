@@ -85,8 +85,10 @@ def _queued(on: device.Device, lowered: Lowered, wanted: bool | None) -> bool:
 
 
 def can_interleave(features: Features, layout: str, lanes: int) -> bool:
-    """Return whether a work-item can have several rays in flight: through `wide8`, among nothing
-    but triangles, or curves that stand still."""
+    """Return whether a work-item can have several rays in flight.
+
+    It can through `wide8`, among nothing but triangles, or curves that stand still.
+    """
     if layout != "wide8" or lanes == 1 or features.geometry.instances:
         return False
     kinds, motion = features.geometry.analytic, features.motion
@@ -96,8 +98,11 @@ def can_interleave(features: Features, layout: str, lanes: int) -> bool:
 
 
 def _interleaved(on: device.Device, lowered: Lowered, layout: str) -> bool:
-    """Whether interleaved rays pay: in trees of nothing but triangles that are larger than the
-    caches, and where there are many pieces of curves, and of other shapes than triangles few."""
+    """Return whether interleaved rays pay.
+
+    They do in trees of nothing but triangles that are larger than the caches, and where there are
+    many pieces of curves, and of other shapes than triangles few.
+    """
     features, count = lowered.features, len(lowered.faces)
     if not can_interleave(features, layout, on.lanes):
         return False

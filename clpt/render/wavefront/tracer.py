@@ -1,5 +1,6 @@
-"""Which samples adaptive sampling adds to a film, and who does so: the film's own wavefront, or
-other devices and machines, whose films are added to it.
+"""Samples that adaptive sampling adds to a film: which ones, and who adds them.
+
+It is the film's own wavefront, or other devices and machines, whose films are added to it.
 """
 
 from __future__ import annotations

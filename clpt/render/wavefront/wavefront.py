@@ -303,8 +303,11 @@ class Wavefront:
         return self._run(self.loops[0], first, end, on_batch)
 
     def finish(self) -> None:
-        """Bring every path in flight to its end, wherever an interrupt has left `render_samples`
-        and the like, and wait; `refresh` then makes a picture of the film."""
+        """Bring every path in flight to its end, and wait.
+
+        Paths may be wherever an interrupt has left `render_samples` and the like; `refresh` then
+        makes a picture of the film.
+        """
         self.stream.rejoin()
         if self._in_flight is not None:
             self._in_flight.finish()
@@ -336,8 +339,11 @@ class Wavefront:
         self._accumulate = self.kernels.bind("accumulate", "accumulate", light_paths=0.0)
 
     def _turns(self, first: int, end: int) -> list[tuple[int, int]]:
-        """The numbers of samples that all kinds of paths take one after the other: few at a time,
-        so that the film is balanced whenever a render stops. No samples are one turn of none."""
+        """Return the numbers of samples that all kinds of paths take one after the other.
+
+        They are few at a time, so that the film is balanced whenever a render stops. No samples are
+        one turn of none.
+        """
         if len(self.loops) == 1 or first == end:
             return [(first, end)]
         step = 1 if self.photons else max(TURN_SAMPLES, TURN_PATHS // self.paths.pixels)

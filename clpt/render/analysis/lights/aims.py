@@ -161,8 +161,10 @@ def _around(pieces: Pieces) -> NDArray[np.float64]:
 
 
 def _cut(pieces: Pieces) -> tuple[tuple[Pieces, ...], bool]:
-    """Pieces in two parts, at a wide gap along an axis, else where the longest is halved; and
-    whether there is such a gap."""
+    """Return pieces in two parts, and whether there is a wide gap between these.
+
+    They are cut at a wide gap along an axis, else where the longest axis is halved.
+    """
     lows, highs = _ends(pieces)
     middles = (lows + highs) / 2
     if len(pieces) <= SEVERAL:

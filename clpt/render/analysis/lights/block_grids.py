@@ -26,7 +26,9 @@ ROWS = 256  # of an image that are worked on at a time
 
 
 class BlockGrid(NamedTuple):
-    """marginal (strips, rows): sums over the rows of each block; conditional (rows, columns): over
+    """Tables to choose a block of cells of a grid, and then a cell in it.
+
+    marginal (strips, rows): sums over the rows of each block; conditional (rows, columns): over
     its columns; blocks (parts + 1, words): chances, of the last one by weight alone; block_rows,
     block_columns: cells of a block; total: sum of all weights.
     """

@@ -54,10 +54,10 @@ class Content(NamedTuple):
 
 
 def extent(lamp: Envmap | CubeMap, look: Look, share: float) -> float:
-    """Return the part of the sphere, from 0 to 1, in whose brightest directions a share of an image
-    light's power is; 1 of a black one. It is counted in blocks, PARTS along each side of an image.
+    """Return the part of the sphere, 0 to 1, that sends a share of an image light's power.
 
-    Raises SceneError for what is no image.
+    It has the brightest directions, and is 1 of a black image. It is counted in blocks, PARTS
+    along each side of an image.
     """
     made = content(lamp, look)
     if isinstance(lamp, Envmap):

@@ -10,8 +10,10 @@ from clpt.scene.layers import LAYERS, MATTE_SLOTS, WORDS, Form
 
 
 def layer_places(names: Iterable[str]) -> dict[str, int]:
-    """Return the first of a pixel's words for each layer of the first samples, after their number;
-    those for denoisers come last."""
+    """Return the first of a pixel's words for each layer of the first samples, after their number.
+
+    Layers for denoisers come last.
+    """
     places, word = {}, 1
     for name in names:
         if LAYERS[name].form in WORDS:

@@ -68,8 +68,10 @@ def lens_words(
 
 
 def _rear_radius(lens: Prescription, back: float, film: float) -> float:
-    """The radius, on the rear plane, within which rays from a film of this radius meet the last
-    surface: more than its own, as its rim is off that plane [mm]."""
+    """Return the rear plane's radius in which rays from the film meet the last surface [mm].
+
+    It is more than the surface's own, as its rim is off that plane.
+    """
     last = lens.surfaces[-1]
     rim = float(sag(last, np.array(last.semi_diameter**2)))
     slope = (film + last.semi_diameter) / max(back - rim, 0.1 * back)
@@ -120,10 +122,10 @@ def _surfaces(
 
 
 def ghost_pairs(lens: Prescription) -> tuple[NDArray[np.int64], Floats] | None:
-    """Return pairs of surfaces that reflect (n, 2), from the film on, nearer one first, and the
-    share (n,) of the samples that each gets; None where there are none.
+    """Return pairs of surfaces that reflect (n, 2), and the share (n,) of the samples of each.
 
-    A share goes with the product of what both return, straight on; a part is even.
+    Surfaces are counted from the film on, the nearer one of a pair is first. It is None where
+    there are no pairs.
     """
     before, back = 1.0, []
     for surface in lens.surfaces:

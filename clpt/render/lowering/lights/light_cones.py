@@ -15,7 +15,10 @@ EMPTY = -1.0  # theta_o of a cone that holds nothing
 
 @dataclass
 class Cones:
-    """n cones: axis (n, 3), theta_o and theta_e (n,) [rad], both (n,) bool; see Bounds."""
+    """The cones of n lights; see Bounds.
+
+    axis (n, 3); theta_o, theta_e (n,) [rad]; both (n,) bool.
+    """
 
     axis: Floats
     theta_o: Floats

@@ -25,7 +25,9 @@ SLACK = 2e-4  # [rad] by which cones are widened, for what is rounded
 
 @dataclass(frozen=True)
 class Tree:
-    """nodes (k, WIDTH) structured as NODE, a group each, the root's first; groups that are not full
+    """A tree over lights, as kernels read it.
+
+    nodes (k, WIDTH) structured as NODE, a group each, the root's first; groups that are not full
     have nodes of power 0 behind. trails (n,) uint32: which nodes lead to a light, from the root.
     """
 
@@ -33,8 +35,10 @@ class Tree:
     trails: NDArray[np.uint32]
 
     def words(self, before: int) -> NDArray[np.uint32]:
-        """Return what stands behind the rows in `lights`, which have so many words: a trail for
-        every row, and then the groups, aligned."""
+        """Return the words behind the rows in `lights`, which have so many words.
+
+        They are a trail for every row, and then the groups, aligned.
+        """
         gap = np.zeros(-(before + len(self.trails)) % LINE, np.uint32)
         return np.concatenate([self.trails, gap, self.nodes.ravel().view(np.uint32)])
 

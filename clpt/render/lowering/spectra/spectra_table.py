@@ -180,8 +180,10 @@ class SpectraTable:
         return words
 
     def angular_words(self, kind: Any) -> tuple[Words, str]:
-        """Return the words of a table over cosines, and its source: "row", or "rows" where it
-        depends on the wavelength; see kernels/optics/angular_table.cl.
+        """Return the words of a table over cosines, and its source.
+
+        The source is "row", or "rows" where it depends on the wavelength; see
+        kernels/optics/angular_table.cl.
         """
         cosines, rows, start, step = kind.device_rows(self.spectral)
         first = self._store.append_floats("distributions", angular_values(cosines, rows))
@@ -191,9 +193,10 @@ class SpectraTable:
         )
 
     def measurement_words(self, value: Measurement | None) -> tuple[Words, str]:
-        """Return the words of a measured material and its source: where its numbers begin, and a
-        spectrum that says which of its colours a wavelength has; kernels/optics/measurement_load.cl
-        reads them.
+        """Return the words of a measured material and its source.
+
+        They tell where its numbers begin, and have a spectrum that says which of its colours a
+        wavelength has; kernels/optics/measurement_load.cl reads them.
         """
         key = "measurement", id(value)
         if key not in self._measurements:
@@ -213,8 +216,10 @@ class SpectraTable:
         return self._store.append_floats("distributions", values)
 
     def merl_words(self, value: MerlTable | None) -> tuple[Words, str]:
-        """Return the words of a table of MERL and its source: where its numbers begin, and what
-        red, green and blue are in spectral mode; see kernels/optics/merl_load.cl.
+        """Return the words of a table of MERL and its source.
+
+        They tell where its numbers begin, and what red, green and blue are in spectral mode; see
+        kernels/optics/merl_load.cl.
         """
         key = "merl", id(value)
         if key not in self._measurements:

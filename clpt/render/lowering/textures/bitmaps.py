@@ -384,8 +384,11 @@ def _level_sizes(height: int, width: int) -> list[tuple[int, int]]:
 
 
 def _levels(values: NDArray[Any], curved: bool) -> list[NDArray[Any]]:
-    """An image (h, w, c) and its smaller copies: a texel is the mean of linear light over its part
-    of the level before, to which texels count by their share, so that each copy has its mean."""
+    """Return an image (h, w, c) and its smaller copies.
+
+    A texel is the mean of linear light over its part of the level before, to which texels count by
+    their share, so that each copy has its mean.
+    """
     made, found = Stored(values, curved).decoded(), [values]
     for height, width in _level_sizes(*values.shape[:2])[1:]:
         made = _means(_means(made, height).swapaxes(0, 1), width).swapaxes(0, 1)
