@@ -9,7 +9,8 @@ import pytest
 
 import clpt
 from clpt import transforms as tf
-from clpt.render.lowering import scene as lowering
+from clpt.render.analysis import analyse
+from clpt.render.lowering.scene import lower
 from clpt.scene import Film, Scene, lights, media
 from clpt.scene import materials as m
 from clpt.scene.cameras import Perspective
@@ -53,13 +54,13 @@ SCENES = {
 @pytest.mark.parametrize("name", SCENES)
 def test_which_are_sealed(name: str) -> None:
     scene, sealed = SCENES[name]
-    assert lowering.lower(scene).features.media.sealed == sealed
+    assert lower(scene).features.media.sealed == sealed
 
 
 def test_not_beside_light_paths() -> None:
     """These are weighed against rays to lights."""
     scene = dataclasses.replace(glass(), integrator=PathIntegrator(guiding=True, light_paths=0))
-    features = lowering.lower(scene).features
+    features = lower(scene).features
     assert not (features.media.sealed and (features.transport.guided or features.transport.weighed))
 
 
@@ -71,8 +72,8 @@ def test_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
     stages = clpt.Renderer(scene, looped=False)
     stages.run(4)
     np.testing.assert_array_equal(stages.image(), sealed)
-    monkeypatch.setattr(lowering, "sealed_media", lambda *_: frozenset())
-    assert not lowering.lower(scene).features.media.sealed
+    monkeypatch.setattr(analyse, "sealed_media", lambda *_: frozenset())
+    assert not lower(scene).features.media.sealed
     np.testing.assert_array_equal(clpt.render(scene, 4), sealed)
     assert sealed.std() > 0.01
 
@@ -91,8 +92,8 @@ def test_a_lamp_that_moves_in_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """
     scene = glass(dataclasses.replace(SMALL, radius=0.4), material=m.Null())
     plain = means(scene, 0)
-    monkeypatch.setattr(lowering, "sealed_media", lambda *_: frozenset([MILK]))
-    assert lowering.lower(scene).features.media.sealed
+    monkeypatch.setattr(analyse, "sealed_media", lambda *_: frozenset([MILK]))
+    assert lower(scene).features.media.sealed
     met = means(scene, 100)
     error = np.hypot(plain.std(ddof=1), met.std(ddof=1)) / np.sqrt(32.0)
     assert abs(plain.mean() - met.mean()) < 4.0 * error
