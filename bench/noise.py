@@ -23,7 +23,7 @@ import clpt
 from bench import machine
 from bench.peer_scenes import SCENES
 from clpt.formats import load
-from clpt.render.wavefront.adaptive import SIDE
+from clpt.render.wavefront.cells import SIDE
 from clpt.scene import Scene
 
 WORST = 99  # percentile of the squares

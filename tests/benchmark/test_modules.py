@@ -1,0 +1,22 @@
+"""Every module of `bench` can be imported: what it takes of the package is there."""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+
+import pytest
+
+BENCH = Path(__file__).resolve().parents[2] / "bench"
+
+
+def test_all_are_imported() -> None:
+    failed = []
+    for path in sorted(BENCH.rglob("*.py")):
+        name = ".".join(path.relative_to(BENCH.parent).with_suffix("").parts)
+        try:
+            importlib.import_module(name.removesuffix(".__init__"))
+        except ImportError as error:
+            failed.append(f"{name}: {error}")
+    if failed:
+        pytest.fail("\n".join(failed), pytrace=False)
