@@ -97,7 +97,7 @@ class Clpt:
             "rays": {"closest": wavefront.counts.closest, "shadow": wavefront.counts.shadow},
             "layout": wavefront.scene.strategy.layout,
             "lanes": wavefront.lanes,
-            "slots": wavefront.slots,
+            "slots": wavefront.paths.slots,
         }
 
 

@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from clpt.cli.files import checkpoints
+from clpt.cli.files.targets import CHECKPOINT
 from clpt.output_files import PARTIAL
 from clpt.render.film import film_file
 from clpt.render.film.saved_film import SavedFilm
@@ -51,7 +52,7 @@ def command(folder: Path, *more: str) -> list[str]:
 def kill_and_resume(folder: Path, kills: int, seed: int) -> Figures:
     """Kill a render so many times, let it end, and compare its film with that of one run."""
     rng, figures = random.Random(seed), Figures()
-    path = folder / ("a" + checkpoints.SUFFIX)
+    path = folder / ("a" + CHECKPOINT)
     endless = command(folder, "--checkpoint", f"{PERIOD}s", "--spp", "1000000000")
     for _ in range(kills):
         moment = rng.choice(MOMENTS)

@@ -181,6 +181,11 @@ class Checkpoints:
         for path in (self._path, former_of(self._path)):
             path.unlink(missing_ok=True)
 
+    def hold(self) -> None:
+        """Hold the film as it is, whether checkpoints have begun or not."""
+        self._holds_from = min(self._holds_from, time.monotonic())
+        self._hold()
+
     def _hold(self) -> None:
         if time.monotonic() < self._holds_from:
             return

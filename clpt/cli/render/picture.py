@@ -160,7 +160,7 @@ class _Picture:
         def ended() -> None:
             maker.report()
             if single:
-                self._renderer.hold()
+                self._writer.hold()
 
         with self._rescuing(ended), self._shown.rendering():
             render_samples(self._renderer, end, show, after_pass, pass_seconds=seconds)
