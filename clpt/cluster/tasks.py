@@ -194,13 +194,7 @@ def _open_renderer(
     while True:
         try:
             with ExitStack() as resources:
-                slow = [on for on in devices if on.info.compiles_singly]
-                units = [_device["threads"] or on.info.compute_units for on in slow]
-                spare = min([dev.spare_cores(), *(number - 1 for number in units)])
-                if slow and spare > 0:
-                    compilers = resources.enter_context(dev.Compilers(spare))
-                    for on in slow:
-                        on.compilers = compilers
+                dev.share_compilers(devices, _device["threads"], resources)
                 job = _Job(scene, devices, options)
                 job.renderer.prepare()
         except MemoryBudgetError:

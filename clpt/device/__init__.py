@@ -4,7 +4,15 @@ from .array import DeviceArray, supersede
 from .buffers import Buffers, host_buffer
 from .building import build, build_all, compile_ahead, link
 from .compilers import Compilers, kill_compilers, spare_cores
-from .context import Device, DeviceInfo, choose, choose_all, devices, names_several
+from .context import (
+    Device,
+    DeviceInfo,
+    choose,
+    choose_all,
+    devices,
+    names_several,
+    share_compilers,
+)
 from .flag import Flag
 from .program import Argument, BoundKernel, Kernel, Program
 from .refusals import refused, wait
@@ -43,6 +51,7 @@ __all__ = [
     "link",
     "names_several",
     "refused",
+    "share_compilers",
     "spare_cores",
     "supersede",
     "tiles",

@@ -7,7 +7,8 @@ import functools
 import logging
 import os
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -26,7 +27,7 @@ from clpt.device import (
 )
 
 from ..errors import DeviceError
-from .compilers import Compilers
+from .compilers import Compilers, spare_cores
 
 log = logging.getLogger(__name__)
 
@@ -69,9 +70,14 @@ class DeviceInfo:
         return 16 if self.float_width >= 16 else 8
 
     @property
+    def is_pocl(self) -> bool:
+        """Whether the driver is PoCL, which only its version says."""
+        return "pocl" in self.version.casefold()
+
+    @property
     def compiles_singly(self) -> bool:
         """Whether the driver compiles one text at a time in a process: PoCL has one lock."""
-        return "pocl" in self.version.casefold()
+        return self.is_pocl
 
     @property
     def links(self) -> bool:
@@ -398,6 +404,19 @@ def _first(info: DeviceInfo) -> Device:
     # Of two threads at once both open a context, and the first is kept: a lock might be held by
     # another thread when the process is forked.
     return _opened.get(_key(info)) or _opened.setdefault(_key(info), Device.open(info))
+
+
+def share_compilers(devices: Sequence[Device], threads: int | None, resources: ExitStack) -> None:
+    """Let other processes compile for devices whose driver compiles one text at a time.
+
+    threads: cores of a CPU to use, at most; resources: get these processes.
+    """
+    slow = [on for on in devices if on.info.compiles_singly]
+    spare = min([spare_cores(), *((threads or on.info.compute_units) - 1 for on in slow)])
+    if slow and spare > 0:
+        compilers = resources.enter_context(Compilers(spare))
+        for on in slow:
+            on.compilers = compilers
 
 
 def _matching(which: str | int | None, infos: tuple[DeviceInfo, ...]) -> list[DeviceInfo]:

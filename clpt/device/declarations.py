@@ -24,7 +24,7 @@ _Built = TypeVar("_Built")
 
 def forms(device: Device, text: str, flags: Sequence[str]) -> Iterator[tuple[str, list[str]]]:
     """Yield texts and options of a program to try, one after the other."""
-    if "portable computing language" in device.info.platform.casefold():
+    if device.info.is_pocl:
         yield declared() + text, [*flags, _GUARD]
     yield text, [*flags]
 

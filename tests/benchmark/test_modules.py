@@ -7,13 +7,15 @@ from pathlib import Path
 
 import pytest
 
+from bench.python_files import full_name
+
 BENCH = Path(__file__).resolve().parents[2] / "bench"
 
 
 def test_all_are_imported() -> None:
     failed = []
     for path in sorted(BENCH.rglob("*.py")):
-        name = ".".join(path.relative_to(BENCH.parent).with_suffix("").parts)
+        name = full_name(path, BENCH.parent)
         try:
             importlib.import_module(name.removesuffix(".__init__"))
         except ImportError as error:

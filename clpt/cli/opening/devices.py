@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
-
 from ... import device as dev
 from ..options.scene_options import Machine
 
@@ -14,20 +12,6 @@ def choose_devices(machine: Machine) -> list[dev.Device]:
     if which is not None and dev.names_several(which):
         return dev.choose_all(which, profiling=profiling, threads=threads)
     return [dev.choose(which, profiling=profiling, threads=threads)]
-
-
-def share_compilers(devices: list[dev.Device], machine: Machine, resources: ExitStack) -> None:
-    """Let other processes compile for devices whose driver compiles one text at a time.
-
-    resources: get these processes.
-    """
-    slow = [on for on in devices if on.info.compiles_singly]
-    cores = [(machine.threads or on.info.compute_units) - 1 for on in slow]
-    spare = min([dev.spare_cores(), *cores])
-    if slow and spare > 0:
-        compilers = resources.enter_context(dev.Compilers(spare))
-        for on in slow:
-            on.compilers = compilers
 
 
 def kill_compilers(devices: list[dev.Device]) -> None:

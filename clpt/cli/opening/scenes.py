@@ -10,13 +10,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ... import device as dev
+from ...device import share_compilers
 from ...render.analysis.checks import check
 from ...scene import Scene
 from ..options.changes import changed
 from ..options.scene_options import SceneOptions
 from ..printing.display import Display
 from ..process.stopping import prompt
-from .devices import choose_devices, share_compilers
+from .devices import choose_devices
 
 
 @dataclass(frozen=True)
@@ -68,5 +69,5 @@ def open_scene(
         scene = read_scene(file, options, shown, accept)
         loading = time.perf_counter() - began
         devices = chosen.result()
-        share_compilers(devices, options.machine, resources)
+        share_compilers(devices, options.machine.threads, resources)
     return Opened(scene, devices, loading)

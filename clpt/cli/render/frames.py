@@ -18,13 +18,14 @@ from typing import Any
 import click
 
 from ... import images
+from ...device import share_compilers
 from ...errors import ClusterError, SceneError
 from ...render.analysis.checks import check
 from ...scene import Scene
 from ...scene.fingerprint import fingerprint
 from ...version import VERSION
 from ..files import outputs, targets
-from ..opening.devices import choose_devices, share_compilers
+from ..opening.devices import choose_devices
 from ..opening.makers import AnyRenderer, Maker, cluster_makers, device_makers
 from ..options.changes import changed
 from ..printing.display import Display, clock
@@ -131,7 +132,7 @@ def _makers(job: Job, frames: int, shown: Display, resources: ExitStack) -> Sequ
         several = cluster_makers(job.workers, job.options, together, shown)
         return resources.enter_context(several)
     devices = choose_devices(job.options.machine)
-    share_compilers(devices, job.options.machine, resources)
+    share_compilers(devices, job.options.machine.threads, resources)
     return device_makers(devices, job.options, frames)
 
 
