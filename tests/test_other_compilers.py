@@ -33,13 +33,27 @@ def check(target: str, texts: Iterable[str]) -> None:
         assert not error, error[:3000]
 
 
-def texts_of(lowered: Lowered) -> list[str]:
-    """All programs of a scene, as a GPU gets them."""
+FORMS = ("stages", "queues", "loop", "film")
+
+
+def texts_of(
+    lowered: Lowered, lanes: tuple[int, ...] = (1,), forms: tuple[str, ...] = FORMS
+) -> list[str]:
+    """All programs of a scene, as a GPU gets them; lanes, forms: others, as CPUs do."""
     made: list[str] = []
     for layout in layouts(lowered.features):
-        for form in ("stages", "queues", "loop", "film"):
-            made += texts(lowered.features, Way(layout, 1, form))
+        for number in lanes:
+            for form in forms:
+                made += texts(lowered.features, Way(layout, number, form))
     return made
+
+
+def of_every_material(mode: str) -> Lowered:
+    """A scene with each material that stands alone."""
+    row: list = [shapes.Rectangle(material=cls()) for cls in materials.LEAVES]
+    row += [shapes.Sphere(emission=lights.Area()), shapes.Disk(material=materials.Mask())]
+    film = Film(width=4, height=4, mode=mode)
+    return lower(Scene(camera=Perspective(), shapes=row, lights=[lights.Constant()], film=film))
 
 
 def builders() -> list[str]:
@@ -74,11 +88,7 @@ def test_builders(target: str) -> None:
 @pytest.mark.parametrize("mode", ["rgb", "spectral"])
 @pytest.mark.parametrize("target", TARGETS)
 def test_every_material(target: str, mode: str) -> None:
-    row: list = [shapes.Rectangle(material=cls()) for cls in materials.LEAVES]
-    row += [shapes.Sphere(emission=lights.Area()), shapes.Disk(material=materials.Mask())]
-    film = Film(width=4, height=4, mode=mode)
-    scene = Scene(camera=Perspective(), shapes=row, lights=[lights.Constant()], film=film)
-    check(target, texts_of(lower(scene)))
+    check(target, texts_of(of_every_material(mode)))
 
 
 @pytest.mark.slow

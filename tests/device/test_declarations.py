@@ -14,11 +14,9 @@ import clpt
 from clpt import device as dev
 from clpt.device import declarations, native_programs
 from clpt.render.lowering.scene import Lowered, lower
-from clpt.scene import Film, Scene, lights, materials, shapes
-from clpt.scene.cameras import Perspective
+from clpt.scene import Film
 from tests.front_end import CLANG, OURS, errors
-from tests.test_other_compilers import builders
-from tests.together.builds import Way, layouts, texts
+from tests.test_other_compilers import builders, of_every_material, texts_of
 
 needs_clang = pytest.mark.skipif(CLANG is None, reason="clang is not installed")
 
@@ -30,14 +28,9 @@ def check(given: Iterable[str]) -> None:
         assert not error, error[:3000]
 
 
-def texts_of(lowered: Lowered) -> list[str]:
-    """All programs of a scene, as CPUs get them."""
-    made: list[str] = []
-    for layout in layouts(lowered.features):
-        for lanes in (1, 8):
-            for form in ("stages", "loop", "film"):
-                made += texts(lowered.features, Way(layout, lanes, form))
-    return list(dict.fromkeys(made))
+def as_cpus_get_them(lowered: Lowered) -> list[str]:
+    """All programs of a scene, each once."""
+    return list(dict.fromkeys(texts_of(lowered, (1, 8), ("stages", "loop", "film"))))
 
 
 @needs_clang
@@ -49,18 +42,15 @@ def test_builders() -> None:
 @pytest.mark.parametrize("mode", ["rgb", "spectral"])
 def test_a_scene(scenes: Path, mode: str) -> None:
     scene = clpt.load(scenes / "cornell.xml")
-    check(texts_of(lower(dataclasses.replace(scene, film=Film(width=4, height=4, mode=mode)))))
+    small = dataclasses.replace(scene, film=Film(width=4, height=4, mode=mode))
+    check(as_cpus_get_them(lower(small)))
 
 
 @needs_clang
 @pytest.mark.slow
 @pytest.mark.parametrize("mode", ["rgb", "spectral"])
 def test_every_material(mode: str) -> None:
-    row: list = [shapes.Rectangle(material=cls()) for cls in materials.LEAVES]
-    row += [shapes.Sphere(emission=lights.Area()), shapes.Disk(material=materials.Mask())]
-    film = Film(width=4, height=4, mode=mode)
-    scene = Scene(camera=Perspective(), shapes=row, lights=[lights.Constant()], film=film)
-    check(texts_of(lower(scene)))
+    check(as_cpus_get_them(of_every_material(mode)))
 
 
 @pytest.mark.parametrize(("value", "tries"), [("sqrt(16.0f)", 1), ("fdim(9.0f, 5.0f)", 2)])
