@@ -234,10 +234,12 @@ def test_a_worker_with_two_devices(more, two, expected, tmp_path):
             assert renderer.workers[third_address].kind in {
                 record.kind for name, record in renderer.workers.items() if name in known
             }
-            for _ in range(10):
+
+            def had_blocks():
                 assert renderer.run(4000)
-                if renderer.workers[third_address].samples and gone.exists() == bool(more):
-                    break
+                return renderer.workers[third_address].samples and gone.exists() == bool(more)
+
+            wait_until(had_blocks, "blocks of the third worker")
             assert renderer.workers[third_address].samples > 0
             assert renderer.workers[third_address].failures == 0
             assert gone.exists() == bool(more)
