@@ -154,9 +154,7 @@ class Session(CameraWork):
             "panels": panels.panels(scene),
             "saves": self.folder is not None,
             "compares": self._loop.kept is not None,
-            "edited": any(
-                getattr(scene, part) is not getattr(self._first, part) for part in EDITABLE
-            ),
+            "edited": differ(scene, self._first),
         }
 
     # the thread
@@ -252,8 +250,7 @@ class Session(CameraWork):
         yield
         if request.name in ("undo", "redo"):
             return
-        same = all(getattr(scene, part) is getattr(self.scene, part) for part in EDITABLE)
-        if not same or look != self.look:
+        if differ(scene, self.scene) or look != self.look:
             values = request.values
             by = (values["target"], values["index"], values["key"]) if "key" in values else None
             self._history.note(State(*before), by)
@@ -496,6 +493,11 @@ class Session(CameraWork):
         else:
             path = self.folder.save_exr(self._loop.renderer(), self._loop.seconds)
         reply({"type": "saved", "what": what, "name": str(path.relative_to(self.folder.folder))})
+
+
+def differ(scene: Scene, other: Scene) -> bool:
+    """Return whether scenes differ in more than the camera."""
+    return any(getattr(scene, part) is not getattr(other, part) for part in EDITABLE)
 
 
 def is_quick(request: Request) -> bool:
