@@ -24,9 +24,6 @@ from clpt.render.renderer import Renderer
 from clpt.scene import KINDS, Scene, materials, shapes
 from clpt.scene.lights import ON_SHAPES
 from clpt.view import panels
-
-pytest.importorskip("websockets", reason="the extra clpt[view] is not installed")
-
 from clpt.view.saving import Folder
 from clpt.view.server import Server
 from clpt.view.session import Session
