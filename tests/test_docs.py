@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 import logging
 import re
@@ -15,6 +16,7 @@ import numpy as np
 import pytest
 
 import clpt
+from clpt.scene.params import DEVICE_ROLES
 from tests import pages
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -212,6 +214,17 @@ LIMITS = (  # on the page, and where the code has them
 def test_limits_are_those_of_the_code(told: str, module: str, name: str, value: int):
     assert told in (DOCS / "limits.md").read_text("utf-8")
     assert getattr(pytest.importorskip(module), name) == value
+
+
+def test_the_site_describes_every_role_of_a_parameter():
+    """Without MkDocs: what the site says of roles is read, not imported."""
+    tree = ast.parse((DOCS / "theme/docstrings.py").read_text("utf-8"))
+    said = next(
+        ast.literal_eval(node.value)
+        for node in tree.body
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "ROLES"
+    )
+    assert set(DEVICE_ROLES) - {"choice"} <= set(said)
 
 
 @pytest.mark.slow
