@@ -127,9 +127,8 @@ def measure(
     caches = folder / "caches"
     shutil.rmtree(caches, ignore_errors=True)
     cold = run(command, caches, checkout)
-    warm = min(
-        (run(command, caches, checkout) for _ in range(rounds)), key=lambda start: start.processor
-    )
+    warm = [run(command, caches, checkout) for _ in range(rounds)]
+    least = min(warm, key=lambda start: start.processor)
     return {**_figures("cold", cold), **_figures("warm", least)}
 
 
