@@ -36,7 +36,13 @@ MODULES = {
     **{
         f"clpt.scene.{category}": category
         for category in (
-            "cameras", "shapes", "materials", "textures", "lights", "media", "motion",
+            "cameras",
+            "shapes",
+            "materials",
+            "textures",
+            "lights",
+            "media",
+            "motion",
             "integrators",
         )
     },
