@@ -25,6 +25,13 @@ def commands(page: Path) -> list[str]:
     return [line.split("   ")[0] for line in lines if line.startswith("clpt ")]
 
 
+def lost(line: str, root: Path) -> list[str]:
+    """Return the files of the repository that a command names and that are not there."""
+    words = shlex.split(line, comments=True)
+    named = [word for word in words if word.startswith(("scenes/", "tests/", "examples/"))]
+    return [word for word in named if not (root / word).exists()]
+
+
 def unknown(line: str) -> str:
     """Return what a line names that clpt does not have, a command or options; else nothing."""
     context = cli.make_context("clpt", ["devices"])

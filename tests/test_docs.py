@@ -16,9 +16,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from PIL import Image
 
 import clpt
+from clpt.cli import cli
 from clpt.scene.params import DEVICE_ROLES
 from docs import figures
 from tests import pages
@@ -91,6 +93,28 @@ def test_pages_use_plain_words():
         for match in re.finditer(HARD, line)
     ]
     assert found == []
+
+
+def test_commands_name_files_of_the_repository_that_are_there():
+    lines = [(page.name, line) for page in PAGES for line in pages.commands(page)]
+    assert [(name, pages.lost(line, ROOT)) for name, line in lines if pages.lost(line, ROOT)] == []
+
+
+TYPED = ("rendering.md", "recipes.md", "tutorial.md", "noise.md", "denoising.md")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", TYPED)
+def test_commands_run_as_typed(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    for name in ("scenes", "tests"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    monkeypatch.chdir(tmp_path)
+    for text in pages.blocks(DOCS / page, "json"):
+        (tmp_path / "pawn.json").write_text(text, "utf-8")
+    for line in pages.commands(DOCS / page):
+        words = pages.smaller(line.split(" > ")[0], spp=2)
+        done = CliRunner().invoke(cli, words)
+        assert done.exit_code == 0, f"{line}: {done.output}"
 
 
 @pytest.fixture
