@@ -50,7 +50,9 @@ def unknown(line: str) -> str:
 
 
 def smaller(line: str, *, spp: int = 1, size: str = "32x32") -> list[str]:
-    """Return the arguments of a command; of a render, with few samples of a small picture."""
+    """Return the arguments of a command; of a render, with few samples and, if it names no size,
+    of a small picture."""
     words = shlex.split(line, comments=True)[1:]
-    renders = words[0] == "render" and "--frames" not in words
-    return words + (["--spp", f"{spp}", "--size", size] if renders else [])
+    if words[0] == "render" and "--frames" not in words:
+        words += ["--spp", f"{spp}"] + ([] if "--size" in words else ["--size", size])
+    return words

@@ -231,6 +231,21 @@ def test_the_code_of_architecture(run: Run, capsys: pytest.CaptureFixture):
     assert capsys.readouterr().out == "real True\n"
 
 
+@pytest.mark.slow
+def test_the_recipes(run: Run):
+    run("recipes.md")
+    for name in ("object", "glass", "gold", "focus", "product", "outdoors", "cloud"):
+        picture = clpt.read_image(f"{name}.png")
+        assert picture.shape == (30, 40, 3) and 0.01 < picture.mean() < 0.95, name
+
+
+@pytest.mark.slow
+def test_the_code_of_media_and_sky(run: Run):
+    names = run("media.md")
+    assert names["renderer"].samples == 4 and 0.1 < names["renderer"].image().mean() < 1.0
+    assert run("sky.md")["body"].interior is not None
+
+
 def test_the_code_of_colour(run: Run):
     pytest.importorskip("PyOpenColorIO", reason="OpenColorIO is not installed")
     names = run("colour.md")
