@@ -125,8 +125,8 @@ INTEGRATORS = {
         spp=256,
     ),
     "vcm": traced(
-        "With a point light in the place of the lamp: its caustic, which `path` never finds, on the "
-        "floor and in the mirror.",
+        "With a point light in the place of the lamp: its caustic, which `path` never finds, "
+        "on the floor and in the mirror.",
         integrators.Vcm(),
         spp=192,
     ),
