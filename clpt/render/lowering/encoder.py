@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from clpt.arrays import Words
-from clpt.errors import SceneError
 from clpt.render.analysis.lights.look import Look
 from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.render.analysis.wavelengths import Density
@@ -197,7 +196,6 @@ class Encoder:
         if self.spectra.spectral:
             rows = np.concatenate([self.kind_words(layer) for layer in material.layers])
         else:
-            self._refuse_textured_metal(material)
             for layer in material.layers:
                 for name, param in params(type(layer)).items():
                     self._check(getattr(layer, name), param, _where(layer, name))
@@ -207,16 +205,6 @@ class Encoder:
             rows = np.array([table, colours.shape[1], *profile], np.uint32)
         first = self.store.append("materials", rows)
         return np.array([first, len(material.layers)], np.uint32), "layers"
-
-    @staticmethod
-    def _refuse_textured_metal(material: Any) -> None:
-        for name in ("eta", "k"):
-            if getattr(getattr(material, name, None), "is_texture", False):
-                raise SceneError(
-                    "below layers it cannot be a texture in RGB mode; give a spectrum, or render "
-                    'in the mode "spectral"',
-                    where=f"{material.kind}.{name}",
-                )
 
 
 def _where(kind: Kind, name: str) -> str:

@@ -1,0 +1,65 @@
+"""Rules of materials that hold others, or layers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from clpt.errors import SceneError
+from clpt.render.analysis.checks.textures import check_textures
+from clpt.render.analysis.index import any_of
+from clpt.scene.materials import Blend, BumpMap, Mask, Material, NormalMap, TwoSided, parts
+
+Maps = tuple[tuple[type[Material], bool], ...]
+
+
+def check_material(material: Material, mode: str, where: str) -> None:
+    """Raise SceneError for a material whose parts do not go together; mode: of the film."""
+    if any_of(material, TwoSided):
+        passing = next((part for part in parts(material) if part.transmits), None)
+        if passing is not None:
+            message = f"{passing.kind} lets light through, so it cannot be a part of two_sided"
+            raise SceneError(f"{message}, or be mixed with it", where=where)
+    _check_maps(material, (), False, where)
+    for part in parts(material):
+        check_textures(part)
+        if mode == "rgb":
+            _check_layers(part, where)
+
+
+def _check_maps(material: Any, outer: Maps, inside: bool, where: str) -> None:
+    """Raise SceneError for two maps of a kind in one another, or on both sides of a two_sided.
+
+    outer: the maps around, and whether each is inside of a two_sided material, as this may be.
+    """
+    if isinstance(material, TwoSided):
+        for side in (material.front, material.back):
+            _check_maps(side, outer, True, where)
+    elif isinstance(material, (NormalMap, BumpMap)):
+        kind = type(material)
+        if any(other is kind for other, _ in outer):
+            message = f"a {kind.kind} inside of a {kind.kind} is not supported"
+            raise SceneError(message, where=where)
+        if any(before != inside for _, before in outer):
+            message = "of normal_map and bump_map, one cannot stand inside and one around a "
+            raise SceneError(f"{message}two_sided", where=where)
+        _check_maps(material.material, (*outer, (kind, inside)), inside, where)
+    elif isinstance(material, Mask):
+        _check_maps(material.material, outer, inside, where)
+    elif isinstance(material, Blend):
+        for part in (material.first, material.second):
+            _check_maps(part, outer, inside, where)
+
+
+def _check_layers(material: Any, where: str) -> None:
+    """Raise SceneError for layers that need the mode spectral."""
+    layers = getattr(material, "layers", ())
+    if not layers:
+        return
+    instead = 'or render in the mode "spectral"'
+    for name in ("eta", "k"):
+        if getattr(getattr(material, name, None), "is_texture", False):
+            message = f"{material.kind}.{name} cannot be a texture below layers in RGB mode; "
+            raise SceneError(f"{message}give a spectrum, {instead}", where=where)
+    if len({id(one.profile) for one in layers if getattr(one.profile, "is_texture", False)}) > 1:
+        message = f"one texture can vary the layers of {material.kind} in RGB mode, not several; "
+        raise SceneError(f"{message}give them the same one, {instead}", where=where)

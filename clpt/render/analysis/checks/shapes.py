@@ -1,0 +1,56 @@
+"""Rules of shapes: what makes one of another form, and what its surface asks of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
+
+from clpt.errors import SceneError
+from clpt.geometry import analytic, refining, shapes, triangles
+from clpt.scene.shapes import Instance, Mesh, Shape, Spheres
+from clpt.scene.textures import attributes_in
+
+
+def check_shapes(things: Iterable[Shape]) -> None:
+    """Raise SceneError for the first shape whose parameters contradict each other.
+
+    What its arrays hold is not looked at.
+    """
+    asked: dict[int, frozenset[str]] = {}  # attributes, by what reads them
+    for shape in things:
+        if not isinstance(shape, Instance):
+            _check_form(shape)
+            _check_attributes(shape, asked)
+
+
+def _check_form(shape: Shape) -> None:
+    """Raise SceneError for parameters after which a shape is none of its kind."""
+    if getattr(shape, "deformation", None) is not None:
+        triangles.check_deformation(shape)
+    if isinstance(shape, Mesh):
+        refining.check(shape, shapes.where(shape))
+    analytic.check(shape)
+
+
+def check_instances(things: Iterable[Shape]) -> None:
+    """Raise SceneError for an instance that stretches what cannot become triangles."""
+    for thing in things:
+        if isinstance(thing, Instance):
+            for shape in thing.group.shapes:
+                if isinstance(shape, Spheres):
+                    matrix = shapes.placement(thing) @ shapes.placement(shape)
+                    analytic.check(replace(shape, to_world=matrix))
+
+
+def _check_attributes(shape: Shape, asked: dict[int, frozenset[str]]) -> None:
+    """Raise SceneError for attributes that material and light read, and the shape lacks."""
+    for user in ("material", "emission"):
+        kind: Any = getattr(shape, user)
+        if id(kind) not in asked:
+            asked[id(kind)] = frozenset(attributes_in(kind))
+        missing = sorted(asked[id(kind)].difference(getattr(shape, "attributes", ())))
+        if missing:
+            known = ", ".join(getattr(shape, "attributes", ())) or "none"
+            message = f"its {user} asks for the attribute {missing[0]!r}; it has {known}"
+            raise SceneError(message, where=shapes.where(shape))

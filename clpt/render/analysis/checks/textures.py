@@ -1,0 +1,47 @@
+"""Rules of textures: an image of spectra holds what the parameter is that it stands for."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from clpt import spectral_exr
+from clpt.scene.params import Kind, params
+from clpt.scene.textures import Bitmap, Product, Texture
+from clpt.spectral_exr import SpectralImage
+
+
+def check_textures(kind: Kind) -> None:
+    """Raise SceneError for light where a kind's parameter reflects, and for the reverse.
+
+    What a file holds is not looked at.
+    """
+    for name, param in params(type(kind)).items():
+        _check(getattr(kind, name), param.role == "emission")
+
+
+def check_image(image: Any, where: str, *, emissive: bool) -> None:
+    """Raise SceneError for an image of the other kind of spectra, where it is in memory."""
+    if isinstance(image, SpectralImage):
+        spectral_exr.find(image, emissive=emissive, where=where)
+
+
+def _check(value: Any, light: bool) -> None:
+    """Raise SceneError for a texture of the wrong kind of spectra; light: which is wanted."""
+    if isinstance(value, tuple):
+        for entry in value:
+            if isinstance(entry, Kind):
+                check_textures(entry)
+    elif isinstance(value, Bitmap):
+        check_image(value.image, "bitmap.image", emissive=light)
+    elif isinstance(value, Texture):
+        for name, param in params(type(value)).items():
+            shines = light and param.role in ("factor", "reflectance") and name != _factor(value)
+            _check(getattr(value, name), shines)
+
+
+def _factor(texture: Texture) -> str:
+    """The parameter that stays a factor in an emission: of a product one, for light times light."""
+    if not isinstance(texture, Product):
+        return ""
+    first, second = (isinstance(part, Texture) for part in (texture.first, texture.second))
+    return "first" if second and not first else "second"
