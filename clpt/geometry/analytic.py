@@ -22,12 +22,11 @@ UNEVEN = 1e-5  # relative difference of lengths or cosine of axes from which a s
 PADDING = 1e-6  # of the size of an analytic shape, for what float32 rounds in its kernel
 
 
-def check(shape: Shape) -> None:
+def check(shape: shapes.Sphere | shapes.Spheres | shapes.Cylinder) -> None:
     """Raise SceneError for a sphere, many or a cylinder that its transform makes none."""
     if isinstance(shape, shapes.Cylinder):
         row(shape)
-    plain = np.array_equal(shape.to_world, transforms.IDENTITY)
-    if isinstance(shape, (shapes.Sphere, shapes.Spheres)) and not plain:
+    elif not np.array_equal(shape.to_world, transforms.IDENTITY):
         _even_axes(placement(shape)[:3, :3], shape)
 
 

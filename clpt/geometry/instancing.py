@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.arrays import Matrices, Points, on_host, single
 from clpt.errors import SceneError
-from clpt.geometry import shape_records, shapes
+from clpt.geometry import analytic, shape_records, shapes
 from clpt.geometry.tessellate import keeps_its_kind, tessellate
 from clpt.geometry.tubes import Tubes, as_tubes
 from clpt.records import INSTANCE
-from clpt.scene.shapes import Curves, Group, Instance, Shape
+from clpt.scene.shapes import Curves, Cylinder, Group, Instance, Shape, Sphere
 
 CELLS = 16  # columns along a side, see `outline`
 FEW = 16  # instances of curves up to which each has its own, as tubes would take more memory
@@ -215,6 +215,8 @@ def _analytic(
     if not stretched.any():
         return copies
     count = int(stretched.sum())
+    if not isinstance(shape, (Sphere, Cylinder)):  # nor can it become triangles: tell why
+        analytic.row(next(copy.shape for copy, bad in zip(copies, stretched, strict=True) if bad))
     warnings.append(
         f"{shapes.where(shape)}: {count} of {len(copies)} instances stretch it; "
         "they are met as triangles"

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
+from clpt.geometry.shapes import where
 from clpt.scene import subdivision
 from clpt.scene.pixels import pixels
 from clpt.scene.shapes import Mesh
@@ -47,13 +48,14 @@ def refined(mesh: Mesh, parts: Parts, name: str) -> Parts:
     return vertices, faces.astype(np.uint32), normals, uvs
 
 
-def check(mesh: Mesh, name: str) -> None:
-    """Raise SceneError for what cannot be subdivided or displaced; name: for messages."""
+def check(mesh: Mesh) -> None:
+    """Raise SceneError for what cannot be subdivided or displaced."""
+    if mesh.subdivision == 0 and mesh.displacement is None:
+        return
+    name = where(mesh)
     if not 0 <= mesh.subdivision <= DEEPEST:
         message = f"subdivision must be 0 to {DEEPEST}, not {mesh.subdivision}"
         raise SceneError(message, where=name)
-    if not is_refined(mesh):
-        return
     made = "subdivided" if mesh.displacement is None else "displaced"
     for found, what in ((mesh.attributes, "attributes"), (mesh.tangents is not None, "tangents")):
         if found:

@@ -199,4 +199,6 @@ def textures_in(value: Any) -> Iterator[Texture]:
         if isinstance(value, Texture):
             yield value
         for name in params(type(value)):
-            yield from textures_in(getattr(value, name))
+            part = getattr(value, name)
+            if isinstance(part, (Kind, list, tuple)):
+                yield from textures_in(part)

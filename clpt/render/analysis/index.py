@@ -250,7 +250,8 @@ def _leaf_kinds(shapes_: tuple[Shape, ...]) -> tuple[type[mt.Material], ...]:
     found: dict[type[mt.Material], str] = {}
     for shape in shapes_:
         for leaf in leaves_of(shape.material):
-            found.setdefault(leaf, shapes.where(shape))
+            if leaf not in found:
+                found[leaf] = shapes.where(shape)
     if any(shape.priority for shape in shapes_):
         found.setdefault(mt.Null, "")  # a surface within a body of higher priority
     return custom_materials.ordered(found) or (mt.Diffuse,)

@@ -6,51 +6,56 @@ from typing import Any
 
 from clpt.errors import SceneError
 from clpt.render.analysis.checks.textures import check_textures
-from clpt.render.analysis.index import any_of
 from clpt.scene.materials import Blend, BumpMap, Mask, Material, NormalMap, TwoSided, parts
 
 Maps = tuple[tuple[type[Material], bool], ...]
 
 
-def check_material(material: Material, mode: str, where: str) -> None:
+def check_material(material: Material, mode: str) -> None:
     """Raise SceneError for a material whose parts do not go together; mode: of the film."""
-    if any_of(material, TwoSided):
-        passing = next((part for part in parts(material) if part.transmits), None)
-        if passing is not None:
-            message = f"{passing.kind} lets light through, so it cannot be a part of two_sided"
-            raise SceneError(f"{message}, or be mixed with it", where=where)
-    _check_maps(material, (), False, where)
-    for part in parts(material):
+    made = list(parts(material))
+    if len(made) > 1:
+        _check_sides(made)
+        _check_maps(material, (), False)
+    for part in made:
         check_textures(part)
         if mode == "rgb":
-            _check_layers(part, where)
+            _check_layers(part)
 
 
-def _check_maps(material: Any, outer: Maps, inside: bool, where: str) -> None:
+def _check_sides(made: list[Material]) -> None:
+    """Raise SceneError for light that is let through beside a two_sided material."""
+    passing = next((part for part in made if part.transmits), None)
+    if passing is not None and any(isinstance(part, TwoSided) for part in made):
+        message = f"{passing.kind} lets light through, so it cannot be a part of two_sided"
+        raise SceneError(f"{message}, or be mixed with it")
+
+
+def _check_maps(material: Any, outer: Maps, inside: bool) -> None:
     """Raise SceneError for two maps of a kind in one another, or on both sides of a two_sided.
 
     outer: the maps around, and whether each is inside of a two_sided material, as this may be.
     """
     if isinstance(material, TwoSided):
         for side in (material.front, material.back):
-            _check_maps(side, outer, True, where)
+            _check_maps(side, outer, True)
     elif isinstance(material, (NormalMap, BumpMap)):
         kind = type(material)
         if any(other is kind for other, _ in outer):
             message = f"a {kind.kind} inside of a {kind.kind} is not supported"
-            raise SceneError(message, where=where)
+            raise SceneError(message)
         if any(before != inside for _, before in outer):
             message = "of normal_map and bump_map, one cannot stand inside and one around a "
-            raise SceneError(f"{message}two_sided", where=where)
-        _check_maps(material.material, (*outer, (kind, inside)), inside, where)
+            raise SceneError(f"{message}two_sided")
+        _check_maps(material.material, (*outer, (kind, inside)), inside)
     elif isinstance(material, Mask):
-        _check_maps(material.material, outer, inside, where)
+        _check_maps(material.material, outer, inside)
     elif isinstance(material, Blend):
         for part in (material.first, material.second):
-            _check_maps(part, outer, inside, where)
+            _check_maps(part, outer, inside)
 
 
-def _check_layers(material: Any, where: str) -> None:
+def _check_layers(material: Any) -> None:
     """Raise SceneError for layers that need the mode spectral."""
     layers = getattr(material, "layers", ())
     if not layers:
@@ -59,7 +64,7 @@ def _check_layers(material: Any, where: str) -> None:
     for name in ("eta", "k"):
         if getattr(getattr(material, name, None), "is_texture", False):
             message = f"{material.kind}.{name} cannot be a texture below layers in RGB mode; "
-            raise SceneError(f"{message}give a spectrum, {instead}", where=where)
+            raise SceneError(f"{message}give a spectrum, {instead}")
     if len({id(one.profile) for one in layers if getattr(one.profile, "is_texture", False)}) > 1:
         message = f"one texture can vary the layers of {material.kind} in RGB mode, not several; "
-        raise SceneError(f"{message}give them the same one, {instead}", where=where)
+        raise SceneError(f"{message}give them the same one, {instead}")

@@ -21,7 +21,7 @@ def check_part(part: Kind) -> None:
     elif isinstance(part, Camera):
         check_camera(part, 1, 1)
     elif isinstance(part, Material):
-        check_material(part, "spectral", part.kind)
+        check_material(part, "spectral")
     elif isinstance(part, ON_SHAPES):
         check_textures(part)
     elif isinstance(part, Light):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from clpt.errors import SceneError
@@ -39,7 +40,9 @@ def check_at_rest(scene: Scene, cache: LoweringCache) -> None:
     _check_entries(scene)
     shapes_ = list(distinct(scene.shapes))
     for shape in shapes_:
-        _check_kind(shape.material, Material, f"{shapes.where(shape)}.material")
+        if not isinstance(shape.material, Material):
+            message = f"must be of a kind of material, not {shape.material!r}"
+            raise SceneError(message, where=f"{shapes.where(shape)}.material")
         if not isinstance(shape.emission, (*ON_SHAPES, type(None))):
             names = " or ".join(f"`{cls.kind}`" for cls in ON_SHAPES)
             raise SceneError(f"its emission must be {names}", where=shapes.where(shape))
@@ -62,29 +65,31 @@ def _check_entries(scene: Scene) -> None:
     for name, base in (
         ("camera", Camera), ("integrator", Integrator), ("sampler", Sampler), ("film", Film),
     ):  # fmt: skip
-        _check_kind(getattr(scene, name), base, name)
-    _check_kind(scene.film.filter, Filter, "film.filter")
+        _check_kinds(name, base, [getattr(scene, name)])
+    _check_kinds("film.filter", Filter, [scene.film.filter])
     if isinstance(scene.seed, bool) or not isinstance(scene.seed, int):
         raise SceneError(f"must be a whole number, not {scene.seed!r}", where="seed")
-    for i, light in enumerate(scene.lights):
-        _check_kind(light, Light, f"lights[{i}]")
-    for i, shape in enumerate(scene.shapes):
-        _check_kind(shape, Shape, f"shapes[{i}]")
+    _check_kinds("lights[{}]", Light, scene.lights)
+    _check_kinds("shapes[{}]", Shape, scene.shapes)
 
 
 def _check_surfaces(shapes_: list[Shape], mode: str) -> None:
     """Raise SceneError for materials and lights of shapes; each is looked at once."""
-    materials, lights = set[int](), set[int]()
+    seen: set[int] = set()
     for shape in shapes_:
-        if id(shape.material) not in materials:
-            materials.add(id(shape.material))
-            check_material(shape.material, mode, shapes.where(shape))
-        if shape.emission is not None and id(shape.emission) not in lights:
-            lights.add(id(shape.emission))
-            check_textures(shape.emission)
+        try:
+            if id(shape.material) not in seen:
+                check_material(shape.material, mode)
+            if shape.emission is not None and id(shape.emission) not in seen:
+                check_textures(shape.emission)
+        except SceneError as error:
+            raise SceneError(str(error), where=shapes.where(shape)) from None
+        seen |= {id(shape.material), id(shape.emission)}
 
 
-def _check_kind(value: Any, base: type, where: str) -> None:
-    if not isinstance(value, base):
-        wanted = base.__name__.lower()
-        raise SceneError(f"must be of a kind of {wanted}, not {value!r}", where=where)
+def _check_kinds(where: str, base: type, values: Sequence[Any]) -> None:
+    """Raise SceneError for the first value that is of no kind of a base."""
+    for i, value in enumerate(values):
+        if not isinstance(value, base):
+            message = f"must be of a kind of {base.__name__.lower()}, not {value!r}"
+            raise SceneError(message, where=where.format(i))

@@ -8,7 +8,7 @@ from typing import Any
 
 from clpt.errors import SceneError
 from clpt.geometry import analytic, refining, shapes, triangles
-from clpt.scene.shapes import Instance, Mesh, Shape, Spheres
+from clpt.scene.shapes import Cylinder, Instance, Mesh, Shape, Sphere, Spheres
 from clpt.scene.textures import attributes_in
 
 
@@ -19,18 +19,15 @@ def check_shapes(things: Iterable[Shape]) -> None:
     """
     asked: dict[int, frozenset[str]] = {}  # attributes, by what reads them
     for shape in things:
-        if not isinstance(shape, Instance):
-            _check_form(shape)
-            _check_attributes(shape, asked)
-
-
-def _check_form(shape: Shape) -> None:
-    """Raise SceneError for parameters after which a shape is none of its kind."""
-    if getattr(shape, "deformation", None) is not None:
-        triangles.check_deformation(shape)
-    if isinstance(shape, Mesh):
-        refining.check(shape, shapes.where(shape))
-    analytic.check(shape)
+        if isinstance(shape, Instance):
+            continue
+        if getattr(shape, "deformation", None) is not None:
+            triangles.check_deformation(shape)
+        if isinstance(shape, Mesh):
+            refining.check(shape)
+        elif isinstance(shape, (Sphere, Spheres, Cylinder)):
+            analytic.check(shape)
+        _check_attributes(shape, asked)
 
 
 def check_instances(things: Iterable[Shape]) -> None:

@@ -16,7 +16,9 @@ def check_textures(kind: Kind) -> None:
     What a file holds is not looked at.
     """
     for name, param in params(type(kind)).items():
-        _check(getattr(kind, name), param.role == "emission")
+        value = getattr(kind, name)
+        if isinstance(value, (Texture, tuple)):
+            _check(value, param.role == "emission")
 
 
 def check_image(image: Any, where: str, *, emissive: bool) -> None:
