@@ -22,7 +22,12 @@ from clpt.geometry import shapes as geometry
 from clpt.lenses import Prescription, Surface
 from clpt.render.analysis.bodies import BENDS, OPEN
 from clpt.render.analysis.cameras import CONNECTED
-from clpt.render.analysis.checks import check, check_part
+from clpt.render.analysis.checks import check
+from clpt.render.analysis.checks.cameras import check_camera
+from clpt.render.analysis.checks.lights import check_light
+from clpt.render.analysis.checks.materials import check_material
+from clpt.render.analysis.checks.shapes import check_shapes
+from clpt.render.analysis.checks.textures import check_textures
 from clpt.scene import Scene, cameras, integrators, lights, materials, media, shapes, textures
 from clpt.scene.air import clear_air
 from clpt.scene.layers import LAYERS
@@ -131,11 +136,25 @@ def _valid(cls: type[Kind], given: dict[str, Any], drop: Sequence[str]) -> Any:
     for left_out in without:
         try:
             part = cls(**{name: value for name, value in given.items() if name not in left_out})
-            check_part(part)
+            _check(part)
             return part
         except SceneError as error:
             refused = error
     raise refused
+
+
+def _check(part: Kind) -> None:
+    """Raise SceneError for a part that no scene may have."""
+    if isinstance(part, shapes.Shape):
+        check_shapes([part])
+    elif isinstance(part, cameras.Camera):
+        check_camera(part, SIZE, SIZE)
+    elif isinstance(part, materials.Material):
+        check_material(part, "spectral")
+    elif isinstance(part, lights.ON_SHAPES):
+        check_textures(part)
+    elif isinstance(part, lights.Light):
+        check_light(part)
 
 
 # Parameters by role --------------------------------------------------------------------------

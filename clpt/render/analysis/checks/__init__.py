@@ -3,7 +3,6 @@
 What passes is refused later only for what files or the device alone can tell: contents, and sizes.
 """
 
-from .parts import check_part
 from .scene import check, check_at_rest
 
-__all__ = ["check", "check_at_rest", "check_part"]
+__all__ = ["check", "check_at_rest"]
