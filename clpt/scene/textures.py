@@ -185,7 +185,7 @@ def attributes_in(value: Any) -> set[str]:
     for texture in textures_in(value):
         if isinstance(texture, MeshAttribute):
             names.add(texture.name)
-        elif getattr(texture, "mapping", "") == "uv1":
+        elif isinstance(texture, Placed) and texture.mapping == "uv1":
             names |= set(SECOND_UV)
     return names
 

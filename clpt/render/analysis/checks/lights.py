@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from numpy.typing import ArrayLike
 
 from clpt.errors import SceneError
 from clpt.render.analysis.checks.textures import check_image, check_textures
 from clpt.render.analysis.lights import image_lights, light_power
 from clpt.render.contract.light_records import RECORDS
 from clpt.scene.lights import CubeMap, Envmap, Goniometric, Light, Projector, Sky, Spot
-from clpt.scene.params import params
+from clpt.scene.params import Texture, params
 
 
 def check_light(lamp: Light) -> None:
@@ -32,13 +32,11 @@ def check_light(lamp: Light) -> None:
             light_power.three(value, where)
 
 
-def _check_matrix(lamp: Light, value: Any, where: str) -> None:
-    image = getattr(lamp, "image", None)
+def _check_matrix(lamp: Light, value: ArrayLike, where: str) -> None:
+    throws = isinstance(lamp, Spot) and isinstance(lamp.image, Texture)
     if isinstance(lamp, (Envmap, CubeMap, Sky)):
         image_lights.axes_of(lamp)
-    elif isinstance(lamp, (Projector, Goniometric)) or (
-        isinstance(lamp, Spot) and getattr(image, "is_texture", False)
-    ):
+    elif throws or isinstance(lamp, (Projector, Goniometric)):
         light_power.unsheared(value, where)
     else:
         light_power.placement(value, where)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from clpt.errors import SceneError
 from clpt.render.analysis.checks.textures import check_textures
 from clpt.scene.materials import Blend, BumpMap, Mask, Material, NormalMap, TwoSided, parts
+from clpt.scene.params import Texture
 
 Maps = tuple[tuple[type[Material], bool], ...]
 
@@ -31,7 +30,7 @@ def _check_sides(made: list[Material]) -> None:
         raise SceneError(f"{message}, or be mixed with it")
 
 
-def _check_maps(material: Any, outer: Maps, inside: bool) -> None:
+def _check_maps(material: Material | None, outer: Maps, inside: bool) -> None:
     """Raise SceneError for two maps of a kind in one another, or on both sides of a two_sided.
 
     outer: the maps around, and whether each is inside of a two_sided material, as this may be.
@@ -55,16 +54,16 @@ def _check_maps(material: Any, outer: Maps, inside: bool) -> None:
             _check_maps(part, outer, inside)
 
 
-def _check_layers(material: Any) -> None:
+def _check_layers(material: Material) -> None:
     """Raise SceneError for layers that need the mode spectral."""
     layers = getattr(material, "layers", ())
     if not layers:
         return
     instead = 'or render in the mode "spectral"'
     for name in ("eta", "k"):
-        if getattr(getattr(material, name, None), "is_texture", False):
+        if isinstance(getattr(material, name, None), Texture):
             message = f"{material.kind}.{name} cannot be a texture below layers in RGB mode; "
             raise SceneError(f"{message}give a spectrum, {instead}")
-    if len({id(one.profile) for one in layers if getattr(one.profile, "is_texture", False)}) > 1:
+    if len({id(one.profile) for one in layers if isinstance(one.profile, Texture)}) > 1:
         message = f"one texture can vary the layers of {material.kind} in RGB mode, not several; "
         raise SceneError(f"{message}give them the same one, {instead}")

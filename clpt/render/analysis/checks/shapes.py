@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import Any
 
 from clpt.errors import SceneError
 from clpt.geometry import analytic, refining, shapes, triangles
-from clpt.scene.shapes import Cylinder, Instance, Mesh, Shape, Sphere, Spheres
+from clpt.scene.shapes import Curves, Cylinder, Instance, Mesh, Shape, Sphere, Spheres
 from clpt.scene.textures import attributes_in
 
 
@@ -21,7 +20,7 @@ def check_shapes(things: Iterable[Shape]) -> None:
     for shape in things:
         if isinstance(shape, Instance):
             continue
-        if getattr(shape, "deformation", None) is not None:
+        if isinstance(shape, (Mesh, Spheres, Curves)) and shape.deformation is not None:
             triangles.check_deformation(shape)
         if isinstance(shape, Mesh):
             refining.check(shape)
@@ -42,12 +41,12 @@ def check_instances(things: Iterable[Shape]) -> None:
 
 def _check_attributes(shape: Shape, asked: dict[int, frozenset[str]]) -> None:
     """Raise SceneError for attributes that material and light read, and the shape lacks."""
-    for user in ("material", "emission"):
-        kind: Any = getattr(shape, user)
+    held = shape.attributes if isinstance(shape, (Mesh, Spheres)) else {}
+    for user, kind in (("material", shape.material), ("emission", shape.emission)):
         if id(kind) not in asked:
             asked[id(kind)] = frozenset(attributes_in(kind))
-        missing = sorted(asked[id(kind)].difference(getattr(shape, "attributes", ())))
+        missing = sorted(asked[id(kind)].difference(held))
         if missing:
-            known = ", ".join(getattr(shape, "attributes", ())) or "none"
+            known = ", ".join(held) or "none"
             message = f"its {user} asks for the attribute {missing[0]!r}; it has {known}"
             raise SceneError(message, where=shapes.where(shape))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from clpt import spectral_exr
 from clpt.scene.params import Kind, params
 from clpt.scene.textures import Bitmap, Product, Texture
@@ -21,13 +19,13 @@ def check_textures(kind: Kind) -> None:
             _check(value, param.role == "emission")
 
 
-def check_image(image: Any, where: str, *, emissive: bool) -> None:
+def check_image(image: object, where: str, *, emissive: bool) -> None:
     """Raise SceneError for an image of the other kind of spectra, where it is in memory."""
     if isinstance(image, SpectralImage):
         spectral_exr.find(image, emissive=emissive, where=where)
 
 
-def _check(value: Any, light: bool) -> None:
+def _check(value: object, light: bool) -> None:
     """Raise SceneError for a texture of the wrong kind of spectra; light: which is wanted."""
     if isinstance(value, tuple):
         for entry in value:
