@@ -41,6 +41,7 @@ DEEPEST = 3  # kinds in kinds
 MOST_GIVEN = 4  # parameters of a kind that are not its defaults
 BANDS = np.array([400.0, 500.0, 600.0, 700.0])  # [nm]
 SIZE = 4  # pixels of a film's side
+PLAIN = integrators.Film(width=SIZE, height=SIZE)
 
 
 class Drawer:
@@ -148,9 +149,9 @@ def _check(part: Kind) -> None:
     if isinstance(part, shapes.Shape):
         check_shapes([part])
     elif isinstance(part, cameras.Camera):
-        check_camera(part, SIZE, SIZE)
+        check_camera(part, PLAIN)
     elif isinstance(part, materials.Material):
-        check_material(part, "spectral")
+        check_material(part, PLAIN)
     elif isinstance(part, lights.ON_SHAPES):
         check_textures(part)
     elif isinstance(part, lights.Light):

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import random
 from collections.abc import Callable
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -12,17 +14,19 @@ import pytest
 from clpt import transforms as tf
 from clpt.errors import SceneError
 from clpt.render.analysis.checks import check
+from clpt.render.editing.parameter_patch import patch
 from clpt.render.lowering.scene import lower
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
-from clpt.scene.cameras import Lens, Perspective
-from clpt.scene.integrators import ParticleTracer
+from clpt.scene.cameras import Lens, Perspective, ThinLens
+from clpt.scene.integrators import Mitchell, ParticleTracer
 from clpt.scene.lights import Area, CubeMap, Directional, Envmap, Point, Projector
 from clpt.scene.media import Homogeneous
 from clpt.scene.motion import Deformation
 from clpt.scene.shapes import Cube, Cylinder, Disk, Group, Instance, Mesh, Rectangle, Sphere
 from clpt.scene.shapes import Spheres as Many
-from clpt.scene.textures import Bitmap, MeshAttribute, Mix, Product
+from clpt.scene.textures import Bitmap, Checkers, MeshAttribute, Mix, Product
+from clpt.spectra import Tabulated
 from clpt.spectral_exr import SpectralImage
 from tests.together.strategies import scene_of
 
@@ -36,10 +40,19 @@ BANDS = np.array([450.0, 600.0])
 PIXELS = np.full((2, 2, 2), 0.5, np.float32)
 MATT, SHINES = (SpectralImage(PIXELS, BANDS, emissive=light) for light in (False, True))
 COLOURS = np.full((2, 2, 3), 0.5, np.float32)
+PROJECTION = np.eye(4) + np.outer([0, 0, 0, 1], [0, 1, 0, 0])
 MAP = m.NormalMap(map=Bitmap(image=COLOURS, raw=True))
 BUMP = m.BumpMap(height=Bitmap(image=COLOURS))
 FOG = Homogeneous(sigma_s=1.0)
+ZERO = Tabulated((400.0, 500.0, 600.0), (1.5, 0.0, 1.5))
 BALLS = Many(centers=CORNERS, radii=0.1)
+
+
+def layered(*profiles: Any, **metal: Any) -> m.Material:
+    return m.RoughConductor(layers=tuple(m.Layer(profile=one) for one in profiles), **metal)
+
+
+COATED = layered(1.0)
 
 
 def ball(material: m.Material) -> dict[str, Any]:
@@ -48,10 +61,6 @@ def ball(material: m.Material) -> dict[str, Any]:
 
 def traced(**given: Any) -> dict[str, Any]:
     return {"integrator": ParticleTracer(), **given}
-
-
-def layered(*profiles: Any, **metal: Any) -> m.Material:
-    return m.RoughConductor(layers=tuple(m.Layer(profile=one) for one in profiles), **metal)
 
 
 def grey() -> Bitmap:
@@ -127,6 +136,25 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "a lens that is too near": (
         {"camera": Lens(focus_distance=1e-3)}, "lens.focus_distance: .*nearer",
     ),
+    "an index of 0 somewhere": (
+        ball(m.Dielectric(int_ior=ZERO)), "sphere: dielectric.int_ior: an index of 0 at 500 nm",
+    ),
+    "an index of a lens": (
+        {"camera": ThinLens(glass=ZERO)},
+        "thin_lens.glass: ",
+    ),
+    "a filter of nothing": (
+        {"film": Film(width=4, height=4, filter=Mitchell(b=1e38))},
+        "film.filter mitchell: .*integral",
+    ),
+    "a texture that is projected": (
+        ball(m.Diffuse(reflectance=Bitmap(image=COLOURS, to_uv=PROJECTION[1:, 1:]))),
+        "sphere: bitmap.to_uv: its last row",
+    ),
+    "a solid texture that is projected": (
+        ball(m.Diffuse(reflectance=Mix(amount=Checkers(to_texture=PROJECTION)))),
+        "sphere: checkers.to_texture: its last row",
+    ),
     "no material": ({"shapes": [Sphere(material=3)]}, "sphere.material: .*kind of material"),
     "a white that is none": (
         {"film": Film(width=4, height=4, white_balance=(0.75, 0.25))}, "white_balance: .* white",
@@ -173,6 +201,15 @@ def test_what_passes() -> None:
         scene = Scene(shapes=things, film=Film(width=4, height=4, mode=mode), **given)
         check(scene)
         lower(scene)
+
+
+def test_a_quick_update_keeps_the_rules() -> None:
+    """Words alone would change: a texture below layers is refused as it is in a new scene."""
+    former = Scene(camera=Perspective(), film=Film(width=4, height=4, mode="rgb"), **ball(COATED))
+    metal = layered(1.0, eta=grey())
+    edited = dataclasses.replace(former, shapes=[Sphere(material=metal)])
+    with pytest.raises(SceneError, match="layers in RGB mode"):
+        patch(cast(Any, SimpleNamespace(lowered=lower(former))), former, edited)
 
 
 def test_few_drawn_scenes_are_refused() -> None:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from clpt.render.analysis import cameras, lens
+from clpt.render.analysis.checks.indices import check_index
 from clpt.scene.cameras import Camera, Lens
+from clpt.scene.integrators import Film
 
 
-def check_camera(camera: Camera, width: int, height: int) -> None:
-    """Raise SceneError for a camera that sees nothing of a film of that size [pixels]."""
+def check_camera(camera: Camera, film: Film) -> None:
+    """Raise SceneError for a camera that cannot be set as it says, with a film."""
     if isinstance(camera, Lens):
         cameras.rigid(camera)
-        lens.focused(camera, height / width)
+        lens.focused(camera, film.height / film.width)
     else:
-        cameras.members(camera, width, height)
+        cameras.members(camera, film.width, film.height)
+    for glass in cameras.dispersive_glasses(camera):
+        check_index(glass, film, f"{camera.kind}.glass")

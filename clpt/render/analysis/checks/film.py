@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from clpt.errors import SceneError
-from clpt.render.analysis import colour
+from clpt.render.analysis import colour, filters
 from clpt.scene import Scene
-from clpt.scene.integrators import HAVE_LAYERS, Vcm
+from clpt.scene.integrators import HAVE_LAYERS, Box, Vcm
 from clpt.scene.layers import LAYERS
 
 WITH_AXIS = ("perspective", "thin_lens", "orthographic")
@@ -23,6 +23,8 @@ def check_film(scene: Scene) -> None:
     if width * height > LARGEST:
         raise SceneError(f"{width}x{height} are more than {LARGEST >> 20} Mi pixels", where="film")
     colour.output_matrix(film, film.mode)
+    if not isinstance(film.filter, Box):
+        filters.integrals(film.filter)
     _check_layers(scene)
 
 

@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 from clpt.errors import SceneError
+from clpt.render.analysis.checks.indices import check_indices
 from clpt.render.analysis.checks.textures import check_textures
+from clpt.scene.integrators import Film
 from clpt.scene.materials import Blend, BumpMap, Mask, Material, NormalMap, TwoSided, parts
 from clpt.scene.params import Texture
 
 Maps = tuple[tuple[type[Material], bool], ...]
 
 
-def check_material(material: Material, mode: str) -> None:
-    """Raise SceneError for a material whose parts do not go together; mode: of the film."""
+def check_material(material: Material, film: Film) -> None:
+    """Raise SceneError for a material whose parts do not go together, or not with a film."""
     made = list(parts(material))
     if len(made) > 1:
         _check_sides(made)
         _check_maps(material, (), False)
     for part in made:
         check_textures(part)
-        if mode == "rgb":
+        for one in (part, *getattr(part, "layers", ())):
+            check_indices(one, film)
+        if film.mode == "rgb":
             _check_layers(part)
 
 

@@ -47,12 +47,12 @@ def check_at_rest(scene: Scene, cache: LoweringCache) -> None:
             names = " or ".join(f"`{cls.kind}`" for cls in ON_SHAPES)
             raise SceneError(f"its emission must be {names}", where=shapes.where(shape))
     check_film(scene)
-    check_camera(scene.camera, scene.film.width, scene.film.height)
+    check_camera(scene.camera, scene.film)
     for light in scene.lights:
         check_light(light)
     check_shapes(shapes_)
     check_instances(scene.shapes)
-    _check_surfaces(shapes_, scene.film.mode)
+    _check_surfaces(shapes_, scene.film)
     check_light_paths(scene, shapes_)
     check_motion(scene, Motions.of(scene))
     check_bodies([*shapes_, *(one for one in scene.shapes if isinstance(one, Instance))])
@@ -73,13 +73,13 @@ def _check_entries(scene: Scene) -> None:
     _check_kinds("shapes[{}]", Shape, scene.shapes)
 
 
-def _check_surfaces(shapes_: list[Shape], mode: str) -> None:
+def _check_surfaces(shapes_: list[Shape], film: Film) -> None:
     """Raise SceneError for materials and lights of shapes; each is looked at once."""
     seen: set[int] = set()
     for shape in shapes_:
         try:
             if id(shape.material) not in seen:
-                check_material(shape.material, mode)
+                check_material(shape.material, film)
             if shape.emission is not None and id(shape.emission) not in seen:
                 check_textures(shape.emission)
         except SceneError as error:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from clpt import spectral_exr
+from clpt.errors import SceneError
 from clpt.scene.params import Kind, params
-from clpt.scene.textures import Bitmap, Product, Texture
+from clpt.scene.textures import Bitmap, Placed, Product, Solid, Texture
 from clpt.spectral_exr import SpectralImage
 
 
@@ -31,12 +34,27 @@ def _check(value: object, light: bool) -> None:
         for entry in value:
             if isinstance(entry, Kind):
                 check_textures(entry)
-    elif isinstance(value, Bitmap):
-        check_image(value.image, "bitmap.image", emissive=light)
     elif isinstance(value, Texture):
+        _check_place(value)
+        if isinstance(value, Bitmap):
+            check_image(value.image, "bitmap.image", emissive=light)
         for name, param in params(type(value)).items():
             shines = light and param.role in ("factor", "reflectance") and name != _factor(value)
             _check(getattr(value, name), shines)
+
+
+def _check_place(texture: Texture) -> None:
+    """Raise SceneError for a matrix that is a projection, where it is used."""
+    if isinstance(texture, Placed):
+        last = texture.to_uv[2]
+        if not np.allclose(last[:2], 0.0) or np.isclose(last[2], 0.0):
+            raise SceneError("its last row must be 0 0 1", where=f"{texture.kind}.to_uv")
+        if texture.mapping in ("uv", "uv1"):
+            return
+    elif not isinstance(texture, Solid):
+        return
+    if not np.allclose(np.asarray(texture.to_texture)[3], [0.0, 0.0, 0.0, 1.0]):
+        raise SceneError("its last row must be 0 0 0 1", where=f"{texture.kind}.to_texture")
 
 
 def _factor(texture: Texture) -> str:
