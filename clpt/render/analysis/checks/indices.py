@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
+from functools import cache
+from typing import Any
 
 from clpt import spectra
 from clpt.errors import SceneError
@@ -12,13 +15,19 @@ from clpt.spectra import Spectrum
 from clpt.spectra.spectrum import extremes
 
 
-def check_indices(kind: Kind, film: Film) -> None:
-    """Raise SceneError for an index of a kind that is 0 at a wavelength of the film."""
-    for name, param in params(type(kind)).items():
-        if param.positive:
+def check_indices(kinds: Iterable[Kind], film: Film) -> None:
+    """Raise SceneError for an index of some kind that is 0 at a wavelength of the film."""
+    for kind in kinds:
+        for name in _indices(type(kind)):
             value = getattr(kind, name)
             if not isinstance(value, Texture):
                 check_index(value, film, place_of(kind, name))
+
+
+@cache
+def _indices(cls: Any) -> tuple[str, ...]:
+    """The parameters of a class that are indices above 0."""
+    return tuple(name for name, param in params(cls).items() if param.positive)
 
 
 def check_index(value: Spectrum | str, film: Film, where: str) -> None:

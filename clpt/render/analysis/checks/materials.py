@@ -6,7 +6,7 @@ from clpt.errors import SceneError
 from clpt.render.analysis.checks.indices import check_indices
 from clpt.render.analysis.checks.textures import check_textures
 from clpt.scene.integrators import Film
-from clpt.scene.materials import Blend, BumpMap, Mask, Material, NormalMap, TwoSided, parts
+from clpt.scene.materials import Blend, BumpMap, Layer, Mask, Material, NormalMap, TwoSided, parts
 from clpt.scene.params import Texture
 
 Maps = tuple[tuple[type[Material], bool], ...]
@@ -20,10 +20,10 @@ def check_material(material: Material, film: Film) -> None:
         _check_maps(material, (), False)
     for part in made:
         check_textures(part)
-        for one in (part, *getattr(part, "layers", ())):
-            check_indices(one, film)
-        if film.mode == "rgb":
-            _check_layers(part)
+        layers = getattr(part, "layers", ())
+        check_indices((part, *layers), film)
+        if layers and film.mode == "rgb":
+            _check_layers(part, layers)
 
 
 def _check_sides(made: list[Material]) -> None:
@@ -58,11 +58,8 @@ def _check_maps(material: Material | None, outer: Maps, inside: bool) -> None:
             _check_maps(part, outer, inside)
 
 
-def _check_layers(material: Material) -> None:
+def _check_layers(material: Material, layers: tuple[Layer, ...]) -> None:
     """Raise SceneError for layers that need the mode spectral."""
-    layers = getattr(material, "layers", ())
-    if not layers:
-        return
     instead = 'or render in the mode "spectral"'
     for name in ("eta", "k"):
         if isinstance(getattr(material, name, None), Texture):

@@ -16,7 +16,7 @@ def check_shapes(things: Iterable[Shape]) -> None:
 
     What its arrays hold is not looked at.
     """
-    asked: dict[int, frozenset[str]] = {}  # attributes, by what reads them
+    asked: dict[int, set[str]] = {}  # attributes, by what reads them
     for shape in things:
         if isinstance(shape, Instance):
             continue
@@ -26,7 +26,11 @@ def check_shapes(things: Iterable[Shape]) -> None:
             refining.check(shape)
         elif isinstance(shape, (Sphere, Spheres, Cylinder)):
             analytic.check(shape)
-        _check_attributes(shape, asked)
+        for user, kind in (("material", shape.material), ("emission", shape.emission)):
+            if id(kind) not in asked:
+                asked[id(kind)] = attributes_in(kind)
+            if asked[id(kind)]:
+                _check_attributes(shape, user, asked[id(kind)])
 
 
 def check_instances(things: Iterable[Shape]) -> None:
@@ -39,14 +43,11 @@ def check_instances(things: Iterable[Shape]) -> None:
                     analytic.check(replace(shape, to_world=matrix))
 
 
-def _check_attributes(shape: Shape, asked: dict[int, frozenset[str]]) -> None:
-    """Raise SceneError for attributes that material and light read, and the shape lacks."""
+def _check_attributes(shape: Shape, user: str, asked: set[str]) -> None:
+    """Raise SceneError for attributes that a shape lacks; user: which part of it reads them."""
     held = shape.attributes if isinstance(shape, (Mesh, Spheres)) else {}
-    for user, kind in (("material", shape.material), ("emission", shape.emission)):
-        if id(kind) not in asked:
-            asked[id(kind)] = frozenset(attributes_in(kind))
-        missing = sorted(asked[id(kind)].difference(held))
-        if missing:
-            known = ", ".join(held) or "none"
-            message = f"its {user} asks for the attribute {missing[0]!r}; it has {known}"
-            raise SceneError(message, where=shapes.where(shape))
+    missing = sorted(asked.difference(held))
+    if missing:
+        known = ", ".join(held) or "none"
+        message = f"its {user} asks for the attribute {missing[0]!r}; it has {known}"
+        raise SceneError(message, where=shapes.where(shape))
