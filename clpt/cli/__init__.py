@@ -10,7 +10,7 @@ import logging
 
 import click
 
-from .options.verbosity import verbose_option
+from .options.verbosity import Handler, verbose_option
 
 COMMANDS = {  # with the first words of their help, for which nothing is imported
     "render": "Render each SCENE: a scene file, a mesh or a folder.",
@@ -59,6 +59,6 @@ class _Commands(_Listed):
 @click.pass_context
 def cli(ctx: click.Context, verbose: int) -> None:
     """clpt, a spectral path tracer in OpenCL."""
-    logging.basicConfig(format="clpt: %(levelname)s: %(message)s")
+    logging.basicConfig(handlers=[Handler()])
     if ctx.invoked_subcommand is None:
         click.echo(ctx.get_help())

@@ -74,7 +74,7 @@ def write_all(
         try:
             write(path, source, stats, grading)
             name = "standard output" if is_standard(path) else path
-            tell(f"{name}  {stats['spp']:.4g} spp, {stats['seconds']:.1f} s")
+            tell(str(name))
         except FAILURES as error:
             rescued = _rescue(path, film, source, stats, grading)
             failures.append(f"{failure(path, error)}; {rescued}")

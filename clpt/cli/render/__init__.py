@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import click
@@ -58,6 +59,7 @@ def render(scenes: tuple[Path, ...], form: str | None, settings: Settings) -> in
 
 def _rendered(job: Job) -> int:
     """Render the picture of a scene, or its frames; return the exit status."""
+    began = time.perf_counter()
     from ..printing.display import display
 
     if job.animation.frames is not None:
@@ -66,6 +68,9 @@ def _rendered(job: Job) -> int:
         return render_frames(job, display(job.quiet, None))
     targets.checked(job.targets)
     locate(job.scene)
+    name = targets.name_of(job.scene)
+    shown = display(job.quiet, job.until.limit, name)
+    shown.begin(f"{name} ...")
     from .picture import render_picture
 
-    return render_picture(job, display(job.quiet, job.until.limit))
+    return render_picture(job, shown, began)

@@ -17,6 +17,7 @@ from ..files import checkpoints, outputs
 from ..opening.makers import AnyRenderer, DeviceMaker, Maker, cluster_makers, device_makers
 from ..opening.scenes import open_scene, read_scene
 from ..printing.display import Display
+from ..printing.names import device_names
 from ..process.stopping import STATUS, stops
 from . import report
 from .passes import End, render_samples
@@ -26,17 +27,19 @@ from .so_far import PictureSoFar
 from .tev_viewer import showing
 
 
-def render_picture(job: Job, shown: Display) -> int:
+def render_picture(job: Job, shown: Display, began: float) -> int:
     """Render the picture of a scene and write its files; return the exit status.
+
+    began: the command, or the scene of several [s of time.perf_counter].
 
     Raises what the render raises, after the picture so far and the film are written.
     """
-    began = time.perf_counter()
     former = _Former.find(job, shown.note)
     with ExitStack() as resources:
         opened = _open(job, former, shown, resources)
         renderer = opened.maker.make(opened.scene, shown, job.until.first)
         resources.callback(renderer.close)
+        shown.note(report.header(shown.name, renderer, opened.where))
         end = former.go_on(renderer, job.until.end(opened.scene), shown.note)
         opened.tell_before(job.verbose)
         picture = _Picture(job, renderer, former, shown)
@@ -47,6 +50,7 @@ def render_picture(job: Job, shown: Display) -> int:
             ends = End(end, shown.limit, renderer.scene.noise, stopped)
             picture.render(opened.maker, ends, show_picture)
             picture.finish(bool(stopped))
+            shown.note(report.ending(renderer, ends, time.perf_counter() - began))
         opened.tell_after(job.verbose)
         if stopped:
             opened.maker.stop()
@@ -94,6 +98,13 @@ class _Opened:
     maker: Maker
     devices: DeviceMaker | None = None
     loading: float = 0.0
+
+    @property
+    def where(self) -> str:
+        """Who renders, in short."""
+        if self.devices is None:
+            return f"workers of {self.maker.name}"
+        return device_names([on.info for on in self.devices.devices])
 
     def tell_before(self, verbose: int) -> None:
         """Print what the devices have made of the scene."""

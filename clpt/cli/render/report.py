@@ -6,6 +6,25 @@ import click
 
 from ...cluster.multi_renderer import MultiRenderer
 from ..opening.makers import AnyRenderer
+from .passes import End
+
+
+def header(name: str, renderer: AnyRenderer, where: str) -> str:
+    """Return the line that says what is rendered, how and where."""
+    film, asked, chosen = renderer.scene.film, renderer.scene.integrator.kind, renderer.stats
+    how = asked if asked == chosen.integrator else f"{asked} -> {chosen.integrator}"
+    size = f"{film.size[0]}x{film.size[1]}"
+    return "  ".join((name, size, film.mode, how, where))
+
+
+def ending(renderer: AnyRenderer, end: End, seconds: float) -> str:
+    """Return the line that says how far the render came, in so many seconds of all."""
+    mean = renderer.counts.samples / renderer.wavefront.paths.pixels
+    samples = f"{mean:.0f}" if mean >= 10 or mean == int(mean) else f"{mean:.2g}"
+    if not end.stopped:
+        return f"{samples} spp, {seconds:.1f} s in all"
+    of = "" if end.samples is None else f" of {end.samples - renderer.first_sample}"
+    return f"stopped at {samples}{of} spp, with the picture so far; {seconds:.1f} s in all"
 
 
 def before(renderer: AnyRenderer, loading: float) -> None:
