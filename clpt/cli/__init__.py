@@ -10,6 +10,7 @@ import logging
 
 import click
 
+from ..errors import nearest
 from .options.verbosity import Handler, verbose_option
 
 COMMANDS = {  # with the first words of their help, for which nothing is imported
@@ -35,6 +36,15 @@ class _Listed(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(self.commands)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        name = args[0]
+        known = self.list_commands(ctx)
+        if name not in known and not name.startswith("-") and not ctx.resilient_parsing:
+            ctx.fail(f"there is no command {name!r}{nearest(name, known)}")
+        return super().resolve_command(ctx, args)
 
 
 class _Commands(_Listed):

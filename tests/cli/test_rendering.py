@@ -207,12 +207,15 @@ def test_short_names_of_devices(info, name):
     assert device_names([one, one]) == f"2 x {name}"
 
 
+SO_FAR = ", with the picture so far; 4.2 s in all"
+
+
 @pytest.mark.parametrize(
     "mean, end, line",
     [
         (64.0, End(64), "64 spp, 4.2 s in all"),
-        (28.44, End(64, stopped=[2]), "stopped at 28 of 64 spp, with the picture so far; 4.2 s in all"),
-        (0.25, End(stopped=[2]), "stopped at 0.25 spp, with the picture so far; 4.2 s in all"),
+        (28.44, End(64, stopped=[2]), f"stopped at 28 of 64 spp{SO_FAR}"),
+        (0.25, End(stopped=[2]), f"stopped at 0.25 spp{SO_FAR}"),
     ],
 )  # fmt: skip
 def test_the_last_line(mean, end, line):

@@ -50,7 +50,7 @@ class Display:
 
     @contextmanager
     def compiling(self, text: str) -> Iterator[Callable[[], None]]:
-        """Yield a function, for any thread, that says that a compiler begins; show it if it lasts."""
+        """Yield a function that any thread calls when a compiler begins; show it if it lasts."""
         yield lambda: None
 
     def begin(self, text: str) -> None:

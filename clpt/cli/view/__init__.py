@@ -9,6 +9,7 @@ import click
 from ..options.grading import grading_options
 from ..options.records import with_records
 from ..options.scene_options import scene_options
+from ..options.values import Count
 from ..options.verbosity import verbose_option
 from ..options.workers import worker_options
 from .settings import Settings
@@ -32,7 +33,7 @@ from .settings import Settings
     metavar="VIEW.json", help="Begin with a view that the page has saved.",
 )  # fmt: skip
 @worker_options("Render on workers, as of `clpt render`.")
-@click.option("--spp", type=click.IntRange(1, 2**31 - 1), help="Samples per pixel.")
+@click.option("--spp", type=Count(), help="Samples per pixel: 256, 1k, 1M.")
 @click.option("--noise", type=click.FloatRange(0.0), metavar="SHARE", help="As of `clpt render`.")
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), help="Seed of the random numbers.")
 @scene_options
