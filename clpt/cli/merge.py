@@ -21,7 +21,7 @@ from .options.scene_options import denoise_option
 @click.argument("films", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option(
     "-o", "--output", "paths", multiple=True, required=True, type=click.Path(path_type=Path),
-    help="Where to write: .film .exr .png .hdr .pfm .npy; may be given several times.",
+    help="Where to write: .film .exr .png .jpg .webp .hdr .pfm .npy; may be given several times.",
 )  # fmt: skip
 @denoise_option
 @grading_options

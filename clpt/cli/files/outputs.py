@@ -128,7 +128,7 @@ def write(
         layer_channels.write_layers(path, source, names=grading.names, metadata=stats)
     else:
         picture = source.colours() if form.bands else source.image()
-        if path.suffix.lower() == ".png":
+        if path.suffix.lower() in images.FOR_SCREENS:
             picture = images.straight(picture)
         images.write(
             path, picture, metadata=stats, space=form.output_space, exposure=grading.exposure,

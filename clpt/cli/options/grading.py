@@ -9,19 +9,21 @@ import click
 
 from ...colour.tones import TONES
 from ...colour.view import DEFAULT_CONFIG, View
+from ...images import Exposure
 from ...render.film.layer_channels import SETS
 from .records import Command, with_options
+from .values import Stops
 
 
 @dataclass(frozen=True)
 class Grading:
     """The form of pictures in files.
 
-    exposure [stops]; tone: a curve of clpt.colour.tones; view: of OpenColorIO, instead; names: of
-    channels of an .exr, a set of clpt.render.film.layer_channels.SETS.
+    exposure [stops], or "auto"; tone: a curve of clpt.colour.tones; view: of OpenColorIO, instead;
+    names: of channels of an .exr, a set of clpt.render.film.layer_channels.SETS.
     """
 
-    exposure: float = 0.0
+    exposure: Exposure = 0.0
     tone: str = "none"
     view: View | None = None
     names: str = SETS[0]
@@ -31,7 +33,7 @@ class Grading:
 class GradingOptions:
     """The options of `grading_options` and `names_option`."""
 
-    exposure: float
+    exposure: Exposure
     tone: str | None
     view: str | None
     display: str | None
@@ -53,9 +55,13 @@ class GradingOptions:
 
 
 _OPTIONS = (
-    click.option("--exposure", type=float, default=0.0, help="Brighten .png by this many stops."),
     click.option(
-        "--tone", type=click.Choice([*TONES]), help="Tone curve of .png.  [default: none]"
+        "--exposure", type=Stops(), default=0.0,
+        help="Brighten .png, .jpg and .webp by so many stops; auto: to a middle grey.",
+    ),
+    click.option(
+        "--tone", type=click.Choice([*TONES]),
+        help="Tone curve of .png, .jpg and .webp.  [default: none]",
     ),
     click.option(
         "--view", metavar="NAME", help="Make .png by this view of OpenColorIO: clpt[colour]."

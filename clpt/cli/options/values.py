@@ -15,6 +15,7 @@ from ...spectra.sensors import OBSERVERS
 
 LARGEST = 65536  # pixels of a side
 MOST_NOISE = 0.5  # that --noise takes: beyond, a few samples of each pixel are enough
+MOST_STOPS = 120.0  # float32 has not many more
 MOST_COUNTED = 2**31 - 1
 
 
@@ -66,6 +67,16 @@ class Count(click.ParamType):
         if not 1 <= number <= MOST_COUNTED:
             self.fail(f"{value} is outside of 1 to {MOST_COUNTED}", param, ctx)
         return int(number)
+
+
+class Stops(click.ParamType):
+    """A number of stops, or auto."""
+
+    name = "STOPS-OR-AUTO"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> float | str:
+        limits = click.FloatRange(-MOST_STOPS, MOST_STOPS)
+        return AUTO if value == AUTO else limits(value, param, ctx)
 
 
 class SensorName(click.ParamType):

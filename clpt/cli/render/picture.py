@@ -19,7 +19,7 @@ from ..opening.scenes import open_scene, read_scene
 from ..printing.display import Display
 from ..printing.names import device_names
 from ..process.stopping import STATUS, stops
-from . import report
+from . import brightness, report
 from .passes import End, render_samples
 from .refused import refusals
 from .settings import Job
@@ -34,6 +34,8 @@ def render_picture(job: Job, shown: Display, began: float) -> int:
 
     Raises what the render raises, after the picture so far and the film are written.
     """
+    for text in brightness.unused(job.graded.grading, job.targets):
+        shown.note(f"clpt: warning: {text}")
     former = _Former.find(job, shown.note)
     with ExitStack() as resources:
         opened = _open(job, former, shown, resources)
@@ -189,7 +191,11 @@ class _Picture:
     def _warn(self, share: float) -> None:
         """Note pixels without a sample, and samples that the film refused."""
         few = [f"only {share:.1%} of the pixels have a sample; others are black"] * (share < 1.0)
-        for text in [*few, *refusals(self._renderer)]:
+        grading, targets = self._job.graded.grading, self._job.targets
+        told = [*few, *refusals(self._renderer)]
+        if self._has_samples:
+            told += brightness.remarks(self._renderer, grading, targets)
+        for text in told:
             self._shown.note(f"clpt: warning: {text}")
 
     @property

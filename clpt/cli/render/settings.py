@@ -212,8 +212,9 @@ _OUTPUT = (
     click.option(
         "-o", "--output", "paths", multiple=True,
         type=click.Path(path_type=Path, allow_dash=True),
-        help="Where to write: .exr .png .hdr .pfm .npy, or - for the standard output; may be given "
-        "several times; {scene} is the scene's name, {camera} that of --camera all.  "
+        help="Where to write: .exr .png .jpg .webp .hdr .pfm .npy, or - for the standard "
+        "output; may be given several times; {scene} is the scene's name, {camera} that of "
+        "--camera all.  "
         "[default: {scene}.exr and {scene}.png]",
     ),
     click.option(

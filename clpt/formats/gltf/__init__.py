@@ -52,8 +52,8 @@ def load(path: Path, missing: Missing = "error", /, **variables: Any) -> Scene:
     and cameras their own numbers. `camera` and `scene` choose by number or name.
     `shutter` [s] is how long light comes to the film from `time` on, while nodes move.
     `variant` chooses among material variants. `lumens`: of a watt, by which punctual lights are
-    divided; of files of Blender 683 by itself. `multiple_scattering`: 1 keeps what facets reflect to
-    each other.
+    divided; of files of Blender 683 by itself. `multiple_scattering`: 1 keeps what facets reflect
+    to each other.
     missing: see clpt.load. Raises SceneError with the JSON path of what is wrong.
     """
     if "shutter" in variables:
