@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from clpt.arrays import Floats32
+from clpt.choices import Exposure
 from clpt.colour.tones import LUMINANCE
 from clpt.colour.view import View
 from clpt.images.transfer import to_codes
-
-Exposure = float | Literal["auto"]  # [stops]
 
 GREY = 0.18  # reflectance of the middle grey that photographers expose for
 DIM = 1e-4  # of the mean: a pixel below counts as if it were as bright

@@ -10,17 +10,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt import output_files
 from clpt.arrays import Floats32
+from clpt.choices import FOR_SCREENS, WRITABLE, Exposure
 from clpt.colour.view import View
 from clpt.errors import SceneError
 from clpt.images import exr, hdr, npy, pfm, screen_files
-from clpt.images.brightness import Exposure, stops
+from clpt.images.brightness import stops
 from clpt.images.png_files import Metadata, png
 from clpt.images.transfer import to_codes, to_rec709
 from clpt.spectra.spaces import chromaticities
 
-FOR_SCREENS = tuple(screen_files.FORMATS)
-WITH_ALPHA = (".png", ".webp")  # of them
-WRITABLE = (".exr", *FOR_SCREENS, ".hdr", ".pfm", ".npy")
+WITH_ALPHA = (".png", ".webp")  # of FOR_SCREENS
 
 
 def write(

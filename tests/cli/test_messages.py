@@ -11,7 +11,7 @@ import pytest
 
 import clpt
 from clpt.__main__ import run
-from clpt.cli.options.values import MOST_COUNTED, Count, Noise
+from clpt.cli.options.values import MOST_SAMPLES, Count, Noise
 from clpt.cli.options.verbosity import Handler
 from clpt.device import context
 from clpt.errors import SceneError
@@ -66,7 +66,7 @@ def test_counts(text, number):
     assert Count()(text) == number
 
 
-@pytest.mark.parametrize("text", ["0", "1.5", "1K", "-1", "k", f"{MOST_COUNTED + 1}", "9000M"])
+@pytest.mark.parametrize("text", ["0", "1.5", "1K", "-1", "k", f"{MOST_SAMPLES + 1}", "9000M"])
 def test_no_counts(text):
     with pytest.raises(click.BadParameter, match=r"such as 256, 1k or 1M|outside of 1 to"):
         Count()(text)

@@ -8,15 +8,12 @@ from typing import Any
 
 import click
 
+from ...choices import AUTO, MOST_LIGHT_PATHS, MOST_SAMPLES, OBSERVERS
 from ...errors import nearest
-from ...scene.integrators import AUTO, MOST_LIGHT_PATHS
-from ...spectra import read_sensor
-from ...spectra.sensors import OBSERVERS
 
 LARGEST = 65536  # pixels of a side
 MOST_NOISE = 0.5  # that --noise takes: beyond, a few samples of each pixel are enough
 MOST_STOPS = 120.0  # float32 has not many more
-MOST_COUNTED = 2**31 - 1
 
 
 class Size(click.ParamType):
@@ -64,8 +61,8 @@ class Count(click.ParamType):
             )
         if not found or number != int(number):
             self.fail(f"{value!r} is no whole number such as 256, 1k or 1M", param, ctx)
-        if not 1 <= number <= MOST_COUNTED:
-            self.fail(f"{value} is outside of 1 to {MOST_COUNTED}", param, ctx)
+        if not 1 <= number <= MOST_SAMPLES:
+            self.fail(f"{value} is outside of 1 to {MOST_SAMPLES}", param, ctx)
         return int(number)
 
 
@@ -85,7 +82,11 @@ class SensorName(click.ParamType):
     name = "NAME-OR-FILE"
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        return value if value in OBSERVERS else read_sensor(value)
+        if value in OBSERVERS:
+            return value
+        from ...spectra import read_sensor  # here: help needs no tables of spectra
+
+        return read_sensor(value)
 
 
 class LightPaths(click.ParamType):

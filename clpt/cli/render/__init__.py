@@ -66,8 +66,8 @@ def _rendered(job: Job) -> int:
         from .frames import render_frames
 
         return render_frames(job, display(job.quiet, None))
-    targets.checked(job.targets)
     locate(job.scene)
+    targets.checked(job.targets)
     name = targets.name_of(job.scene)
     shown = display(job.quiet, job.until.limit, name)
     shown.begin(f"{name} ...")

@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from ... import images
+from ...arrays import Floats32
 from ...render.analysis.lights import light_power
 from ...render.analysis.lights.sources import emissions_of
 from ...scene import Scene
 from ...scene.lights import Light
 from ..opening.makers import AnyRenderer
-from ..options.grading import Grading
+from ..options.grading import Grading, for_screens
 
 MOSTLY_WHITE = 0.5  # of the lit pixels
 NEARLY_BLACK = 0.98  # of all pixels
@@ -22,27 +23,14 @@ OUTSHINING = 1000.0  # times as strong as any other lamp
 ADVICE = "docs/lighting.md has a list: Why is it black?"
 
 
-def on_screens(targets: tuple[Path, ...]) -> list[Path]:
-    """Return the files that exposure and tone curve concern."""
-    return [path for path in targets if path.suffix.lower() in images.FOR_SCREENS]
-
-
-def unused(grading: Grading, targets: tuple[Path, ...]) -> Iterator[str]:
-    """Yield a sentence for options of files for screens, where there is none."""
-    if on_screens(targets):
-        return
-    given = (grading.exposure != 0.0, "--exposure"), (grading.tone != "none", "--tone")
-    names = [name for was, name in (*given, (grading.view is not None, "--view")) if was]
-    if names:
-        suffixes = " ".join(images.FOR_SCREENS)
-        yield f"{' and '.join(names)} without effect: of {suffixes} only; others keep the light"
+def exposure_found(renderer: AnyRenderer) -> float:
+    """Return the stops of `--exposure auto`."""
+    return images.auto_exposure(_pixels(renderer))
 
 
 def remarks(renderer: AnyRenderer, grading: Grading, targets: tuple[Path, ...]) -> Iterator[str]:
     """Yield sentences of a picture in which little is seen, with what mends it."""
-    scene = renderer.scene
-    colours = renderer.colours() if renderer.form.bands else renderer.image()
-    pixels = images.to_rec709(images.straight(colours), scene.film.output_space)
+    scene, pixels = renderer.scene, _pixels(renderer)
     exposure = images.stops(grading.exposure, pixels)
     found = images.levels(pixels, exposure, grading.tone, grading.view)
     mended = images.auto_exposure(pixels)
@@ -50,12 +38,18 @@ def remarks(renderer: AnyRenderer, grading: Grading, targets: tuple[Path, ...]) 
     if not found.lit:
         yield f"the picture is black: no path has found a light; {ADVICE}"
         return
-    if grading.exposure != "auto" and on_screens(targets):
+    if grading.exposure != "auto" and for_screens(targets):
         if found.white > MOSTLY_WHITE:
             yield f"{found.white:.0%} of what is lit is white: {advice}"
         elif found.black > NEARLY_BLACK and mended > exposure + DARK:
             yield f"{found.black:.0%} of the picture is black: {advice}"
     yield from _outshone(scene)
+
+
+def _pixels(renderer: AnyRenderer) -> Floats32:
+    """The picture so far in linear Rec. 709, (h, w, c)."""
+    colours = renderer.colours() if renderer.form.bands else renderer.image()
+    return images.to_rec709(images.straight(colours), renderer.scene.film.output_space)
 
 
 def _outshone(scene: Scene) -> Iterator[str]:

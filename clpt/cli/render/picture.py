@@ -16,6 +16,7 @@ from ...scene import Scene
 from ..files import checkpoints, outputs
 from ..opening.makers import AnyRenderer, DeviceMaker, Maker, cluster_makers, device_makers
 from ..opening.scenes import open_scene, read_scene
+from ..options.grading import for_screens
 from ..printing.display import Display
 from ..printing.names import device_names
 from ..process.stopping import STATUS, stops
@@ -34,7 +35,7 @@ def render_picture(job: Job, shown: Display, began: float) -> int:
 
     Raises what the render raises, after the picture so far and the film are written.
     """
-    for text in brightness.unused(job.graded.grading, job.targets):
+    if text := job.graded.grading.unused(job.targets):
         shown.note(f"clpt: warning: {text}")
     former = _Former.find(job, shown.note)
     with ExitStack() as resources:
@@ -194,6 +195,8 @@ class _Picture:
         grading, targets = self._job.graded.grading, self._job.targets
         told = [*few, *refusals(self._renderer)]
         if self._has_samples:
+            if grading.exposure == "auto" and for_screens(targets):
+                self._shown.note(f"exposure {brightness.exposure_found(self._renderer):+.1f} stops")
             told += brightness.remarks(self._renderer, grading, targets)
         for text in told:
             self._shown.note(f"clpt: warning: {text}")
