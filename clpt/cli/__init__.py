@@ -22,8 +22,9 @@ COMMANDS = {  # with the first words of their help, for which nothing is importe
     "cluster": "Render on several machines; see also `clpt worker`.",
     "devices": "List the OpenCL devices, with the one that would be used and why.",
     "info": "Show what the file or folder SCENE holds, without rendering it.",
-    "inspect": "Show what the image or film FILE holds; plot the spectra of pixels, or their "
-    "channels.",
+    "inspect": "Show what the image or film FILE holds, and the values of its pixels.",
+    "convert": "Write the image or film SOURCE as TARGET, in another format or for a screen.",
+    "compare": "Measure how the image or film A differs from B.",
     "kernels": "Write the OpenCL programs that render SCENE, one file each.",
     "mie": "Make the medium of spheres of RADIUS micrometres: fog, mist, milk.",
     "lens": "Tell of LENS: a file (.dat, .zmx, .txt) or a name of the library.",
