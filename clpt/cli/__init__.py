@@ -28,6 +28,7 @@ COMMANDS = {  # with the first words of their help, for which nothing is importe
     "kernels": "Write the OpenCL programs that render SCENE, one file each.",
     "mie": "Make the medium of spheres of RADIUS micrometres: fog, mist, milk.",
     "lens": "Tell of LENS: a file (.dat, .zmx, .txt) or a name of the library.",
+    "completion": "Let the TAB key of a SHELL complete clpt's commands, options and values.",
     "bench": "Measure rays, stages of rendering, builds and starts of an OpenCL device.",
 }
 
@@ -60,8 +61,8 @@ class _Commands(_Listed):
         return getattr(importlib.import_module(f"{__name__}.{cmd_name}"), cmd_name)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        listed = {name: click.Command(name, help=text) for name, text in COMMANDS.items()}
-        _Listed(commands=listed).format_commands(ctx, formatter)
+        with formatter.section("Commands"):
+            formatter.write_dl([*COMMANDS.items()])
 
 
 def _tell_version(ctx: click.Context, _: click.Parameter, asked: bool) -> None:
@@ -82,6 +83,6 @@ def _tell_version(ctx: click.Context, _: click.Parameter, asked: bool) -> None:
 @click.pass_context
 def cli(ctx: click.Context, verbose: int) -> None:
     """clpt, a spectral path tracer in OpenCL."""
-    logging.basicConfig(handlers=[Handler()])
+    logging.basicConfig(handlers=[Handler()], format="%(message)s")
     if ctx.invoked_subcommand is None:
         click.echo(ctx.get_help())

@@ -197,7 +197,7 @@ def build_all(
         futures = {name: pool.submit(build, device, s, options) for name, s in sources.items()}
         programs = {name: future.result() for name, future in futures.items()}
     seconds, built = time.perf_counter() - start, device.builds.programs - before
-    log.info("%d programs in %.2f s, %d of them built", len(programs), seconds, built)
+    log.info("programs: %d in %.2f s, %d of them by the driver", len(programs), seconds, built)
     return programs
 
 

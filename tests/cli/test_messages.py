@@ -134,6 +134,14 @@ def test_messages_of_the_log_are_like_others(capsys):
     assert capsys.readouterr().err == "clpt: warning: it is odd\n"
 
 
+def test_what_the_log_says_more(capsys, monkeypatch):
+    """-v, as a user of the command has it, whose process has no other handlers."""
+    monkeypatch.setattr(logging.getLogger(), "handlers", [])
+    assert run(["-v", "devices"]) == 0
+    logging.getLogger("clpt").info("it is %s", "odd")
+    assert "clpt: info: it is odd\n" in capsys.readouterr().err
+
+
 def test_rgb_leaves_dispersion_out():
     sphere = {
         name: clpt.scene.shapes.Sphere(material=clpt.scene.materials.Dielectric(int_ior=index))

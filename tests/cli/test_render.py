@@ -292,7 +292,7 @@ def test_verbose_tells_of_tables_and_stages(tmp_path, capsys):
     assert run(["render", CORNELL, *arguments]) == 0
     told = capsys.readouterr().err
     expected = ("36 triangles", "tree triangles", "table vertices", "from clpt's cache",
-                "seconds to load", "seconds until ready", "seconds until a sample",
+                "time to read the file", "time until it is ready", "time to the first sample",
                 "path: nothing is sharp",
                 "stage loop" if device.choose().info.is_cpu else "stage shade_diffuse")  # fmt: skip
     for words in expected:
