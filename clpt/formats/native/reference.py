@@ -87,7 +87,8 @@ applied first: `{"translate": [x, y, z]}`, `{"scale": s}` or `{"scale": [x, y, z
 plane of u and v.
 
 **Spectra** are a number (the same at every wavelength), `[r, g, b]` in linear Rec. 709, a name, or
-an object. What a number or a colour means depends on the parameter's role:
+an object. Reflectances, emissions and factors may be `"#rrggbb"` too: a colour in sRGB, as colour
+pickers show it. What a number or a colour means depends on the parameter's role:
 
 | role | number | `[r, g, b]` | name | a table beyond its ends |
 | --- | --- | --- | --- | --- |
