@@ -66,6 +66,14 @@ def of_scenes(paths: Iterable[Path], modes: Iterable[str] = MODES) -> list[Progr
     return [_named(program, layouts[text]) for text, program in found.items()]
 
 
+def longest(given: Iterable[Program], count: int) -> list[Program]:
+    """Of each stage and mode the longest texts: what asks for most."""
+    groups: dict[tuple[str, str], list[Program]] = {}
+    for program in sorted(given, key=lambda one: -len(one.text)):
+        groups.setdefault((program.stage, program.mode), []).append(program)
+    return [program for own in groups.values() for program in own[:count]]
+
+
 def _sources(features: Features, layout: str) -> Iterator[tuple[str, device.Source]]:
     """The texts of a picture, by the names of their stages."""
     for own in features.passes:

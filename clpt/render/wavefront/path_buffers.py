@@ -83,7 +83,9 @@ def divide_film(
     wanted = min(slots or default_slots(info, footprint), int(room) - SLAB_BLOCK)
     if wanted < GROUP:
         advice = "close other programs or choose another device"
-        raise MemoryBudgetError("the least number of paths", 4 * words * GROUP, memory, advice)
+        raise MemoryBudgetError(
+            "the least number of paths", 8 * words * GROUP, 8 * words * max(int(room), 0), advice
+        )
     film = -(-padded_pixels // GROUP) * GROUP
     per_plane = min(wanted // GROUP * GROUP, film)
     planes = max(1, wanted // film) if per_plane == film else 1
