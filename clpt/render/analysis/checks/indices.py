@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from functools import cache
-from typing import Any
 
 from clpt import spectra
 from clpt.errors import SceneError
@@ -25,7 +24,7 @@ def check_indices(kinds: Iterable[Kind], film: Film) -> None:
 
 
 @cache
-def _indices(cls: Any) -> tuple[str, ...]:
+def _indices(cls: type[Kind]) -> tuple[str, ...]:
     """The parameters of a class that are indices above 0."""
     return tuple(name for name, param in params(cls).items() if param.positive)
 
