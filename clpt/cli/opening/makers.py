@@ -16,7 +16,7 @@ from ..options.scene_options import SceneOptions
 from ..options.workers import Workers
 from ..printing.display import Display
 from ..process.stopping import prompt
-from .devices import kill_compilers
+from .devices import ending_at_limit, kill_compilers
 
 if TYPE_CHECKING:  # one device has no use for what several need
     from distributed import Client
@@ -74,7 +74,8 @@ class DeviceMaker(Maker):
     def make(self, scene: Scene, shown: Display, first_sample: int = 0) -> AnyRenderer:
         """Return a new renderer of a scene; note its warnings."""
         names = " and ".join(on.info.name for on in self.devices)
-        with prompt(dev.kill_compilers), shown.phase(f"building kernels for {names}"):
+        building = shown.phase(f"building kernels for {names}")
+        with prompt(dev.kill_compilers), ending_at_limit(), building:
             renderer = new_renderer(scene, self.devices, first_sample=first_sample, **self._made)
         for warning in renderer.warnings:
             shown.note(f"clpt: warning: {warning}")
