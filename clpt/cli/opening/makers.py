@@ -15,6 +15,7 @@ from ...scene import Scene
 from ..options.scene_options import SceneOptions
 from ..options.workers import Workers
 from ..printing.display import Display
+from ..printing.names import device_names
 from ..process.stopping import prompt
 from .devices import ending_at_limit, kill_compilers
 
@@ -73,9 +74,10 @@ class DeviceMaker(Maker):
 
     def make(self, scene: Scene, shown: Display, first_sample: int = 0) -> AnyRenderer:
         """Return a new renderer of a scene; note its warnings."""
-        names = " and ".join(on.info.name for on in self.devices)
-        building = shown.phase(f"building kernels for {names}")
-        with prompt(dev.kill_compilers), ending_at_limit(), building:
+        text = f"building kernels for {device_names([on.info for on in self.devices])}"
+        with prompt(dev.kill_compilers), ending_at_limit(), shown.compiling(text) as compiles:
+            for on in self.devices:
+                on.builds.on_compile = compiles
             renderer = new_renderer(scene, self.devices, first_sample=first_sample, **self._made)
         for warning in renderer.warnings:
             shown.note(f"clpt: warning: {warning}")

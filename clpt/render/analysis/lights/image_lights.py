@@ -171,8 +171,6 @@ def _loaded(image: Any, where: str, notes: list[str]) -> Floats32:
     """
     if spectral_exr.find(image, emissive=True, where=where) is not None:
         raise SceneError("spectral images can be an envmap only", where=where)
-    if image is None:
-        raise SceneError("an image is needed: a path, or an array (h, w, 3)", where=where)
     values: NDArray[Any]
     if isinstance(image, (str, Path)):
         stored = images.read_stored(image)
