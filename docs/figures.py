@@ -42,7 +42,7 @@ def records() -> list[Record]:
     return sorted(map(json.loads, lines), key=lambda record: str(record["date"]))
 
 
-def newest(bench: str, **about: Any) -> Record:
+def newest(bench: str, **about: object) -> Record:
     """Return the newest record of a bench with these values; raises KeyError if there is none."""
     for record in reversed(records()):
         if record["bench"] == bench and about.items() <= record.items():
@@ -50,7 +50,7 @@ def newest(bench: str, **about: Any) -> Record:
     raise KeyError(f"bench/results has no {bench} with {about}")
 
 
-def names(bench: str, name: str, **about: Any) -> list[str]:
+def names(bench: str, name: str, **about: object) -> list[str]:
     """Return the values that a name has in the records of a bench, in the order of their coming."""
     found = [r[name] for r in records() if r["bench"] == bench and about.items() <= r.items()]
     return list(dict.fromkeys(found))
