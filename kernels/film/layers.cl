@@ -71,7 +71,6 @@ inline void layer_put_long(integer *words, mask m, real v)
 /* Puts an id. */
 inline void layer_put_id(integer *words, mask m, integer id) { words[0] = sel_i(m, id + 1, (integer)(0)); }
 
-#if MATTES
 /* Names that a pixel's samples have met, and how often: MATTE_SLOTS words a list, ascending. A word has 1 more than the
  * name's number in its upper 25 bits and how often in its lower 7; 0 is none. Of more names the first ones of the scene
  * are kept: a slot keeps the least that comes to it, with all its counts, and hands the others to the next slot. So
@@ -104,4 +103,3 @@ inline void mattes_add(global uint *mattes, mask m, integer pixel_index, int whi
     for (int i = 0; i < LANES; i++)
         if (adds[i]) matte_add(mattes + ((size_t)pixels[i] * MATTES + which) * MATTE_SLOTS, numbers[i]);
 }
-#endif

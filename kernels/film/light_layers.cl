@@ -48,7 +48,6 @@ inline void light_layers_sum(Scene scene, mask m, integer pixel_index, integer s
 #endif
 }
 
-#if !LIGHT_PATHS
 /* Adds light that arrives at the camera from the light in row `row` of `lights`, after as many surfaces. */
 inline void light_layers_add(Scene scene, Slab path, uint at, mask m, integer surfaces, integer row, Spectrum light,
                              global uint *light_layers)
@@ -57,4 +56,3 @@ inline void light_layers_add(Scene scene, Slab path, uint at, mask m, integer su
     vec3 v = scale3(film_value(scene, light, lambdas), load_path_weight(path, at) * scene.settings->film_scale);
     light_layers_sum(scene, m, load_path_pixel_index(path, at), surfaces, row, 0, v, light_layers);
 }
-#endif

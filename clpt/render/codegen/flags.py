@@ -50,7 +50,7 @@ def has_lobe(features: Features, cls: type[Scatterer], name: str) -> bool:
     return name in declared and sources.get(name, none) != none
 
 
-def _chromatic(features: Features, cls: type[Scatterer]) -> bool:
+def is_chromatic(features: Features, cls: type[Scatterer]) -> bool:
     """Whether densities of a material's directions differ between wavelengths."""
     return features.materials.phase_varies(cls) if cls.is_phase else cls.chromatic
 
@@ -79,7 +79,7 @@ MATERIAL: dict[str, Callable[[Features, type[Scatterer]], int]] = {
     "BSDF_TRANSMITS": lambda f, cls: int(cls.kind in f.materials.transmitting),  # calculated with
     "BSDF_SHINES": lambda f, cls: cls.kind in f.materials.shining,
     "BSDF_ABSORBS": lambda f, cls: cls.absorbs,
-    "BSDF_CHROMATIC": _chromatic,
+    "BSDF_CHROMATIC": is_chromatic,
     "BSDF_FLUORESCES": fluoresces,
     "BSDF_ENDS_LIGHT_PATHS": lambda f, cls: f.transport.balanced and ends_light_paths(f, cls),
     "BSDF_MERGES": lambda f, cls: f.transport.merged and gathers_photons(f, cls),

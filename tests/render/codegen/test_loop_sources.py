@@ -81,9 +81,11 @@ def test_only_stages_are_seen_outside(name: str) -> None:
             assert len(found) > 10, "definitions are found at all"
             for head, own in found:
                 if head.startswith("static "):
-                    assert private[own] == f"{program}_{own}", head
+                    assert private[own] == f"in_{program}_{own}", head
                 elif head.startswith("STAGE("):
                     outside.append(private["PART"])
+                elif head.startswith("COMMON("):
+                    outside.append(f"loop_{own}")
                 else:
                     assert head.startswith("kernel "), f"{program}: {head} is not private"
                     outside.append(own)
