@@ -105,7 +105,7 @@ inline mask rival_light_met(Scene scene, integer row)
 inline real rival_of_light_sample(Scene scene, Rival r, Surface s, LightSample ls, real p, real p_back)
 {
     real chosen = sel(ls.pdf < 0.0f, ls.chance, ls.pdf);
-    real emission = common_light_path_pdf(scene, ls.row, s.p, ls.wi, ls.t, ls.n) / max_r(chosen, (real)(1e-30f));
+    real emission = light_path_pdf(scene, ls.row, s.p, ls.wi, ls.t, ls.n) / max_r(chosen, (real)(1e-30f));
     real arrives = rival_arrives(r, mask_of(0), p, p_back) * VERTEX_COSINE(s.n, ls.wi) * emission;
     real third = rival_limited(arrives * p_back);
     real joined = 0.0f;

@@ -1,6 +1,6 @@
 /* What light that a path meets counts, against its choice by next-event estimation and against light paths. */
 inline real met_weight(Scene scene, Slab path, uint at, Vertex v, integer light, real pdf, real other)
 {
-    real emission = common_light_path_pdf(scene, light, v.o, v.d, v.t, v.s.n);
+    real emission = light_path_pdf(scene, light, v.o, v.d, v.t, v.s.n);
     return mis_weight_of_three(pdf, other, path_rival(path, at, v.depth) * emission);
 }

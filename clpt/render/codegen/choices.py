@@ -79,6 +79,17 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         ("generated/lights.cl", "path/met_light.cl") * f.media.grids.emissive
         + ("media/grid_flight.cl",) * f.media.grids.present
     ),
+    "generated/kept_hemisphere.cl": lambda f, _: either(f.hemispheres, "path/kept_hemisphere.cl"),
+    "generated/seen_wavelengths.cl": lambda f, _: either(
+        f.fluorescence, "path/seen_wavelengths.cl"
+    ),
+    "generated/infinite_weight.cl": lambda f, _: either(
+        f.transport.balanced, "lighting/infinite_weight.cl"
+    ),
+    "generated/emit_steps.cl": lambda f, _: (
+        *either(f.transport.aimed, "lighting/aimed_rival.cl"),
+        *either(f.transport.balanced, "lighting/light_kept.cl"),
+    ),
     "generated/medium_steps.cl": lambda f, _: either(f.media.present, "media/medium_flies.cl"),
     "generated/medium_dims.cl": lambda f, _: either(not f.shadow_media, "media/medium_dims.cl"),
     "generated/light_media.cl": lambda f, _: either(f.light_media, "media/light_media.cl"),

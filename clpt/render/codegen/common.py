@@ -37,8 +37,6 @@ def _parameters(text: str) -> tuple[tuple[str, str], ...]:
     return tuple(found)
 
 
-_AT_LIGHT = "Scene scene, integer row, vec3 p, "
-
 # What is short or called often stays inline: a call keeps structs in memory.
 FUNCTIONS = (
     Common(
@@ -55,14 +53,10 @@ FUNCTIONS = (
     ),
     Common(
         "real",
-        "light_path_pdf",
-        _parameters(_AT_LIGHT + "vec3 wi, real t, vec3 n"),
-        lambda f, cls: f.transport.aimed and not flags.is_null(f, cls),
-    ),
-    Common(
-        "real",
         "light_begins_pdf",
-        _parameters(_AT_LIGHT + "vec3 hemisphere, vec3 wi, real t, vec3 n, real *found"),
+        _parameters(
+            "Scene scene, integer row, vec3 p, vec3 hemisphere, vec3 wi, real t, vec3 n, real *found"
+        ),
         lambda f, cls: f.transport.balanced and not flags.is_null(f, cls),
     ),
 )

@@ -12,7 +12,6 @@ from collections.abc import Callable
 from clpt.render.contract.features import Features
 from clpt.render.contract.features.macros import said
 from clpt.render.contract.texture_records import IMAGES
-from clpt.scene.layers import LAYERS, WORDS
 from clpt.scene.params import device_params
 from clpt.scene.scatterer import Scatterer
 
@@ -91,17 +90,12 @@ MATERIAL: dict[str, Callable[[Features, type[Scatterer]], int]] = {
     "USES_CHOICE": lambda f, cls: cls.uses_lobe_sample or cls.fluoresces or not f.lights.few,
 }
 
-# the layers whose words in a pixel begin at a place of their own, by the macros that tell it
-_LAYERS = {f"LAYER_{name.upper()}": name for name in LAYERS if LAYERS[name].form in WORDS}
-
-SCENE = frozenset({*dict(said(Features())), *_LAYERS})  # the names of flags of a scene
+SCENE = frozenset(dict(said(Features())))  # the names of flags of a scene
 
 
 def of_scene(features: Features) -> Defines:
     """Return the macros that features say."""
-    places = features.film.layers.places
-    layers = {macro: places.get(name, 0) for macro, name in _LAYERS.items()}
-    return layers | {name: value for name, value in said(features) if value is not None}
+    return {name: value for name, value in said(features) if value is not None}
 
 
 def of_material(features: Features, cls: type[Scatterer]) -> Defines:
