@@ -7,7 +7,7 @@ import functools
 import logging
 import os
 import threading
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -129,11 +129,14 @@ class Builds:
     """The programs that have been built so far, and the seconds that took (summed over threads).
 
     cached: how many of them came from clpt's own cache; drivers do not tell about theirs.
+    on_compile: called when a program, or a part of one, is about to be given to a compiler; threads
+    call it.
     """
 
     programs: int = 0
     cached: int = 0
     seconds: float = 0.0
+    on_compile: Callable[[], None] = lambda: None
     _lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
 
     def add(self, seconds: float, cached: bool) -> None:
@@ -465,7 +468,7 @@ def _cl_devices() -> Iterator[cl.Device]:
     try:
         platforms = runtimes.platforms()
     except cl.Error as error:
-        log.warning("no OpenCL platform: %s", error)
+        log.info("no OpenCL platform: %s", error)  # who needs a device says so
         return
     for platform in sorted(platforms, key=lambda platform: platform.name):
         try:
