@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import dataclasses
+import itertools
 import json
 import logging
 import re
@@ -51,6 +52,20 @@ def test_commands_and_options_exist():
     lines = [(page.name, line) for page in PAGES for line in pages.commands(page)]
     unknown = [(name, line, pages.unknown(line)) for name, line in lines]
     assert [": ".join(told) for told in unknown if told[-1]] == []
+
+
+@pytest.mark.parametrize("name", ["rendering", "image_tools"])
+def test_commands_name_files_that_there_are(name: str):
+    """Of this repository, or made by a command before; what is behind a pipe is another program."""
+    made: set[str] = set()
+    for line in pages.commands(DOCS / f"{name}.md"):
+        words = shlex.split(re.split(r" [|>] ", line)[0], comments=True)
+        target = {words[3]} if words[1] == "convert" else set()
+        for before, word in itertools.pairwise(words[1:]):
+            if before == "-o" or word in target:
+                made.add(word)
+            elif "/" in word or re.search(r"\.[a-z]{3}$", word):
+                assert (ROOT / word).exists() or word in made, line
 
 
 def test_commands_of_the_gallery_make_pictures_of_the_size_that_is_shown():
