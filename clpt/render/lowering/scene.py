@@ -310,8 +310,6 @@ def _lower_camera(index: SceneIndex, encoder: Encoder) -> tuple[int, ...]:
     """Append the camera; return the rows in `spectra` of its glasses that disperse."""
     camera, film = index.scene.camera, index.scene.film
     glasses = cameras.dispersive_glasses(camera)
-    for glass in glasses:
-        encoder.spectra.check_index(glass, f"{camera.kind}.glass")
     rows = tuple(encoder.spectra.row(glass) for glass in glasses) if index.spectral else ()
     _, words = lower_camera(camera, film.width, film.height, rows)
     encoder.store.append_floats("camera", words)
