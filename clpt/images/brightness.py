@@ -1,4 +1,4 @@
-"""How bright a picture is for a screen, and the exposure that suits it."""
+"""Brightness of pictures on a screen: what is white or black, and the exposure that suits."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LOOKED_AT = 1 << 16  # pixels that are enough to judge a picture
 
 @dataclass(frozen=True)
 class Levels:
-    """How a picture comes out on a screen.
+    """Shares of a picture on a screen.
 
     lit: whether any light came; white: the share of the lit pixels that are white; black: that of
     all pixels which are black.
