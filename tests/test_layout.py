@@ -10,7 +10,7 @@ import pytest
 
 from clpt import device
 from clpt.device import kernels_folder
-from clpt.layout import TYPES, Constants, Record, bits
+from clpt.layout import SLAB_BLOCK, TYPES, Constants, Record, bits
 from clpt.records import CONSTANTS, LIGHT, PATH, SETTINGS, SHAPE, SLABS
 from clpt.render.codegen.signatures import scene_text
 from clpt.render.contract import camera_records
@@ -33,6 +33,7 @@ def run(on: device.Device, text: str, lanes: int, *arrays: np.ndarray) -> None:
         "generated/spectrum_read.cl": '#include "spectrum/spectral_read.cl"\n',
     }
     defines = {"LANES": lanes, "SPECTRA_SIZE": 471, "SPECTRA_STEP": "1.0f"}
+    defines["SLAB_BLOCK"] = SLAB_BLOCK if lanes == 1 else 0
     program = device.build(on, device.assemble("probe.cl", virtual, defines))
     flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
     buffers = [cl.Buffer(on.context, flags, hostbuf=a) for a in arrays]
@@ -90,11 +91,12 @@ def test_offsets_on_the_device(opened: device.Device, record: Record) -> None:
 @pytest.mark.parametrize("lanes", [1, 8, 16])
 def test_slab_members_go_in_and_out(opened: device.Device, lanes: int) -> None:
     """Every word of a slab, loaded and stored elsewhere member by member, lands where it should."""
-    stride = 48
     rng = np.random.default_rng(1)
-    source = rng.normal(size=(PATH.words, stride)).astype(np.float32)
+    shape = (2, PATH.step, SLAB_BLOCK) if lanes == 1 else (1, PATH.step, 2 * SLAB_BLOCK)
+    source = rng.normal(size=shape).astype(np.float32)
+    stride = PATH.step if lanes == 1 else 2 * SLAB_BLOCK
     target = np.zeros_like(source)
-    slots = np.arange(16, 16 + lanes, dtype=np.uint32)
+    slots = np.arange(48, 48 + lanes, dtype=np.uint32)
     lane_mask = (rng.random(lanes) < 0.6).astype(np.uint32)
     read = "(*(global const integer *)d)" if lanes > 1 else "((integer)d[0])"
     moves = "".join(
@@ -110,7 +112,8 @@ def test_slab_members_go_in_and_out(opened: device.Device, lanes: int) -> None:
     run(opened, kernel, lanes, source, target, slots, lane_mask)
     expected = np.zeros_like(source)
     kept = slots[lane_mask != 0]
-    expected[:, kept] = source[:, kept]
+    block, within = kept // shape[2], kept % shape[2]
+    expected[block, : PATH.words, within] = source[block, : PATH.words, within]
     assert np.array_equal(target, expected)
 
 

@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from ..errors import SceneError
-from ..render.film import film_file
-from ..render.film.saved_film import SavedFilm, other_devices
+from ..formats import locate
 from ..version import VERSION
-from .files import checkpoints, outputs
 from .files.targets import checked
 from .options.grading import GradingOptions, grading_options, names_option
 from .options.records import with_records
 from .options.scene_options import denoise_option
+
+if TYPE_CHECKING:
+    from ..render.film.saved_film import SavedFilm
 
 
 @click.command()
 @click.argument("films", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option(
     "-o", "--output", "paths", multiple=True, required=True, type=click.Path(path_type=Path),
-    help="Where to write: .film .exr .png .hdr .pfm .npy; may be given several times.",
+    help="Where to write: .film .exr .png .jpg .webp .hdr .pfm .npy; may be given several times.",
 )  # fmt: skip
 @denoise_option
 @grading_options
@@ -41,6 +43,11 @@ def merge(
     (NAME.resume.exr) are films too. Films of another scene, setting or version are refused, and
     those that have a sample that another one has. No device is needed.
     """
+    for film in films:
+        locate(film)
+    from ..render.film.saved_film import other_devices  # here: help needs no OpenCL
+    from .files import checkpoints, outputs
+
     how = graded.grading
     targets = checked(paths)
 
@@ -48,6 +55,8 @@ def merge(
         if not quiet:
             click.echo(text, err=True)
 
+    if text := how.unused(targets):
+        note(f"clpt: warning: {text}")
     total = added(films)
     for change in other_devices(total.sessions, total.sessions[0].device):
         note(f"clpt: warning: the films are of several classes of devices: {change}")
@@ -67,6 +76,8 @@ def merge(
 
 def added(films: tuple[Path, ...]) -> SavedFilm:
     """Return the film of the samples of all. Raises SceneError, which names files."""
+    from ..render.film import film_file
+
     total = film_file.read(films[0])
     for path in films[1:]:
         try:

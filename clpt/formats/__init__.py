@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import difflib
 import importlib
+import itertools
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 from clpt import budget as budgets
 from clpt.budget import Budget
+from clpt.choices import Missing
 from clpt.errors import SceneError
-from clpt.formats.missing import Missing
-from clpt.scene import Scene
-from clpt.scene.materials import Material
+
+if TYPE_CHECKING:  # a name of a file is looked up without the kinds of scenes
+    from clpt.scene import Scene
+    from clpt.scene.materials import Material
 
 FORMATS = {  # the module whose `load` reads files of a suffix, imported when it is used
     ".json": "native",
@@ -34,6 +38,7 @@ WITH_VARIABLES = ("mitsuba", "gltf")
 # The scene of a folder: the first of these, else the one with the folder's name, else the only one.
 IN_FOLDERS = ("scene.json", "scene.xml", "scene.pbrt", "scene-v4.pbrt")
 SCENES = (".xml", ".pbrt", ".pbrt.gz", ".glb", ".gltf")
+MOST_COMPARED, CLOSE = 4096, 0.7  # names of a folder, and how near one is that is meant
 MOST_NAMED = 8  # scenes of a folder that a message names
 
 __all__ = ["FORMATS", "load", "locate", "save"]
@@ -82,7 +87,8 @@ def _load(
         known = " ".join(FORMATS)
         raise SceneError(f"unknown format {path.suffix!r}; known: {known}", file=path)
     if "camera" in variables and kind not in WITH_VARIABLES:
-        message = f"only .xml and glTF have cameras to choose from, no {variables['camera']!r}"
+        message = f"only .xml and glTF have cameras to choose from, no {variables['camera']!r}; "
+        message += "--camera AZIMUTH,ELEVATION such as 45,20 looks at all of a scene"
         raise SceneError(message, file=path)
     if variables and kind not in WITH_VARIABLES:
         raise SceneError(
@@ -116,6 +122,8 @@ def save(scene: Scene, path: str | Path, /) -> None:
     Raises TypeError for what is no scene; SceneError for another suffix, for a buffer on a device,
     and where a file cannot be written.
     """
+    from clpt.scene import Scene
+
     path = Path(path)
     if not isinstance(scene, Scene):
         raise TypeError(f"clpt.save writes a clpt.Scene, not {type(scene).__name__}")
@@ -127,18 +135,52 @@ def save(scene: Scene, path: str | Path, /) -> None:
 
 
 def locate(path: str | Path, /) -> Path:
-    """Return the file that `load` reads: of a folder the scene in it. Raises SceneError."""
+    """Return the file that `load` reads: of a folder the scene in it. Raises SceneError.
+
+    A relative path that begins with `scenes` and is not there names one of clpt's own scenes.
+    """
     path = Path(path)
     try:
         if path.is_dir():
             return _inside(path)
         if path.is_file():
             return path
+        own = scenes_folder().parent / path
+        if path.parts[:1] == ("scenes",) and ".." not in path.parts and own.exists():
+            return locate(own)
     except SceneError:
         raise
     except (OSError, ValueError) as error:
         raise SceneError(f"cannot be read: {error}", file=path) from None
-    raise SceneError("there is no such file", file=path)
+    raise SceneError(f"there is no such file{_nearest_file(path)}", file=path)
+
+
+def _nearest_file(path: Path) -> str:
+    """Return the end of a message: scenes and folders of nearly the same name, if there are any.
+
+    Of a path whose folder is not there, folders near the first one that is missing.
+    """
+    while not path.parent.is_dir() and path.parent != path:
+        path = path.parent
+    try:
+        names = [
+            one.name
+            for one in itertools.islice(path.parent.iterdir(), MOST_COMPARED)
+            if one.is_dir() or one.name.lower().endswith(tuple(FORMATS))
+        ]
+    except OSError:
+        return ""
+    near = difflib.get_close_matches(path.name, names, n=2, cutoff=CLOSE)
+    return (
+        f"; did you mean {' or '.join(str(path.parent / name) for name in near)}?" if near else ""
+    )
+
+
+def scenes_folder() -> Path:
+    """Return the folder of clpt's own scenes: in the installed package, or of the checkout."""
+    package = Path(__file__).resolve().parent.parent
+    installed = package / "scenes"
+    return installed if installed.is_dir() else package.parent / "scenes"
 
 
 def _inside(folder: Path) -> Path:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from clpt.choices import AUTO, MOST_LIGHT_PATHS
 from clpt.errors import SceneError, UnknownKindError
 from clpt.scene.layers import LAYERS
 from clpt.scene.params import Kind, choice, emission, flag, host, real
@@ -17,9 +18,7 @@ from clpt.spectra.spaces import TEMPERATURES
 from clpt.spectra.spectrum import LONGEST, SHORTEST
 
 MOST_BANDS = 1024
-MOST_LIGHT_PATHS = 64  # for a sample of the camera
 FEWEST_LIGHT_PATHS = 1.0 / 64
-AUTO = "auto"  # light paths as suits the scene
 MOST_GROUPS = 64  # of wavelengths
 MOST_PHOTON_MEMORY = 8192  # [MiB]; words of photons are numbered by 31 bits
 NARROWEST = 0.01  # [nm], a range of wavelengths
@@ -37,6 +36,17 @@ class Integrator(Kind):
             if not whole or (depth < 1 and not unlimited):
                 least = "1 or more, or -1 for no limit" if name == "max_depth" else "1 or more"
                 raise SceneError(f"must be {least}, not {depth!r}", where=f"{self.kind}.{name}")
+
+
+LONG = 64  # depth from which panes of thin glass on the way do not matter
+
+
+def is_long(max_depth: int) -> bool:
+    """Return whether paths are so long that it does not matter whether panes of glass count.
+
+    Other renderers count them. Light of so many bounces is below a thousandth of the picture.
+    """
+    return max_depth == -1 or max_depth >= LONG
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -61,7 +71,7 @@ class Path(Integrator):
         form="number_or_auto",
     )
     free_panes: bool = flag(
-        False, "thin glass is as a null surface where light goes straight through it: no depth"
+        True, "thin glass is as a null surface where light goes straight through it: no depth"
     )
     guiding: bool = host(
         False, "directions are learned from light paths before the first sample; without others"
@@ -132,6 +142,7 @@ class Auto(Integrator):
     max_depth: int = host(8, "longest path, as of `path`; -1: no limit")
     rr_depth: int = host(3, "depth from which Russian roulette may end a path")
     hide_lights: bool = flag(False, "the camera sees through lights, also those on shapes")
+    free_panes: bool = flag(True, "as of `path`")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

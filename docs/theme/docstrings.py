@@ -35,11 +35,19 @@ ROLES = {
     "reradiation": "`spectra.Reradiation`",
     "orders": "numbers",
     "layers": "`Layer`s",
+    "quantity": "spectrum",
+    "angular": "rows of numbers",
+    "measurement": "`measured.Measurement`",
+    "merl": "`measured.MerlTable`",
 }
 
 
 class Sentences(griffe.Extension):
     """Adds markup to docstrings while griffe reads the sources."""
+
+    def on_module(self, *, mod: griffe.Module, **_: object) -> None:
+        """Mark the docstring of a module."""
+        _mark(mod, set())
 
     def on_function(self, *, func: griffe.Function, **_: Any) -> None:
         """Mark the names of parameters in a docstring."""

@@ -1,8 +1,19 @@
-/* Slabs: structure-of-arrays state, one stream per word. A work-item serves LANES neighbours, from the slot `at` on. */
-typedef struct { global float *words; uint stride; } Slab;
+/* Slabs: the state of paths, a word of all slots side by side, then the next word; a work-item serves LANES neighbours,
+ * from the slot `at` on. So that neighbours read neighbours, a CPU has one such run of all slots. A GPU has one for each
+ * block of SLAB_BLOCK slots: all words of a slot then lie at fixed distances from the first, whose address is the one
+ * that a work-item keeps, in place of one a word. step: words of a slot in a block; else from a word to the next. */
+typedef struct { global float *words; uint step; } Slab;
 
-#define slab_read(s, c, at) block_load((s).words + (size_t)(c) * (s).stride + (at))
-#define slab_write(s, c, at, m, v) slab_store((s).words + (size_t)(c) * (s).stride + (at), m, v)
+#if SLAB_BLOCK
+#define SLAB_STEP(words_of_slot, stride) words_of_slot
+#define slab_at(s, c, at) \
+    ((s).words + ((size_t)((at) / SLAB_BLOCK * SLAB_BLOCK) * (s).step + (at) % SLAB_BLOCK) + (c) * SLAB_BLOCK)
+#else
+#define SLAB_STEP(words_of_slot, stride) stride
+#define slab_at(s, c, at) ((s).words + (size_t)(c) * (s).step + (at))
+#endif
+#define slab_read(s, c, at) block_load(slab_at(s, c, at))
+#define slab_write(s, c, at, m, v) slab_store(slab_at(s, c, at), m, v)
 inline void slab_store(global float *p, mask m, real v)
 {
 #if LANES == 1
@@ -12,14 +23,23 @@ inline void slab_store(global float *p, mask m, real v)
 #endif
 }
 
+/* Where words of any slots are, from that of slot 0 on. */
+inline integer slab_places(Slab s, integer slots)
+{
+#if SLAB_BLOCK
+    integer within = slots & (SLAB_BLOCK - 1);
+    return (slots - within) * (int)s.step + within;
+#else
+    return slots;
+#endif
+}
+
 /* Copies word c of any slots to neighbours from `at` on, and back where m. */
 inline void slab_gather(Slab s, uint c, integer slots, uint at)
 {
-    global float *words = s.words + (size_t)c * s.stride;
-    block_store(words + at, gather(words, slots));
+    block_store(slab_at(s, c, at), gather(slab_at(s, c, 0u), slab_places(s, slots)));
 }
 inline void slab_scatter(Slab s, uint c, uint at, integer slots, mask m)
 {
-    global float *words = s.words + (size_t)c * s.stride;
-    scatter_if(words, slots, m, block_load(words + at));
+    scatter_if(slab_at(s, c, 0u), slab_places(s, slots), m, block_load(slab_at(s, c, at)));
 }

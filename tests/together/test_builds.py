@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from clpt.errors import SceneError
+from clpt.render.analysis.checks import check
 from clpt.render.lowering.scene import lower
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Lens, Perspective
@@ -79,7 +80,8 @@ MET: dict[str, dict[str, Any]] = {  # parts that once could not be in one scene
         for cls in SAMPLERS
     },
     "photons that diffuse surfaces leave": {
-        "shapes": [Sphere(emission=Area())], "integrator": Vcm(),
+        "shapes": [Sphere(emission=Area())],
+        "integrator": Vcm(),
     },
     "a number mixed of spectra, all of it the first": {
         "shapes": [Sphere(material=Phong(exponent=Mix(first=TABLE, amount=0.0)))]
@@ -110,11 +112,13 @@ def test_parts_that_once_did_not_go_together(parts: str, mode: str) -> None:
 @hypothesis.given(scenes(), ways())
 def test_scenes_build(scene: Scene, way: Way) -> None:
     try:
-        features = lower(scene).features
+        check(scene)
     except SceneError as error:
         assert error.where and "\n" not in str(error)
         hypothesis.reject()
-    except Exception as error:
+    try:
+        features = lower(scene).features
+    except Exception as error:  # what `check` has let pass is not refused any more
         raise AssertionError(f"{error!r} of\n{shown(scene)}") from error
     for error in errors(texts(features, way)):
         assert not error, f"{error[:2000]}\n{way}\n{shown(scene)}"

@@ -8,12 +8,12 @@ from typing import Any
 
 import click
 
+from ...choices import AUTO, MOST_LIGHT_PATHS, MOST_SAMPLES, OBSERVERS
 from ...errors import nearest
-from ...scene.integrators import AUTO, MOST_LIGHT_PATHS
-from ...spectra import read_sensor
-from ...spectra.sensors import OBSERVERS
 
 LARGEST = 65536  # pixels of a side
+MOST_NOISE = 0.5  # that --noise takes: beyond, a few samples of each pixel are enough
+MOST_STOPS = 120.0  # float32 has not many more
 
 
 class Size(click.ParamType):
@@ -31,13 +31,68 @@ class Size(click.ParamType):
         return width, height
 
 
+class Noise(click.ParamType):
+    """A share such as 0.02 or 2%, at most MOST_NOISE; 0 for none."""
+
+    name = "SHARE"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        found = re.fullmatch(r"(\d{1,9}(?:\.\d*)?|\.\d+)(?:e-?\d{1,2})?( ?%)?", str(value).strip())
+        if not found:
+            self.fail(f"{value!r} does not look like 0.02 or 2%", param, ctx)
+        share = float(str(value).strip().rstrip(" %")) / (100.0 if found[2] else 1.0)
+        if share > MOST_NOISE:
+            advice = f"; write {share:g}% or {share / 100.0:g}" if not found[2] else ""
+            self.fail(f"{value} is a noise above {MOST_NOISE:.0%}{advice}", param, ctx)
+        return share
+
+
+class Count(click.ParamType):
+    """A whole number from 1 on, such as 256, 1k or 1M."""
+
+    name = "N"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> int:
+        found = re.fullmatch(r"(\d{1,10})(?:\.(\d{1,6}))?([kM]?)", str(value).strip())
+        number = 0.0
+        if found:
+            number = (
+                float(f"{found[1]}.{found[2] or 0}") * {"": 1, "k": 1000, "M": 1000_000}[found[3]]
+            )
+        if not found or number != int(number):
+            self.fail(f"{value!r} is no whole number such as 256, 1k or 1M", param, ctx)
+        if not 1 <= number <= MOST_SAMPLES:
+            self.fail(f"{value} is outside of 1 to {MOST_SAMPLES}", param, ctx)
+        return int(number)
+
+
+class Stops(click.ParamType):
+    """A number of stops, or auto."""
+
+    name = "STOPS-OR-AUTO"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float | str:
+        limits = click.FloatRange(-MOST_STOPS, MOST_STOPS)
+        return AUTO if value == AUTO else limits(value, param, ctx)
+
+
 class SensorName(click.ParamType):
     """An observer's name, or the file of a camera's curves."""
 
     name = "NAME-OR-FILE"
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        return value if value in OBSERVERS else read_sensor(value)
+        if value in OBSERVERS:
+            return value
+        from ...spectra import read_sensor  # here: help needs no tables of spectra
+
+        return read_sensor(value)
 
 
 class LightPaths(click.ParamType):

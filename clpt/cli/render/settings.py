@@ -5,20 +5,23 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from ... import tev
-from ...scene import Scene
+from ...choices import MOST_SAMPLES, VIEWER
 from ..files.standard_output import FORMATS
 from ..files.targets import default
 from ..options.changes import Sampling
 from ..options.grading import GradingOptions
 from ..options.records import Command, with_options
 from ..options.scene_options import SceneOptions
+from ..options.values import Count, Noise
 from ..options.workers import Workers
 from .frame_values import Frames
+
+if TYPE_CHECKING:
+    from ...scene import Scene
 
 
 class SampleRange(click.ParamType):
@@ -27,8 +30,6 @@ class SampleRange(click.ParamType):
     name = "FIRST:END"
 
     def convert(self, value: Any, param: Any, ctx: Any) -> tuple[int, int]:
-        from ...render.film_renderer import MOST_SAMPLES  # here: help needs no OpenCL
-
         found = re.fullmatch(r"(\d{1,10}):(\d{1,10})", str(value).strip())
         if not found or not int(found[1]) < int(found[2]) <= MOST_SAMPLES:
             self.fail(f"{value!r} is no range of samples such as 0:1024", param, ctx)
@@ -68,6 +69,8 @@ class Address(click.ParamType):
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
         if not isinstance(value, str):
             return value
+        from ... import tev  # here: help needs no numpy
+
         try:
             return tev.address(value)
         except ValueError as error:
@@ -211,8 +214,9 @@ _OUTPUT = (
     click.option(
         "-o", "--output", "paths", multiple=True,
         type=click.Path(path_type=Path, allow_dash=True),
-        help="Where to write: .exr .png .hdr .pfm .npy, or - for the standard output; may be given "
-        "several times; {scene} is the scene's name, {camera} that of --camera all.  "
+        help="Where to write: .exr .png .jpg .webp .hdr .pfm .npy, or - for the standard "
+        "output; may be given several times; {scene} is the scene's name, {camera} that of "
+        "--camera all.  "
         "[default: {scene}.exr and {scene}.png]",
     ),
     click.option(
@@ -225,10 +229,10 @@ _OUTPUT = (
     ),
 )  # fmt: skip
 _UNTIL = (
-    click.option("--spp", type=click.IntRange(1, 2**31 - 1), help="Samples per pixel."),
+    click.option("--spp", type=Count(), help="Samples per pixel: 256, 1k, 1M."),
     click.option(
-        "--noise", type=click.FloatRange(0.0), metavar="SHARE",
-        help="Stop sampling pixels with less noise, such as 0.02 of their light, after --denoise "
+        "--noise", type=Noise(),
+        help="Stop sampling pixels with less noise, such as 2% of their light, after --denoise "
         "if that is given; 0: never.",
     ),
     click.option("--time", "limit", type=Duration(), help="Stop after 30s, 5m, 1h30m."),
@@ -266,7 +270,7 @@ _SEED = click.option(
 
 
 tev_option = click.option(
-    "--tev", type=Address(), is_flag=False, flag_value=tev.HOST,
+    "--tev", type=Address(), is_flag=False, flag_value=VIEWER,
     help="Show the picture in tev or HDRView while it is rendered.  [default: 127.0.0.1:14158]",
 )  # fmt: skip
 

@@ -38,8 +38,8 @@ CLOSE_SECONDS = 3.0  # in which a session ends that waits for no compiler
 
 def show(scene: Path, settings: Settings) -> int:
     """Show a scene until a signal comes; return the exit status. Raises what its session does."""
-    with extra("view", "clpt view"):
-        from ...view.server import Server
+    from ...view.server import Server  # here: asyncio and sockets are for this command alone
+
     file = locate(scene)
     begins = load_view(settings.opened) if settings.opened is not None else None
     looked_at = _display(settings)
@@ -73,6 +73,8 @@ def _display(settings: Settings) -> Display:
     """Return how the picture is shown at first. Raises SceneError, click.UsageError."""
     grading = settings.graded.grading
     tone = OF_VIEW if grading.view else grading.tone
+    if grading.exposure == "auto":
+        raise click.UsageError("--exposure auto is for files: give the page a number to begin with")
     return Display(grading.exposure, tone, grading.view)
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from clpt import lenses
+from clpt.choices import AUTO
 from clpt.errors import UnknownKindError
 from clpt.formats.mitsuba.media import around
 from clpt.formats.mitsuba.properties import Context, Properties, unknown
@@ -338,15 +339,18 @@ def _depths(props: Properties, usual: int = -1) -> dict[str, Any]:
 
 
 def _path(props: Properties) -> Integrator:
-    return integrators.Path(**_depths(props), light_paths=_light_paths(props))
+    depths = _depths(props)
+    # with free panes lights behind them are hidden too, as by `volpath`
+    free = integrators.is_long(depths["max_depth"]) and not depths["hide_lights"]
+    return integrators.Path(**depths, light_paths=_light_paths(props), free_panes=free)
 
 
 def _light_paths(props: Properties) -> float | str:
     """Ours, see docs/mitsuba_plugins.md: Mitsuba's path has no such parameter."""
     child = props.named.get("light_paths")
     if child is not None and child.tag == "string":
-        return props.text("light_paths", "", (integrators.AUTO,))
-    return integrators.AUTO if child is None else props.number("light_paths", 0.0)
+        return props.text("light_paths", "", (AUTO,))
+    return AUTO if child is None else props.number("light_paths", 0.0)
 
 
 def _vcm(props: Properties) -> Integrator:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 
 from clpt import bvh, device
+from clpt.layout import SLAB_BLOCK
 from clpt.render.codegen import (
     blocks,
     bounce,
@@ -56,7 +57,7 @@ def _stages(
     features: Features, layout: str, lanes: int, interleaved: bool, part: bool = False
 ) -> dict[str, device.Source]:
     """The texts of a bounce but for queues and shading, see `sources`; part: of a loop."""
-    files, defines = _shared(features, layout), flags.of_scene(features)
+    files, defines = _shared(features, layout), _defines(features, lanes)
     make = functools.partial(_source, part=part)
     begin, join = bounce.begin_and_join(features)
     trace_lanes = bounce.trace_lanes(layout, lanes)
@@ -95,7 +96,7 @@ def _shading(
     features: Features, layout: str, lanes: int, *, queued: bool = False, part: bool = False
 ) -> dict[str, device.Source]:
     """The texts that shade, see `sources`; part: of a loop, for all kinds of paths of the scene."""
-    files, defines = _shared(features, layout), flags.of_scene(features)
+    files, defines = _shared(features, layout), _defines(features, lanes)
     texts = {}
     for cls in features.materials.leaves:
         own = {
@@ -154,7 +155,7 @@ def loop_sources(
         "generated/block.cl": blocks.blocks_text(features.passes),
         "generated/bounce_stages.cl": bounce.stages_text(features, layout, lanes, interleaved),
     }
-    loop = _source("loop", files, flags.of_scene(features), lanes)
+    loop = _source("loop", files, _defines(features, lanes), lanes)
     parts = {name: made[name].with_private(name) for name in used}
     return {**parts, "loop": loop.with_private("loop")}
 
@@ -170,12 +171,17 @@ def _common(features: Features, layout: str, lanes: int) -> device.Source:
 
 def _alone(features: Features, layout: str, *names: str) -> dict[str, device.Source]:
     """The texts of programs whose work-items serve a pixel each."""
-    files, defines = _shared(features, layout), flags.of_scene(features)
+    files, defines = _shared(features, layout), _defines(features, 1)
     return {name: _source(name, files, defines, 1) for name in names}
 
 
 def _static(texts: dict[str, device.Source]) -> dict[str, device.Source]:
     return {name: text.with_static() for name, text in texts.items()}
+
+
+def _defines(features: Features, lanes: int) -> flags.Defines:
+    """What is the same for all programs of a scene; lanes: paths that a work-item shades."""
+    return {**flags.of_scene(features), "SLAB_BLOCK": SLAB_BLOCK if lanes == 1 else 0}
 
 
 def _source(
