@@ -72,10 +72,42 @@ class Scene:
     extra: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        self.shapes, self.lights = _listed(self.shapes, "shapes"), _listed(self.lights, "lights")
+        check_parts(self)
         if isinstance(self.spp, bool) or not isinstance(self.spp, int) or self.spp < 1:
             raise SceneError(f"must be a whole number above zero, not {self.spp!r}", where="spp")
         if self.noise is not None:
             check_noise(self.noise)
+
+
+def check_parts(scene: Scene) -> None:
+    """Raise SceneError for a part of a scene that is of another category."""
+    _check_kind(scene.camera, cameras.Camera, "camera")
+    _check_kind(scene.integrator, integrators.Integrator, "integrator")
+    _check_kind(scene.sampler, integrators.Sampler, "sampler")
+    _check_kind(scene.film, Film, "film")
+    for i, shape in enumerate(scene.shapes):
+        if not isinstance(shape, shapes.Shape):
+            _check_kind(shape, shapes.Shape, f"shapes[{i}]")
+    for i, light in enumerate(scene.lights):
+        _check_kind(light, lights.Light, f"lights[{i}]")
+
+
+def _listed(held: Any, name: str) -> list[Any]:
+    """Return a list as it is, one thing or other items in a new one. Raises SceneError."""
+    if isinstance(held, (list, Kind)):
+        return held if isinstance(held, list) else [held]
+    try:
+        return list(held)
+    except TypeError:
+        raise SceneError(f"must be a list of {name}, not {held!r}", where=name) from None
+
+
+def _check_kind(value: Any, base: type[Kind], where: str) -> None:
+    """Raise SceneError for a value that is of no kind of a category."""
+    if not isinstance(value, base):
+        message = f"must be of a kind of {base.__name__.lower()}, not {value!r}"
+        raise SceneError(message, where=where)
 
 
 def check_noise(noise: Any) -> None:

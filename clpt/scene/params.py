@@ -39,7 +39,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from clpt.errors import SceneError
+from clpt.errors import SceneError, UnusedParameterError
 from clpt.measured import Measurement, MerlTable
 from clpt.spectra import (
     RGB,
@@ -211,12 +211,21 @@ def layers(doc: str) -> Any:
     return _field((), Param("layers", doc))
 
 
-def host(default: Any, doc: str, unit: str = "", *, form: HostForm | None = None) -> Any:
+def host(
+    default: Any,
+    doc: str,
+    unit: str = "",
+    *,
+    form: HostForm | None = None,
+    positive: bool = False,
+) -> Any:
     """Declare what only the host needs: geometry, matrices, nested kinds.
 
-    form: what it holds; None for what the type of the default implies.
+    form: what it holds; None for what the type of the default implies. positive: of a number.
     """
-    return _field(default, Param("host", doc, unit, form=form or _form_of(default)))
+    low = 0.0 if positive else -math.inf
+    made = Param("host", doc, unit, low, form=form or _form_of(default), positive=positive)
+    return _field(default, made)
 
 
 def _form_of(default: Any) -> str:
@@ -241,10 +250,45 @@ class classproperty:
         return self.function(owner)
 
 
+class KindType(type):
+    """The type of kinds: what all of them do with the arguments that they are called with.
+
+    A name that the kind does not have raises UnusedParameterError with the nearest ones. Shorthands
+    become the parameters that they stand for. What is wrong with an object tells its name.
+    """
+
+    def __call__(cls, /, *values: Any, **given: Any) -> Any:
+        kind: Any = cls
+        if values:
+            example = next(iter((*device_params(kind), *_field_names(kind))), "")
+            message = f"{cls.__name__} takes its parameters by name: {cls.__name__}({example}=...)"
+            raise TypeError(message)
+        try:
+            return super().__call__(**_spelled_out(kind, given))
+        except SceneError as error:
+            name, where = given.get("name"), error.where or kind.kind
+            if name and isinstance(name, str) and where.startswith(kind.kind):
+                error.place_at(f"{kind.kind} {name!r}{where.removeprefix(kind.kind)}")
+            raise
+
+
+def _spelled_out(kind: Any, given: dict[str, Any]) -> dict[str, Any]:
+    """Return arguments of a kind without shorthands. Raises SceneError, UnusedParameterError."""
+    known, short = _field_names(kind), kind.shorthands
+    for name in given:
+        if name not in known and name not in short:
+            raise UnusedParameterError(kind.kind, name, (*known, *short))
+    asked = {name: given[name] for name in short if given.get(name) is not None}
+    plain = {name: value for name, value in given.items() if name not in short}
+    return {**plain, **kind.spelled_out(asked, plain)} if asked else plain
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Kind:
+class Kind(metaclass=KindType):
     """Base of all kinds; the class name gives the name in files and kernels."""
 
+    # Arguments that stand for others, and how each is documented: see `spelled_out`.
+    shorthands: ClassVar[Mapping[str, Param]] = MappingProxyType({})
     needs_wavelengths: ClassVar[bool] = False  # its struct in the kernels has `lambdas`
     # Where all numbers of one of these are above 0, its struct has the `luminance` of `base_color`,
     # and its kernel file includes core/luminance.cl.
@@ -272,6 +316,15 @@ class Kind:
                 message = f"is nested deeper than {MOST_NESTED} parts"
             raise SceneError(message, where=self.kind)
         self.check()
+
+    @classmethod
+    def spelled_out(cls, short: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the parameters that shorthands stand for.
+
+        short: shorthands with their values, none of them None; given: the other arguments. Raises
+        SceneError where one stands for a parameter that is given too.
+        """
+        raise NotImplementedError
 
     def check(self) -> None:
         """Raise SceneError where the parameters contradict each other."""
@@ -336,6 +389,8 @@ def interior_params(cls: type) -> Mapping[str, Param]:
 
 
 def _checked(value: Any, param: Param, where: str) -> Any:
+    if param.role == "host" and param.form in _CHECKED_FORMS:
+        return _CHECKED_FORMS[param.form](value, param, where)
     if param.role in ("host", "angular"):
         return value
     if param.role == "flag":
@@ -384,11 +439,51 @@ def _number(value: Any, param: Param, where: str) -> float:
         raise SceneError(f"must be finite, not {value}", where=where)
     if abs(value) > LARGEST:
         raise SceneError(f"{value:g} is beyond {LARGEST:g}, where float32 ends", where=where)
+    if param.positive and value <= 0.0:
+        raise SceneError(f"must be above 0, not {value}", where=where)
     if not param.low <= value <= param.high:
         raise SceneError(f"{value} is outside [{param.low:g}, {param.high:g}]", where=where)
-    if param.positive and value == 0.0:
-        raise SceneError("must be above 0", where=where)
     return float(value)
+
+
+def _vector(value: Any, param: Param, where: str) -> Any:
+    """Check three numbers; those of a direction cannot all be 0."""
+    try:
+        numbers = np.asarray(value, np.float64)
+    except (TypeError, ValueError):
+        numbers = np.empty(0)
+    if numbers.shape != (3,) or not np.isfinite(numbers).all():
+        raise SceneError(f"must be three finite numbers, not {value!r}", where=where)
+    if np.abs(numbers).max() > LARGEST:
+        raise SceneError(f"is beyond {LARGEST:g}, where float32 ends", where=where)
+    if param.form == "direction" and not numbers.any():
+        raise SceneError("has no length", where=where)
+    return value
+
+
+def _matrix(value: Any, param: Param, where: str) -> Any:
+    """Check the form of a matrix that is not on a device."""
+    if isinstance(value, np.ndarray) and value.shape == _MATRICES[param.form]:
+        return value
+    if hasattr(value, "context"):
+        return value
+    try:
+        shape = np.asarray(value, np.float64).shape
+    except (TypeError, ValueError) as error:
+        raise SceneError(f"is not a matrix: {error}", where=where) from None
+    if shape != _MATRICES[param.form]:
+        raise SceneError(f"must be {_MATRICES[param.form]}, found {shape}", where=where)
+    return value
+
+
+_MATRICES = {"matrix3": (3, 3), "matrix4": (4, 4)}
+_CHECKED_FORMS: dict[str, Callable[[Any, Param, str], Any]] = {
+    "number": _number,
+    "vector": _vector,
+    "direction": _vector,
+    "matrix3": _matrix,
+    "matrix4": _matrix,
+}
 
 
 def _orders(value: Any, param: Param, where: str) -> tuple[float, ...]:

@@ -6,10 +6,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clpt import images
 from clpt.errors import SceneError
-from clpt.scene.lights import Light
+from clpt.scene.lights import ON_SHAPES, Light
 from clpt.scene.materials import Diffuse, Material, TwoSided
 from clpt.scene.media import Medium
 from clpt.scene.motion import Deformation, Keys
@@ -36,6 +37,25 @@ class Shape(Kind):
     motion: Keys | None = host(None, "moves it after `to_world`; None: still", form="keys")
     flip_normals: bool = host(False, "turn the front to the other side")
     name: str = host("", "for messages")
+
+    def check(self) -> None:
+        """Raise SceneError for a material or a light that is none."""
+        if not isinstance(self.material, Material):
+            advice = "such as clpt.scene.materials.Diffuse()"
+            message = f"must be a material, {advice}, not {self.material!r}"
+            raise SceneError(message, where=f"{self.kind}.material")
+        if not isinstance(self.emission, (*ON_SHAPES, type(None))):
+            names = " or ".join(cls.__name__ for cls in ON_SHAPES)
+            message = f"must be a light of a surface, {names}, not {self.emission!r}"
+            raise SceneError(message, where=f"{self.kind}.emission")
+
+
+def check_faces(faces: NDArray[Any], vertices: int, where: str) -> None:
+    """Raise SceneError for faces (m, 3) of integers that name a vertex beyond so many."""
+    lowest, highest = int(faces.min()), int(faces.max())
+    if lowest < 0 or highest >= vertices:
+        wrong = lowest if lowest < 0 else highest
+        raise SceneError(f"a face names vertex {wrong}, there are {vertices}", where=where)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -70,6 +90,17 @@ class Mesh(Shape):
     )
     displacement_scale: float = host(1.0, "factor on them", "m")
     displacement_edge: float = host(0.05, "longest edge of what is displaced, in the world", "m")
+
+    def check(self) -> None:
+        """Raise SceneError for faces of vertices that are not there, as far as the host knows."""
+        super().check()
+        if not all(isinstance(a, (np.ndarray, list, tuple)) for a in (self.vertices, self.faces)):
+            return
+        vertices, faces = self.vertices, np.asarray(self.faces)
+        if (
+            faces.size and len(vertices) and faces.dtype.kind in "iu"
+        ):  # else `triangulate` says what they lack
+            check_faces(faces, len(vertices), "mesh.faces")
 
     @classmethod
     def from_trimesh(cls, geometry: Any, **parameters: Any) -> Mesh:
@@ -110,7 +141,7 @@ class Sphere(Shape):
     """A sphere; uv from the azimuth and polar angle about z."""
 
     center: Vector3 = host((0.0, 0.0, 0.0), "before `to_world`", "m")
-    radius: float = host(1.0, "before `to_world`, which may scale it evenly", "m")
+    radius: float = host(1.0, "before `to_world`, which may scale it evenly", "m", positive=True)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -155,7 +186,7 @@ class Cylinder(Shape):
 
     p0: Vector3 = host((0.0, 0.0, 0.0), "start of the axis", "m")
     p1: Vector3 = host((0.0, 0.0, 1.0), "end of the axis", "m")
-    radius: float = host(1.0, "before `to_world`, which may scale it evenly", "m")
+    radius: float = host(1.0, "before `to_world`, which may scale it evenly", "m", positive=True)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -234,6 +265,7 @@ class Instance(Shape):
     flip_normals: bool = field(default=False, init=False, repr=False)
 
     def check(self) -> None:
+        """Raise SceneError for what is no group."""
         if not isinstance(self.group, Group):
             raise SceneError(f"must be a group, not {self.group!r}", where="instance.group")
 

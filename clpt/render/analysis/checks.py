@@ -11,19 +11,10 @@ from clpt.geometry.motion import Motions
 from clpt.geometry.motion import check as check_motion
 from clpt.render.analysis.bodies import check_bodies
 from clpt.render.analysis.cameras import CONNECTED, dispersive_glasses
-from clpt.scene import Scene
-from clpt.scene.cameras import Camera
-from clpt.scene.integrators import (
-    HAVE_LAYERS,
-    Film,
-    Filter,
-    Integrator,
-    ParticleTracer,
-    Sampler,
-    Vcm,
-)
+from clpt.scene import Scene, check_parts
+from clpt.scene.integrators import HAVE_LAYERS, ParticleTracer, Vcm
 from clpt.scene.layers import LAYERS
-from clpt.scene.lights import ON_SHAPES, DirectionalArea, Light, Point
+from clpt.scene.lights import DirectionalArea, Point
 from clpt.scene.materials import Material
 from clpt.scene.media import Medium
 from clpt.scene.params import params
@@ -35,22 +26,10 @@ LARGEST = 1 << 26  # pixels of a film; its tiles are divided in float32, see ker
 
 def check(scene: Scene) -> None:
     """Raise SceneError for an entry of a scene that is of the wrong kind, or a film too large."""
-    for name, base in (
-        ("camera", Camera), ("integrator", Integrator), ("sampler", Sampler), ("film", Film),
-    ):  # fmt: skip
-        _check_kind(getattr(scene, name), base, name)
-    _check_kind(scene.film.filter, Filter, "film.filter")
+    check_parts(scene)
     if isinstance(scene.seed, bool) or not isinstance(scene.seed, int):
         raise SceneError(f"must be a whole number, not {scene.seed!r}", where="seed")
-    for i, light in enumerate(scene.lights):
-        _check_kind(light, Light, f"lights[{i}]")
-    for i, shape in enumerate(scene.shapes):
-        _check_kind(shape, Shape, f"shapes[{i}]")
     shapes_ = list(distinct(scene.shapes))
-    for shape in shapes_:
-        if not isinstance(shape.emission, (*ON_SHAPES, type(None))):
-            names = " or ".join(f"`{cls.kind}`" for cls in ON_SHAPES)
-            raise SceneError(f"its emission must be {names}", where=shapes.where(shape))
     if scene.film.mode == "rgb":
         for name, plain in (("sensor", "cie1931"), ("bands", 0)):
             if getattr(scene.film, name) != plain:
@@ -134,9 +113,3 @@ def _has(material: Any, trait: str) -> bool:
     return getattr(material, trait, False) or any(
         _has(part, trait) for part in parts if isinstance(part, Material)
     )
-
-
-def _check_kind(value: Any, base: type, where: str) -> None:
-    if not isinstance(value, base):
-        wanted = base.__name__.lower()
-        raise SceneError(f"must be of a kind of {wanted}, not {value!r}", where=where)
