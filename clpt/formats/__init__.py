@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Iterable
+from difflib import get_close_matches
+from itertools import islice
 from pathlib import Path
 from typing import Any, get_args
 
 from clpt import budget as budgets
 from clpt.budget import Budget
-from clpt.errors import SceneError
+from clpt.errors import SceneError, nearest
 from clpt.formats.missing import Missing
 from clpt.scene import Scene
 from clpt.scene.materials import Material
@@ -35,6 +37,8 @@ WITH_VARIABLES = ("mitsuba", "gltf")
 IN_FOLDERS = ("scene.json", "scene.xml", "scene.pbrt", "scene-v4.pbrt")
 SCENES = (".xml", ".pbrt", ".pbrt.gz", ".glb", ".gltf")
 MOST_NAMED = 8  # scenes of a folder that a message names
+MOST_LISTED = 10_000  # entries of a folder that a misspelt name is compared with
+ARGUMENTS = ("kinds", "progress", "missing_textures", "budget")  # of `load`, beside variables
 
 __all__ = ["FORMATS", "load", "locate", "save"]
 
@@ -85,9 +89,10 @@ def _load(
         message = f"only .xml and glTF have cameras to choose from, no {variables['camera']!r}"
         raise SceneError(message, file=path)
     if variables and kind not in WITH_VARIABLES:
-        raise SceneError(
-            f"only .xml and glTF have variables, so {min(variables)!r} means nothing", file=path
-        )
+        name = min(variables)
+        message = f"only .xml and glTF have variables, so {name!r} means nothing"
+        near = get_close_matches(name, ARGUMENTS)
+        raise SceneError(message + (nearest(name, ARGUMENTS) if near else ""), file=path)
     if kinds and kind != "native":
         raise SceneError("only a scene.json can have kinds that are not clpt's own", file=path)
     loader = importlib.import_module(f"clpt.formats.{kind}").load
@@ -138,7 +143,21 @@ def locate(path: str | Path, /) -> Path:
         raise
     except (OSError, ValueError) as error:
         raise SceneError(f"cannot be read: {error}", file=path) from None
-    raise SceneError("there is no such file", file=path)
+    raise SceneError(f"there is no such file{_nearest_file(path)}", file=path)
+
+
+def _nearest_file(path: Path) -> str:
+    """Return the end of a message: what a path that is not there may be meant to be, or ""."""
+    try:
+        there = next(folder for folder in path.parents if folder.is_dir())
+        wanted = path.relative_to(there).parts[0]
+        known = [entry.name for entry in islice(there.iterdir(), MOST_LISTED)]
+    except (OSError, ValueError, StopIteration):
+        return ""
+    near = get_close_matches(wanted, known, n=1) or [
+        name for name in known if Path(name).stem == Path(wanted).stem
+    ]
+    return f"; did you mean {str(there / near[0])!r}?" if near else ""
 
 
 def _inside(folder: Path) -> Path:

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import pyopencl as cl
 
 from clpt import device as dev
-from clpt.arrays import Image
 from clpt.denoise import needs
 from clpt.errors import DeviceError, MemoryBudgetError, SceneError
 from clpt.render.analysis.bodies import matter_of
@@ -30,7 +29,7 @@ from clpt.render.editing.scene_edit import (
     match_replacements,
     resolve_device_arrays,
 )
-from clpt.render.film_renderer import Watch, checked_number, checked_samples, next_range
+from clpt.render.film_renderer import Watch, checked_number, next_range
 from clpt.render.locking import healing, synchronized
 from clpt.render.lowering.scene import Lowered, lower
 from clpt.render.options import RenderOptions, check_changes, check_options, check_scene
@@ -580,26 +579,3 @@ def _lights_moved(former: Scene, scene: Scene) -> bool:
 def texture_budget_of(device: dev.Device) -> int:
     """Return what bitmaps may take on a device [bytes]: half of what is free, in one buffer."""
     return min(int(TEXTURE_SHARE * device.free_memory()), device.info.max_alloc)
-
-
-def render(
-    scene: Scene,
-    spp: int | None = None,
-    *,
-    device: dev.Device | str | int | None = None,
-    progress: Callable[[Progress], bool | None] | None = None,
-    noise: float | None = None,
-    **options: Unpack[RenderOptions],
-) -> Image:
-    """Render a scene: (h, w, 3) float32 linear Rec. 709; else see `Renderer.image`.
-
-    spp: samples per pixel, noise and progress: see `Renderer.run`; spp and noise are the scene's
-    own by default. device: see `Renderer`; options: see `RenderOptions`; with `denoise` the picture
-    is denoised. Raises as `Renderer` does.
-    """
-    check_scene(scene)
-    spp = checked_samples(scene.spp if spp is None else spp)
-    noise = scene.noise if noise is None else noise
-    renderer = Renderer(dataclasses.replace(scene, spp=spp, noise=noise), device, **options)
-    renderer.run(spp, progress, noise=noise)
-    return renderer.image() if renderer.denoise is None else renderer.denoised()

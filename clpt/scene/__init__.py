@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import numbers
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from clpt.errors import SceneError
-from clpt.scene import cameras, integrators, lights, materials, media, shapes, textures
+from clpt.scene import cameras, integrators, lights, materials, media, shapes, studio, textures
 from clpt.scene.integrators import Auto, Film, Sobol
 from clpt.scene.params import Kind
 
@@ -70,6 +71,28 @@ class Scene:
     name: str = ""
     warnings: list[str] = field(default_factory=list)
     extra: dict[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def studio(
+        cls,
+        things: shapes.Shape | Sequence[shapes.Shape],
+        *,
+        camera: cameras.Camera | None = None,
+        lights: Sequence[lights.Light] = (),
+        up: studio.Up = "y",
+        name: str = "",
+    ) -> Scene:
+        """Return a scene of shapes in a photographer's studio, as `clpt render mesh.ply` makes it.
+
+        things: a shape, or several. camera: by default one that frames them all, from the front and
+        above. lights: by default a warm key light and a cool fill, over a ground that curves up to
+        a backdrop. up: "y", or "z" as in CAD; the front is then +z, or -y.
+
+        Raises SceneError for shapes too large to be framed.
+        """
+        listed = _listed(things, "shapes")
+        made = studio.parts(listed, camera=camera, own_lights=lights, up=up)
+        return cls(**made, name=name)
 
     def __post_init__(self) -> None:
         self.shapes, self.lights = _listed(self.shapes, "shapes"), _listed(self.lights, "lights")

@@ -12,8 +12,8 @@ import trimesh
 from clpt import transforms
 from clpt.errors import SceneError
 from clpt.formats import load
-from clpt.formats.meshes import framing, mesh
-from clpt.scene import materials, shapes
+from clpt.formats.meshes import mesh
+from clpt.scene import framing, materials, shapes
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 PLY = """ply
