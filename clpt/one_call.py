@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 import os
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
 
 from clpt import device as dev
 from clpt import formats
@@ -15,7 +16,7 @@ from clpt.render.film_renderer import checked_samples
 from clpt.render.options import RenderOptions, check_scene
 from clpt.render.progress import Progress
 from clpt.render.renderer import Renderer
-from clpt.scene import Scene, viewpoint
+from clpt.scene import Film, Scene, viewpoint
 from clpt.scene.cameras import Camera
 
 if TYPE_CHECKING:
@@ -25,63 +26,78 @@ CameraLike = Camera | Sequence[float] | str | int
 ORBIT = "(azimuth, elevation), such as (45, 20), or with a distance, in those that frame the scene"
 
 
+class PictureOptions(RenderOptions, total=False):
+    """Named arguments of `clpt.render`: those of `RenderOptions`, and changes of the scene.
+
+    size: (width, height) of the picture [pixels].
+    mode: "spectral" or "rgb".
+    camera: a camera; (azimuth, elevation) in degrees, or with a distance, from which the whole
+    scene is seen; or, of a file with several, the name or number of one.
+    env: an image that surrounds the scene, in place of its sky and of the light of the studio.
+
+    What is left out, or None, is as the scene has it.
+    """
+
+    size: tuple[int, int] | None
+    mode: str | None
+    camera: CameraLike | None
+    env: str | os.PathLike[str] | None
+
+
 def render(
     scene: Scene | str | os.PathLike[str],
     spp: int | None = None,
     *,
-    size: tuple[int, int] | None = None,
-    mode: str | None = None,
-    camera: CameraLike | None = None,
-    env: str | os.PathLike[str] | None = None,
     noise: float | None = None,
     device: dev.Device | str | int | None = None,
     progress: Callable[[Progress], bool | None] | None = None,
-    **options: Unpack[RenderOptions],
+    **options: Unpack[PictureOptions],
 ) -> Image:
-    """Render a scene: (h, w, 3) float32 linear Rec. 709; else see `Renderer.image`.
+    """Render a scene or a file: (h, w, 3) float32 linear Rec. 709; else see `Renderer.image`.
 
     scene: a `Scene`, or the path of a file or a folder, as `clpt.load` takes it.
     spp: samples per pixel, by default the scene's own.
-    size: (width, height) of the picture [pixels], by default the scene's own.
-    mode: "spectral" or "rgb", by default the scene's own.
-    camera: another one: a camera; (azimuth, elevation) in degrees, or with a distance, from which
-    the whole scene is seen; or, of a file with several, its name or number.
-    env: an image that surrounds the scene, in place of its sky and of the light of the studio.
     noise: leave pixels as soon as they have as little noise, such as 0.02; see `Renderer.run`.
-    device, progress: see `Renderer` and `Renderer.run`. options: see `RenderOptions`; with
-    `denoise` the picture is denoised.
+    device, progress: see `Renderer` and `Renderer.run`.
+    options: size=(width, height), mode, camera, env: see `PictureOptions`; and `RenderOptions`,
+    with whose `denoise` the picture is denoised.
 
     Raises as `clpt.load` and `Renderer` do.
     """
+    size, mode = options.pop("size", None), options.pop("mode", None)
+    camera, env = options.pop("camera", None), options.pop("env", None)
     if isinstance(scene, (str, os.PathLike)):
-        chosen = {"camera": camera} if isinstance(camera, (str, int)) else {}
-        scene = formats.load(scene, **chosen)
-        camera = None if chosen else camera
+        file = Path(scene)
+        if isinstance(camera, (str, int)):
+            scene, camera = formats.load(file, camera=camera), None
+        else:
+            scene = formats.load(file)
     check_scene(scene)
     if env is not None:
         scene = viewpoint.surrounded(scene, os.fspath(env))
-    changes: dict[str, Any] = {"film": _film(scene, size, mode)}
-    if camera is not None:
-        changes["camera"] = _camera(scene, camera)
-    if noise is not None:
-        changes["noise"] = noise
-    changes["spp"] = spp = checked_samples(scene.spp if spp is None else spp)
-    scene = dataclasses.replace(scene, **changes)
-    renderer = Renderer(scene, device, **options)
+    spp = checked_samples(scene.spp if spp is None else spp)
+    scene = dataclasses.replace(
+        scene,
+        camera=scene.camera if camera is None else _camera(scene, camera),
+        film=_film(scene, size, mode),
+        spp=spp,
+        noise=scene.noise if noise is None else noise,
+    )
+    renderer = Renderer(scene, device, **cast("RenderOptions", options))
     renderer.run(spp, progress, noise=scene.noise)
     return renderer.image() if renderer.denoise is None else renderer.denoised()
 
 
-def _film(scene: Scene, size: tuple[int, int] | None, mode: str | None) -> Any:
+def _film(scene: Scene, size: tuple[int, int] | None, mode: str | None) -> Film:
     """Return the film of a scene with another size or mode; a crop may not fit another size."""
-    changes: dict[str, Any] = {} if mode is None else {"mode": mode}
-    if size is not None:
-        try:
-            width, height = size
-        except (TypeError, ValueError):
-            raise SceneError(f"must be (width, height), not {size!r}", where="size") from None
-        changes |= {"width": width, "height": height, "crop": None}
-    return dataclasses.replace(scene.film, **changes) if changes else scene.film
+    film = scene.film if mode is None else dataclasses.replace(scene.film, mode=mode)
+    if size is None:
+        return film
+    try:
+        width, height = size
+    except (TypeError, ValueError):
+        raise SceneError(f"must be (width, height), not {size!r}", where="size") from None
+    return dataclasses.replace(film, width=width, height=height, crop=None)
 
 
 def _camera(scene: Scene, camera: CameraLike) -> Camera:

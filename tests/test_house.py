@@ -26,7 +26,7 @@ BOUNDS = {
     ": Any": 615,
     "aliases of array types outside clpt/arrays.py": 5,
     "rooms in circles of imports": 0,
-    "lines of Python": 75_500,
+    "lines of Python": 76_800,
     "lines of OpenCL": 19_000,
     "words of README.md": 3_132,
     "docstrings that begin with What, Of, How, Those, The same": 0,

@@ -11,7 +11,9 @@ from typing import Any
 from clpt.errors import SceneError
 from clpt.scene import cameras, integrators, lights, materials, media, shapes, studio, textures
 from clpt.scene.integrators import Auto, Film, Sobol
+from clpt.scene.lights import Light
 from clpt.scene.params import Kind
+from clpt.scene.shapes import Shape
 
 __all__ = [
     "KINDS",
@@ -75,10 +77,10 @@ class Scene:
     @classmethod
     def studio(
         cls,
-        things: shapes.Shape | Sequence[shapes.Shape],
+        things: Shape | Sequence[Shape],
         *,
         camera: cameras.Camera | None = None,
-        lights: Sequence[lights.Light] = (),
+        lights: Sequence[Light] = (),
         up: studio.Up = "y",
         name: str = "",
     ) -> Scene:
@@ -109,24 +111,27 @@ def check_parts(scene: Scene) -> None:
     _check_kind(scene.integrator, integrators.Integrator, "integrator")
     _check_kind(scene.sampler, integrators.Sampler, "sampler")
     _check_kind(scene.film, Film, "film")
-    for i, shape in enumerate(scene.shapes):
-        if not isinstance(shape, shapes.Shape):
-            _check_kind(shape, shapes.Shape, f"shapes[{i}]")
-    for i, light in enumerate(scene.lights):
-        _check_kind(light, lights.Light, f"lights[{i}]")
+    held: tuple[tuple[str, Sequence[object], type[Kind]], ...] = (
+        ("shapes", scene.shapes, Shape),
+        ("lights", scene.lights, Light),
+    )
+    for name, things, base in held:
+        for i, thing in enumerate(things):
+            if not isinstance(thing, base):  # there may be a million
+                _check_kind(thing, base, f"{name}[{i}]")
 
 
-def _listed(held: Any, name: str) -> list[Any]:
+def _listed(held: object, name: str) -> list[Any]:
     """Return a list as it is, one thing or other items in a new one. Raises SceneError."""
     if isinstance(held, (list, Kind)):
         return held if isinstance(held, list) else [held]
     try:
-        return list(held)
+        return list(held)  # type: ignore[call-overload]
     except TypeError:
         raise SceneError(f"must be a list of {name}, not {held!r}", where=name) from None
 
 
-def _check_kind(value: Any, base: type[Kind], where: str) -> None:
+def _check_kind(value: object, base: type[Kind], where: str) -> None:
     """Raise SceneError for a value that is of no kind of a category."""
     if not isinstance(value, base):
         message = f"must be of a kind of {base.__name__.lower()}, not {value!r}"

@@ -309,8 +309,9 @@ class Film(Kind):
                 raise SceneError(f"must be 1 to 65536, not {size!r}", where=f"film.{name}")
         if self.crop is not None:
             object.__setattr__(self, "crop", self._checked_crop())
-        if not isinstance(self.filter, Filter):
-            message = f"must be of a kind of filter, not {self.filter!r}"
+        given_filter: object = self.filter
+        if not isinstance(given_filter, Filter):
+            message = f"must be of a kind of filter, not {given_filter!r}"
             raise SceneError(message, where="film.filter")
         if self.lambda_min >= self.lambda_max:
             raise SceneError("must be below lambda_max", where="film.lambda_min")

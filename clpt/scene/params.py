@@ -35,9 +35,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from types import MappingProxyType
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from clpt.errors import SceneError, UnusedParameterError
 from clpt.measured import Measurement, MerlTable
@@ -257,8 +258,8 @@ class KindType(type):
     become the parameters that they stand for. What is wrong with an object tells its name.
     """
 
-    def __call__(cls, /, *values: Any, **given: Any) -> Any:
-        kind: Any = cls
+    def __call__(cls, /, *values: object, **given: object) -> Any:
+        kind = cast("type[Kind]", cls)
         if values:
             example = next(iter((*device_params(kind), *_field_names(kind))), "")
             message = f"{cls.__name__} takes its parameters by name: {cls.__name__}({example}=...)"
@@ -272,7 +273,7 @@ class KindType(type):
             raise
 
 
-def _spelled_out(kind: Any, given: dict[str, Any]) -> dict[str, Any]:
+def _spelled_out(kind: type[Kind], given: dict[str, object]) -> dict[str, object]:
     """Return arguments of a kind without shorthands. Raises SceneError, UnusedParameterError."""
     known, short = _field_names(kind), kind.shorthands
     for name in given:
@@ -318,7 +319,7 @@ class Kind(metaclass=KindType):
         self.check()
 
     @classmethod
-    def spelled_out(cls, short: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    def spelled_out(cls, short: dict[str, Any], given: Mapping[str, object]) -> dict[str, Any]:
         """Return the parameters that shorthands stand for.
 
         short: shorthands with their values, none of them None; given: the other arguments. Raises
@@ -446,10 +447,10 @@ def _number(value: Any, param: Param, where: str) -> float:
     return float(value)
 
 
-def _vector(value: Any, param: Param, where: str) -> Any:
+def _vector(value: object, param: Param, where: str) -> Any:
     """Check three numbers; those of a direction cannot all be 0."""
     try:
-        numbers = np.asarray(value, np.float64)
+        numbers = np.asarray(cast("ArrayLike", value), np.float64)
     except (TypeError, ValueError):
         numbers = np.empty(0)
     if numbers.shape != (3,) or not np.isfinite(numbers).all():
@@ -461,14 +462,14 @@ def _vector(value: Any, param: Param, where: str) -> Any:
     return value
 
 
-def _matrix(value: Any, param: Param, where: str) -> Any:
+def _matrix(value: object, param: Param, where: str) -> Any:
     """Check the form of a matrix that is not on a device."""
     if isinstance(value, np.ndarray) and value.shape == _MATRICES[param.form]:
         return value
     if hasattr(value, "context"):
         return value
     try:
-        shape = np.asarray(value, np.float64).shape
+        shape = np.asarray(cast("ArrayLike", value), np.float64).shape
     except (TypeError, ValueError) as error:
         raise SceneError(f"is not a matrix: {error}", where=where) from None
     if shape != _MATRICES[param.form]:

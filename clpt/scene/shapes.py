@@ -40,9 +40,10 @@ class Shape(Kind):
 
     def check(self) -> None:
         """Raise SceneError for a material or a light that is none."""
-        if not isinstance(self.material, Material):
+        material: object = self.material
+        if not isinstance(material, Material):
             advice = "such as clpt.scene.materials.Diffuse()"
-            message = f"must be a material, {advice}, not {self.material!r}"
+            message = f"must be a material, {advice}, not {material!r}"
             raise SceneError(message, where=f"{self.kind}.material")
         if not isinstance(self.emission, (*ON_SHAPES, type(None))):
             names = " or ".join(cls.__name__ for cls in ON_SHAPES)
