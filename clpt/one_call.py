@@ -93,11 +93,8 @@ def _film(scene: Scene, size: tuple[int, int] | None, mode: str | None) -> Film:
     film = scene.film if mode is None else dataclasses.replace(scene.film, mode=mode)
     if size is None:
         return film
-    try:
-        width, height = size
-    except (TypeError, ValueError):
-        raise SceneError(f"must be (width, height), not {size!r}", where="size") from None
-    return dataclasses.replace(film, width=width, height=height, crop=None)
+    other = Film(size=size)
+    return dataclasses.replace(film, width=other.width, height=other.height, crop=None)
 
 
 def _camera(scene: Scene, camera: CameraLike) -> Camera:

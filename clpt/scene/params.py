@@ -69,7 +69,7 @@ HostForm = Literal[
     "rows2", "rows3", "rows4", "grid", "normals", "triangles", "attributes",
     "number_or_list", "lengths",
     "image", "volume", "colour_volume", "cube_images", "crop", "sensor", "white_balance",
-    "number_or_auto", "lens", "keys", "deformation", "shutter",
+    "number_or_auto", "lens", "keys", "deformation", "shutter", "optional_number", "metal", "size",
 ]  # fmt: skip
 MEASURED = {"measurement": Measurement, "merl": MerlTable}
 ORDERS = 8  # highest order of diffraction, see kernels/optics/diffraction.cl
@@ -241,6 +241,19 @@ def _form_of(default: Any) -> str:
     return forms.get(type(default), "")
 
 
+@dataclass(frozen=True)
+class Shorthand:
+    """Arguments of a kind that stand for some of its parameters.
+
+    arguments: what each is, by its name. stands_for: the parameters. spell: called with those of
+    the arguments that are given, returns values of the parameters by name.
+    """
+
+    arguments: Mapping[str, Param]
+    stands_for: tuple[str, ...]
+    spell: Callable[..., dict[str, Any]]
+
+
 class classproperty:
     """A read-only property of a class."""
 
@@ -275,21 +288,31 @@ class KindType(type):
 
 def _spelled_out(kind: type[Kind], given: dict[str, object]) -> dict[str, object]:
     """Return arguments of a kind without shorthands. Raises SceneError, UnusedParameterError."""
-    known, short = _field_names(kind), kind.shorthands
+    known, short = _field_names(kind), shorthands(kind)
     for name in given:
         if name not in known and name not in short:
             raise UnusedParameterError(kind.kind, name, (*known, *short))
-    asked = {name: given[name] for name in short if given.get(name) is not None}
     plain = {name: value for name, value in given.items() if name not in short}
-    return {**plain, **kind.spelled_out(asked, plain)} if asked else plain
+    for shorthand in kind.shorthands:
+        asked = {name: given[name] for name in shorthand.arguments if given.get(name) is not None}
+        for name in shorthand.stands_for if asked else ():
+            if name in plain:
+                first = next(iter(asked))
+                message = f"{first!r} stands for {name!r} too; give either"
+                raise SceneError(message, where=f"{kind.kind}.{first}")
+        try:
+            plain |= shorthand.spell(**asked) if asked else {}
+        except SceneError as error:
+            error.place_at(f"{kind.kind}.{error.where or next(iter(asked))}")
+            raise
+    return plain
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Kind(metaclass=KindType):
     """Base of all kinds; the class name gives the name in files and kernels."""
 
-    # Arguments that stand for others, and how each is documented: see `spelled_out`.
-    shorthands: ClassVar[Mapping[str, Param]] = MappingProxyType({})
+    shorthands: ClassVar[tuple[Shorthand, ...]] = ()
     needs_wavelengths: ClassVar[bool] = False  # its struct in the kernels has `lambdas`
     # Where all numbers of one of these are above 0, its struct has the `luminance` of `base_color`,
     # and its kernel file includes core/luminance.cl.
@@ -317,15 +340,6 @@ class Kind(metaclass=KindType):
                 message = f"is nested deeper than {MOST_NESTED} parts"
             raise SceneError(message, where=self.kind)
         self.check()
-
-    @classmethod
-    def spelled_out(cls, short: dict[str, Any], given: Mapping[str, object]) -> dict[str, Any]:
-        """Return the parameters that shorthands stand for.
-
-        short: shorthands with their values, none of them None; given: the other arguments. Raises
-        SceneError where one stands for a parameter that is given too.
-        """
-        raise NotImplementedError
 
     def check(self) -> None:
         """Raise SceneError where the parameters contradict each other."""
@@ -357,6 +371,13 @@ def _declared_of(cls: Any, *roles: str) -> Mapping[str, Param]:
 def params(cls: type) -> Mapping[str, Param]:
     """Return the declared parameters of a kind, by name, in their order."""
     return _declared(cls)
+
+
+@cache
+def shorthands(cls: type[Kind]) -> Mapping[str, Param]:
+    """Return the arguments of a kind that stand for parameters, by name; see `Shorthand`."""
+    merged = {name: param for one in cls.shorthands for name, param in one.arguments.items()}
+    return MappingProxyType(merged)
 
 
 def defaults(cls: type) -> dict[str, Any]:
@@ -418,7 +439,7 @@ def _checked(value: Any, param: Param, where: str) -> Any:
             raise SceneError("cannot be a texture", where=where)
         return value
     if param.role == "real":
-        return _number(value, param, where)
+        return check_number(value, param, where)
     if param.role == "orders":
         return _orders(value, param, where)
     return _spectrum(value, param, where)
@@ -433,7 +454,8 @@ def _layers(value: Any, where: str) -> tuple[Kind, ...]:
     return tuple(value)
 
 
-def _number(value: Any, param: Param, where: str) -> float:
+def check_number(value: Any, param: Param, where: str | None = None) -> float:
+    """Return the value of a number's parameter. Raises SceneError."""
     if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
         raise SceneError(f"must be a number, not {value!r}", where=where)
     if not math.isfinite(value):
@@ -478,8 +500,15 @@ def _matrix(value: object, param: Param, where: str) -> Any:
 
 
 _MATRICES = {"matrix3": (3, 3), "matrix4": (4, 4)}
+
+
+def _optional_number(value: Any, param: Param, where: str) -> float | None:
+    return None if value is None else check_number(value, param, where)
+
+
 _CHECKED_FORMS: dict[str, Callable[[Any, Param, str], Any]] = {
-    "number": _number,
+    "number": check_number,
+    "optional_number": _optional_number,
     "vector": _vector,
     "direction": _vector,
     "matrix3": _matrix,
@@ -495,7 +524,7 @@ def _orders(value: Any, param: Param, where: str) -> tuple[float, ...]:
             f"must be an odd count of numbers, for orders -n to n with n up to {ORDERS}",
             where=where,
         )
-    return tuple(_number(v, param, where) for v in value)
+    return tuple(check_number(v, param, where) for v in value)
 
 
 def _spectrum(value: Any, param: Param, where: str) -> Any:
@@ -511,12 +540,12 @@ def _spectrum(value: Any, param: Param, where: str) -> Any:
     if isinstance(value, (list, tuple, np.ndarray)) and len(value) == 3:
         bounded = param.role not in ("factor", "quantity") and max(value) <= 1.0
         made = RGB if bounded or param.role == "emission" else RGBUnbounded
-        colour = made(*(_number(v, param, where) for v in value))
+        colour = made(*(check_number(v, param, where) for v in value))
         if param.role == "quantity":
             _check_spectrum(colour, param, where)
         return colour
     if isinstance(value, (int, float, np.number)):
-        number = _number(value, param, where)
+        number = check_number(value, param, where)
         return RGBIlluminant(*[number] * 3) if param.role == "emission" else Constant(number)
     names = ", a name" if param.role in ("index", "emission") else ""
     raise SceneError(

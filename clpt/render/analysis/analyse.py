@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.errors import SceneError
+from clpt.geometry.lamps import plainly_lit
 from clpt.geometry.motion import at_rest
 from clpt.render.analysis import open_boundaries
 from clpt.render.analysis.bodies import matter_of
@@ -77,6 +78,7 @@ def analyse(scene: Scene, cache: LoweringCache, before: Before | None = None) ->
     """
     scene = at_rest(scene)
     check(scene)
+    scene = plainly_lit(scene)
     index = replace(SceneIndex.of(scene), lit_before=before.lit_ghosts if before else None)
     geometry = assembled(index, cache)
     sphere = geometry.bounding_sphere()

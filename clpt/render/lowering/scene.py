@@ -243,7 +243,8 @@ def _begin_materials(index: SceneIndex, encoder: Encoder) -> MaterialWords:
     """Append what idle lanes read as a material, and make the maker of material words."""
     if index.shifts:
         encoder.spectra.expect_light(emissions(index))
-    longest = max(map(row_words, (*mt.LEAVES, *index.leaves)))
+    leaves: tuple[type[mt.Material], ...] = (*mt.LEAVES, *index.leaves)
+    longest = max(map(row_words, leaves))
     encoder.store.append("materials", np.zeros(longest, np.uint32))
     return MaterialWords(encoder, index.leaves, index.normal_mapped)
 
