@@ -1,4 +1,4 @@
-"""The studio of a bare mesh: a camera that frames it, a ground and a soft light."""
+"""The studio of a bare mesh: a camera that frames it, a backdrop, a warm light and a cool one."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import transforms
+from clpt import spectra, transforms
 from clpt.errors import SceneError
 from clpt.scene import cameras, integrators, lights, shapes
 from clpt.scene.framing import direction, framing_camera, middle, world_bounds
@@ -19,6 +19,11 @@ Up = Literal["y", "z"]
 
 BELOW = 1e-3  # radii from the shapes down to the ground: flat shapes do not lie in it
 KEY_FROM = (-0.8, 1.3, 0.7)  # direction from the centre of the scene to the key light, +y up
+KEY_IRRADIANCE = RGBIlluminant(4.6, 3.9, 3.1)  # at the centre, warm
+FILL = RGBIlluminant(0.26, 0.33, 0.42)  # radiance from all sides, cool
+PAPER = 0.36  # albedo of the backdrop
+FLOOR, BEND, WALL = 24.0, 12.0, 40.0  # radii of the backdrop's floor and bend, and its height
+SIDES, RINGS = 96, 17  # of the backdrop around its middle, and along its bend
 Z_UP = transforms.rotate([1.0, 0.0, 0.0], 90.0)
 # From a space whose up is +y and whose front is +z.
 UPS: dict[str, transforms.Matrix] = {"y": transforms.IDENTITY, "z": Z_UP}
@@ -45,11 +50,11 @@ def parts(
     extra_shapes: list[shapes.Shape] = []
     extra_lights: list[lights.Light] = []
     if not own_lights:
-        extra_lights = [lights.Constant(radiance=RGBIlluminant(0.35, 0.35, 0.35))]
+        extra_lights = [lights.Constant(radiance=FILL)]
         if camera is None:
             floor, axis = centre.copy(), int(np.argmax(turn[:3, 1]))
             floor[axis] = low[axis] - BELOW * radius
-            extra_shapes = [_ground(floor, radius, turn), _key(centre, radius, turn)]
+            extra_shapes = [_backdrop(floor, radius, turn), _key(centre, radius, turn)]
         else:
             extra_lights.append(_distant_key(turn))
     added = {
@@ -67,17 +72,41 @@ def parts(
     }
 
 
-def _ground(floor: NDArray[np.float64], radius: float, up: transforms.Matrix) -> shapes.Shape:
-    flat = up @ transforms.rotate([1.0, 0.0, 0.0], -90.0)
-    to_world = transforms.translate(floor) @ flat @ transforms.scale(40.0 * radius)
-    return shapes.Disk(to_world=to_world, material=Diffuse(reflectance=0.5), name="ground")
+def _backdrop(floor: NDArray[np.float64], radius: float, up: transforms.Matrix) -> shapes.Shape:
+    """Return a dish: a floor around a point that curves up to a wall on all sides, without a seam.
+
+    So the camera may stand anywhere within it, and sees no horizon.
+    """
+    turn = np.linspace(0.0, 0.5 * np.pi, RINGS)
+    out = np.concatenate([[0.0], FLOOR + BEND * np.sin(turn), [FLOOR + BEND]])
+    high = np.concatenate([[0.0], BEND * (1.0 - np.cos(turn)), [WALL]])
+    around = 2.0 * np.pi * np.arange(SIDES) / SIDES
+    points = np.stack(
+        [
+            np.outer(out, np.sin(around)),
+            np.outer(high, np.ones(SIDES)),
+            np.outer(out, np.cos(around)),
+        ],
+        axis=-1,
+    )
+    here = np.arange(len(out) - 1)[:, None] * SIDES + np.arange(SIDES)
+    beside = np.arange(len(out) - 1)[:, None] * SIDES + (np.arange(SIDES) + 1) % SIDES
+    inner = np.stack([here, here + SIDES, beside + SIDES], axis=-1)
+    outer = np.stack([here, beside + SIDES, beside], axis=-1)[1:]  # none at the middle
+    faces = np.concatenate([inner.reshape(-1, 3), outer.reshape(-1, 3)]).astype(np.uint32)
+    return shapes.Mesh(
+        vertices=points.reshape(-1, 3).astype(np.float32),
+        faces=faces,
+        normals=shapes.SMOOTH,
+        to_world=transforms.translate(floor) @ up @ transforms.scale(radius),
+        material=Diffuse(reflectance=PAPER),
+        name="backdrop",
+    )
 
 
 def _distant_key(up: transforms.Matrix) -> lights.Light:
     """Return a light about as bright as the square one, from the same side."""
-    return lights.Directional(
-        direction=tuple(-direction(KEY_FROM, up)), irradiance=RGBIlluminant(4.0, 4.0, 4.0)
-    )
+    return lights.Directional(direction=tuple(-direction(KEY_FROM, up)), irradiance=KEY_IRRADIANCE)
 
 
 def _key(centre: NDArray[np.float64], radius: float, up: transforms.Matrix) -> shapes.Shape:
@@ -87,6 +116,6 @@ def _key(centre: NDArray[np.float64], radius: float, up: transforms.Matrix) -> s
     return shapes.Rectangle(
         to_world=to_world,
         material=Diffuse(reflectance=0.0),
-        emission=lights.Area(radiance=RGBIlluminant(8.0, 8.0, 8.0)),
+        emission=lights.Area(radiance=spectra.scaled(KEY_IRRADIANCE, 16.0 / 9.0)),
         name="key light",
     )
