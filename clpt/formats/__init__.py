@@ -7,14 +7,16 @@ from collections.abc import Callable, Iterable
 from difflib import get_close_matches
 from itertools import islice
 from pathlib import Path
-from typing import Any, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 from clpt import budget as budgets
 from clpt.budget import Budget
+from clpt.choices import Missing
 from clpt.errors import SceneError, nearest
-from clpt.formats.missing import Missing
-from clpt.scene import Scene
-from clpt.scene.materials import Material
+
+if TYPE_CHECKING:  # a name of a file is looked up without the kinds of scenes
+    from clpt.scene import Scene
+    from clpt.scene.materials import Material
 
 FORMATS = {  # the module whose `load` reads files of a suffix, imported when it is used
     ".json": "native",
@@ -121,6 +123,8 @@ def save(scene: Scene, path: str | Path, /) -> None:
     Raises TypeError for what is no scene; SceneError for another suffix, for a buffer on a device,
     and where a file cannot be written.
     """
+    from clpt.scene import Scene
+
     path = Path(path)
     if not isinstance(scene, Scene):
         raise TypeError(f"clpt.save writes a clpt.Scene, not {type(scene).__name__}")
@@ -132,13 +136,19 @@ def save(scene: Scene, path: str | Path, /) -> None:
 
 
 def locate(path: str | Path, /) -> Path:
-    """Return the file that `load` reads: of a folder the scene in it. Raises SceneError."""
+    """Return the file that `load` reads: of a folder the scene in it. Raises SceneError.
+
+    A relative path that begins with `scenes` and is not there names one of clpt's own scenes.
+    """
     path = Path(path)
     try:
         if path.is_dir():
             return _inside(path)
         if path.is_file():
             return path
+        own = scenes_folder().parent / path
+        if path.parts[:1] == ("scenes",) and ".." not in path.parts and own.exists():
+            return locate(own)
     except SceneError:
         raise
     except (OSError, ValueError) as error:
@@ -158,6 +168,13 @@ def _nearest_file(path: Path) -> str:
         name for name in known if Path(name).stem == Path(wanted).stem
     ]
     return f"; did you mean {str(there / near[0])!r}?" if near else ""
+
+
+def scenes_folder() -> Path:
+    """Return the folder of clpt's own scenes: in the installed package, or of the checkout."""
+    package = Path(__file__).resolve().parent.parent
+    installed = package / "scenes"
+    return installed if installed.is_dir() else package.parent / "scenes"
 
 
 def _inside(folder: Path) -> Path:

@@ -17,6 +17,11 @@ FARTHEST = 1e12  # [m] from the origin, as of vertices
 POLE = math.radians(2.0)  # nearest to the pole that a turn ends
 
 
+def rounded(point: Floats) -> list[float]:
+    """Return a point (3,) with six digits, as somebody would write it."""
+    return [float(f"{value:.6g}") for value in point]
+
+
 def is_within_reach(camera: Camera) -> bool:
     """Return whether the numbers of a camera say where it is and looks, and are below FARTHEST."""
     matrix = np.asarray(camera.view if isinstance(camera, Matrix) else camera.to_world, float)

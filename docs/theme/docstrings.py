@@ -35,6 +35,10 @@ ROLES = {
     "reradiation": "`spectra.Reradiation`",
     "orders": "numbers",
     "layers": "`Layer`s",
+    "quantity": "spectrum",
+    "angular": "rows of numbers",
+    "measurement": "`measured.Measurement`",
+    "merl": "`measured.MerlTable`",
 }
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import re
 from dataclasses import dataclass
@@ -11,7 +10,6 @@ from typing import Any
 
 import click
 
-from ...scene import Scene, viewpoint
 from .records import Command, with_options
 
 NEAREST, FARTHEST = 1e-3, 1e6  # of an orbit, in distances that frame the scene
@@ -155,21 +153,3 @@ _OPTIONS = (
 def composition_options(command: Command) -> Command:
     """Give a command the options of which `Composition` is the record."""
     return with_options(command, _OPTIONS)
-
-
-def composed(scene: Scene, composition: Composition) -> Scene:
-    """Return the scene as these options want it. Raises click.BadParameter, SceneError."""
-    camera, env, rotation = composition.camera, composition.env, composition.env_rotation
-    if env is None and rotation is not None:
-        raise click.BadParameter("there is no --env to turn", param_hint="--env-rotation")
-    if env is not None:
-        scene = viewpoint.surrounded(scene, env, rotation or 0.0)
-    if camera is not None:
-        seen = viewpoint.orbiting(scene, camera.azimuth, camera.elevation, camera.distance)
-        scene = dataclasses.replace(scene, camera=seen)
-    if composition.crop is not None:
-        film, (columns, rows) = scene.film, composition.crop
-        (x, width), (y, height) = columns.of(film.width), rows.of(film.height)
-        film = dataclasses.replace(film, crop=(x, y, width, height))
-        scene = dataclasses.replace(scene, film=film)
-    return scene

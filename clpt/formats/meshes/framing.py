@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from clpt.choices import Missing
 from clpt.errors import SceneError
 from clpt.formats.meshes import mesh
-from clpt.formats.missing import Missing
 from clpt.scene import Scene, cameras, lights, shapes
 from clpt.scene.studio import Up
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from clpt.formats.missing import Missing
+from clpt.choices import Missing
 from clpt.formats.mitsuba import sensors
 from clpt.formats.mitsuba.bsdfs import bsdf
 from clpt.formats.mitsuba.emitters import emitter

@@ -13,6 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from clpt import spectra
+from clpt.choices import AUTO
 from clpt.formats.native import json_schema, lenses, motion, reradiation, sensors
 from clpt.formats.native import spectra as json_spectra
 from clpt.formats.native.cursor import Cursor
@@ -20,7 +21,6 @@ from clpt.formats.native.json_schema import NUMBER, NUMBERS, STRING, TRIPLE, Sch
 from clpt.formats.native.spectra import kind_name
 from clpt.formats.native.transforms import matrix
 from clpt.scene import kinds
-from clpt.scene.integrators import AUTO
 from clpt.scene.params import ORDERS, SPECTRUM_ROLES, Kind, Param
 from clpt.scene.shapes import SMOOTH
 from clpt.scene.textures import ATTRIBUTES, Texture
