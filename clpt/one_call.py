@@ -93,8 +93,8 @@ def _film(scene: Scene, size: tuple[int, int] | None, mode: str | None) -> Film:
     film = scene.film if mode is None else dataclasses.replace(scene.film, mode=mode)
     if size is None:
         return film
-    other = Film(size=size)
-    return dataclasses.replace(film, width=other.width, height=other.height, crop=None)
+    asked = Film(size=size)
+    return dataclasses.replace(film, width=asked.width, height=asked.height, crop=None)
 
 
 def _camera(scene: Scene, camera: CameraLike) -> Camera:

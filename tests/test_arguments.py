@@ -66,7 +66,7 @@ def test_options(function: Any, options: dict[str, Any], error: type, message: s
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"size": 4}, r"^size: must be \(width, height\), not 4$"),
+        ({"size": 4}, r"^film\.size: must be \(width, height\), not 4$"),
         ({"size": (0, 4)}, r"^film\.width: must be 1 to 65536, not 0$"),
         ({"mode": "rbg"}, r"^film\.mode: 'rbg' is none of spectral, rgb"),
         ({"camera": "front"}, r"^camera: must be a camera or \(azimuth, elevation\).* not 'front'"),

@@ -5,11 +5,23 @@ from __future__ import annotations
 import math
 import numbers
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
+
 from clpt.errors import SceneError
-from clpt.scene import cameras, integrators, lights, materials, media, shapes, studio, textures
+from clpt.scene import (
+    cameras,
+    integrators,
+    lights,
+    materials,
+    media,
+    shapes,
+    studio,
+    textures,
+    trimeshes,
+)
 from clpt.scene.integrators import Auto, Film, Sobol
 from clpt.scene.lights import Light
 from clpt.scene.params import Kind
@@ -77,7 +89,7 @@ class Scene:
     @classmethod
     def studio(
         cls,
-        things: Shape | Sequence[Shape],
+        things: Any,
         *,
         camera: cameras.Camera | None = None,
         lights: Sequence[Light] = (),
@@ -86,15 +98,50 @@ class Scene:
     ) -> Scene:
         """Return a scene of shapes in a photographer's studio, as `clpt render mesh.ply` makes it.
 
-        things: a shape, or several. camera: by default one that frames them all, from the front and
-        above. lights: by default a warm key light and a cool fill, over a ground that curves up to
+        things: a shape, a `trimesh.Trimesh`, or a list of them. camera: by default one that frames
+        them all, from the front and above. lights: by default a warm key light and a cool fill, over a ground that curves up to
         a backdrop. up: "y", or "z" as in CAD; the front is then +z, or -y.
 
         Raises SceneError for shapes too large to be framed.
         """
-        listed = _listed(things, "shapes")
-        made = studio.parts(listed, camera=camera, own_lights=lights, up=up)
+        listed = [things] if trimeshes.is_mesh(things) else _listed(things, "shapes")
+        shapes_ = [
+            shapes.Mesh.from_trimesh(thing) if trimeshes.is_mesh(thing) else thing
+            for thing in listed
+        ]
+        made = studio.parts(shapes_, camera=camera, own_lights=lights, up=up)
         return cls(**made, name=name)
+
+    @classmethod
+    def from_trimesh(cls, scene: Any, *, up: studio.Up = "y", name: str = "") -> Scene:
+        """Return a `trimesh.Scene` in the studio: its meshes where they are, with their materials.
+
+        It is seen by its own camera if it has been given one. up, name: see `studio`. What is no
+        mesh, such as a path, is left out, with a warning.
+
+        Raises SceneError for an object that is not a scene of trimesh.
+        """
+        if not trimeshes.is_scene(scene):
+            message = f"must be a trimesh.Scene, not {type(scene).__name__}; "
+            raise SceneError(message + "Scene.studio takes a mesh", where="scene")
+        meshes: dict[str, shapes.Mesh] = {}
+        placed: list[Shape] = []
+        left_out: list[str] = []
+        for node in scene.graph.nodes_geometry:
+            to_world, key = scene.graph[node]
+            geometry = scene.geometry[key]
+            if not trimeshes.is_mesh(geometry):
+                left_out.append(f"{key}: a {type(geometry).__name__} is no mesh, left out")
+                continue
+            if key not in meshes:
+                meshes[key] = shapes.Mesh.from_trimesh(geometry, name=str(key))
+            placed.append(replace(meshes[key], to_world=np.array(to_world), name=str(node)))
+        camera = None
+        if scene.has_camera:
+            camera = trimeshes.camera_of(scene.camera, scene.camera_transform)
+        made = cls.studio(placed, camera=camera, up=up, name=name)
+        made.warnings = list(dict.fromkeys(left_out))
+        return made
 
     def __post_init__(self) -> None:
         self.shapes, self.lights = _listed(self.shapes, "shapes"), _listed(self.lights, "lights")

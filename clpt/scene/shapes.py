@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import images
 from clpt.errors import SceneError
+from clpt.scene import trimeshes
 from clpt.scene.lights import ON_SHAPES, Light
-from clpt.scene.materials import Diffuse, Material, TwoSided
+from clpt.scene.materials import Diffuse, Material
 from clpt.scene.media import Medium
 from clpt.scene.motion import Deformation, Keys
 from clpt.scene.params import Kind, choice, host
-from clpt.scene.textures import Bitmap, MeshAttribute
+from clpt.scene.textures import Bitmap
 from clpt.scene.values import Matrix4, OnDevice, Vector3
 
 SMOOTH = "smooth"  # normals of a mesh: the means of the triangles around a vertex, by their areas
@@ -105,31 +105,30 @@ class Mesh(Shape):
 
     @classmethod
     def from_trimesh(cls, geometry: Any, **parameters: Any) -> Mesh:
-        """Return a `trimesh.Trimesh` as a mesh: its vertices, faces, uvs and colours.
+        """Return a `trimesh.Trimesh` as a mesh: its vertices, faces, uvs, colours and material.
 
         geometry: its arrays are shared where they have clpt's types already. Colours of vertices
         or faces, 8-bit sRGB, become the linear attribute `vertex_color` or `face_color`, which the
-        material shows if none is given. Its material is not read.
+        material shows; a material with its images becomes one of clpt's, and a light if it glows.
         parameters: further ones of the mesh, such as material, to_world, name, or normals="smooth";
-        without normals the triangles are flat.
+        without normals the triangles are flat. A `material` takes the place of trimesh's.
 
-        Raises SceneError for an object that is not a Trimesh.
+        Raises SceneError for an object that is not a Trimesh; `Scene.from_trimesh` takes scenes.
         """
-        if not (hasattr(geometry, "faces") and hasattr(geometry, "vertices")):
-            message = f"must be a trimesh.Trimesh, not {type(geometry).__name__}; "
-            raise SceneError(message + "a trimesh.Scene gives one by its to_mesh()", where="mesh")
-        visual, given = getattr(geometry, "visual", None), dict(parameters)
-        uvs = getattr(visual, "uv", None)
+        if not trimeshes.is_mesh(geometry):
+            advice = "; Scene.from_trimesh takes a scene" if trimeshes.is_scene(geometry) else ""
+            message = f"must be a trimesh.Trimesh, not {type(geometry).__name__}{advice}"
+            raise SceneError(message, where="mesh")
+        visual, given = geometry.visual, dict(parameters)
+        uvs, colours = getattr(visual, "uv", None), trimeshes.colours_of(visual)
         if uvs is not None:
             given.setdefault("uvs", np.ascontiguousarray(uvs, np.float32))
-        kind = getattr(visual, "kind", None)
-        if kind in ("vertex", "face"):
-            levels = np.asarray(getattr(visual, f"{kind}_colors"))[:, :3]
-            colours = images.srgb_to_linear(levels.astype(np.float32) / np.float32(255.0))
-            name = f"{kind}_color"
-            given["attributes"] = {name: colours, **given.get("attributes", {})}
-            shown = Diffuse(reflectance=MeshAttribute(name=name), name=name)
-            given.setdefault("material", TwoSided(front=shown))
+        if colours:
+            given["attributes"] = {**colours, **given.get("attributes", {})}
+            given.setdefault("material", trimeshes.coloured(next(iter(colours))))
+        if "material" not in given and (found := trimeshes.material_of(visual)):
+            given["material"], emission = found
+            given.setdefault("emission", emission)
         return cls(
             vertices=np.ascontiguousarray(geometry.vertices, np.float32),
             faces=np.ascontiguousarray(geometry.faces, np.uint32),
