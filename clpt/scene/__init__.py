@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -17,6 +17,7 @@ from clpt.scene import (
     lights,
     materials,
     media,
+    paths,
     shapes,
     studio,
     textures,
@@ -99,8 +100,8 @@ class Scene:
         """Return a scene of shapes in a photographer's studio, as `clpt render mesh.ply` makes it.
 
         things: a shape, a `trimesh.Trimesh`, or a list of them. camera: by default one that frames
-        them all, from the front and above. lights: by default a warm key light and a cool fill, over a ground that curves up to
-        a backdrop. up: "y", or "z" as in CAD; the front is then +z, or -y.
+        them all, from the front and above. lights: by default a warm key light and a cool fill,
+        over a ground that curves up to a backdrop. up: "y", or "z" as in CAD; the front is then +z, or -y.
 
         Raises SceneError for shapes too large to be framed.
         """
@@ -142,6 +143,34 @@ class Scene:
         made = cls.studio(placed, camera=camera, up=up, name=name)
         made.warnings = list(dict.fromkeys(left_out))
         return made
+
+    def parameters(self) -> dict[str, Any]:
+        """Return all parameters by their paths, as "ball.material.reflectance", in their order.
+
+        A path begins with camera, film, integrator, sampler, spp, noise or seed; with the name of
+        a shape or of a material; or with shapes[0] or lights[0]. See also `changed`.
+        """
+        return paths.parameters(self)
+
+    def __getitem__(self, path: str) -> Any:
+        """Return the parameter or the object at a path, see `parameters`.
+
+        Raises SceneError, with the nearest names, for a path that leads to nothing.
+        """
+        return paths.get(self, path)
+
+    def changed(self, values: Mapping[str, Any]) -> Scene:
+        """Return a scene with other values, by their paths; this one stays as it is.
+
+        `renderer.update(scene=scene.changed({"ball.material.reflectance": 0.2}))` renders it. What
+        several shapes share, such as a material, changes at all of them.
+
+        Raises SceneError for a path that leads to nothing, and a value that makes no sense there.
+        """
+        scene = self
+        for path, value in values.items():
+            scene = paths.changed(scene, path, value)
+        return scene
 
     def __post_init__(self) -> None:
         self.shapes, self.lights = _listed(self.shapes, "shapes"), _listed(self.lights, "lights")
