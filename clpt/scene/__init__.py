@@ -27,6 +27,7 @@ from clpt.scene.integrators import Auto, Film, Sobol
 from clpt.scene.lights import Light
 from clpt.scene.params import Kind
 from clpt.scene.shapes import Shape
+from clpt.scene.studio import Up
 
 __all__ = [
     "KINDS",
@@ -94,14 +95,15 @@ class Scene:
         *,
         camera: cameras.Camera | None = None,
         lights: Sequence[Light] = (),
-        up: studio.Up = "y",
+        up: Up = "y",
         name: str = "",
     ) -> Scene:
         """Return a scene of shapes in a photographer's studio, as `clpt render mesh.ply` makes it.
 
         things: a shape, a `trimesh.Trimesh`, or a list of them. camera: by default one that frames
         them all, from the front and above. lights: by default a warm key light and a cool fill,
-        over a ground that curves up to a backdrop. up: "y", or "z" as in CAD; the front is then +z, or -y.
+        over a ground that curves up to a backdrop. up: "y", or "z" as in CAD; the front is +z, or
+        -y then.
 
         Raises SceneError for shapes too large to be framed.
         """
@@ -114,7 +116,7 @@ class Scene:
         return cls(**made, name=name)
 
     @classmethod
-    def from_trimesh(cls, scene: Any, *, up: studio.Up = "y", name: str = "") -> Scene:
+    def from_trimesh(cls, scene: Any, *, up: Up = "y", name: str = "") -> Scene:
         """Return a `trimesh.Scene` in the studio: its meshes where they are, with their materials.
 
         It is seen by its own camera if it has been given one. up, name: see `studio`. What is no

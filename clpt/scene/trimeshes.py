@@ -63,7 +63,7 @@ def material_of(visual: object) -> tuple[Material, Light | None] | None:
     if hasattr(given, "baseColorFactor"):
         return _physical(given, name)
     image = _image(given, "image")
-    shown = image or tuple(_levels(given, "diffuse", (0.5, 0.5, 0.5)))
+    shown: Textured = _levels(given, "diffuse", (0.5,) * 3) if image is None else image
     return TwoSided(front=Diffuse(reflectance=shown, name=name)), None
 
 
@@ -72,12 +72,12 @@ def _physical(given: object, name: str) -> tuple[Material, Light | None]:
     rough = {"b": "metallic", "g": "roughness"}
     numbers: dict[str, TexturedNumber] = {}
     for channel, parameter in rough.items():
-        factor = _of(given, f"{parameter}Factor", (float, int))
-        value = 1.0 if factor is None else float(factor)
+        share = _of(given, f"{parameter}Factor", (float, int))
+        value = 1.0 if share is None else float(share)
         image = _image(given, "metallicRoughnessTexture", raw=True, channel=channel)
         numbers[parameter] = value if image is None else _times(image, value)
     base, factor = _image(given, "baseColorTexture"), _levels(given, "baseColorFactor", WHITE)
-    colour: Textured = tuple(factor) if base is None else _times(base, tuple(factor))
+    colour: Textured = factor if base is None else _times(base, factor)
     front: Material = GltfSurface(
         base_color=colour, metallic=numbers["metallic"], roughness=numbers["roughness"], name=name
     )
@@ -97,7 +97,7 @@ def _glow(given: object) -> Light | None:
     image, factor = _image(given, "emissiveTexture"), _levels(given, "emissiveFactor", (0.0,) * 3)
     if max(factor) == 0.0:
         return None
-    return Area(radiance=tuple(factor) if image is None else _times(image, tuple(factor)))
+    return Area(radiance=factor if image is None else _times(image, factor))
 
 
 def _times(image: Bitmap, factor: float | tuple[float, ...]) -> Texture:
@@ -122,14 +122,14 @@ def _image(
     return Bitmap(image=np.asarray(image), raw=raw, channel=channel)
 
 
-def _levels(given: object, name: str, default: Sequence[float]) -> list[float]:
+def _levels(given: object, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
     """Return a colour of a material: linear, whole numbers of 255 or floats to 1."""
     value = getattr(given, name, None)
     if value is None:
-        return list(default)
+        return default
     numbers = np.asarray(value)
     numbers = numbers / 255.0 if numbers.dtype.kind in "iu" else numbers.astype(float)
-    return [float(one) for one in np.clip(numbers[:3], 0.0, None)]
+    return tuple(float(one) for one in np.clip(numbers[:3], 0.0, None))
 
 
 _T = TypeVar("_T")

@@ -84,7 +84,7 @@ class CameraWork:
         self._tell_state()
 
     def _do_look_at(self, reply: Reply) -> None:
-        at = navigation.pose(self.scene.camera)
+        at = viewpoint.pose(self.scene.camera)
         target = at.origin + self._distance() * at.forward
         points = {"origin": at.origin, "target": target, "up": at.up}
         rounded = {name: navigation.rounded(point) for name, point in points.items()}
