@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -59,7 +59,6 @@ def names(bench: str, name: str, **about: Any) -> list[str]:
 def shown(value: float) -> str:
     """Return two or three digits."""
     return f"{value:.3g}" if value >= 10 else f"{value:.2f}"
-
 
 
 def efficiency() -> str:
@@ -157,9 +156,20 @@ def denoisers() -> str:
     return table(heads, body)
 
 
+def media() -> str:
+    """Return clpt's efficiency in media over the better of Mitsuba's integrators."""
+    about = {"renderer": "clpt"}
+    body = []
+    both = [set(names("media", "scene", mode=mode, **about)) for mode in ("rgb", "spectral")]
+    for scene in sorted(set.intersection(*both)):
+        own = [newest("media", scene=scene, mode=m, **about) for m in ("rgb", "spectral")]
+        body.append([scene, *(f"{record['efficiency_ratio']:.1f}" for record in own)])
+    return table(["scene", "RGB", "spectral"], body)
+
+
 TABLES: dict[str, Callable[[], str]] = {
     one.__name__: one
-    for one in (efficiency, samplers, modes, effects, layouts, sizes, denoisers)
+    for one in (efficiency, samplers, modes, effects, layouts, sizes, denoisers, media)
 }
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import difflib
 import importlib
+import itertools
 from collections.abc import Callable, Iterable
-from difflib import get_close_matches
-from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -38,8 +38,8 @@ WITH_VARIABLES = ("mitsuba", "gltf")
 # The scene of a folder: the first of these, else the one with the folder's name, else the only one.
 IN_FOLDERS = ("scene.json", "scene.xml", "scene.pbrt", "scene-v4.pbrt")
 SCENES = (".xml", ".pbrt", ".pbrt.gz", ".glb", ".gltf")
+MOST_COMPARED, CLOSE = 4096, 0.7  # names of a folder, and how near one is that is meant
 MOST_NAMED = 8  # scenes of a folder that a message names
-MOST_LISTED = 10_000  # entries of a folder that a misspelt name is compared with
 ARGUMENTS = ("kinds", "progress", "missing_textures", "budget")  # of `load`, beside variables
 
 __all__ = ["FORMATS", "load", "locate", "save"]
@@ -88,12 +88,13 @@ def _load(
         known = " ".join(FORMATS)
         raise SceneError(f"unknown format {path.suffix!r}; known: {known}", file=path)
     if "camera" in variables and kind not in WITH_VARIABLES:
-        message = f"only .xml and glTF have cameras to choose from, no {variables['camera']!r}"
+        message = f"only .xml and glTF have cameras to choose from, no {variables['camera']!r}; "
+        message += "--camera AZIMUTH,ELEVATION such as 45,20 looks at all of a scene"
         raise SceneError(message, file=path)
     if variables and kind not in WITH_VARIABLES:
         name = min(variables)
         message = f"only .xml and glTF have variables, so {name!r} means nothing"
-        near = get_close_matches(name, ARGUMENTS)
+        near = difflib.get_close_matches(name, ARGUMENTS)
         raise SceneError(message + (nearest(name, ARGUMENTS) if near else ""), file=path)
     if kinds and kind != "native":
         raise SceneError("only a scene.json can have kinds that are not clpt's own", file=path)
@@ -157,17 +158,24 @@ def locate(path: str | Path, /) -> Path:
 
 
 def _nearest_file(path: Path) -> str:
-    """Return the end of a message: what a path that is not there may be meant to be, or ""."""
+    """Return the end of a message: scenes and folders of nearly the same name, if there are any.
+
+    Of a path whose folder is not there, folders near the first one that is missing.
+    """
+    while not path.parent.is_dir() and path.parent != path:
+        path = path.parent
     try:
-        there = next(folder for folder in path.parents if folder.is_dir())
-        wanted = path.relative_to(there).parts[0]
-        known = [entry.name for entry in islice(there.iterdir(), MOST_LISTED)]
-    except (OSError, ValueError, StopIteration):
+        names = [
+            one.name
+            for one in itertools.islice(path.parent.iterdir(), MOST_COMPARED)
+            if one.is_dir() or one.name.lower().endswith(tuple(FORMATS))
+        ]
+    except OSError:
         return ""
-    near = get_close_matches(wanted, known, n=1) or [
-        name for name in known if Path(name).stem == Path(wanted).stem
-    ]
-    return f"; did you mean {str(there / near[0])!r}?" if near else ""
+    near = difflib.get_close_matches(path.name, names, n=2, cutoff=CLOSE)
+    return (
+        f"; did you mean {' or '.join(str(path.parent / name) for name in near)}?" if near else ""
+    )
 
 
 def scenes_folder() -> Path:

@@ -400,6 +400,12 @@ def _field_names(cls: Any) -> tuple[str, ...]:
     return tuple(field.name for field in dataclasses.fields(cls))
 
 
+def place_of(kind: Kind, name: str) -> str:
+    """Return the name of a parameter for messages, with the name of its material."""
+    named = getattr(kind, "name", "")
+    return f"{kind.kind}.{name}" + (f" of {named!r}" if named else "")
+
+
 def device_params(cls: type) -> Mapping[str, Param]:
     """Return the parameters that the kernels read."""
     return _declared_of(cls, *DEVICE_ROLES)
@@ -465,7 +471,11 @@ def check_number(value: Any, param: Param, where: str | None = None) -> float:
     if param.positive and value <= 0.0:
         raise SceneError(f"must be above 0, not {value}", where=where)
     if not param.low <= value <= param.high:
-        raise SceneError(f"{value} is outside [{param.low:g}, {param.high:g}]", where=where)
+        advice = (
+            "; colours are 0 to 1, linear" if param.role == "reflectance" and value > 1.0 else ""
+        )
+        message = f"{value} is outside [{param.low:g}, {param.high:g}]{advice}"
+        raise SceneError(message, where=where)
     return float(value)
 
 

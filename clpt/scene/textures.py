@@ -179,6 +179,17 @@ def _octaves(texture: Any) -> None:
         raise SceneError(message, where=f"{texture.kind}.octaves")
 
 
+def attributes_in(value: Any) -> set[str]:
+    """Return the names of the attributes of meshes that the textures in a kind read."""
+    names: set[str] = set()
+    for texture in textures_in(value):
+        if isinstance(texture, MeshAttribute):
+            names.add(texture.name)
+        elif isinstance(texture, Placed) and texture.mapping == "uv1":
+            names |= set(SECOND_UV)
+    return names
+
+
 def textures_in(value: Any) -> Iterator[Texture]:
     """Yield the textures that a kind's parameters hold, and those in what these hold, and so on."""
     if isinstance(value, (list, tuple)):
@@ -188,4 +199,6 @@ def textures_in(value: Any) -> Iterator[Texture]:
         if isinstance(value, Texture):
             yield value
         for name in params(type(value)):
-            yield from textures_in(getattr(value, name))
+            part = getattr(value, name)
+            if isinstance(part, (Kind, list, tuple)):
+                yield from textures_in(part)

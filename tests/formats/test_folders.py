@@ -41,7 +41,6 @@ def test_a_folder_means_the_scene_in_it(tmp_path):
         ("scenes/cornel_box", "scenes/cornell_box"),
         ("scenes/cornel_box/scene.json", "scenes/cornell_box"),
         ("scenes/cornell_box/scne.json", "scenes/cornell_box/scene.json"),
-        ("scenes/room.obj", "scenes/room.ply"),
         ("scens", "scenes"),
     ],
 )
@@ -51,7 +50,7 @@ def test_a_missing_file_names_the_nearest(tmp_path: Path, asked: str, meant: str
     (tmp_path / "scenes" / "room.ply").write_text("")
     with pytest.raises(SceneError, match="no such file; did you mean") as caught:
         load(tmp_path / asked)
-    assert str(caught.value).endswith(f"did you mean {str(tmp_path / meant)!r}?")
+    assert str(caught.value).endswith(f"did you mean {tmp_path / meant}?")
 
 
 def test_a_missing_file_like_no_other(tmp_path: Path) -> None:

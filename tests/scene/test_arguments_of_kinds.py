@@ -41,7 +41,7 @@ CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
         (
             lambda: materials.Diffuse(reflectance=2.0, name="wall"),
             SceneError,
-            r"^diffuse 'wall'\.reflectance: 2\.0 is outside \[0, 1\]$",
+            r"^diffuse 'wall'\.reflectance: 2\.0 is outside \[0, 1\]; colours are 0 to 1",
         ),
         (
             lambda: shapes.Sphere(radius=-1.0, name="ball"),

@@ -134,7 +134,7 @@ def test_a_scene_is_no_list() -> None:
 
 
 def test_a_value_that_makes_no_sense() -> None:
-    with pytest.raises(SceneError, match=r"^diffuse\.reflectance: 2\.0 is outside \[0, 1\]$"):
+    with pytest.raises(SceneError, match=r"^diffuse\.reflectance: 2\.0 is outside \[0, 1\]"):
         scene().changed({"ball.material.reflectance": 2.0})
 
 

@@ -26,7 +26,7 @@ from clpt.formats.native.json_schema import (
 )
 from clpt.formats.native.reradiation import RERADIATIONS
 from clpt.formats.native.shape_files import FILES
-from clpt.formats.native.spectra import SPECTRA
+from clpt.formats.native.spectra import HEX, HEX_ROLES, SPECTRA
 from clpt.scene import KINDS, integrators, materials
 from clpt.scene.params import SPECTRUM_ROLES, Kind, Param, defaults, params
 
@@ -128,6 +128,8 @@ def _parameter(param: Param, default: Any) -> Schema:
 def _spectrum(role: str) -> Schema:
     number: Schema = NUMBER if role in ("factor", "quantity") else {**NUMBER, "minimum": 0}
     one_of = [number, {**TRIPLE, "description": "linear Rec. 709"}, ref("spectrum")]
+    if role in HEX_ROLES:
+        one_of.append({**STRING, "pattern": f"^{HEX}$", "description": "a colour in sRGB"})
     if role == "reflectance":
         number["maximum"] = 1
     elif role == "emission":

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from clpt.arrays import Words
-from clpt.errors import SceneError
 from clpt.render.analysis.lights.look import Look
 from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.render.analysis.wavelengths import Density
@@ -24,7 +23,7 @@ from clpt.render.lowering.spectra.spectra_table import SpectraTable
 from clpt.render.lowering.tables import TableStore, as_words
 from clpt.render.lowering.textures.bitmaps import Images
 from clpt.render.lowering.textures.textures import TextureTable
-from clpt.scene.params import Kind, Param, device_params, interior_params, params
+from clpt.scene.params import Kind, device_params, interior_params, params, place_of
 from clpt.spectra import RGB, Constant, Sensor, Tabulated
 
 BLACK = (Constant(0.0), RGB(0.0, 0.0, 0.0))
@@ -127,7 +126,7 @@ class Encoder:
                 value, source = self.spectra.angular_words(kind)
             else:
                 given = getattr(kind, name)
-                self._check(given, param, _where(kind, name))
+                self._note_reach(given, place_of(kind, name))
                 value, source = self.param_words(given, param.role, param.choices)
                 if param.lobe and given in (0.0, *BLACK):
                     source = "none"
@@ -135,10 +134,8 @@ class Encoder:
             self._sources[kind.kind][name].add(source)
         return np.concatenate(words) if words else np.zeros(1, np.uint32)
 
-    def _check(self, value: Any, param: Param, where: str) -> None:
-        """Raise SceneError for an index of 0; note a table that the film does not reach."""
-        if param.positive:
-            self.spectra.check_index(value, where)
+    def _note_reach(self, value: Any, where: str) -> None:
+        """Note a table that the film does not reach."""
         if isinstance(value, Tabulated) and not self.spectra.reaches(value):
             low, high = self.spectra.range
             self.warnings.add(
@@ -197,32 +194,15 @@ class Encoder:
         if self.spectra.spectral:
             rows = np.concatenate([self.kind_words(layer) for layer in material.layers])
         else:
-            self._refuse_textured_metal(material)
             for layer in material.layers:
-                for name, param in params(type(layer)).items():
-                    self._check(getattr(layer, name), param, _where(layer, name))
+                for name in params(type(layer)):
+                    self._note_reach(getattr(layer, name), place_of(layer, name))
             colours = thin_films.film_colours(material)
             table = self.store.append_floats("spectra", colours)
             profile, _ = self.named_words("layer", "profile", thin_films.profile(material), "real")
             rows = np.array([table, colours.shape[1], *profile], np.uint32)
         first = self.store.append("materials", rows)
         return np.array([first, len(material.layers)], np.uint32), "layers"
-
-    @staticmethod
-    def _refuse_textured_metal(material: Any) -> None:
-        for name in ("eta", "k"):
-            if getattr(getattr(material, name, None), "is_texture", False):
-                raise SceneError(
-                    "below layers it cannot be a texture in RGB mode; give a spectrum, or render "
-                    'in the mode "spectral"',
-                    where=f"{material.kind}.{name}",
-                )
-
-
-def _where(kind: Kind, name: str) -> str:
-    """Return the name of a parameter for messages, with the name of its material."""
-    named = getattr(kind, "name", "")
-    return f"{kind.kind}.{name}" + (f" of {named!r}" if named else "")
 
 
 def _no_sources() -> dict[str, dict[str, set[str]]]:

@@ -21,9 +21,10 @@ from clpt.render.analysis.bodies import matter_of
 from clpt.render.analysis.geometry import Emitter, Geometry
 from clpt.render.analysis.index import SceneIndex
 from clpt.render.analysis.lights import light_bounds
-from clpt.render.analysis.lights.sources import Sources
+from clpt.render.analysis.lights.sources import Sources, row_order
 from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.scene import Scene
+from clpt.scene.lights import Light
 from clpt.scene.media import Lattice, Medium
 from clpt.scene.motion import Deformation, Keys
 
@@ -58,18 +59,45 @@ def light_media(
     sphere: tuple[NDArray[np.float64], float],
     cache: LoweringCache,
 ) -> LightMedia:
-    """Return the media around all lights of a scene that has media.
+    """Return the media around all lights of a scene that has media; the rest as of `around`."""
+    try:
+        found = around(index, geometry, sphere, cache)
+    except Unknown as reason:
+        return NOWHERE._replace(refusal=str(reason))
+    ends = (*sources.first, len(sources.power))[1:]
+    counts = [1] * len(sources.order)
+    counts += [end - first for first, end in zip(sources.first, ends, strict=True)]
+    rows = tuple(zip(found, counts, strict=True))
+    extinction = np.concatenate(
+        [np.zeros(0), *(np.full(count, _extinction(there)) for there, count in rows)]
+    )
+    return LightMedia(rows, "", extinction)
+
+
+class Unknown(Exception):
+    """Why no paths can start at some light; where: that light, "" where it is none's own."""
+
+    def __init__(self, reason: str, where: str = ""):
+        super().__init__(reason)
+        self.where = where
+
+
+def around(
+    index: SceneIndex,
+    geometry: Geometry,
+    sphere: tuple[NDArray[np.float64], float],
+    cache: LoweringCache,
+) -> list[Around]:
+    """Return the media around each lamp, in the order of rows, and each shape that shines.
 
     geometry: of the shapes that shine; sphere: centre and radius of one around the scene [m].
-    What moves is looked at again and again while the shutter is open: a light must stay in one
-    medium.
+    What moves is looked at again and again while the shutter is open. Raises Unknown for a light
+    that is not in one medium which is known, and for media that give out light.
     """
-    scene, rows, motions = index.scene, [], index.motions
+    scene, motions = index.scene, index.motions
     if index.emitting:
         name = index.emitting[0].name or index.emitting[0].kind
-        return NOWHERE._replace(
-            refusal=f"no path starts in the medium {name!r}, which gives out light"
-        )
+        raise Unknown(f"no path starts in the medium {name!r}, which gives out light")
     known = _Known(scene, index.nested, cache, motions)
     hole = None if index.nested else known.open_medium()
     unknown = (
@@ -81,38 +109,48 @@ def light_media(
         )
     )
     afar = sphere[0] + AFAR * sphere[1] * np.ones(3)
-    for i in sources.order:
-        lamp = scene.lights[i]
-        if unknown:
-            return NOWHERE._replace(refusal=unknown.format(f"lights[{i}]"))
-        if lamp.reach == "placed":
-            bounds = light_bounds.of_lamp(lamp)
-            inside = known.along(bounds.low[0], motions.lamps.get(i))
-            if inside is None:
-                return NOWHERE._replace(refusal=CROSSES.format(f"lights[{i}]"))
-            rows.append((inside, 1))
-            continue
-        found = known.along(afar, None)
-        if found or found is None:
-            reason = f"the light of lights[{i}] comes from infinity, where a medium has no end"
-            return NOWHERE._replace(refusal=reason)
-        rows.append((found, 1))
-    ends = (*sources.first, len(sources.power))[1:]
-    for emitter, first, end in zip(geometry.emitters, sources.first, ends, strict=True):
-        if unknown and not _says(emitter.shape):
-            return NOWHERE._replace(refusal=unknown.format(shapes.where(emitter.shape)))
-        number = int(geometry.rows[emitter.shape_row]["number"])
-        into = _around_shape(emitter, known, motions, number)
-        if into is None:
-            reason = f"{shapes.where(emitter.shape)} shines into more than one medium"
-            if motions.moving:
-                reason += " while the shutter is open"
-            return NOWHERE._replace(refusal=reason)
-        rows.append((into, end - first))
-    extinction = np.concatenate(
-        [np.zeros(0), *(np.full(count, _extinction(around)) for around, count in rows)]
-    )
-    return LightMedia(tuple(rows), "", extinction)
+    lamps = [
+        _around_lamp(i, scene.lights[i], known, afar, unknown) for i in row_order(scene.lights)
+    ]
+    return lamps + [
+        _around_emitter(one, known, index, geometry, unknown) for one in geometry.emitters
+    ]
+
+
+def _around_lamp(
+    i: int, lamp: Light, known: _Known, afar: NDArray[np.float64], unknown: str
+) -> Around:
+    """The media around a lamp; afar: a point (3,) that stands for infinity; unknown: where a
+    boundary is open, what to say of a light. Raises Unknown."""
+    name = f"lights[{i}]"
+    if unknown:
+        raise Unknown(unknown.format(name))
+    if lamp.reach == "placed":
+        bounds = light_bounds.of_lamp(lamp)
+        inside = known.along(bounds.low[0], known.motions.lamps.get(i))
+        if inside is None:
+            raise Unknown(CROSSES.format(name), name)
+        return inside
+    found = known.along(afar, None)
+    if found or found is None:
+        reason = f"the light of {name} comes from infinity, where a medium has no end"
+        raise Unknown(reason, name)
+    return found
+
+
+def _around_emitter(
+    emitter: Emitter, known: _Known, index: SceneIndex, geometry: Geometry, unknown: str
+) -> Around:
+    """The media that a shape shines into; unknown: as of `_around_lamp`. Raises Unknown."""
+    name = shapes.where(emitter.shape)
+    if unknown and not _says(emitter.shape):
+        raise Unknown(unknown.format(name))
+    number = int(geometry.rows[emitter.shape_row]["number"])
+    into = _around_shape(emitter, known, index.motions, number)
+    if into is None:
+        moving = " while the shutter is open" if index.motions.moving else ""
+        raise Unknown(f"{name} shines into more than one medium{moving}", name)
+    return into
 
 
 def _extinction(around: Around) -> float:
@@ -133,7 +171,7 @@ class _Known:
 
     def __init__(self, scene: Scene, nested: bool, cache: LoweringCache, motions: Motions):
         self.scene = surroundings.boundaries(scene, matter_of if nested else None)
-        self.nested, self.cache = nested, cache
+        self.nested, self.cache, self.motions = nested, cache, motions
         self.looks = motions.looks()
         self.still = surroundings.stands_still(self.scene)
         # A camera's medium that no boundary holds is wherever there is no other.

@@ -7,10 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt import transforms
 from clpt.arrays import fits_single
 from clpt.errors import SceneError
-from clpt.render.analysis.lights.light_power import invertible, three
+from clpt.render.analysis.lights import light_power
 from clpt.render.analysis.lights.sources import emissions_of
 from clpt.render.contract import light_records
 from clpt.render.contract.light_records import RECORDS
@@ -78,9 +77,10 @@ def _declared_members(lamp: Light) -> dict[str, ArrayLike]:
         if param.form in light_records.OF_HOST:
             continue
         if param.form == "matrix4":
-            members |= _placement(value, where)
+            members |= light_power.placement(value, where)
         elif param.role == "host":
-            members[name] = (_unit if param.form == "direction" else three)(value, where)
+            turned = light_power.unit if param.form == "direction" else light_power.three
+            members[name] = turned(value, where)
         elif param.role == "choice":
             members[name] = param.choices.index(value)
         elif param.role != "emission":
@@ -93,7 +93,7 @@ def _computed_members(kind: str, lamp: Light, encoder: Encoder) -> dict[str, Arr
     if kind in light_records.PROJECTED_RECORDS:
         return projected.members(lamp, encoder)
     assert isinstance(lamp, lights.Spot)
-    placement = _placement(lamp.to_world, "spot.to_world")
+    placement = light_power.placement(lamp.to_world, "spot.to_world")
     return {
         "position": placement["position"],
         "axis": placement["z"],
@@ -101,18 +101,3 @@ def _computed_members(kind: str, lamp: Light, encoder: Encoder) -> dict[str, Arr
         "beam_width": np.radians(min(lamp.beam_width, lamp.cutoff)),
         "smooth": lights.SPOT_EDGES.index(lamp.edge),
     }
-
-
-def _placement(to_world: ArrayLike, where: str) -> dict[str, ArrayLike]:
-    """A light's position and unit axes. Raises SceneError for a matrix without an inverse."""
-    matrix = invertible(to_world, where)
-    axes = {axis: _unit(matrix[:3, i], where) for i, axis in enumerate("xyz")}
-    return {"position": matrix[:3, 3], **axes}
-
-
-def _unit(value: ArrayLike, where: str) -> NDArray[np.float64]:
-    vector = three(value, where)
-    length = transforms.length(vector)
-    if not length > 0.0:
-        raise SceneError("has no length", where=where)
-    return vector / length
