@@ -87,6 +87,7 @@ _HOMES = {  # the module of each name, and what it is called there
     "__version__": ("version", "VERSION"),
 }
 _SHOWN = ("MultiRenderer", "Renderer")  # renderers, whose pictures a notebook shows
+_MAKE_SCENES = ("Scene", "load")
 
 
 class _Front(ModuleType):
@@ -98,6 +99,8 @@ class _Front(ModuleType):
             value = vars(importlib.import_module(f"clpt.{module}"))[inside]
             if name in _SHOWN:
                 _give_widgets()
+            if name in _MAKE_SCENES:
+                _give_pictures()
         else:
             value = _submodule(name)
         self.__dict__[name] = value
@@ -117,7 +120,19 @@ def _give_widgets() -> None:
     from clpt.render.pictures import DevicePictures
     from clpt.view.notebook import widget
 
-    DevicePictures.make_widget = widget
+    DevicePictures._make_widget = widget
+
+
+def _give_pictures() -> None:
+    """Let scenes show themselves in notebooks: they know no renderer."""
+    from clpt.scene import Scene as Shown
+
+    def picture(scene: Shown) -> bytes:
+        from clpt.one_call import small_picture
+
+        return small_picture(scene)
+
+    Shown._picture = staticmethod(picture)
 
 
 def _submodule(name: str) -> ModuleType:

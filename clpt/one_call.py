@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
 CameraLike = Camera | Sequence[float] | str | int
+SHOWN, SHOWN_SAMPLES = 400, 32  # pixels a side and samples of what a notebook shows of a scene
 ORBIT = "(azimuth, elevation), such as (45, 20), or with a distance, in those that frame the scene"
 
 
@@ -86,6 +87,23 @@ def render(
     renderer = Renderer(scene, device, **cast("RenderOptions", options))
     renderer.run(spp, progress, noise=scene.noise)
     return renderer.image() if renderer.denoise is None else renderer.denoised()
+
+
+def small_picture(scene: Scene) -> bytes:
+    """Return a picture of a scene as PNG, of at most SHOWN pixels a side and few samples.
+
+    Raises as `Renderer` does.
+    """
+    width, height = scene.film.size
+    shrunk = max(1.0, max(width, height) / SHOWN)
+    size = max(round(width / shrunk), 1), max(round(height / shrunk), 1)
+    film = dataclasses.replace(
+        scene.film, width=size[0], height=size[1], crop=None, bands=0, layers=(), alpha=False
+    )
+    shown = dataclasses.replace(scene, film=film, noise=None)
+    with Renderer(shown) as renderer:
+        renderer.run(min(scene.spp, SHOWN_SAMPLES))
+        return renderer._repr_png_()
 
 
 def _film(scene: Scene, size: tuple[int, int] | None, mode: str | None) -> Film:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -87,6 +87,13 @@ class Scene:
     name: str = ""
     warnings: list[str] = field(default_factory=list)
     extra: dict[str, Any] = field(default_factory=dict)
+
+    # Makes the picture that a notebook shows: given by clpt/__init__, as scenes know no renderer.
+    _picture: ClassVar[Callable[[Scene], bytes] | None] = None
+
+    def _repr_png_(self) -> bytes | None:
+        """Return a small picture of the scene as PNG, which a notebook shows of it."""
+        return None if Scene._picture is None else Scene._picture(self)
 
     @classmethod
     def studio(
@@ -171,7 +178,8 @@ class Scene:
         """
         scene = self
         for path, value in values.items():
-            scene = paths.changed(scene, path, value)
+            parts: dict[str, Any] = paths.changes(scene, path, value)
+            scene = replace(scene, **parts)
         return scene
 
     def __post_init__(self) -> None:

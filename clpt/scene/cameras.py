@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import InitVar, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -42,7 +42,7 @@ LOOK_AT = Shorthand(
 class Camera(Kind):
     """Base of all cameras."""
 
-    shorthands = (LOOK_AT,)
+    shorthands: ClassVar[tuple[Shorthand, ...]] = (LOOK_AT,)
     if TYPE_CHECKING:  # arguments only: they stand for `to_world`
         origin: InitVar[Vector3 | None] = None
         target: InitVar[Vector3 | None] = None

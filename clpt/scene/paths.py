@@ -10,16 +10,14 @@ from __future__ import annotations
 import dataclasses
 import re
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, TypeVar, cast
+from typing import Protocol, TypeVar, cast
 
 from clpt.errors import SceneError, nearest
+from clpt.scene.lights import Light
 from clpt.scene.materials import Material
 from clpt.scene.params import Kind, defaults, params, shorthands
-from clpt.scene.shapes import Group
+from clpt.scene.shapes import Group, Shape
 from clpt.spectra import Spectrum
-
-if TYPE_CHECKING:
-    from clpt.scene import Scene
 
 SINGLE = ("camera", "film", "integrator", "sampler")
 NUMBERS = ("spp", "noise", "seed")
@@ -29,7 +27,14 @@ STEP = re.compile(r"\.([^.\[\]]+)|\[(\d+)\]")
 Key = str | int
 
 
-def parameters(scene: Scene) -> dict[str, object]:
+class Parts(Protocol):
+    """A scene, as far as paths lead into it."""
+
+    shapes: list[Shape]
+    lights: list[Light]
+
+
+def parameters(scene: Parts) -> dict[str, object]:
     """Return all parameters of a scene by their paths, in its order.
 
     A material with a name stands once, under that name, and so does what several places share.
@@ -41,20 +46,20 @@ def parameters(scene: Scene) -> dict[str, object]:
     return found
 
 
-def get(scene: Scene, path: str) -> object:
+def get(scene: Parts, path: str) -> object:
     """Return what is at a path. Raises SceneError, with the nearest names, where nothing is."""
     chain, last = _walked(scene, path)
     return _children(chain[-1][1])[last] if chain else _roots(scene)[cast("str", last)]
 
 
-def changed(scene: Scene, path: str, value: object) -> Scene:
-    """Return a scene with another value at a path.
+def changes(scene: Parts, path: str, value: object) -> dict[str, object]:
+    """Return the parts of a scene, by name, with another value at a path.
 
     What several places share changes at all of them; what is a default changes at this one alone.
     Raises SceneError for a path to nothing, and for a value that makes no sense there.
     """
     if path in (*SINGLE, *NUMBERS):
-        return dataclasses.replace(scene, **{path: value})  # type: ignore[arg-type]
+        return {path: value}
     chain, key = _walked(scene, path, shorthand=True)
     made: dict[int, object] = {}
     if not chain:
@@ -68,17 +73,15 @@ def changed(scene: Scene, path: str, value: object) -> Scene:
             made[id(thing)] = value
         key = step
     seen: dict[int, object] = {}
-    parts = {name: _swapped(getattr(scene, name), made, seen) for name in SINGLE}
-    lists = {
-        name: [_swapped(one, made, seen) for one in getattr(scene, name)]
-        for name in ("shapes", "lights")
-    }
-    return dataclasses.replace(scene, **parts, **lists)  # type: ignore[arg-type]
+    parts = {name: _swapped(vars(scene)[name], made, seen) for name in SINGLE}
+    parts["shapes"] = [_swapped(one, made, seen) for one in scene.shapes]
+    parts["lights"] = [_swapped(one, made, seen) for one in scene.lights]
+    return parts
 
 
-def _roots(scene: Scene) -> dict[str, object]:
+def _roots(scene: Parts) -> dict[str, object]:
     """Return what paths begin with; a name that two have names neither."""
-    found: dict[str, object] = {name: getattr(scene, name) for name in (*SINGLE, *NUMBERS)}
+    found: dict[str, object] = {name: vars(scene)[name] for name in (*SINGLE, *NUMBERS)}
     materials = _named_materials(scene)
     names = [shape.name for shape in scene.shapes]
     several = len(names) > MOST_NAMED
@@ -90,7 +93,7 @@ def _roots(scene: Scene) -> dict[str, object]:
     return found | {name: one for name, one in materials.items() if name not in found}
 
 
-def _named_materials(scene: Scene) -> dict[str, object]:
+def _named_materials(scene: Parts) -> dict[str, object]:
     """Return the materials that have a name, by it: the first of each name."""
     found: dict[str, object] = {}
     seen: set[int] = set()
@@ -116,11 +119,11 @@ def _is_inner(thing: object) -> bool:
 def _children(thing: object) -> dict[Key, object]:
     """Return what is directly in a thing: parameters of a kind, fields of a spectrum, items."""
     if isinstance(thing, Kind):
-        return {name: getattr(thing, name) for name in params(type(thing))}
+        return {name: vars(thing)[name] for name in params(type(thing))}
     if isinstance(thing, tuple):
         return dict(enumerate(thing))
     if isinstance(thing, (Spectrum, Group)) and dataclasses.is_dataclass(thing):
-        return {field.name: getattr(thing, field.name) for field in dataclasses.fields(thing)}
+        return {field.name: vars(thing)[field.name] for field in dataclasses.fields(thing)}
     return {}
 
 
@@ -139,7 +142,7 @@ def _inside(path: str, thing: object, seen: set[int]) -> dict[str, object]:
 
 
 def _walked(
-    scene: Scene, path: str, *, shorthand: bool = False
+    scene: Parts, path: str, *, shorthand: bool = False
 ) -> tuple[list[tuple[Key, object]], Key]:
     """Return the things on the way to the end of a path, each with its key, and the last key.
 

@@ -33,8 +33,8 @@ def write_layers(
     The picture is in half floats, or its bands in float32, layers in float32. names: a set of SETS;
     "blender" gives names such as ViewLayer.Combined.R. Raises SceneError.
     """
-    source = source.developed()
-    layers, form = source.layers(), source.form
+    source = source._developed()
+    layers, form = source.layers(), source._form
     if form.adaptive:
         layers.setdefault("samples", source.samples_per_pixel()[..., None])
     channels = channels_of(layers, names)
