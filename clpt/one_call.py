@@ -68,11 +68,8 @@ def render(
     size, mode = options.pop("size", None), options.pop("mode", None)
     camera, env = options.pop("camera", None), options.pop("env", None)
     if isinstance(scene, (str, os.PathLike)):
-        file = Path(scene)
-        if isinstance(camera, (str, int)):
-            scene, camera = formats.load(file, camera=camera), None
-        else:
-            scene = formats.load(file)
+        named = {"camera": camera} if isinstance(camera, (str, int)) else {}
+        scene, camera = _loaded(Path(scene), named), None if named else camera
     check_scene(scene)
     if env is not None:
         scene = viewpoint.surrounded(scene, os.fspath(env))
@@ -87,6 +84,10 @@ def render(
     renderer = Renderer(scene, device, **cast("RenderOptions", options))
     renderer.run(spp, progress, noise=scene.noise)
     return renderer.image() if renderer.denoise is None else renderer.denoised()
+
+
+def _loaded(file: Path, variables: dict[str, str | int]) -> Scene:
+    return formats.load(file, **variables)  # type: ignore[arg-type]
 
 
 def small_picture(scene: Scene) -> bytes:

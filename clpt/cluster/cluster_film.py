@@ -216,7 +216,7 @@ class ClusterFilm(DevicePictures):
         It may lack samples before its last one, which `ClusterRenderer` takes when it goes on.
         """
         if held and self._held is None:
-            raise SceneError("no film is held; call hold() first")
+            raise SceneError("no film is held")
         adaptive = {} if self._noise is None or held else self._noise.arrays()
         films, arrays = self._held if held and self._held else (self._sum, adaptive)
         state = self._empty() if films.film is None else films.film

@@ -144,7 +144,7 @@ class MultiFilm(DevicePictures):
         """
         if held:
             if self._held is None:
-                raise SceneError("no film is held; call hold() first")
+                raise SceneError("no film is held")
             if isinstance(self._held, _Held):
                 self._held = self._read(self._held)
             return self._held

@@ -17,6 +17,7 @@ import numpy as np
 from clpt import images
 from clpt.arrays import Image
 from clpt.choices import MOST_SAMPLES
+from clpt.choices import Exposure
 from clpt.colour.view import View
 from clpt.errors import SceneError
 from clpt.render.contents import FilmOwner
@@ -241,11 +242,11 @@ class FilmRenderer(FilmOwner, Pictures):
         self,
         path: str | Path,
         *,
-        exposure: images.Exposure = 0.0,
+        exposure: Exposure = 0.0,
         tone: str = "none",
         view: View | None = None,
     ) -> None:
-        """Write the picture so far to a file, in the format of its suffix; wait for it.
+        """Write the picture so far to a file, in the format of the path's suffix; wait for it.
 
         An .exr has the film's layers. A renderer with `denoise` writes what is denoised.
         exposure [stops], tone, view: of files for screens, see `clpt.write_image`.
@@ -264,6 +265,8 @@ class FilmRenderer(FilmOwner, Pictures):
     def save_state(self, path: str | Path) -> None:
         """Write the film to a file, from which `load_state` goes on, in another process too.
 
+        path: of the file; the former one is replaced.
+
         Raises SceneError for a file that cannot be written: the former one is then as it was.
         """
         saved = self._saved_film()
@@ -274,6 +277,8 @@ class FilmRenderer(FilmOwner, Pictures):
 
     def load_state(self, path: str | Path) -> None:
         """Go on from a file of `save_state`, of any renderer: what the film held before is gone.
+
+        path: of the file.
 
         All that follows is to the bit as if nothing had been interrupted, where the device is of
         the class that took the samples; `warnings` tells where it is not.

@@ -73,7 +73,8 @@ class DevicePictures(FilmRenderer):
         exposure [stops]; tone: none, reinhard, aces, agx or neutral, see clpt.colour.tones; srgb:
         whether the sRGB transfer is applied, by default to uint8 only; colours become Rec. 709.
         view: of OpenColorIO, in the place of tone and transfer: a table of it, right to 1/512 for
-        98 of 100 colours. flip: the first row is the lowest.
+        98 of 100 colours. flip: the first row is the lowest. wait_for: events of the caller that
+        come first.
 
         Returns the Array, whose `events` hold the event of the picture; for an Image the event.
         Raises DeviceError if the picture does not fit, UnknownKindError for names.

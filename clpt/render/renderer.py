@@ -310,7 +310,8 @@ class Renderer(Resumable):
     ) -> cl.Event:
         """Enqueue that the film is emptied; the next sample is the first one again.
 
-        first_sample: its number from now on, by default as before. seed: of the samples from now
+        wait_for: events of the caller that come first. first_sample: its number from now on, by
+        default as before. seed: of the samples from now
         on, which `self.scene` then has; by default as before. Raises SceneError for a seed that is
         no whole number, and for a number that is too large.
 
@@ -411,7 +412,8 @@ class Renderer(Resumable):
         film, for any other change; arrays and images that it shares with the present one are taken
         to be unchanged. motion: what changes place, of shapes, lights and the camera, moves from
         where it was to where it is, and so do vertices, while the shutter of the camera is open;
-        the next update goes on from there. The scene is lowered again then, and once more after.
+        the next update goes on from there. wait_for: events of the caller that come first. The
+        scene is lowered again then, and once more after.
 
         The first of three ways that is possible is taken:
 

@@ -88,7 +88,7 @@ class Resumable(DevicePictures):
         without a `_hold`.
         """
         if held and self._held is None:
-            raise SceneError("no film is held; call _hold() first")
+            raise SceneError("no film is held")
         if held and self._held is not None:
             so_far = dict(self._held)
         else:

@@ -6,6 +6,7 @@ import math
 import numbers
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import FunctionType, ModuleType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -57,6 +58,26 @@ KINDS: dict[str, tuple[type[Kind], ...]] = {
 }
 
 
+def __dir__() -> list[str]:
+    return __all__
+
+
+def _show_own(module: ModuleType) -> None:
+    """Let TAB after a module's name show what it defines, not what it imports."""
+    defined = (type, FunctionType)
+    own = [
+        name
+        for name, value in vars(module).items()
+        if not name.startswith("_")
+        and (name.isupper() or (isinstance(value, defined) and value.__module__ == module.__name__))
+    ]
+    vars(module)["__dir__"] = lambda: own
+
+
+for _module in (cameras, integrators, lights, materials, media, shapes, textures):
+    _show_own(_module)
+
+
 def kinds(category: str) -> dict[str, type[Kind]]:
     """Return the kinds of a category by their names in scene files."""
     return {cls.kind: cls for cls in KINDS[category]}
@@ -66,10 +87,11 @@ def kinds(category: str) -> dict[str, type[Kind]]:
 class Scene:
     """A whole scene.
 
-    shapes, lights: what there is; lights that are surfaces are a shape's `emission`. integrator:
-    how light is followed; sampler: where its random numbers come from; film: size, mode, filter and
-    colours of the picture. spp: samples of a pixel, for `clpt.render`; noise: below which it gets
-    no more, None for all, see clpt.render.wavefront.adaptive; seed: of the random numbers.
+    camera: from which it is seen. shapes, lights: what there is; lights that are surfaces are a
+    shape's `emission`. integrator: how light is followed; sampler: where its random numbers come
+    from; film: size, mode, filter and colours of the picture. spp: samples of a pixel, for
+    `clpt.render`; noise: below which it gets no more, None for all, see
+    clpt.render.wavefront.adaptive; seed: of the random numbers. name: for messages and files.
     warnings: what a loader had to pass over; extra: what else it found, for people.
 
     Raises SceneError for `spp` that is no whole number above zero, and `noise` likewise.
@@ -98,7 +120,7 @@ class Scene:
     @classmethod
     def studio(
         cls,
-        things: Any,
+        things: object,
         *,
         camera: cameras.Camera | None = None,
         lights: Sequence[Light] = (),
@@ -110,7 +132,7 @@ class Scene:
         things: a shape, a `trimesh.Trimesh`, or a list of them. camera: by default one that frames
         them all, from the front and above. lights: by default a warm key light and a cool fill,
         over a ground that curves up to a backdrop. up: "y", or "z" as in CAD; the front is +z, or
-        -y then.
+        -y then. name: of the scene.
 
         Raises SceneError for shapes too large to be framed.
         """

@@ -512,7 +512,7 @@ def _matrix(value: object, param: Param, where: str) -> Any:
 _MATRICES = {"matrix3": (3, 3), "matrix4": (4, 4)}
 
 
-def _optional_number(value: Any, param: Param, where: str) -> float | None:
+def _optional_number(value: object, param: Param, where: str) -> float | None:
     return None if value is None else check_number(value, param, where)
 
 

@@ -57,12 +57,8 @@ def parts(
             extra_shapes = [_backdrop(floor, radius, turn), _key(centre, radius, turn)]
         else:
             extra_lights.append(_distant_key(turn))
-    added = {
-        "camera": camera is None,
-        "shapes": len(extra_shapes),
-        "lights": len(extra_lights),
-        "up": up,
-    }
+    counts = {"shapes": len(extra_shapes), "lights": len(extra_lights)}
+    added = {"camera": camera is None, **counts, "up": up}
     return {
         "camera": camera or framing_camera(things, turn),
         "shapes": [*things, *extra_shapes],

@@ -56,7 +56,7 @@ def material_of(visual: object) -> tuple[Material, Light | None] | None:
 
     A `PBRMaterial` becomes what clpt.load makes of glTF, a `SimpleMaterial` a matt surface.
     """
-    given = getattr(visual, "material", None)
+    given = _of(visual, "material", object)
     if given is None:
         return None
     name = _of(given, "name", str) or ""
@@ -112,7 +112,7 @@ def _image(
     given: object, name: str, *, raw: bool = False, channel: str = "luminance"
 ) -> Bitmap | None:
     """Return the image of a material as a texture, None where it has none."""
-    image = getattr(given, name, None)
+    image = _of(given, name, object)
     if image is None:
         return None
     modes = ("L", "RGB", "RGBA")
@@ -124,7 +124,7 @@ def _image(
 
 def _levels(given: object, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
     """Return a colour of a material: linear, whole numbers of 255 or floats to 1."""
-    value = getattr(given, name, None)
+    value = _of(given, name, object)
     if value is None:
         return default
     numbers = np.asarray(value)

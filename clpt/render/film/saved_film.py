@@ -83,7 +83,7 @@ class SavedFilm(Pictures):
 
     @property
     def _form(self) -> PictureForm:  # type: ignore[override]
-        """How its pictures are made."""
+        """The way from the film's words to a picture."""
         return self.form
 
     def _developed(self, *words: str) -> Developed:
