@@ -16,8 +16,7 @@ import numpy as np
 
 from clpt import images
 from clpt.arrays import Image
-from clpt.choices import MOST_SAMPLES
-from clpt.choices import Exposure
+from clpt.choices import MOST_SAMPLES, Exposure
 from clpt.colour.view import View
 from clpt.errors import SceneError
 from clpt.render.contents import FilmOwner
