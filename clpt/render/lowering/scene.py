@@ -49,7 +49,7 @@ from clpt.scene import materials as mt
 from clpt.scene.integrators import Film, Integrator
 from clpt.scene.lights import Point
 from clpt.scene.media import Lattice
-from clpt.scene.params import params
+from clpt.scene.params import Kind, params
 from clpt.scene.shapes import Mesh, Shape
 
 TREE_FROM = 16  # lights from which a tree chooses among them, see bench/lights.py
@@ -244,7 +244,8 @@ def _begin_materials(index: SceneIndex, encoder: Encoder) -> MaterialWords:
     """Append what idle lanes read as a material, and make the maker of material words."""
     if index.shifts:
         encoder.spectra.expect_light(emissions(index))
-    longest = max(map(row_words, (*mt.LEAVES, *index.leaves)))
+    leaves: tuple[type[Kind], ...] = (*mt.LEAVES, *index.leaves)
+    longest = max(map(row_words, leaves))
     encoder.store.append("materials", np.zeros(longest, np.uint32))
     return MaterialWords(encoder, index.leaves, index.normal_mapped)
 
