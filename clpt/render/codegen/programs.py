@@ -166,7 +166,7 @@ def _common(features: Features, layout: str, lanes: int) -> device.Source:
         **_shared(features, layout),
         "generated/common_part.cl": common.part_text(features),
     }
-    return _source("common", files, flags.of_scene(features), lanes)
+    return _source("common", files, _defines(features, lanes), lanes)
 
 
 def _alone(features: Features, layout: str, *names: str) -> dict[str, device.Source]:
