@@ -191,7 +191,6 @@ class BoundKernel:
             where = f"kernel {self.kernel.name!r} at {global_size}, {local_size}"
             raise refused(where, error) from error
 
-
     def _fitting(
         self, queue: cl.CommandQueue, local_size: Sequence[int] | None
     ) -> Sequence[int] | None:

@@ -31,7 +31,7 @@ def tiles(width: int, height: int) -> tuple[tuple[int, int], tuple[int, int]]:
 
 @dataclass(frozen=True)
 class Rows:
-    """Parts of a buffer at equal distances: where the first begins, their size and distance [bytes]."""
+    """Parts of a buffer at equal distances: the first one, their size and distance [bytes]."""
 
     first: int
     size: int
