@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from ... import device as dev
+from ...device import compile_limits
 from ..options.scene_options import Machine
+from ..process import failures
 
 
 def choose_devices(machine: Machine) -> list[dev.Device]:
@@ -19,3 +25,19 @@ def kill_compilers(devices: list[dev.Device]) -> None:
     for on in devices:
         if on.compilers is not None:
             on.compilers.kill()
+
+
+@contextmanager
+def ending_at_limit() -> Iterator[None]:
+    """End the process with an error if a driver's compiler hangs in it: nothing else would."""
+
+    def end(said: str) -> None:
+        dev.kill_compilers()
+        failures.complain(said)
+        os._exit(failures.BAD_INPUT)
+
+    before, compile_limits.at_limit = compile_limits.at_limit, end
+    try:
+        yield
+    finally:
+        compile_limits.at_limit = before

@@ -14,6 +14,7 @@ from clpt.render.codegen import (
     blocks,
     bounce,
     choices,
+    common,
     emission,
     flags,
     lights,
@@ -103,6 +104,8 @@ def _shading(
             **choices.material_files(features, cls),
             "generated/bsdf.cl": stages.bsdf_text(features, cls),
         }
+        if part:
+            own["generated/common.cl"] = common.calls_text(features)
         if cls.is_phase:
             own["generated/shading_frame.cl"] = ("path/phase_frame.cl",)
         if cls.source is not None:
@@ -143,6 +146,9 @@ def loop_sources(
         made |= _stages(own, layout, lanes, interleaved, part=True)
         stages_ = bounce.order(own, layout, lanes, interleaved)
         used |= dict.fromkeys(stage.program for stage in stages_)
+    if common.shared(features):
+        made["common"] = _common(features, layout, lanes)
+        used["common"] = None
     files = {
         **_shared(features, layout),
         **signatures.loop_files(features, layout),
@@ -152,6 +158,15 @@ def loop_sources(
     loop = _source("loop", files, _defines(features, lanes), lanes)
     parts = {name: made[name].with_private(name) for name in used}
     return {**parts, "loop": loop.with_private("loop")}
+
+
+def _common(features: Features, layout: str, lanes: int) -> device.Source:
+    """The part of a loop that several kinds of materials call."""
+    files = {
+        **_shared(features, layout),
+        "generated/common_part.cl": common.part_text(features),
+    }
+    return _source("common", files, flags.of_scene(features), lanes)
 
 
 def _alone(features: Features, layout: str, *names: str) -> dict[str, device.Source]:
@@ -193,8 +208,10 @@ def _shared(features: Features, layout: str) -> Files:
         **signatures.virtual_files(features, layout),
         **parameters.virtual_files(features),
         **choices.virtual_files(features, layout),
+        "generated/common.cl": common.calls_text(),
         "generated/camera.cl": stages.camera_text(features.camera, moves=features.motion.camera),
         "generated/connect.cl": stages.connect_text(features),
+        "generated/grid_words.cl": stages.grid_words_text(features.media.grids),
         "generated/screen.cl": stages.screen_text(features),
         "generated/photon.cl": stages.photon_text(features) if features.transport.merged else "",
         "generated/emission.cl": emission.dispatch_text(features),

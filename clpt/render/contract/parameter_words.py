@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from clpt.records import MATERIAL_KINDS
+from clpt.records import MATERIAL_KINDS, RERADIATION_SIZES
 from clpt.scene.params import (
     ORDERS,
     SPECTRUM_ROLES,
@@ -15,7 +15,7 @@ from clpt.scene.params import (
 NORMAL_MAP_WORDS = 11  # before a material's row, see kernels/path/shading_frame_mapped.cl
 MIXTURE = MATERIAL_KINDS["mixture"]
 FILM_COSINES = 128  # of the table of a film's colours, from 0 to 1
-RERADIATION_STEP = 5  # [nm] between the nodes of a matrix
+RERADIATION_STEP = RERADIATION_SIZES["step"]  # [nm] between the nodes of a matrix
 SPECTRAL = (*SPECTRUM_ROLES, "reradiation")  # roles whose values are spectra in the kernels
 
 # How many words a parameter takes in a row of `materials`, `textures` or `light_params`.
