@@ -67,7 +67,7 @@ def scene_text(unused: Container[str] = ()) -> str:
         for name, (element, doc) in TABLES.items()
     ]
     slab_sets = [
-        f"{record.name.lower()} = {{{name}, SLAB_STEP({record.snake_name.upper()}_STEP, stride)}}"
+        f"{record.name.lower()} = {{{name}, SLAB_STEP({record.step}, stride)}}"
         for record, name in zip(SLABS, SLAB_ARGS, strict=False)
     ]
     return "\n".join(
