@@ -65,16 +65,15 @@ kernel void probe(SLAB_ARGS, global const uint *queue, uint entry, uint end, uin
     store_path_pdf(path, block, all, load_path_pdf(path, block) * 2.0f);
     store_shadow_t(shadow, block, all, load_shadow_t(shadow, block) * 2.0f);
     store_hit_t(hit, block, all, (real)(-1.0f));
-    constant uchar *words = BLOCK_WORDS(0)->shadow_words;
-    uint count = BLOCK_WORDS(0)->shadow;
-    queue_return(path, shadow, BLOCK_WORDS(0), words, count, queue, entry, end, block);
+    constant BlockWords *own = BLOCK_WORDS(0);
+    queue_return(path, shadow, own, own->shadow_words, own->shadow, queue, entry, end, block);
 }
 """,
 }
 
 
 def laid(record: Record, words: np.ndarray, lanes: int) -> np.ndarray:
-    """Words (words, slots) as they lie in a slab: in blocks, or as they are."""
+    """Words (words, slots) as they lie in a slab: in blocks (blocks, step, SLAB_BLOCK), or as is."""
     if lanes > 1:
         return words
     filled = np.zeros((record.step, words.shape[1]), words.dtype)
