@@ -158,7 +158,14 @@ class Wavefront:
         share = strategy.loop_share(on)
         blocks = -(-divided.total // share) * on.lanes if share > on.lanes else 0  # one each
         in_flight = PathBuffers(
-            stream, buffers, settings, divided, blocks, chosen.queued, kinds, footprint,
+            stream,
+            buffers,
+            settings,
+            divided,
+            blocks,
+            chosen.queued,
+            kinds,
+            footprint,
             in_blocks=on.lanes == 1,
         )
         return cls(scene, in_flight, looped, tuning)
