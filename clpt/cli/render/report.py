@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import click
 
-from ...cluster.multi_renderer import MultiRenderer
 from ..opening.makers import AnyRenderer
 from .passes import End
 
@@ -73,6 +72,8 @@ def before(renderer: AnyRenderer, loading: float) -> None:
 
 def after(renderer: AnyRenderer) -> None:
     """Print the time of the first sample, what each device did, and each stage of the first."""
+    from ...cluster.multi_renderer import MultiRenderer  # here: one device has no use for it
+
     if isinstance(renderer, MultiRenderer):
         for one in renderer.shares:
             lost = f", failed: {one.failure}" if one.failure else ""
