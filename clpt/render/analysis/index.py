@@ -101,7 +101,7 @@ class SceneIndex:
             emissive=any(isinstance(medium, Lattice) for medium in emitting),
             hot=any(getattr(one, "temperature", None) is not None for one in emitting),
             tinted=any(getattr(one, "albedo_grid", None) is not None for one in media),
-            coloured=any(getattr(one, "colour_grid", None) is not None for one in media),
+            coloured=any(getattr(one, "color_grid", None) is not None for one in media),
             mixed=max((len(getattr(one, "parts", ())) for one in media), default=0),
             bytes=any(isinstance(one, Grid) and one.bits == 8 for one in media),
         )
