@@ -35,11 +35,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from types import MappingProxyType
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from clpt.errors import SceneError
+from clpt.errors import SceneError, UnusedParameterError
 from clpt.measured import Measurement, MerlTable
 from clpt.spectra import (
     RGB,
@@ -68,7 +69,7 @@ HostForm = Literal[
     "rows2", "rows3", "rows4", "grid", "normals", "triangles", "attributes",
     "number_or_list", "lengths",
     "image", "volume", "colour_volume", "cube_images", "crop", "sensor", "white_balance",
-    "number_or_auto", "lens", "keys", "deformation", "shutter",
+    "number_or_auto", "lens", "keys", "deformation", "shutter", "optional_number", "metal", "size",
 ]  # fmt: skip
 MEASURED = {"measurement": Measurement, "merl": MerlTable}
 ORDERS = 8  # highest order of diffraction, see kernels/optics/diffraction.cl
@@ -211,12 +212,21 @@ def layers(doc: str) -> Any:
     return _field((), Param("layers", doc))
 
 
-def host(default: Any, doc: str, unit: str = "", *, form: HostForm | None = None) -> Any:
+def host(
+    default: Any,
+    doc: str,
+    unit: str = "",
+    *,
+    form: HostForm | None = None,
+    positive: bool = False,
+) -> Any:
     """Declare what only the host needs: geometry, matrices, nested kinds.
 
-    form: what it holds; None for what the type of the default implies.
+    form: what it holds; None for what the type of the default implies. positive: of a number.
     """
-    return _field(default, Param("host", doc, unit, form=form or _form_of(default)))
+    low = 0.0 if positive else -math.inf
+    made = Param("host", doc, unit, low, form=form or _form_of(default), positive=positive)
+    return _field(default, made)
 
 
 def _form_of(default: Any) -> str:
@@ -231,6 +241,19 @@ def _form_of(default: Any) -> str:
     return forms.get(type(default), "")
 
 
+@dataclass(frozen=True)
+class Shorthand:
+    """Arguments of a kind that stand for some of its parameters.
+
+    arguments: what each is, by its name. stands_for: the parameters. spell: called with those of
+    the arguments that are given, returns values of the parameters by name.
+    """
+
+    arguments: Mapping[str, Param]
+    stands_for: tuple[str, ...]
+    spell: Callable[..., dict[str, Any]]
+
+
 class classproperty:
     """A read-only property of a class."""
 
@@ -241,10 +264,55 @@ class classproperty:
         return self.function(owner)
 
 
+class KindType(type):
+    """The type of kinds: what all of them do with the arguments that they are called with.
+
+    A name that the kind does not have raises UnusedParameterError with the nearest ones. Shorthands
+    become the parameters that they stand for. What is wrong with an object tells its name.
+    """
+
+    def __call__(cls, /, *values: object, **given: object) -> Any:
+        kind = cast("type[Kind]", cls)
+        if values:
+            example = next(iter((*device_params(kind), *_field_names(kind))), "")
+            message = f"{cls.__name__} takes its parameters by name: {cls.__name__}({example}=...)"
+            raise TypeError(message)
+        try:
+            return super().__call__(**_spelled_out(kind, given))
+        except SceneError as error:
+            name, where = given.get("name"), error.where or kind.kind
+            if name and isinstance(name, str) and where.startswith(kind.kind):
+                error.place_at(f"{kind.kind} {name!r}{where.removeprefix(kind.kind)}")
+            raise
+
+
+def _spelled_out(kind: type[Kind], given: dict[str, object]) -> dict[str, object]:
+    """Return arguments of a kind without shorthands. Raises SceneError, UnusedParameterError."""
+    known, short = _field_names(kind), shorthands(kind)
+    for name in given:
+        if name not in known and name not in short:
+            raise UnusedParameterError(kind.kind, name, (*known, *short))
+    plain = {name: value for name, value in given.items() if name not in short}
+    for shorthand in kind.shorthands:
+        asked = {name: given[name] for name in shorthand.arguments if given.get(name) is not None}
+        for name in shorthand.stands_for if asked else ():
+            if name in plain:
+                first = next(iter(asked))
+                message = f"{first!r} stands for {name!r} too; give either"
+                raise SceneError(message, where=f"{kind.kind}.{first}")
+        try:
+            plain |= shorthand.spell(**asked) if asked else {}
+        except SceneError as error:
+            error.place_at(f"{kind.kind}.{error.where or next(iter(asked))}")
+            raise
+    return plain
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Kind:
+class Kind(metaclass=KindType):
     """Base of all kinds; the class name gives the name in files and kernels."""
 
+    shorthands: ClassVar[tuple[Shorthand, ...]] = ()
     needs_wavelengths: ClassVar[bool] = False  # its struct in the kernels has `lambdas`
     # Where all numbers of one of these are above 0, its struct has the `luminance` of `base_color`,
     # and its kernel file includes core/luminance.cl.
@@ -305,6 +373,13 @@ def params(cls: type) -> Mapping[str, Param]:
     return _declared(cls)
 
 
+@cache
+def shorthands(cls: type[Kind]) -> Mapping[str, Param]:
+    """Return the arguments of a kind that stand for parameters, by name; see `Shorthand`."""
+    merged = {name: param for one in cls.shorthands for name, param in one.arguments.items()}
+    return MappingProxyType(merged)
+
+
 def defaults(cls: type) -> dict[str, Any]:
     """Return the defaults of a kind's declared parameters, by name."""
     fields = {f.name: f for f in dataclasses.fields(cls) if "param" in f.metadata}
@@ -342,6 +417,8 @@ def interior_params(cls: type) -> Mapping[str, Param]:
 
 
 def _checked(value: Any, param: Param, where: str) -> Any:
+    if param.role == "host" and param.form in _CHECKED_FORMS:
+        return _CHECKED_FORMS[param.form](value, param, where)
     if param.role in ("host", "angular"):
         return value
     if param.role == "flag":
@@ -368,7 +445,7 @@ def _checked(value: Any, param: Param, where: str) -> Any:
             raise SceneError("cannot be a texture", where=where)
         return value
     if param.role == "real":
-        return _number(value, param, where)
+        return check_number(value, param, where)
     if param.role == "orders":
         return _orders(value, param, where)
     return _spectrum(value, param, where)
@@ -383,22 +460,70 @@ def _layers(value: Any, where: str) -> tuple[Kind, ...]:
     return tuple(value)
 
 
-def _number(value: Any, param: Param, where: str) -> float:
+def check_number(value: Any, param: Param, where: str | None = None) -> float:
+    """Return the value of a number's parameter. Raises SceneError."""
     if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
         raise SceneError(f"must be a number, not {value!r}", where=where)
     if not math.isfinite(value):
         raise SceneError(f"must be finite, not {value}", where=where)
     if abs(value) > LARGEST:
         raise SceneError(f"{value:g} is beyond {LARGEST:g}, where float32 ends", where=where)
+    if param.positive and value <= 0.0:
+        raise SceneError(f"must be above 0, not {value}", where=where)
     if not param.low <= value <= param.high:
         advice = (
             "; colours are 0 to 1, linear" if param.role == "reflectance" and value > 1.0 else ""
         )
         message = f"{value} is outside [{param.low:g}, {param.high:g}]{advice}"
         raise SceneError(message, where=where)
-    if param.positive and value == 0.0:
-        raise SceneError("must be above 0", where=where)
     return float(value)
+
+
+def _vector(value: object, param: Param, where: str) -> Any:
+    """Check three numbers; those of a direction cannot all be 0."""
+    try:
+        numbers = np.asarray(cast("ArrayLike", value), np.float64)
+    except (TypeError, ValueError):
+        numbers = np.empty(0)
+    if numbers.shape != (3,) or not np.isfinite(numbers).all():
+        raise SceneError(f"must be three finite numbers, not {value!r}", where=where)
+    if np.abs(numbers).max() > LARGEST:
+        raise SceneError(f"is beyond {LARGEST:g}, where float32 ends", where=where)
+    if param.form == "direction" and not numbers.any():
+        raise SceneError("has no length", where=where)
+    return value
+
+
+def _matrix(value: object, param: Param, where: str) -> Any:
+    """Check the form of a matrix that is not on a device."""
+    if isinstance(value, np.ndarray) and value.shape == _MATRICES[param.form]:
+        return value
+    if hasattr(value, "context"):
+        return value
+    try:
+        shape = np.asarray(cast("ArrayLike", value), np.float64).shape
+    except (TypeError, ValueError) as error:
+        raise SceneError(f"is not a matrix: {error}", where=where) from None
+    if shape != _MATRICES[param.form]:
+        raise SceneError(f"must be {_MATRICES[param.form]}, found {shape}", where=where)
+    return value
+
+
+_MATRICES = {"matrix3": (3, 3), "matrix4": (4, 4)}
+
+
+def _optional_number(value: object, param: Param, where: str) -> float | None:
+    return None if value is None else check_number(value, param, where)
+
+
+_CHECKED_FORMS: dict[str, Callable[[Any, Param, str], Any]] = {
+    "number": check_number,
+    "optional_number": _optional_number,
+    "vector": _vector,
+    "direction": _vector,
+    "matrix3": _matrix,
+    "matrix4": _matrix,
+}
 
 
 def _orders(value: Any, param: Param, where: str) -> tuple[float, ...]:
@@ -409,7 +534,7 @@ def _orders(value: Any, param: Param, where: str) -> tuple[float, ...]:
             f"must be an odd count of numbers, for orders -n to n with n up to {ORDERS}",
             where=where,
         )
-    return tuple(_number(v, param, where) for v in value)
+    return tuple(check_number(v, param, where) for v in value)
 
 
 def _spectrum(value: Any, param: Param, where: str) -> Any:
@@ -425,12 +550,12 @@ def _spectrum(value: Any, param: Param, where: str) -> Any:
     if isinstance(value, (list, tuple, np.ndarray)) and len(value) == 3:
         bounded = param.role not in ("factor", "quantity") and max(value) <= 1.0
         made = RGB if bounded or param.role == "emission" else RGBUnbounded
-        colour = made(*(_number(v, param, where) for v in value))
+        colour = made(*(check_number(v, param, where) for v in value))
         if param.role == "quantity":
             _check_spectrum(colour, param, where)
         return colour
     if isinstance(value, (int, float, np.number)):
-        number = _number(value, param, where)
+        number = check_number(value, param, where)
         return RGBIlluminant(*[number] * 3) if param.role == "emission" else Constant(number)
     names = ", a name" if param.role in ("index", "emission") else ""
     raise SceneError(

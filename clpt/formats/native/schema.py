@@ -14,6 +14,7 @@ from typing import Any
 from clpt import output_files, spectra
 from clpt.formats.native import forms, motion
 from clpt.formats.native.json_schema import (
+    INDEX_FILE_OBJECT,
     NUMBER,
     NUMBERS,
     STRING,
@@ -29,7 +30,6 @@ from clpt.formats.native.spectra import HEX, HEX_ROLES, SPECTRA
 from clpt.scene import KINDS, integrators, materials
 from clpt.scene.params import SPECTRUM_ROLES, Kind, Param, defaults, params
 
-INDEX_FILE = {**STRING, "description": "columns, or a page of refractiveindex.info"}
 ANY_OF_SCALE = {"anyOf": [NUMBER, TRIPLE]}
 
 
@@ -92,10 +92,11 @@ def _kind(cls: type[Kind]) -> Schema:
     properties: Schema = {"type": {"const": cls.kind}}
     for name, param in params(cls).items():
         properties[name] = _parameter(param, default[name])
-    if {"eta", "k"} <= properties.keys():
-        named: Schema = {"enum": list(spectra.metals())}
-        either = [named, object_of({"file": INDEX_FILE}, ["file"])]
-        properties["metal"] = {"anyOf": either, "description": "stands for eta and k"}
+    for shorthand in cls.shorthands:
+        stands = f"stands for {' and '.join(shorthand.stands_for)}"
+        for name, param in shorthand.arguments.items():
+            doc = f"{param.doc} [{param.unit}]" if param.unit else param.doc
+            properties[name] = {"description": f"{doc}; {stands}", **forms.schema(param)}
     if (file := FILES.get(cls)) is not None:
         properties["file"] = {**STRING, "description": f"{file.accepts}: {file.meaning}"}
     summary = (cls.__doc__ or "").strip().splitlines()[0]
@@ -140,7 +141,7 @@ def _spectrum(role: str) -> Schema:
 
 def _typed_spectra() -> Schema:
     variants = [
-        object_of({"file": INDEX_FILE}, ["file"]),
+        INDEX_FILE_OBJECT,
         object_of({"values": {**rows(2), "description": "[nm, value]"}}, ["values"]),
     ]
     for kind, cls in SPECTRA.items():

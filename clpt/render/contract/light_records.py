@@ -72,6 +72,8 @@ _RADIANCE = ("integer", "first word of the emission parameter in `light_params`"
 _SCALE = ("real", "what the image's values were divided by")
 _FACTOR = ("integer", "first word of its factor in `light_params`")
 
+OF_HOST = ("text", "keys", "optional_number")  # forms of parameters that are for the host alone
+
 PROJECTED_RECORDS: dict[str, Record] = {
     "projector": Record(
         "Projector",
@@ -119,7 +121,7 @@ def _members(name: str, param: Param) -> dict[str, str]:
     if param.role == "host":
         placement = {member: type_ for member, (type_, _) in _PLACEMENT.items()}
         forms = {"vector": {name: "vec3"}, "direction": {name: "vec3"}, "matrix4": placement}
-        forms |= {"text": {}, "keys": {}}  # for the host alone
+        forms |= {form: {} for form in OF_HOST}
         if param.form not in forms:
             raise TypeError(f"a light cannot declare {name!r} as a host parameter of this form")
         return forms[param.form]

@@ -42,14 +42,14 @@ from clpt.render.lowering.media.body_words import BodyWords
 from clpt.render.lowering.media.light_media import light_media_words
 from clpt.render.lowering.media.medium_words import MediumWords, medium_aims
 from clpt.render.lowering.motion import lower_motion
-from clpt.render.lowering.settings import DEEPEST, Found, set_layers, settings_of
+from clpt.render.lowering.settings import DEEPEST, Found, settings_of
 from clpt.render.lowering.textures.attributes import lower_attributes
 from clpt.scene import Scene
 from clpt.scene import materials as mt
 from clpt.scene.integrators import Film, Integrator
 from clpt.scene.lights import Point
 from clpt.scene.media import Lattice
-from clpt.scene.params import params
+from clpt.scene.params import Kind, params
 from clpt.scene.shapes import Mesh, Shape
 
 TREE_FROM = 16  # lights from which a tree chooses among them, see bench/lights.py
@@ -143,8 +143,7 @@ def encode(found: Analysis, cache: LoweringCache, texture_budget: int | None = N
     camera = _lower_bodies(found, geometry, encoder, materials, media)
     profile = _lower_profile(index, encoder)
     density_row, tabulated = _lower_density(index, encoder, wavelengths)
-    targets = found.aims
-    first_aim = encoder.store.append_floats("distributions", targets)
+    first_aim = encoder.store.append_floats("distributions", targets := found.aims)
     lower_attributes(geometry.owners, encoder.textures, cache, geometry.single_count, geometry.keys)
     encoder.store.append("shapes", shape_words(geometry.rows))
     glass_rows = _lower_camera(index, encoder)
@@ -172,9 +171,9 @@ def encode(found: Analysis, cache: LoweringCache, texture_budget: int | None = N
         spectra=spectra,
         materials=needs.of_materials(index, encoder, materials),
     )
-    own = Found(density_row, ambient_row, (first_aim, len(targets)), camera, features.dispersion)
+    aims, disperses = (first_aim, len(targets)), features.dispersion
+    own = Found(density_row, ambient_row, aims, camera, disperses, layers)
     settings = settings_of(index, geometry, lights, wavelengths, found.sphere, own)
-    set_layers(settings, layers)
     cache.settle()
     tables = encoder.store.arrays()
     encoder.textures.images.joined(tables["images"])
@@ -245,7 +244,8 @@ def _begin_materials(index: SceneIndex, encoder: Encoder) -> MaterialWords:
     """Append what idle lanes read as a material, and make the maker of material words."""
     if index.shifts:
         encoder.spectra.expect_light(emissions(index))
-    longest = max(map(row_words, (*mt.LEAVES, *index.leaves)))
+    leaves: tuple[type[Kind], ...] = (*mt.LEAVES, *index.leaves)
+    longest = max(map(row_words, leaves))
     encoder.store.append("materials", np.zeros(longest, np.uint32))
     return MaterialWords(encoder, index.leaves, index.normal_mapped)
 

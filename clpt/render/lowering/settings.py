@@ -35,7 +35,7 @@ class Found:
     density_row: where the table of the density of wavelengths begins in `distributions`;
     ambient_row: where the ambient light is in `light_params`; aims: the first of the spheres at
     which light paths aim, and their number; around: words of the bodies and of the medium at the
-    camera; disperses: whether directions depend on wavelengths.
+    camera; disperses: whether directions depend on wavelengths; layers: beside the picture.
     """
 
     density_row: int
@@ -43,6 +43,7 @@ class Found:
     aims: tuple[int, int]
     around: tuple[int, int]
     disperses: bool
+    layers: LayerFeatures
 
 
 def settings_of(
@@ -101,10 +102,11 @@ def settings_of(
     settings["film_scale"] = scale
     settings["to_first"], settings["to_second"], settings["to_third"] = matrix / scale
     settings["center"], settings["scene_radius"] = sphere
+    _set_layers(settings, found.layers)
     return settings
 
 
-def set_layers(settings: NDArray[np.void], layers: LayerFeatures) -> None:
+def _set_layers(settings: NDArray[np.void], layers: LayerFeatures) -> None:
     """Set where the layers beside the picture stand."""
     for name, place in layers.places.items():
         settings[f"layer_{name}"] = place

@@ -92,7 +92,7 @@ def light_rows(
             importance = np.concatenate([one.importance for one in every])
             by = content(importance, *vars(bounds).values())
             tree = encoder.cache(_tree_words, bounds, importance, by=(by,))
-    kinds = tuple(KINDS[i] for i in np.unique(rows["kind"]))
+    kinds = tuple(KINDS[i] for i in sorted({*rows["kind"].tolist()}))  # np.unique loads numpy.ma
     return LightRows(
         rows=rows,
         power=power,

@@ -74,7 +74,7 @@ def _declared_members(lamp: Light) -> dict[str, ArrayLike]:
     members: dict[str, ArrayLike] = {}
     for name, param in params(type(lamp)).items():
         value, where = getattr(lamp, name), f"{lamp.kind}.{name}"
-        if param.form in ("text", "keys"):
+        if param.form in light_records.OF_HOST:
             continue
         if param.form == "matrix4":
             members |= light_power.placement(value, where)
