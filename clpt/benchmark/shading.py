@@ -18,6 +18,7 @@ from clpt.scene import Scene, integrators, lights, params, textures
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Film
 from clpt.scene.materials import LEAVES, Diffuse, Material
+from clpt.scene.roles import REFLECTANCE
 from clpt.scene.shapes import Rectangle, Shape
 
 from .figures import Figure, Taken, clock_complaint, timed
@@ -39,7 +40,7 @@ def variants(cls: type[Material]) -> dict[str, Material]:
     """
     made = {"constant": cls()}
     declared, usual = params.device_params(cls), params.defaults(cls)
-    colours = [n for n, p in declared.items() if p.role == "reflectance" and p.textured]
+    colours = [n for n, p in declared.items() if p.role is REFLECTANCE and p.textured]
     if colours:
         image: dict[str, Any] = {colours[0]: _image()}
         made["textured"] = cls(**image)

@@ -11,6 +11,7 @@ import numpy as np
 from clpt.errors import SceneError
 from clpt.scene.motion import Keys
 from clpt.scene.params import Kind, choice, emission, flag, host, real, reflectance
+from clpt.scene.textures import Texture
 from clpt.scene.values import ImageLike, Matrix4, SpectrumLike, Textured, Vector3
 
 RADIANCE = "W m^-2 sr^-1 nm^-1"
@@ -28,6 +29,8 @@ class Light(Kind):
     """
 
     reach: ClassVar[Reach] = "placed"
+    falloff = True  # irradiance falls with the distance
+    two_sided = False
 
     motion: Keys | None = host(
         None, "moves it after its place; None: still; of an area light its shape moves", form="keys"
@@ -84,7 +87,7 @@ class Spot(Light):
     )
 
     def check(self) -> None:
-        if getattr(self.image, "is_texture", False) and self.cutoff >= 90.0:
+        if isinstance(self.image, Texture) and self.cutoff >= 90.0:
             raise SceneError("an image needs a cutoff below 90 degrees", where="spot.cutoff")
 
 

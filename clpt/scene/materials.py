@@ -14,24 +14,24 @@ from clpt.errors import SceneError
 from clpt.measured import Measurement, MerlTable
 from clpt.scene.energy import check_reradiation
 from clpt.scene.params import (
-    ORDERS,
     Kind,
     Texture,
     choice,
     coefficient,
     factor,
+    fields_of,
     flag,
     host,
     index,
     layers,
     measurement,
     merl,
-    params,
     per_order,
     real,
     reflectance,
     reradiation,
 )
+from clpt.scene.roles import ORDERS
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.textures import Bitmap
 from clpt.scene.values import IndexLike, SpectrumLike, Textured, TexturedNumber
@@ -79,6 +79,16 @@ class Material(Scatterer):
     """
 
     name: str = host("", "for messages and for references in scene files")
+
+    @property
+    def absorption(self) -> SpectrumLike:
+        """How much a metre of the inside absorbs [1/m]."""
+        return CLEAR
+
+    @property
+    def layers(self) -> tuple[Layer, ...]:
+        """The thin films on the surface, from the outside in."""
+        return ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -650,7 +660,7 @@ class NormalMap(NormalMapped):
     along_v: bool = flag(False, "y of the map goes along v even where uv are mirrored, as in glTF")
 
     def check(self) -> None:
-        if self.map is not None and getattr(self.map, "kind", "") != "bitmap":
+        if self.map is not None and not isinstance(self.map, Bitmap):
             raise SceneError(f"must be a bitmap, not {self.map!r}", where="normal_map.map")
 
 
@@ -689,8 +699,7 @@ KINDS = LEAVES + COMPOSITES
 
 def inner(material: Material) -> Iterator[tuple[str, Material]]:
     """The materials that one is made of, by its parameters."""
-    for name in params(type(material)):
-        part = getattr(material, name)
+    for name, part in fields_of(material).items():
         if isinstance(part, Material):
             yield name, part
 

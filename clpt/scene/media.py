@@ -21,6 +21,7 @@ from clpt.scene.params import (
     Kind,
     angular,
     coefficient,
+    fields_of,
     host,
     quantity,
     real,
@@ -112,8 +113,9 @@ class Tabulated(Phase):
 
     def check(self) -> None:
         """Check the three arrays, and scale the rows."""
-        values = np.atleast_2d(self._numbers("values"))
-        cosines, lambdas = self._numbers("cosines"), self._numbers("wavelengths")
+        values = np.atleast_2d(self._numbers("values", self.values))
+        cosines = self._numbers("cosines", self.cosines)
+        lambdas = self._numbers("wavelengths", self.wavelengths)
         if values.ndim != 2 or values.shape[1] < 2:
             raise self._error("values", "must be two numbers or more, or rows of them")
         if not cosines.size:
@@ -163,9 +165,9 @@ class Tabulated(Phase):
         whole = _whole(rows, self.cosines)
         return self.cosines, rows / whole[:, None], 0.0, 1.0
 
-    def _numbers(self, name: str) -> NDArray[np.float64]:
+    def _numbers(self, name: str, given: Any) -> NDArray[np.float64]:
         try:
-            made = np.array(getattr(self, name), np.float64)
+            made = np.array(given, np.float64)
         except (TypeError, ValueError):
             raise self._error(name, "must be numbers, in rows of one length") from None
         if not np.isfinite(made).all():
@@ -186,9 +188,9 @@ class Blend(Phase):
 
     def check(self) -> None:
         """Raise SceneError for what is no phase function."""
-        for name in ("first", "second"):
-            if not isinstance(getattr(self, name), Phase):
-                message = f"must be a phase function, not {getattr(self, name)!r}"
+        for name, part in (("first", self.first), ("second", self.second)):
+            if not isinstance(part, Phase):
+                message = f"must be a phase function, not {part!r}"
                 raise SceneError(message, where=f"{self.kind}.{name}")
 
     @property
@@ -249,6 +251,16 @@ class Medium(Kind):
 
     name: str = host("", "for messages and for references in scene files")
     phase: Phase = host(Isotropic(), "what a point of it sends where", form="phase")
+
+    @property
+    def parts(self) -> tuple[Medium, ...]:
+        """The media that fill its place together: itself, or those of a mixture."""
+        return (self,)
+
+    @property
+    def glows(self) -> bool:
+        """Whether it has a dye that gives out light."""
+        return False
 
     @property
     def scatters(self) -> bool:
@@ -496,8 +508,8 @@ class Cloud(Lattice, Homogeneous):
     )  # fmt: skip
 
     def check(self) -> None:
-        for name in ("low", "high"):
-            found = np.asarray(getattr(self, name), float)
+        for name, corner in (("low", self.low), ("high", self.high)):
+            found = np.asarray(corner, float)
             if found.shape != (3,) or not np.isfinite(found).all():
                 raise SceneError("must be three numbers", where=f"{self.kind}.{name}")
         corners = np.array([self.low, self.high], float)
@@ -593,7 +605,7 @@ class Grid(Lattice, Homogeneous):
 
     def _fit(self, name: str, own: Matrix4) -> None:
         """Bring numbers to the points of the density, or that to theirs where they are more."""
-        given, where = getattr(self, name), f"{self.kind}.{name}"
+        given, where = fields_of(self)[name], f"{self.kind}.{name}"
         if given is None:
             return
         values = given.values if isinstance(given, Volume) else given
@@ -803,7 +815,7 @@ class Mixture(Lattice):
 
     @cached_property
     def _densest(self) -> list[float]:
-        densities: list[Any] = [getattr(part, "density", None) for part in self.parts]
+        densities = [part.density if isinstance(part, Grid) else None for part in self.parts]
         numbers = [d.get() if hasattr(d, "get") else d for d in densities]
         return [1.0 if one is None else float(np.max(one)) for one in numbers]
 

@@ -215,8 +215,7 @@ class Shutter:
     shape: Any = "box"
 
     def __post_init__(self) -> None:
-        for name in ("open", "close"):
-            value = getattr(self, name)
+        for name, value in (("open", self.open), ("close", self.close)):
             number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
             if not number or not math.isfinite(value):
                 raise SceneError(f"must be a time [s], not {value!r}", where=f"shutter.{name}")

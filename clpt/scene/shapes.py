@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -18,6 +20,7 @@ from clpt.scene.textures import Bitmap, MeshAttribute
 from clpt.scene.values import Matrix4, OnDevice, Vector3
 
 SMOOTH = "smooth"  # normals of a mesh: the means of the triangles around a vertex, by their areas
+NO_ATTRIBUTES: Mapping[str, Any] = MappingProxyType({})
 BASES = ("linear", "bspline", "bezier")
 
 
@@ -26,6 +29,27 @@ class Shape(Kind):
     """Base of all shapes; placed by `to_world`."""
 
     is_tree = False  # it holds trees side by side
+    attributes = NO_ATTRIBUTES
+
+    @property
+    def normals(self) -> Any:
+        """The normals of its vertices, as of a mesh; None: there are none."""
+        return None
+
+    @property
+    def tangents(self) -> Any:
+        """The tangents of its vertices, as of a mesh; None: there are none."""
+        return None
+
+    @property
+    def deformation(self) -> Deformation | None:
+        """Where its points are at times; None: still."""
+        return None
+
+    @property
+    def members(self) -> tuple[Shape, ...]:
+        """The shape, or those that an instance places."""
+        return (self,)
 
     material: Material = host(Diffuse(), "of the surface", form="material")
     emission: Light | None = host(None, "an `area` light, or None", form="area_light")
@@ -232,6 +256,10 @@ class Instance(Shape):
     material: Any = field(default=None, init=False, repr=False)
     emission: Any = field(default=None, init=False, repr=False)
     flip_normals: bool = field(default=False, init=False, repr=False)
+
+    @property
+    def members(self) -> tuple[Shape, ...]:
+        return self.group.shapes
 
     def check(self) -> None:
         if not isinstance(self.group, Group):

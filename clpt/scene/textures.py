@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import SceneError
-from clpt.scene.params import Kind, choice, factor, host, params, real, reflectance
+from clpt.scene.params import Kind, choice, factor, fields_of, host, real, reflectance
 from clpt.scene.params import Texture as Texture
 from clpt.scene.values import ImageLike, Matrix4, Textured, TexturedNumber
 
@@ -166,7 +166,7 @@ KINDS = (Bitmap, Checkerboard, Product, Mix, MeshAttribute, Dots, Checkers, Nois
 
 def _matrix(texture: Texture, name: str, size: int) -> None:
     """Make a texture's matrix float64. Raises SceneError for one of another form."""
-    matrix = np.asarray(getattr(texture, name), dtype=np.float64)
+    matrix = np.asarray(fields_of(texture)[name], dtype=np.float64)
     if matrix.shape != (size, size) or not np.isfinite(matrix).all():
         raise SceneError(f"must be a finite {size}x{size} matrix", where=f"{texture.kind}.{name}")
     object.__setattr__(texture, name, matrix)
@@ -187,5 +187,5 @@ def textures_in(value: Any) -> Iterator[Texture]:
     elif isinstance(value, Kind):
         if isinstance(value, Texture):
             yield value
-        for name in params(type(value)):
-            yield from textures_in(getattr(value, name))
+        for inner in fields_of(value).values():
+            yield from textures_in(inner)

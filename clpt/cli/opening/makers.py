@@ -18,7 +18,6 @@ from ..options.scene_options import SceneOptions
 from ..options.workers import Workers
 from ..printing.display import Display
 from ..process.stopping import prompt
-from .devices import kill_compilers
 from .workers import Watch, connected
 
 if TYPE_CHECKING:
@@ -83,7 +82,7 @@ class DeviceMaker(Maker):
 
     def stop(self) -> None:
         """End the processes that compile."""
-        kill_compilers(self.devices)
+        dev.kill_compilers()
 
 
 class ClusterMaker(Maker):

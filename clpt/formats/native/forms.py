@@ -1,6 +1,6 @@
 """Forms of parameters in scene.json: how each is read, written, and described.
 
-FORMS has an entry for each role and for each form of a host parameter (`clpt.scene.params`).
+FORMS has an entry for each role (`clpt.scene.roles`), by its name.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from clpt.formats.native.spectra import kind_name
 from clpt.formats.native.transforms import matrix
 from clpt.scene import kinds
 from clpt.scene.integrators import AUTO
-from clpt.scene.params import ORDERS, SPECTRUM_ROLES, Kind, Param
+from clpt.scene.params import Kind
+from clpt.scene.roles import FACTOR, ORDERS, REFLECTANCE, SPECTRA, Param, Spectral
 from clpt.scene.shapes import SMOOTH
 from clpt.scene.textures import ATTRIBUTES, Texture
 from clpt.spectra.spaces import TEMPERATURES
@@ -79,7 +80,7 @@ class Form:
 
 def form_of(param: Param) -> Form:
     """Return the form of a parameter."""
-    return FORMS[param.form or param.role]
+    return FORMS[param.role.name]
 
 
 def read(cursor: Cursor, param: Param, reader: Reader) -> Any:
@@ -120,9 +121,9 @@ def _of_cursor(
     return Form(words, schema, lambda cursor, _: read(cursor))
 
 
-def _spectrum(role: str) -> Form:
+def _spectrum(role: Spectral) -> Form:
     return Form(
-        role,
+        role.name,
         lambda param: ref(f"spectrum_{_limits_of(param)}"),
         lambda cursor, _: json_spectra.read(cursor, role),
         # a default may be given as a number or three
@@ -136,7 +137,8 @@ def _spectrum(role: str) -> Form:
 
 def _limits_of(param: Param) -> str:
     """The role whose limits a spectrum has."""
-    return "factor" if param.role == "reflectance" and math.isinf(param.high) else param.role
+    limited = param.role is not REFLECTANCE or math.isfinite(param.high)
+    return (param.role if limited else FACTOR).name
 
 
 def _rows(width: int, item: str = "number") -> Form:
@@ -261,7 +263,7 @@ NAME_OF_MATERIAL: Schema = {**STRING, "description": "a name in the scene's mate
 
 FORMS: dict[str, Form] = {
     # roles
-    **{role: _spectrum(role) for role in SPECTRUM_ROLES},
+    **{role.name: _spectrum(role) for role in SPECTRA},
     "flag": _of_cursor("true or false", BOOLEAN, lambda cursor: cursor.value),
     "choice": Form(
         _choice_words,

@@ -26,8 +26,9 @@ from clpt.formats.native.json_schema import (
 from clpt.formats.native.reradiation import RERADIATIONS
 from clpt.formats.native.shape_files import FILES
 from clpt.formats.native.spectra import SPECTRA
-from clpt.scene import KINDS, integrators, materials
-from clpt.scene.params import SPECTRUM_ROLES, Kind, Param, defaults, params
+from clpt.scene import KINDS, integrators, materials, roles
+from clpt.scene.params import Kind, defaults, params
+from clpt.scene.roles import Param, Role
 
 INDEX_FILE = {**STRING, "description": "columns, or a page of refractiveindex.info"}
 ANY_OF_SCALE = {"anyOf": [NUMBER, TRIPLE]}
@@ -36,7 +37,7 @@ ANY_OF_SCALE = {"anyOf": [NUMBER, TRIPLE]}
 def schema() -> Schema:
     """Return the JSON Schema (draft 2020-12) of a scene.json."""
     defs: Schema = {category: _category(category) for category in KINDS}
-    defs |= {f"spectrum_{role}": _spectrum(role) for role in SPECTRUM_ROLES}
+    defs |= {f"spectrum_{role.name}": _spectrum(role) for role in roles.SPECTRA}
     defs["reradiation"] = _reradiation()
     defs |= {
         "spectrum": _typed_spectra(),
@@ -113,10 +114,8 @@ def _parameter(param: Param, default: Any) -> Schema:
     """The values of a parameter, with its description and its default."""
     doc = f"{param.doc} [{param.unit}]" if param.unit else param.doc
     shown = forms.plain(default)
-    has_default = isinstance(shown, (bool, int, float, str, list)) and param.form not in (
-        "volume",
-        "media",
-    )
+    has_default = isinstance(shown, (bool, int, float, str, list))
+    has_default &= param.role.name not in ("volume", "media")
     return {
         "description": doc,
         **({"default": shown} if has_default else {}),
@@ -124,16 +123,20 @@ def _parameter(param: Param, default: Any) -> Schema:
     }
 
 
-def _spectrum(role: str) -> Schema:
-    number: Schema = NUMBER if role in ("factor", "quantity") else {**NUMBER, "minimum": 0}
+# of a number in the place of a spectrum, where it is not any from 0
+LIMITS: dict[Role, Schema] = {
+    roles.FACTOR: {}, roles.QUANTITY: {}, roles.REFLECTANCE: {"minimum": 0, "maximum": 1},
+}  # fmt: skip
+NAMES: dict[Role, Schema] = {
+    roles.EMISSION: {"enum": list(spectra.illuminants()), "description": "an illuminant"},
+    roles.INDEX: {"enum": list(spectra.glasses()), "description": "a glass or liquid"},
+}
+
+
+def _spectrum(role: Role) -> Schema:
+    number: Schema = {**NUMBER, **LIMITS.get(role, {"minimum": 0})}
     one_of = [number, {**TRIPLE, "description": "linear Rec. 709"}, ref("spectrum")]
-    if role == "reflectance":
-        number["maximum"] = 1
-    elif role == "emission":
-        one_of.append({"enum": list(spectra.illuminants()), "description": "an illuminant"})
-    elif role == "index":
-        one_of.append({"enum": list(spectra.glasses()), "description": "a glass or liquid"})
-    return {"anyOf": one_of}
+    return {"anyOf": [*one_of, *([NAMES[role]] if role in NAMES else [])]}
 
 
 def _typed_spectra() -> Schema:

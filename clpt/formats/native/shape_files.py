@@ -119,8 +119,8 @@ def checked_arrays(cursor: Cursor, shape: shapes.Mesh, warnings: list[str]) -> s
     """Check the arrays of a mesh that is given in the JSON itself."""
     if shape.vertices is None or shape.faces is None:
         raise cursor.error("a mesh needs a 'file', or 'vertices' and 'faces'")
-    for name in ("normals", "uvs", "tangents"):
-        values = getattr(shape, name)
+    given = {"normals": shape.normals, "uvs": shape.uvs, "tangents": shape.tangents}
+    for name, values in given.items():
         is_array = values is not None and not isinstance(values, str)
         if is_array and len(values) != len(shape.vertices):
             raise cursor.at(name).error(f"must be one for each of {len(shape.vertices)} vertices")

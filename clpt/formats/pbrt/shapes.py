@@ -23,6 +23,7 @@ from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.state import Definition, State
 from clpt.formats.pbrt.textures import textured
 from clpt.scene import shapes, subdivision
+from clpt.scene.roles import REAL
 from clpt.scene.shapes import Shape
 from clpt.scene.textures import Bitmap
 
@@ -203,7 +204,7 @@ def displaced(made: Geometry, params: Parameters, state: State) -> Geometry:
     edge, scale = params.above_zero("edgelength", 1.0), params.above_zero("uvscale", 1.0)
     if "displacement" not in params:
         return made
-    heights = textured(params, "displacement", "real", state, 0.0)
+    heights = textured(params, "displacement", REAL, state, 0.0)
     uv = isinstance(heights, Bitmap) and heights.mapping == "uv"
     if not uv or made.parts["uvs"] is None:
         reason = "it is no image by uv" if not uv else "the mesh has no uv"

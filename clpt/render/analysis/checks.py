@@ -26,7 +26,7 @@ from clpt.scene.layers import LAYERS
 from clpt.scene.lights import ON_SHAPES, DirectionalArea, Light, Point
 from clpt.scene.materials import Material
 from clpt.scene.media import Medium
-from clpt.scene.params import params
+from clpt.scene.params import fields_of
 from clpt.scene.shapes import Instance, Shape
 
 WITH_AXIS = ("perspective", "thin_lens", "orthographic")
@@ -35,10 +35,11 @@ LARGEST = 1 << 26  # pixels of a film; its tiles are divided in float32, see ker
 
 def check(scene: Scene) -> None:
     """Raise SceneError for an entry of a scene that is of the wrong kind, or a film too large."""
-    for name, base in (
-        ("camera", Camera), ("integrator", Integrator), ("sampler", Sampler), ("film", Film),
+    for given, base, name in (
+        (scene.camera, Camera, "camera"), (scene.integrator, Integrator, "integrator"),
+        (scene.sampler, Sampler, "sampler"), (scene.film, Film, "film"),
     ):  # fmt: skip
-        _check_kind(getattr(scene, name), base, name)
+        _check_kind(given, base, name)
     _check_kind(scene.film.filter, Filter, "film.filter")
     if isinstance(scene.seed, bool) or not isinstance(scene.seed, int):
         raise SceneError(f"must be a whole number, not {scene.seed!r}", where="seed")
@@ -52,8 +53,9 @@ def check(scene: Scene) -> None:
             names = " or ".join(f"`{cls.kind}`" for cls in ON_SHAPES)
             raise SceneError(f"its emission must be {names}", where=shapes.where(shape))
     if scene.film.mode == "rgb":
-        for name, plain in (("sensor", "cie1931"), ("bands", 0)):
-            if getattr(scene.film, name) != plain:
+        film = scene.film
+        for name, given, plain in (("sensor", film.sensor, "cie1931"), ("bands", film.bands, 0)):
+            if given != plain:
                 raise SceneError("needs the mode spectral", where=f"film.{name}")
     width, height = scene.film.size
     if width * height > LARGEST:
@@ -130,7 +132,7 @@ def _gives_other_light(medium: Medium | None) -> bool:
 
 def _has(material: Any, trait: str) -> bool:
     """Whether a material, or one inside it, has a trait of its class."""
-    parts = [getattr(material, name) for name in params(type(material))]
+    parts = fields_of(material).values()
     return getattr(material, trait, False) or any(
         _has(part, trait) for part in parts if isinstance(part, Material)
     )

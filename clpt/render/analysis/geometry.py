@@ -30,6 +30,7 @@ from clpt.render.analysis.index import SceneIndex
 from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.scene.params import fields_of
 from clpt.scene.shapes import Shape
+from clpt.scene.textures import Texture
 
 LEAST_RADIUS = 1e-12  # of a sphere around a scene [m]
 SWEPT_CELLS = 4  # of the hull of what moves, see `instancing.hull_points`
@@ -227,7 +228,7 @@ class _Builder:
             count = len(times) if _in_triangles(shape) else 1
             self.emitters.append(Emitter(shape, len(self.rows), *corners, keys=max(count, 1)))
             values = fields_of(shape.emission).values()
-            self.uvs |= any(getattr(value, "is_texture", False) for value in values)
+            self.uvs |= any(isinstance(value, Texture) for value in values)
         self.rows.append(row)
         self.stored.append(stored)
 
@@ -279,7 +280,7 @@ class _Builder:
         row["flags"] |= SHAPE_BITS["normals"] if normals is not None else 0
         row["flags"] |= SHAPE_BITS["uvs"] if uvs is not None else 0
         self.normals |= normals is not None
-        if getattr(shape, "tangents", None) is not None and not times:
+        if shape.tangents is not None and not times:
             row["flags"] |= SHAPE_BITS["tangents"]
             own = (*shapes.geometry(shape), shape.tangents)
             along = self.cache(triangles.tangents, shape, by=own)

@@ -173,11 +173,12 @@ class Moving:
             if device_matrix:
                 raise CannotMove(f"{name} is no triangles, and its transform is on the device")
             return self._plan_analytic(ranges, new)
-        if getattr(ranges.shape, "tangents", None) is not None:
+        if ranges.shape.tangents is not None:
             raise CannotMove(f"{name} has tangents of its own, which lie in the world")
         count = ranges.vertices[1]
+        given, before = fields_of(new), fields_of(old)
         for field_name in ("vertices", "normals"):
-            values = getattr(new, field_name, None)
+            values = given.get(field_name)
             if on_device(values):
                 self._locate(values, (count, 3), f"the {field_name} of {name}")
         matrix, points = transforms.IDENTITY, None
@@ -187,7 +188,7 @@ class Moving:
                 raise CannotMove(f"the transform of {name} mirrors it")
         elif isinstance(new, Instance):
             raise CannotMove(f"{name} is copied, not shared, and its transform is on the device")
-        if getattr(new, "vertices", None) is not getattr(old, "vertices", None):
+        if given.get("vertices") is not before.get("vertices"):
             if not ranges.whole:
                 raise CannotMove(f"{name} has triangles without an area")
             if not on_device(new.vertices):
@@ -321,11 +322,12 @@ class Moving:
     def _local(self, ranges: _Ranges, name: str) -> Location:
         """Return where vertices or normals of a shape are on the device, before its transform."""
         shape = ranges.shape
-        values = getattr(shape, name, None)
+        given = fields_of(shape)
+        values = given.get(name)
         if on_device(values):
             self.target.stream.after(getattr(values, "events", ()))
             return self._locate(values, (ranges.vertices[1], 3), name)
-        vertices = getattr(shape, "vertices", None)
+        vertices = given.get("vertices")
         if ranges.local is None or ranges.local[0] is not vertices:
             ranges.local = vertices, {}
         buffers = ranges.local[1]
@@ -386,7 +388,8 @@ def _check_fields(old: Any, new: Any) -> None:
     """Raise CannotMove if more than what moves differs between two shapes."""
     if not isinstance(new, Shape) or type(old) is not type(new):
         raise CannotMove(f"{_name(old)} becomes something else")
-    changed = {name for name, value in fields_of(new).items() if value is not getattr(old, name)}
+    before = fields_of(old)
+    changed = {name for name, value in fields_of(new).items() if value is not before[name]}
     if changed - _MOVABLE:
         raise CannotMove(f"{_name(new)} has another {' and '.join(sorted(changed - _MOVABLE))}")
 

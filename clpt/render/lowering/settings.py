@@ -18,13 +18,12 @@ from clpt.render.analysis.wavelengths import Density
 from clpt.render.lowering import guides
 from clpt.render.lowering.lights.light_level import light_level
 from clpt.render.lowering.lights.lights import LightRows
+from clpt.scene.integrators import DEEPEST
 from clpt.spectra.cie import tanh_ends
 
 LARGEST = 62  # exponent of 4 of a unit of areas, which is float32
 ORDINARY_SIZE = 10  # exponent of 2 of the radius of a scene [m], up and down
 MOST_SAMPLE_BITS = 16  # of a zsobol pixel's part of its sequence
-DEEPEST = 4000  # path state has 12 bits for the depth
-DEPTHS = {"direct": 2}  # of integrators without the parameter
 
 
 @dataclass(frozen=True)
@@ -67,10 +66,10 @@ def settings_of(
     settings["padded_pixels"] = 16 * settings["tiles_x"] * -(-(height + 2 * margin) // 4)
     settings["seed"] = scene.seed % 2**32
     settings["sample_bits"] = min((max(scene.spp, 1) - 1).bit_length(), MOST_SAMPLE_BITS)
-    depth: int = DEPTHS.get(integrator.kind, 0) or getattr(integrator, "max_depth", -1)
+    depth = integrator.max_depth
     settings["max_depth"] = DEEPEST if depth < 0 else min(depth, DEEPEST)
-    settings["rr_depth"] = min(getattr(integrator, "rr_depth", DEEPEST), DEEPEST)
-    settings["hide_lights"] = getattr(integrator, "hide_lights", False)
+    settings["rr_depth"] = min(integrator.rr_depth, DEEPEST)
+    settings["hide_lights"] = integrator.hide_lights
     settings["alpha"] = index.alpha
     settings["light_paths"] = index.weighed
     if index.merged:

@@ -175,8 +175,8 @@ class _Known:
 
 def _around_shape(emitter: Emitter, known: _Known, motions: Motions, number: int) -> Around | None:
     """Return the media that a shape shines into, None if they differ between places or times."""
-    shape: Any = emitter.shape
-    both = getattr(shape.emission, "two_sided", False)
+    shape = emitter.shape
+    both = shape.emission is not None and shape.emission.two_sided
     if known.nested and matter_of(shape) is not None:
         return None
     if not known.nested and _says(shape):

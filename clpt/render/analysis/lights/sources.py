@@ -27,7 +27,8 @@ from clpt.render.contract.light_records import INFINITE, RECORDS
 from clpt.scene import lights
 from clpt.scene.lights import DirectionalArea, Light
 from clpt.scene.media import Medium
-from clpt.scene.params import params
+from clpt.scene.params import fields_of, params
+from clpt.scene.roles import EMISSION
 from clpt.scene.shapes import Shape
 from clpt.scene.textures import MeshAttribute, textures_in
 
@@ -137,8 +138,8 @@ def is_whole(shape: Shape) -> bool:
 
 def emissions_of(lamp: Light) -> dict[str, Any]:
     """Return the values of a light's emission parameters."""
-    declared = params(type(lamp)).items()
-    return {name: getattr(lamp, name) for name, param in declared if param.role == "emission"}
+    given, declared = fields_of(lamp), params(type(lamp)).items()
+    return {name: given[name] for name, param in declared if param.role is EMISSION}
 
 
 def _of_lamp(lamp: Light, scene_radius: float, look: Look) -> Source:

@@ -17,10 +17,12 @@ from clpt.render.contract.parameter_words import MIXTURE
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.materials.normal_maps import NormalPerturbation
 from clpt.scene import materials as mt
+from clpt.scene import roles
 from clpt.scene.media import Blend, Phase
-from clpt.scene.params import device_params
+from clpt.scene.params import fields_of
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.shapes import Shape
+from clpt.scene.textures import Texture
 
 _NULL, _BLACK = mt.Null(), mt.Diffuse(reflectance=0.0)
 
@@ -115,9 +117,9 @@ class MaterialWords:
         row = self._encoder.row(material, "materials", before)
         if row >= 1 << 24:
             raise SceneError("the scene has more than 16 million words of material parameters")
-        self.uvs |= any(map(_has_textures, (material, *getattr(material, "layers", ()))))
+        self.uvs |= any(map(_has_textures, (material, *material.layers)))
         self.tangents |= material.uses_tangents
-        self.absorption |= getattr(material, "absorption", mt.CLEAR) != mt.CLEAR
+        self.absorption |= material.absorption != mt.CLEAR
         if material.transmits:
             self.transmitting.add(material.kind)
         return self._leaves.index(type(material)) << 24 | row
@@ -126,7 +128,7 @@ class MaterialWords:
         return self._mixture_of(weight, [self._word(one, side) for one in (first, second)])
 
     def _mixture_of(self, weight: Any, children: list[int]) -> int:
-        words, source = self._encoder.named_words("mixture", "weight", weight, "real")
+        words, source = self._encoder.named_words("mixture", "weight", weight, roles.REAL)
         self.uvs |= source == "texture"
         word = MIXTURE << 24 | self._encoder.store.append("mixtures", [*words, *children])
         self._depths[word] = 1 + max(self._depths.get(child, 0) for child in children)
@@ -135,4 +137,4 @@ class MaterialWords:
 
 def _has_textures(kind: Any) -> bool:
     """Whether a parameter of a kind is a texture."""
-    return any(getattr(getattr(kind, n), "is_texture", False) for n in device_params(type(kind)))
+    return any(isinstance(value, Texture) for value in fields_of(kind).values())

@@ -12,6 +12,7 @@ from clpt.arrays import Words
 from clpt.errors import SceneError
 from clpt.render.contract.parameter_words import NORMAL_MAP_WORDS
 from clpt.render.lowering.encoder import Encoder
+from clpt.scene import roles
 from clpt.scene.materials import BumpMap, NormalMap
 from clpt.scene.textures import Bitmap
 
@@ -62,7 +63,7 @@ class NormalPerturbation:
 
 
 def _real(value: Any, encoder: Encoder) -> Words:
-    return encoder.named_words("perturbation", "value", value, "real")[0]
+    return encoder.named_words("perturbation", "value", value, roles.REAL)[0]
 
 
 def _flags(outer: Map) -> int:

@@ -17,17 +17,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import spectra
+from clpt.arrays import Array
 from clpt.errors import SceneError
 from clpt.render.contract.parameter_words import FILM_COSINES
 from clpt.scene.materials import Layer
 from clpt.scene.params import Kind, params
+from clpt.scene.textures import Texture
 from clpt.spectra import cie
 from clpt.spectra.spectrum import d65
 
 THICKNESS_STEP = 4.0  # [nm] of the table, where a texture varies the thickness
 MOST_ROWS = 1024
 
-Array = NDArray[Any]
 _ZERO = spectra.Constant(0.0)
 
 
@@ -104,7 +105,7 @@ def film_shares(
 
 
 def _textured(layer: Layer) -> bool:
-    return getattr(layer.profile, "is_texture", False)
+    return isinstance(layer.profile, Texture)
 
 
 def profile(material: Kind) -> Any:
