@@ -53,9 +53,21 @@ class _Commands(_Listed):
         _Listed(commands=listed).format_commands(ctx, formatter)
 
 
+def _tell_version(ctx: click.Context, _: click.Parameter, asked: bool) -> None:
+    """Print the version and leave."""
+    if asked:
+        from clpt import version
+
+        click.echo(f"clpt {version.described()}")
+        ctx.exit()
+
+
 @click.group(cls=_Commands, invoke_without_command=True)
 @verbose_option("Log more; twice for everything.")
-@click.version_option(package_name="clpt")
+@click.option(
+    "--version", is_flag=True, is_eager=True, expose_value=False, callback=_tell_version,
+    help="Tell the version, and the commit that it was made from.",
+)  # fmt: skip
 @click.pass_context
 def cli(ctx: click.Context, verbose: int) -> None:
     """clpt, a spectral path tracer in OpenCL."""

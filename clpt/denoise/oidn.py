@@ -104,6 +104,15 @@ def scale_of(luminance: Image) -> float:
     return float(GREY / np.exp(np.log(lit).mean(dtype=float))) if lit.size else 1.0
 
 
+def is_installed() -> bool:
+    """Return whether the library can be loaded."""
+    try:
+        check_installed()
+    except SceneError:
+        return False
+    return True
+
+
 def check_installed() -> None:
     """Raise SceneError where the library is not installed."""
     _pyoidn()

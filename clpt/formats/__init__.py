@@ -127,18 +127,31 @@ def save(scene: Scene, path: str | Path, /) -> None:
 
 
 def locate(path: str | Path, /) -> Path:
-    """Return the file that `load` reads: of a folder the scene in it. Raises SceneError."""
+    """Return the file that `load` reads: of a folder the scene in it. Raises SceneError.
+
+    A relative path that begins with `scenes` and is not there names one of clpt's own scenes.
+    """
     path = Path(path)
     try:
         if path.is_dir():
             return _inside(path)
         if path.is_file():
             return path
+        own = scenes_folder().parent / path
+        if path.parts[:1] == ("scenes",) and ".." not in path.parts and own.exists():
+            return locate(own)
     except SceneError:
         raise
     except (OSError, ValueError) as error:
         raise SceneError(f"cannot be read: {error}", file=path) from None
     raise SceneError("there is no such file", file=path)
+
+
+def scenes_folder() -> Path:
+    """Return the folder of clpt's own scenes: in the installed package, or of the checkout."""
+    package = Path(__file__).resolve().parent.parent
+    installed = package / "scenes"
+    return installed if installed.is_dir() else package.parent / "scenes"
 
 
 def _inside(folder: Path) -> Path:

@@ -83,6 +83,13 @@ class CameraWork:
         self._move(dataclasses.replace(self.scene.camera, fov=degrees))
         self._tell_state()
 
+    def _do_look_at(self, reply: Reply) -> None:
+        at = navigation.pose(self.scene.camera)
+        target = at.origin + self._distance() * at.forward
+        points = {"origin": at.origin, "target": target, "up": at.up}
+        rounded = {name: navigation.rounded(point) for name, point in points.items()}
+        reply({"type": "look_at", **rounded})
+
     def _do_pick(self, reply: Reply, x: int, y: int) -> None:
         self._ask_hit(x, y, reply, lambda hit: self._aim_at(hit, reply))
 

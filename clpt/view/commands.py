@@ -145,6 +145,7 @@ class Request:
 DRAG = Number(-20.0, 20.0)  # heights of the picture
 PIXEL = Whole(0, 65535)
 SIDE = Whole(1, 65536)
+LENGTH = Whole(1, 16384)  # [pixels] of a film
 MANY = Whole(0, 2**31 - 1)
 
 COMMANDS: dict[str, Command] = {
@@ -172,6 +173,7 @@ COMMANDS: dict[str, Command] = {
         },
         restarts=True,
     ),
+    "look_at": Command("tell where the camera is and looks", steers=False, quick=True),
     "copy_view": Command("tell the view, to be kept elsewhere", steers=False, quick=True),
     "field_of_view": Command(
         "of a perspective camera", {"degrees": Number(0.1, 170.0)}, restarts=True
@@ -194,6 +196,9 @@ COMMANDS: dict[str, Command] = {
         {"target": Choice(TARGETS), "index": MANY, "key": Name(), "value": Value()},
         restarts=True,
     ),
+    "undo": Command("take back the last change of the scene", restarts=True),
+    "redo": Command("make the change again that was taken back", restarts=True),
+    "size": Command("render so many pixels", {"width": LENGTH, "height": LENGTH}, restarts=True),
     "restore": Command("the scene as its file has it", restarts=True),
     "hide": Command("leave an object out", {"shape": MANY, "hidden": Flag()}, restarts=True),
     "hide_at": Command("leave out what a pixel shows", {"x": PIXEL, "y": PIXEL}),

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from clpt import images
 from clpt.arrays import Bytes, Image
+from clpt.denoise import oidn
 from clpt.render.film.layer_preview import viewable
 from clpt.scene.layers import LAYERS
 
@@ -17,6 +18,7 @@ PICTURE, SAMPLES, ERROR, DENOISED = "picture", "samples", "error", "denoised"
 # layers that are one picture each, of what paths have met
 SURFACES = tuple(n for n, layer in LAYERS.items() if layer.form in ("near", "long", "id"))
 MAPS: Final = (PICTURE, DENOISED, SAMPLES, ERROR, *SURFACES)  # each is a choice in the page
+
 
 # From few to many: of matplotlib's "inferno", which is as even in grey.
 COLOURS: Final = (
@@ -26,6 +28,11 @@ COLOURS: Final = (
 LEAST_ERROR, MOST_ERROR = 0.001, 1.0  # relative, the ends of the scale
 WINDOW = 9  # pixels of a side: over so many differences the error is a mean, by a tent
 DARK = 0.01  # of the picture's mean: what is darker counts as if it were as bright
+
+
+def offered() -> list[str]:
+    """Return the maps that can be made here: without Open Image Denoise, none is denoised by it."""
+    return [name for name in MAPS if name != DENOISED or oidn.is_installed()]
 
 
 @dataclass(frozen=True)

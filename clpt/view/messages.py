@@ -9,7 +9,7 @@ import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from clpt.errors import ClptError, KernelBuildError, SceneError, one_line
 
@@ -19,6 +19,7 @@ QUOTED_FOLDER = re.compile(r"""(?<=['"])(?:[A-Za-z]:)?[/\\][^'"\n]*[/\\]""")
 FOLDER = re.compile(r"""(?<![\w.~-])(?:[A-Za-z]:)?[/\\][^\s'"]*[/\\]""")
 CUT_FOLDER = re.compile(r"""(?<= \.\.\. )[^'"]*[/\\]""")  # where `one_line` has cut its beginning
 
+PREPARING: Final[dict[str, Any]] = {"type": "status", "phase": "preparing"}
 Reply = Callable[[dict[str, Any]], None]
 
 

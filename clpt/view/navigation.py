@@ -38,6 +38,11 @@ def pose(camera: Camera) -> Pose:
     return Pose(matrix[:3, 3].copy(), left, up, forward)
 
 
+def rounded(point: Floats) -> list[float]:
+    """Return a point (3,) with six digits, as somebody would write it."""
+    return [float(f"{value:.6g}") for value in point]
+
+
 def is_within_reach(camera: Camera) -> bool:
     """Return whether the numbers of a camera say where it is and looks, and are below FARTHEST."""
     matrix = np.asarray(camera.view if isinstance(camera, Matrix) else camera.to_world, float)

@@ -23,6 +23,7 @@ from clpt.render.progress import Progress
 from clpt.render.renderer import Renderer
 from clpt.scene import Scene
 from clpt.view import maps, pictures
+from clpt.view.messages import PREPARING
 from clpt.view.pictures import Display
 from clpt.view.target import Change, Make, Target, smaller
 
@@ -92,6 +93,7 @@ class RenderLoop:
         self._waited = self._samples = 0.0
         self._slow_previews = self._fast_previews = 0
         self._told = 0.0
+        self.status: dict[str, Any] = PREPARING  # what viewers were told last
         self._rates = 0.0, 0.0
         self._closing = False
 
@@ -218,7 +220,7 @@ class RenderLoop:
     def _follow(self, target: Target) -> Renderer:
         """Return a target's renderer, of the present scene; tell viewers that it may take long."""
         if target.is_slow:
-            self.outlet.message({"type": "status", "phase": "preparing"})
+            self._tell(PREPARING)
         return target.follow(self.scene)
 
     def _resize_preview(self, divider: int) -> None:
@@ -324,7 +326,7 @@ class RenderLoop:
         """Tell all viewers how far the render is."""
         self._told = time.perf_counter()
         phase = "done" if self.done else "paused" if self.paused else "rendering"
-        self.outlet.message(
+        self._tell(
             {
                 "type": "status",
                 "phase": "moving" if self._previews_left else phase,
@@ -337,6 +339,10 @@ class RenderLoop:
                 "rays_per_second": self._rates[1],
             }
         )
+
+    def _tell(self, status: dict[str, Any]) -> None:
+        self.status = status
+        self.outlet.message(status)
 
 
 def first_divider(scene: Scene) -> int:

@@ -32,7 +32,7 @@ from websockets.http11 import Response
 from clpt.errors import ClptError
 from clpt.view.access import LOOPBACK, Access, is_loopback
 from clpt.view.commands import COMMANDS, LARGEST_MESSAGE, CommandError, parse
-from clpt.view.messages import answering, as_json
+from clpt.view.messages import PREPARING, answering, as_json
 from clpt.view.session import Session
 
 log = logging.getLogger(__name__)
@@ -385,8 +385,9 @@ class Server:
     def _welcome(self, viewer: Viewer) -> None:
         if self.session is not None:
             viewer.tell(self.session.state())
+            viewer.tell(self.session.status())
         else:
-            viewer.tell({"type": "status", "phase": "preparing"})
+            viewer.tell(PREPARING)
         if self._last_frame is not None:
             viewer.offer(*self._last_frame)
         self._tell_wheel()

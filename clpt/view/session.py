@@ -18,6 +18,7 @@ from clpt.scene import Scene
 from clpt.view import maps, panels, views
 from clpt.view.camera_work import CameraWork
 from clpt.view.commands import COMMANDS, CommandError, Request
+from clpt.view.history import History, State
 from clpt.view.look import Look
 from clpt.view.messages import Reply, answering, error_message
 from clpt.view.pictures import METHOD, Display
@@ -49,7 +50,7 @@ class Session(CameraWork):
     what is saved, and source tells when the file has changed, where they are given; where: what
     renders, for people. options: of `RenderLoop` and renderers.
 
-    `post`, `watched` and `state` may be called from any thread.
+    `post`, `watched`, `status` and `state` may be called from any thread.
     """
 
     def __init__(
@@ -69,6 +70,7 @@ class Session(CameraWork):
         self.scene = self._first = scene
         self.look = Look()
         self._works = self.scene, self.look  # the last ones that could be rendered
+        self._history = History()
         self._has_worked = False
         self._rests = False  # nothing can be rendered until something is asked for
         self.error: BaseException | None = None
@@ -124,6 +126,10 @@ class Session(CameraWork):
         if not self._viewers:
             self._loop.cancel()
 
+    def status(self) -> dict[str, Any]:
+        """Return how far the render is, as all viewers were told last."""
+        return self._loop.status
+
     def state(self) -> dict[str, Any]:
         """Return what a viewer has to know of the scene, and how it is looked at."""
         scene, film = self.scene, self.scene.film
@@ -142,15 +148,13 @@ class Session(CameraWork):
             "device": self.where,
             "names": {
                 **panels.names(self._loop.display.view is not None),
-                "maps": list(maps.MAPS),
+                "maps": maps.offered(),
             },
             "objects": panels.objects(scene),
             "panels": panels.panels(scene),
             "saves": self.folder is not None,
             "compares": self._loop.kept is not None,
-            "edited": any(
-                getattr(scene, part) is not getattr(self._first, part) for part in EDITABLE
-            ),
+            "edited": differ(scene, self._first),
         }
 
     # the thread
@@ -220,7 +224,7 @@ class Session(CameraWork):
     def _handle(self, requests: list[tuple[Request, Reply]]) -> None:
         for request, reply in requests:
             self._rests = False
-            with answering(reply), self._all_or_nothing():
+            with answering(reply), self._all_or_nothing(), self._noted(request):
                 function = getattr(self, f"_do_{request.name}", None)
                 if function is None:  # what the server does
                     raise CommandError(f"there is nothing to {request.name} here")
@@ -238,6 +242,18 @@ class Session(CameraWork):
             if self.scene is not scene or self.look != look:
                 self._show(scene, Change(whole=True), look)
             raise
+
+    @contextmanager
+    def _noted(self, request: Request) -> Iterator[None]:
+        """Note the state before a request that changes more than the camera, so as to undo it."""
+        scene, look = before = self.scene, self.look
+        yield
+        if request.name in ("undo", "redo"):
+            return
+        if differ(scene, self.scene) or look != self.look:
+            values = request.values
+            by = (values["target"], values["index"], values["key"]) if "key" in values else None
+            self._history.note(State(*before), by)
 
     def _watch(self) -> None:
         """Read the scene again if its file has changed."""
@@ -258,6 +274,7 @@ class Session(CameraWork):
         look = Look(lamp=self.look.lamp, wavelength=self.look.wavelength)
         self._show(dataclasses.replace(scene, camera=camera), Change(whole=True), look)
         self._first = scene
+        self._history.clear()
         if not same_camera:
             self._set_pivot()
         self._tell_state()
@@ -337,6 +354,27 @@ class Session(CameraWork):
             self._move(scene.camera)
             return
         self._show(scene, change)
+
+    def _do_undo(self, reply: Reply) -> None:
+        self._go_to(self._history.back(State(self.scene, self.look)), "undo")
+
+    def _do_redo(self, reply: Reply) -> None:
+        self._go_to(self._history.forward(State(self.scene, self.look)), "redo")
+
+    def _go_to(self, state: State | None, verb: str) -> None:
+        """Show a state of the history; the camera and the end of the render stay."""
+        if state is None:
+            raise CommandError(f"there is nothing to {verb}")
+        now = self.scene
+        kept = {"camera": now.camera, "spp": now.spp, "noise": now.noise}
+        self._show(dataclasses.replace(state.scene, **kept), Change(whole=True), state.look)
+        self._tell_state()
+
+    def _do_size(self, reply: Reply, width: int, height: int) -> None:
+        film = dataclasses.replace(self.scene.film, width=width, height=height, crop=None)
+        look = dataclasses.replace(self.look, region=None)  # it is told in pixels
+        self._show(dataclasses.replace(self.scene, film=film), Change(whole=True), look)
+        self._tell_state()
 
     def _do_restore(self, reply: Reply) -> None:
         self._show(self._first, Change(whole=True), Look())
@@ -455,6 +493,11 @@ class Session(CameraWork):
         else:
             path = self.folder.save_exr(self._loop.renderer(), self._loop.seconds)
         reply({"type": "saved", "what": what, "name": str(path.relative_to(self.folder.folder))})
+
+
+def differ(scene: Scene, other: Scene) -> bool:
+    """Return whether scenes differ in more than the camera."""
+    return any(getattr(scene, part) is not getattr(other, part) for part in EDITABLE)
 
 
 def is_quick(request: Request) -> bool:

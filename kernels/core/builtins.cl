@@ -92,3 +92,4 @@ uint PURE get_work_dim(void);
 #define PLACED(name) size_t PURE name(uint);
 PLACED(get_global_size) PLACED(get_global_id) PLACED(get_local_size) PLACED(get_local_id) PLACED(get_num_groups)
 PLACED(get_group_id) PLACED(get_global_offset)
+void CALLED write_imagef(write_only image2d_t, int2, float4);

@@ -103,7 +103,6 @@ def test_commands_that_start_workers(folder: Path) -> None:
 
 
 def test_the_page(folder: Path) -> None:
-    pytest.importorskip("websockets")
     process = start(folder, "view", "scene", "--no-browser", "--port", "0", "--size", "4x4")
     try:
         for line in process.stdout:

@@ -20,7 +20,6 @@ CORNELL = str(Path(__file__).resolve().parents[2] / "scenes" / "cornell_box")
 
 
 def test_it_prints_one_line_and_ends_by_ctrl_c(tmp_path):
-    pytest.importorskip("websockets", reason="the extra clpt[view] is not installed")
     options = ["--no-browser", "--size", "16x12", "--mode", "rgb", "--quiet", "-o", str(tmp_path)]
     command = [sys.executable, "-m", "clpt", "view", CORNELL, *options]
     heeds = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # a background job ignores it
@@ -39,7 +38,6 @@ def test_it_prints_one_line_and_ends_by_ctrl_c(tmp_path):
 
 
 def test_bad_input_is_one_line(capsys, tmp_path):
-    pytest.importorskip("websockets", reason="the extra clpt[view] is not installed")
     assert run(["view", str(tmp_path / "nothing.json"), "--no-browser"]) == 2
     assert "there is no such file" in capsys.readouterr().err
     with socket.socket() as taken:
@@ -49,14 +47,6 @@ def test_bad_input_is_one_line(capsys, tmp_path):
         assert run(["view", CORNELL, "--no-browser", "--port", port]) == 2
     told = capsys.readouterr()
     assert f"cannot listen at 127.0.0.1:{port}" in told.err and told.out == ""
-
-
-def test_without_the_extra_it_says_what_to_install(monkeypatch, capsys):
-    monkeypatch.delitem(sys.modules, "clpt.view.server", raising=False)
-    monkeypatch.setitem(sys.modules, "websockets", None)
-    monkeypatch.setitem(sys.modules, "websockets.asyncio.server", None)
-    assert run(["view", CORNELL, "--no-browser"]) == 2
-    assert 'pip install "clpt[view]"' in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

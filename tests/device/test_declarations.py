@@ -14,6 +14,7 @@ import clpt
 from clpt import device as dev
 from clpt.device import declarations, native_programs
 from clpt.render.lowering.scene import Lowered, lower
+from clpt.render.wavefront import guide, photons
 from clpt.scene import Film
 from tests.front_end import CLANG, OURS, errors
 from tests.test_other_compilers import builders, of_every_material, texts_of
@@ -36,6 +37,14 @@ def as_cpus_get_them(lowered: Lowered) -> list[str]:
 @needs_clang
 def test_builders() -> None:
     check(builders())
+
+
+@needs_clang
+def test_programs_that_know_no_scene() -> None:
+    """Developing pictures, denoising, the trial of a device; of photons and of the guide."""
+    alone = ["stage/resolve.cl", "stage/denoise.cl", "stage/trial.cl", photons.ROOT, guide.ROOT]
+    defines = {"LANES": 8, "TRIAL_NODES": 64}
+    check(dev.assemble(root, {}, defines).text for root in alone)
 
 
 @needs_clang

@@ -79,7 +79,8 @@ MET: dict[str, dict[str, Any]] = {  # parts that once could not be in one scene
         for cls in SAMPLERS
     },
     "photons that diffuse surfaces leave": {
-        "shapes": [Sphere(emission=Area())], "integrator": Vcm(),
+        "shapes": [Sphere(emission=Area())],
+        "integrator": Vcm(),
     },
     "a number mixed of spectra, all of it the first": {
         "shapes": [Sphere(material=Phong(exponent=Mix(first=TABLE, amount=0.0)))]

@@ -8,8 +8,6 @@ from typing import Any
 
 import pytest
 
-pytest.importorskip("websockets", reason="the extra clpt[view] is not installed")
-
 from clpt.view.commands import (
     COMMANDS,
     Choice,

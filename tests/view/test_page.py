@@ -24,9 +24,6 @@ from clpt.render.renderer import Renderer
 from clpt.scene import KINDS, Scene, materials, shapes
 from clpt.scene.lights import ON_SHAPES
 from clpt.view import panels
-
-pytest.importorskip("websockets", reason="the extra clpt[view] is not installed")
-
 from clpt.view.saving import Folder
 from clpt.view.server import Server
 from clpt.view.session import Session
@@ -239,6 +236,41 @@ def test_maps_are_chosen_and_have_a_legend(shown: Shown) -> None:
     page.wait_for_selector("#legend >> text=100 % error")
     page.select_option("select[aria-label='show']", '"picture"')
     page.wait_for_selector("#legend", state="hidden")
+
+
+def test_buttons_undo_size_and_files(shown: Shown, on: device.Device, tmp_path: Path) -> None:
+    """Undo by the key that people know, another size, a picture for the browser."""
+    page = shown.page
+    page.click("#tools >> text=Hide")
+    page.wait_for_selector("#hint >> text=click what to hide")
+    before = page.evaluate("clpt.picture.latest")
+    page.mouse.click(*_middle(page))
+    before = shown.rest(before)
+    assert page.evaluate("clpt.state.look.hidden.length") == 1
+    page.keyboard.press("Control+z")
+    shown.rest(before)
+    wait(page, "clpt.state.look.hidden.length === 0")
+    page.click("#tab-render")
+    page.fill("input[aria-label='size 1']", "40")
+    page.keyboard.press("Enter")
+    wait(page, "clpt.picture.header.rest && clpt.picture.film[0] === 40")
+    assert np.array_equal(shown.pixels(), picture(shown.session, on))
+    shown.session.folder = Folder(tmp_path, "room", lambda *_: None)
+    page.keyboard.press("Tab")
+    page.evaluate("document.activeElement.blur()")
+    page.keyboard.press("g")
+    page.wait_for_selector("#notes >> text=saving .png")
+    with page.expect_download() as download:
+        page.click("#notes >> text=download it")
+    assert download.value.suggested_filename == "room-001.png"
+    ours, theirs = (np.asarray(Image.open(path))[..., :3] for path in
+                    (tmp_path / "room-001.png", download.value.path()))  # fmt: skip
+    assert np.array_equal(ours, theirs)
+
+
+def _middle(page: Any) -> tuple[float, float]:
+    box = page.locator("#picture").bounding_box()
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
 
 def test_a_view_that_is_pasted_opens(shown: Shown, on: device.Device) -> None:
@@ -472,3 +504,4 @@ def test_the_page_is_loaded_again(shown: Shown) -> None:
     page.reload()
     wait(page, "window.clpt && clpt.picture.latest > 0")
     assert "token" not in page.url
+    page.wait_for_selector("#phase >> text=done")  # nothing happens any more that would tell it

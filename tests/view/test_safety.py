@@ -17,8 +17,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-pytest.importorskip("websockets", reason="the extra clpt[view] is not installed")
-
 from clpt import device
 from clpt.errors import LONGEST, ClptError, KernelBuildError, MemoryBudgetError, SceneError
 from clpt.scene import KINDS, cameras

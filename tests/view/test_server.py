@@ -10,9 +10,6 @@ import time
 from collections.abc import Iterator
 
 import pytest
-
-pytest.importorskip("websockets", reason="the extra clpt[view] is not installed")
-
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from clpt.errors import ClptError

@@ -6,6 +6,7 @@ import dataclasses
 import io
 import json
 import random
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -17,7 +18,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from clpt import device, images, load, spectra
+from clpt import device, images, load, spectra, transforms
 from clpt.cli.files import outputs
 from clpt.cli.options.grading import Grading
 from clpt.cluster.multi_renderer import MultiRenderer
@@ -274,6 +275,62 @@ def test_a_material_is_edited(opened, audience, on) -> None:
     assert np.array_equal(after, expected(session.scene, on))
     ask(session, audience, "restore")
     assert np.array_equal(audience.rest()[1], before)
+
+
+def test_changes_are_undone_and_redone(opened, audience) -> None:
+    """What a slider sends is one step; the camera and the end of the render stay."""
+    session = opened(small())
+    _, first = audience.rest()
+    red = next(one for one in session.state()["panels"] if one["title"] == "red")
+    which = {"target": "material", "index": red["index"], "key": "reflectance"}
+    for blue in (0.2, 0.4, 0.8):
+        ask(session, audience, "edit", **which, value=[0.1, 0.2, blue])
+    _, edited = audience.rest()
+    ask(session, audience, "hide", shape=7, hidden=True)
+    audience.rest()
+    ask(session, audience, "orbit", dx=0.1, dy=0.0)
+    audience.rest()
+    ask(session, audience, "home")
+    audience.rest()
+    ask(session, audience, "undo")
+    assert np.array_equal(audience.rest()[1], edited)
+    ask(session, audience, "undo")
+    assert np.array_equal(audience.rest()[1], first)
+    assert session.state()["edited"] is False
+    ask(session, audience, "undo")
+    assert audience.answer("error")["text"] == "there is nothing to undo"
+    ask(session, audience, "redo")
+    assert np.array_equal(audience.rest()[1], edited)
+    ask(session, audience, "edit", **which, value=[0.5, 0.5, 0.5])
+    audience.rest()
+    ask(session, audience, "redo")
+    assert audience.answer("error")["text"] == "there is nothing to redo"
+
+
+def test_the_film_gets_another_size(opened, audience, on) -> None:
+    session = opened(small())
+    audience.rest()
+    ask(session, audience, "region", x=2, y=2, width=8, height=8)
+    audience.rest()
+    ask(session, audience, "size", width=40, height=20)
+    header, shown = audience.rest()
+    assert header["film"] == [40, 20] and header["crop"] is None
+    assert np.array_equal(shown, expected(session.scene, on))
+    assert session.state()["look"]["region"] is None
+
+
+def test_where_the_camera_is_is_told_as_people_write_it(opened, audience) -> None:
+    session = opened(small())
+    ask(session, audience, "look_at")
+    told = audience.answer("look_at")
+    made = transforms.look_at(told["origin"], told["target"], told["up"])
+    np.testing.assert_allclose(made, small().camera.to_world, atol=1e-5)
+
+
+def test_without_a_denoiser_none_is_offered(opened, audience, monkeypatch) -> None:
+    monkeypatch.setitem(sys.modules, "pyoidn", None)
+    offered = opened(small()).state()["names"]["maps"]
+    assert "denoised" not in offered and {"picture", "samples", "error"} <= set(offered)
 
 
 def test_objects_are_hidden_and_come_back(opened, audience) -> None:

@@ -18,9 +18,6 @@ import pytest
 
 from clpt import device, load
 from clpt.cli.process import allocator
-
-pytest.importorskip("websockets", reason="the extra clpt[view] is not installed")
-
 from clpt.view.server import Server
 from clpt.view.session import Session
 from tests.view import campaign

@@ -38,8 +38,8 @@ CLOSE_SECONDS = 3.0  # in which a session ends that waits for no compiler
 
 def show(scene: Path, settings: Settings) -> int:
     """Show a scene until a signal comes; return the exit status. Raises what its session does."""
-    with extra("view", "clpt view"):
-        from ...view.server import Server
+    from ...view.server import Server  # here: asyncio and sockets are for this command alone
+
     file = locate(scene)
     begins = load_view(settings.opened) if settings.opened is not None else None
     looked_at = _display(settings)

@@ -1,6 +1,6 @@
 // What is under the cursor: values, samples, first hit, and the spectrum with its error.
 
-import { h, short, within } from "./dom.js";
+import { h, many, short, within } from "./dom.js";
 import { spectrumPlot } from "./plot.js";
 
 const SAMPLE = Object.assign(document.createElement("canvas"), { width: 1, height: 1 });
@@ -70,7 +70,7 @@ export class Inspector {
   draw() {
     const { value, hit, spectrum } = this.found;
     if (!this.at || !value) {
-      this.pane.replaceChildren(h("p", { class: "empty" }, "Point at the picture: its values, what it shows, and its spectrum appear here. A click holds the pixel."));
+      this.pane.replaceChildren(h("p", { class: "empty" }, "Point at the picture. The values of the pixel, what it shows, and its spectrum appear here. A click holds the pixel."));
       return;
     }
     const same = spectrum && spectrum.x === this.at.x && spectrum.y === this.at.y;
@@ -83,13 +83,13 @@ export class Inspector {
       add("samples", String(value.samples), "of this pixel so far");
     }
     if (same && spectrum.rgb_mean) {
-      add("by itself", spectrum.rgb_mean.map((v, i) => within(v, spectrum.rgb_error[i])).join("\n"),
-        `the same pixel again, with ${spectrum.samples} samples of its own`);
+      add("exact", spectrum.rgb_mean.map((v, i) => within(v, spectrum.rgb_error[i])).join("\n"),
+        `this pixel with ${many(spectrum.samples)}samples of its own, ± one standard error`);
     }
     if (hit) {
       if (hit.shape === null) add("shows", "nothing");
       else {
-        add("shows", `${hit.object?.name ?? "shape"} (${hit.shape}), part ${hit.primitive}`);
+        add("shows", hit.object?.name ?? `shape ${hit.shape}`, `shape ${hit.shape}, primitive ${hit.primitive}`);
         const { made_of: material, material: panel = null } = hit.object ?? {};
         const name = material?.replaceAll("_", " ");
         if (name && this.edit && panel !== null) add("material", h("button", { class: "link", title: "its panel", onclick: () => this.edit(panel) }, name));

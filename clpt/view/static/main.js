@@ -26,35 +26,39 @@ const display = {
   },
 };
 
-function note(text, kind = "") {
-  const item = h("li", { class: kind }, text);
+// A message for some seconds; parts: buttons behind its text.
+function note(text, kind = "", ...parts) {
+  const item = h("li", { class: kind }, text, parts);
   $("notes").append(item);
   setTimeout(() => item.remove(), kind === "error" ? 8000 : 4000);
   while ($("notes").children.length > 4) $("notes").firstChild.remove();
 }
 
-// What keys and buttons do. button: the sign in the header, if it has one.
+// What keys and buttons do. button: the word in the header, if it has one; group: which buttons stand together.
 const actions = [
-  { keys: [" "], text: "pause, go on", run: () => connection.send("pause", { paused: !state?.paused }), button: "pause" },
-  { keys: ["h"], text: "the camera of the file", run: () => connection.send("home"), button: "home" },
-  { keys: ["p"], text: "pick the pivot", run: () => steering.choose("pivot"), tool: "pivot", button: "pivot" },
-  { keys: ["f"], text: "focus the lens by a click", run: () => steering.choose("focus"), tool: "focus", button: "focus" },
-  { keys: ["x"], text: "hide the object that is clicked next", run: () => steering.choose("hide"), tool: "hide", button: "hide" },
+  { keys: [" "], text: "pause, go on", run: () => connection.send("pause", { paused: !state?.paused }), button: "Pause", group: "render" },
+  { keys: ["h"], text: "the camera of the file", run: () => connection.send("home"), button: "Reset view", group: "camera" },
+  { keys: ["p"], text: "click the point that the camera turns about", run: () => steering.choose("pivot"), tool: "pivot", button: "Orbit point", group: "camera" },
+  { keys: ["f"], text: "click what the lens focuses on", run: () => steering.choose("focus"), tool: "focus", button: "Focus", group: "camera" },
+  { keys: ["x"], text: "click an object to hide it", run: () => steering.choose("hide"), tool: "hide", button: "Hide", group: "scene" },
   { keys: ["X"], text: "show all objects", run: () => connection.send("show_all") },
-  { keys: ["r"], text: "render a region, or the whole picture again", run: region, tool: "region", button: "region" },
-  { keys: ["c"], text: "keep the picture, and wipe between both", run: compare, button: "compare" },
+  { keys: ["z"], text: "undo the last change of the scene", run: () => undo("undo"), button: "Undo", group: "scene" },
+  { keys: ["Z"], text: "redo what was undone", run: () => undo("redo") },
+  { keys: ["r"], text: "render a region, or the whole picture again", run: region, tool: "region", button: "Region", group: "picture" },
+  { keys: ["c"], text: "keep the picture, and wipe between it and the next one", run: compare, button: "Compare", group: "picture" },
   { keys: ["v"], text: "the difference from the kept picture, eight times as bright", run: differ },
+  { keys: ["m"], text: "the next layer in place of the picture: depth, normals, error ...", run: nextMap, button: "Layers", group: "picture" },
   { keys: ["+", "="], text: "brighter by a third of a stop", run: () => expose(1 / 3) },
   { keys: ["-"], text: "darker by a third of a stop", run: () => expose(-1 / 3) },
   { keys: ["0"], text: "exposure 0", run: () => expose(-display.exposure) },
   { keys: ["t"], text: "the next tone curve", run: nextTone },
-  { keys: ["m"], text: "the next map or layer in the place of the picture", run: nextMap, button: "maps" },
   { keys: ["1"], text: "one pixel for one of the screen, or all of the picture", run: () => { picture.actual = !picture.actual; $("stage").classList.toggle("actual", picture.actual); picture.fit(); } },
-  { keys: ["g"], text: "save a .png", run: () => connection.send("save", { what: "png" }), button: "save" },
+  { keys: ["g"], text: "save a .png", run: () => save("png"), button: "Save", group: "file" },
+  { keys: ["l"], text: "copy where the camera is and looks, as look_at", run: () => connection.send("look_at") },
   { keys: ["y"], text: "copy the view as text; paste it, or drop its file, to open it", run: () => connection.send("copy_view") },
   { keys: ["i"], text: "an address for another viewer", run: () => connection.send("invite") },
   { keys: ["Escape"], text: "leave a tool", run: () => { if (steering.tool) steering.choose(steering.tool); } },
-  { keys: ["?"], text: "these keys", run: help, button: "keys" },
+  { keys: ["?"], text: "all keys and gestures", run: help, button: "Keys", group: "file" },
 ];
 const steering = new Steering(picture, connection, actions, window);
 
@@ -66,9 +70,12 @@ tabs.onopen = (name) => {
 };
 
 for (const action of actions.filter(({ button }) => button)) {
-  action.element = h("button", { title: `${action.text} (${action.keys[0] === " " ? "space" : action.keys[0]})`, onclick: () => { action.run(); } }, action.button);
+  action.element = h("button", { "data-group": action.group, title: `${action.text} (${action.keys[0] === " " ? "space" : action.keys[0]})`, onclick: () => { action.run(); } }, action.button);
   $("tools").append(action.element);
 }
+
+const firstOfGroup = new Map([...actions].reverse().filter(({ button }) => button).map((action) => [action.group, action.element]));
+for (const element of firstOfGroup.values()) element.classList.add("first");
 
 function draw(name = tabs.current) {
   if (!state) return;
@@ -77,7 +84,7 @@ function draw(name = tabs.current) {
   const top = $("panes").scrollTop;
   if (name === "view") pane.replaceChildren(...viewPane(state, connection, display));
   if (name === "scene") pane.replaceChildren(...scenePane(state, connection, open));
-  if (name === "render") pane.replaceChildren(...renderPane(state, connection, figures));
+  if (name === "render") pane.replaceChildren(...renderPane(state, connection, figures, { save, fitted }));
   $("panes").scrollTop = top;
 }
 
@@ -87,6 +94,34 @@ function editMaterial(index) {
   for (const one of ["material", key]) open.add(one);
   tabs.open("scene");
   tabs.panes.scene.querySelector(`[data-key="${key}"]`)?.scrollIntoView({ block: "start" });
+}
+
+// Save a file on the side of the server. It may wait for the end of a pass.
+function save(what) {
+  note(`saving ${what === "scene" || what === "view" ? `the ${what}` : `.${what}`} ...`);
+  connection.send("save", { what });
+}
+
+// The picture as it is shown, as a file of the browser.
+function download(name) {
+  picture.now.toBlob((blob) => {
+    const link = h("a", { href: URL.createObjectURL(blob), download: name });
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+  }, "image/png");
+}
+
+function undo(verb) {
+  document.activeElement?.blur?.(); // a field that is edited would keep its number
+  connection.send(verb);
+}
+
+// The film's size that has one pixel for each of the window's, in the film's shape.
+function fitted() {
+  const box = $("stage").getBoundingClientRect();
+  const [width, height] = state.film;
+  const scale = Math.min(box.width / width, box.height / height) * (window.devicePixelRatio || 1);
+  return [width, height].map((length) => Math.max(1, Math.round(length * scale)));
 }
 
 function region() {
@@ -159,10 +194,23 @@ function help() {
   dialog.showModal();
 }
 
+function hint(text) {
+  $("hint").hidden = !text;
+  $("hint").textContent = text;
+}
+
+// For the first seconds, until the picture is touched.
+function welcome() {
+  const touch = window.matchMedia("(pointer: coarse)").matches;
+  hint(touch ? "drag: orbit    pinch: zoom    tap: a pixel" : "drag: orbit    wheel: zoom    click: a pixel    ?: keys");
+  const end = () => { if (!steering.tool) hint(""); };
+  setTimeout(end, 8000);
+  picture.canvas.addEventListener("pointerdown", end, { once: true });
+}
+
 steering.addEventListener("tool", ({ detail }) => {
-  const hints = { pivot: "click what to turn about", focus: "click what is to be sharp", hide: "click what to hide", region: "drag a rectangle" };
-  $("hint").hidden = !detail;
-  $("hint").textContent = hints[detail] ?? "";
+  const hints = { pivot: "click the point to turn about", focus: "click what is to be sharp", hide: "click what to hide", region: "drag a rectangle" };
+  hint(hints[detail] ?? "");
   for (const { tool, element } of actions) if (tool && element) element.setAttribute("aria-pressed", tool === detail);
 });
 steering.addEventListener("hide", ({ detail }) => connection.send("hide_at", detail));
@@ -181,7 +229,7 @@ connection.addEventListener("state", ({ detail }) => {
   $("name").textContent = detail.name || "scene";
   picture.region = detail.look.region;
   if (!detail.compares && !picture.kept) picture.wipe = null;
-  for (const { button, element } of actions) if (button === "pause") { element.textContent = detail.paused ? "go on" : "pause"; }
+  for (const { button, element } of actions) if (button === "Pause") { element.textContent = detail.paused ? "Go on" : "Pause"; }
   picture.paintOverlay();
   draw();
 });
@@ -204,6 +252,7 @@ picture.addEventListener("shown", ({ detail }) => {
   figures.times = [...figures.times.slice(-19), performance.now()];
   const span = figures.times.at(-1) - figures.times[0];
   figures.perSecond = span ? ((figures.times.length - 1) / span) * 1000 : 0;
+  if (!document.body.classList.contains("shows")) welcome();
   document.body.classList.add("shows");
   legend(detail);
 });
@@ -214,14 +263,19 @@ connection.addEventListener("wheel", ({ detail }) => {
   document.body.classList.toggle("watches", !steers);
   let button = $("steer");
   if (!steers && !button) {
-    button = h("button", { id: "steer", onclick: () => connection.send("steer") }, "take the wheel");
+    button = h("button", { id: "steer", onclick: () => connection.send("steer") }, "Take the wheel");
     $("tools").prepend(button);
   }
   if (steers) button?.remove();
 });
 connection.addEventListener("statistics", ({ detail }) => { figures.statistics = detail; if (tabs.current === "render") draw(); });
-connection.addEventListener("saved", ({ detail }) => note(`saved ${detail.name}`));
-connection.addEventListener("pivot", () => note("The pivot is there."));
+connection.addEventListener("saved", ({ detail }) => note(`saved ${detail.name} in the folder of clpt view`, "",
+  ...(detail.what === "png" ? [h("button", { class: "link", onclick: () => download(detail.name) }, "download it")] : [])));
+connection.addEventListener("pivot", () => note("The camera turns about this point."));
+connection.addEventListener("look_at", ({ detail }) => {
+  const point = (values) => `[${values.join(", ")}]`;
+  copy(`transforms.look_at(${point(detail.origin)}, ${point(detail.target)}, ${point(detail.up)})`, "look_at is in the clipboard.");
+});
 connection.addEventListener("invitation", ({ detail }) => copy(detail.address, "An address for one more viewer is in the clipboard."));
 connection.addEventListener("view", ({ detail }) => copy(JSON.stringify(detail.view), "The view is in the clipboard; paste it here to come back."));
 connection.addEventListener("error", ({ detail }) => note(detail.text, "error"));
@@ -260,6 +314,15 @@ window.addEventListener("drop", async (event) => {
   event.preventDefault();
   const [file] = event.dataTransfer.files;
   if (file) openView(await file.text());
+});
+
+// Undo by the keys that people know; in a field they are the field's own.
+window.addEventListener("keydown", (event) => {
+  if (!(event.ctrlKey || event.metaKey) || event.altKey || event.target.closest?.("input:not([type=range]):not([type=checkbox]), textarea, dialog")) return;
+  const verb = { z: event.shiftKey ? "redo" : "undo", y: "redo" }[event.key.toLowerCase()];
+  if (!verb) return;
+  event.preventDefault();
+  undo(verb);
 });
 
 // The picture has an outline only where Tab has led to it.

@@ -1,7 +1,7 @@
 // The side: tabs of panes, whose controls are made from what the server tells of the scene.
 
 import { bytes, h, many, short } from "./dom.js";
-import { choice, flag, number, parameterRow, row } from "./controls.js";
+import { choice, flag, number, numbers, parameterRow, row } from "./controls.js";
 
 export class Tabs {
   constructor(tabs, panes, names) {
@@ -100,7 +100,9 @@ function panelOf(panel, state, connection, open, folded) {
     let current = made();
     return current;
   });
-  if (!folded) return [h("p", { class: "kind" }, panel.kind.replaceAll("_", " ")), h("p", { class: "doc" }, panel.doc), rows()];
+  const place = panel.target === "camera"
+    ? h("button", { class: "link", title: "origin, target and up, as Python", onclick: () => connection.send("look_at") }, "copy look_at") : null;
+  if (!folded) return [h("p", { class: "kind" }, panel.kind.replaceAll("_", " ")), h("p", { class: "doc" }, panel.doc), rows(), place];
   const details = h("details", { class: "inner", open: open.has(key) },
     h("summary", {}, panel.title, panel.title === panel.kind.replaceAll("_", " ") ? "" : h("span", { class: "dim" }, panel.kind.replaceAll("_", " "))), body);
   const fill = () => { if (details.open && body.children.length === 1) body.append(...rows()); };
@@ -115,19 +117,22 @@ function panelOf(panel, state, connection, open, folded) {
 }
 
 // Where the render ends, what it takes, and what is saved.
-export function renderPane(state, connection, figures) {
+export function renderPane(state, connection, figures, { save, fitted }) {
   const stop = (spp, noise) => connection.send("stop_at", { spp, noise });
-  const save = (what, title, tip) => h("button", { title: tip, onclick: () => connection.send("save", { what }) }, title);
+  const size = ([width, height]) => connection.send("size", { width, height });
+  const saved = (what, title, tip) => h("button", { title: tip, onclick: () => save(what) }, title);
   const difference = figures.difference;
   return [
     section("Render", true,
+      row("size", "of the picture, width and height in pixels", numbers(state.film, (lengths) => size(lengths.map((length) => Math.max(1, Math.round(length)))), "size"),
+        h("button", { class: "quiet", title: "one pixel for each of the window's", onclick: () => size(fitted()) }, "fit")),
       row("samples", "of every pixel, at most", number(state.spp, { whole: true, label: "samples" }, (spp) => stop(Math.max(1, spp), state.noise))),
       row("noise", `pixels with less${state.look.denoises ? " after denoising" : ""} get no more samples; empty: all get as many`, choice([["all samples", null], ["5 %", 0.05], ["2 %", 0.02], ["1 %", 0.01], ["0.5 %", 0.005], ...(state.noise && ![0.05, 0.02, 0.01, 0.005].includes(state.noise) ? [[`${short(100 * state.noise)} %`, state.noise]] : [])], state.noise, (noise) => stop(state.spp, noise), "noise")),
       h("div", { class: "buttons" }, h("button", { onclick: () => connection.send("pause", { paused: !state.paused }) }, state.paused ? "go on" : "pause"),
         h("button", { onclick: () => connection.send("restart") }, "begin again"),
         state.look.region ? h("button", { onclick: () => connection.send("region") }, "whole picture") : null)),
     section("Save", true,
-      h("div", { class: "buttons" }, save("png", ".png", "as it is shown"), save("exr", ".exr", "linear, with all bands"), save("scene", "scene.json", "with all edits"), save("view", "view", "the camera and the display")),
+      h("div", { class: "buttons" }, saved("png", ".png", "as it is shown"), saved("exr", ".exr", "linear, with all bands"), saved("scene", "scene.json", "with all edits"), saved("view", "view", "the camera and the display")),
       state.saves ? h("p", { class: "doc" }, "new files in the folder that clpt view was given") : null),
     difference ? section("Against the kept picture", true, list([
       ["mean difference", `${short(100 * difference.relative_mean, 3)} %`], ["root mean square", `${short(100 * difference.relative_rms, 3)} %`],
