@@ -41,6 +41,7 @@ from clpt.render.resumable import Resumable
 from clpt.render.stats import RenderStats, collect
 from clpt.render.wavefront import adaptive
 from clpt.render.wavefront.film_state import FilmState, join_ranges
+from clpt.render.wavefront.strategy import Tuning
 from clpt.render.wavefront.tracer import Tracer, use_all_pixels
 from clpt.render.wavefront.wavefront import Counts, Wavefront
 from clpt.scene import Scene
@@ -103,13 +104,11 @@ class Renderer(Resumable):
         self._wavefront = first = Wavefront.create(
             device,
             lowered,
-            layout=options.get("layout"),
+            Tuning(options.get("layout"), options.get("queued"), options.get("cancel_seconds")),
             slots=options.get("slots"),
-            queued=options.get("queued"),
             looped=options.get("looped", None if options.get("queue") is None else True),
             tree_quality=options.get("tree_quality", "high"),
             halves=options.get("halves", False) or needs.halves(scene, self.denoise),
-            cancel_seconds=options.get("cancel_seconds"),
         )
         first.prepare()
         self._built = device.builds.programs - before[0], device.builds.cached - before[1]
@@ -455,7 +454,7 @@ class Renderer(Resumable):
         new = self.scene if scene is None else scene
         replaced = {} if scene is None else match_replacements(self.scene, new)
         if materials or transforms or vertices:
-            new, more = edit_scene(new, self._successors, materials, transforms, vertices)
+            new, more = self._edit(new, materials, transforms, vertices)
             replaced |= more
         return new if camera is None else dataclasses.replace(new, camera=camera), replaced
 
@@ -484,11 +483,21 @@ class Renderer(Resumable):
         readable = resolve_device_arrays(scene, self.device.queue)
         return lower(readable, self._texture_budget, former)
 
+    def _edit(
+        self,
+        scene: Scene,
+        materials: Mapping[MaterialKey, Material] | None,
+        transforms: Mapping[ShapeKey, Any] | None,
+        vertices: Mapping[ShapeKey, Any] | None,
+    ) -> tuple[Scene, Replacements]:
+        """Return a scene with these changes, and what stands for what; see `edit_scene`."""
+        return edit_scene(scene, self._successors, materials, transforms, vertices)
+
     def _move(self, transforms: Mapping[ShapeKey, Any], vertices: Mapping[ShapeKey, Any]) -> bool:
         """Move shapes on the device, and begin at sample 0; return whether they could."""
         if self._moving is None:
             self._moving = Moving(self.wavefront.scene, self.scene)
-        moved, replaced = self._edited(None, None, None, transforms, vertices)
+        moved, replaced = self._edit(self.scene, None, transforms, vertices)
         if self._enters_a_medium(moved):
             return False
         with self.change("update", heals=False) as change:

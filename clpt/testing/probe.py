@@ -219,9 +219,10 @@ class Probe:
             "    m.layers = layers;",
         ]
 
-    def _text(self, boundary: str, film: str) -> str:
-        kind, names = self.cls.kind, "xyzw"[: self.components]
-        at, reads = 9, []
+    def _reads(self) -> list[str]:
+        """Return the rows that set a material's members from `in`, behind three vectors."""
+        names = "xyzw"[: self.components]
+        reads, at = [], 9
         for name, param in self._streamed():
             form = lane_type(param)
             members = [f"m.{name}.{c}" for c in names] if form == "Spectrum" else [f"m.{name}"]
@@ -237,6 +238,11 @@ class Probe:
         if self.cls.needs_wavelengths:
             for i, c in enumerate(names):
                 reads.append(f"    m.lambdas.{c} = block_load(in + {at + i} * n + at);")
+        return reads
+
+    def _text(self, boundary: str, film: str) -> str:
+        kind, names = self.cls.kind, "xyzw"[: self.components]
+        reads = self._reads()
         spectra = {name: [f"{name}.{c}" for c in names] for name in ("f", "again", "albedo")}
         weight = [f"s.weight.{c}" for c in names]
         results = ["s.wi.x", "s.wi.y", "s.wi.z", *weight, "s.pdf", "s.eta", "to_real(s.lobe)"]

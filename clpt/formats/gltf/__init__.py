@@ -56,16 +56,13 @@ def load(path: Path, missing: Missing = "error", /, **variables: Any) -> Scene:
     missing: see clpt.load. Raises SceneError with the JSON path of what is wrong.
     """
     if "shutter" in variables:
-        length = _seconds(path, variables["shutter"], "shutter")
+        length = _seconds(path, variables.pop("shutter"), "shutter")
         if not 0.0 <= length < float("inf"):
             raise SceneError(f"the shutter {length:g} s must be from zero", file=path)
-        time = _seconds(path, variables.get("time", 0.0))
-        others = {name: value for name, value in variables.items() if name != "shutter"}
+        time = _seconds(path, variables.pop("time", 0.0))
         if length > 0.0:
-            return motion.between(
-                lambda t: load(path, missing, **{**others, "time": t}), time, length
-            )
-        variables = {**others, "time": time}
+            return motion.between(lambda t: load(path, missing, **variables, time=t), time, length)
+        variables["time"] = time
     document, graph = _open(path, variables, missing)
     chosen = cameras.chosen(graph, _text(variables.get("camera")))
     shapes = meshes.shapes(graph)

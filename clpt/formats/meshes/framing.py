@@ -70,20 +70,15 @@ def show(
             extra_shapes = [_ground(floor, radius, up), _key(centre, radius, up)]
         else:
             extra_lights.append(_distant_key(up))
+    counts = {"shapes": len(extra_shapes), "lights": len(extra_lights)}
+    added: dict[str, int] = {"camera": camera is None, **counts}
     return Scene(
         camera=camera or framing_camera(things, up),
         shapes=[*things, *extra_shapes],
         lights=[*own_lights, *extra_lights],
         film=integrators.Film(filter=integrators.Gaussian()),
         name=file.stem,
-        extra={
-            "format": _format(file),
-            "studio": {
-                "camera": camera is None,
-                "shapes": len(extra_shapes),
-                "lights": len(extra_lights),
-            },
-        },
+        extra={"format": _format(file), "studio": added},
     )
 
 

@@ -242,6 +242,10 @@ class _Maker:
                 int_ior=self.index(COAT),
                 name=self.name,
             )
+        return self.glossy(diffuse, gloss)
+
+    def glossy(self, diffuse: Any, gloss: Any) -> Material:
+        """Return a material with a highlight, as wide as Ns says."""
         alpha = self.alpha()
         if diffuse == BLACK:
             return RoughConductor(

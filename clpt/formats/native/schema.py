@@ -34,6 +34,31 @@ INDEX_FILE = {**STRING, "description": "columns, or a page of refractiveindex.in
 ANY_OF_SCALE = {"anyOf": [NUMBER, TRIPLE]}
 
 
+PROPERTIES: Schema = {
+    "$schema": STRING,
+    "name": STRING,
+    "camera": ref("camera"),
+    "integrator": ref("integrator"),
+    "sampler": ref("sampler"),
+    "materials": {"type": "object", "additionalProperties": ref("material")},
+    "media": {"type": "object", "additionalProperties": ref("medium")},
+    "groups": {
+        "type": "object",
+        "additionalProperties": {"type": "array", "items": ref("shape")},
+        "description": "shapes that instances place together",
+    },
+    "shapes": {"type": "array", "items": ref("shape")},
+    "lights": {"type": "array", "items": ref("light")},
+    "spp": {"type": "integer", "minimum": 1, "description": "samples of a pixel"},
+    "noise": {
+        "type": "number",
+        "exclusiveMinimum": 0,
+        "description": "below which a pixel gets no more samples",
+    },
+    "seed": {"type": "integer", "description": "of the random numbers"},
+}  # of a scene, but for its film
+
+
 def schema() -> Schema:
     """Return the JSON Schema (draft 2020-12) of a scene.json."""
     defs: Schema = {category: _category(category) for category in KINDS}
@@ -47,7 +72,7 @@ def schema() -> Schema:
         "shutter": motion.SHUTTER_SCHEMA,
         "transform": _transform(),
     }
-    film, defs["layer"] = _untyped(integrators.Film), _untyped(materials.Layer)
+    defs["layer"] = _untyped(materials.Layer)
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "clpt scene",
@@ -55,30 +80,7 @@ def schema() -> Schema:
         "type": "object",
         "additionalProperties": False,
         "required": ["camera"],
-        "properties": {
-            "$schema": STRING,
-            "name": STRING,
-            "camera": ref("camera"),
-            "film": film,
-            "integrator": ref("integrator"),
-            "sampler": ref("sampler"),
-            "materials": {"type": "object", "additionalProperties": ref("material")},
-            "media": {"type": "object", "additionalProperties": ref("medium")},
-            "groups": {
-                "type": "object",
-                "additionalProperties": {"type": "array", "items": ref("shape")},
-                "description": "shapes that instances place together",
-            },
-            "shapes": {"type": "array", "items": ref("shape")},
-            "lights": {"type": "array", "items": ref("light")},
-            "spp": {"type": "integer", "minimum": 1, "description": "samples of a pixel"},
-            "noise": {
-                "type": "number",
-                "exclusiveMinimum": 0,
-                "description": "below which a pixel gets no more samples",
-            },
-            "seed": {"type": "integer", "description": "of the random numbers"},
-        },
+        "properties": {**PROPERTIES, "film": _untyped(integrators.Film)},
         "$defs": defs,
     }
 

@@ -129,16 +129,14 @@ def checked_arrays(cursor: Cursor, shape: shapes.Mesh, warnings: list[str]) -> s
         if len(values) != count:
             raise cursor.at("attributes").at(name).error(f"must be {count} rows")
     with cursor.locating():
-        arrays = mesh.checked(
-            None,
-            "",
+        made = mesh.Arrays(
             shape.vertices,
             shape.faces.astype(np.int64),
             None if isinstance(shape.normals, str) else shape.normals,
             shape.uvs,
-            warnings,
             _with_tangents(shape),
         )
+        arrays = mesh.checked(None, "", made, warnings)
         if shape.tangents is not None:
             arrays["tangents"] = arrays["attributes"].pop(TANGENTS)
     if isinstance(shape.normals, str):

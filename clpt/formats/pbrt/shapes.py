@@ -134,7 +134,7 @@ def _mesh(
 ) -> Geometry | None:
     """A mesh whose triangles turn their front to where the normals point, if it has any."""
     warnings = list(warnings)
-    arrays = mesh.checked(None, "", points, faces, normals, uvs, warnings)
+    arrays = mesh.checked(None, "", mesh.Arrays(points, faces, normals, uvs), warnings)
     if not len(arrays["faces"]):
         return None
     for name in ("vertices", "normals", "uvs"):
@@ -223,7 +223,7 @@ def _loop(params: Parameters, state: State) -> Geometry | None:
     params.ignore("scheme")
     if not 0 <= levels <= DEEPEST:
         raise SceneError(f"'levels' must be 0 to {DEEPEST}, not {levels}")
-    arrays = mesh.checked(None, "", points, faces.reshape(-1, 3), None, None, [])
+    arrays = mesh.checked(None, "", mesh.Arrays(points, faces.reshape(-1, 3)), [])
     if not len(arrays["faces"]):
         return None
     coarse = arrays["vertices"].astype(np.float64), arrays["faces"].astype(np.int64)

@@ -53,10 +53,9 @@ def check(scene: Scene) -> None:
             names = " or ".join(f"`{cls.kind}`" for cls in ON_SHAPES)
             raise SceneError(f"its emission must be {names}", where=shapes.where(shape))
     if scene.film.mode == "rgb":
-        film = scene.film
-        for name, given, plain in (("sensor", film.sensor, "cie1931"), ("bands", film.bands, 0)):
-            if given != plain:
-                raise SceneError("needs the mode spectral", where=f"film.{name}")
+        asks = {"sensor": scene.film.sensor != "cie1931", "bands": scene.film.bands != 0}
+        for name in (name for name, asked in asks.items() if asked):
+            raise SceneError("needs the mode spectral", where=f"film.{name}")
     width, height = scene.film.size
     if width * height > LARGEST:
         raise SceneError(f"{width}x{height} are more than {LARGEST >> 20} Mi pixels", where="film")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -125,16 +125,23 @@ class Geometry:
         return (low + high) / 2, max(float(np.linalg.norm(high - low)) / 2, LEAST_RADIUS)
 
 
+def _divided(placed: Iterable[Placed]) -> tuple[list[Placed], list[Placed]]:
+    """Divide shapes into those of triangles and others; the latter, with many in one, come last."""
+    meshes: list[Placed] = []
+    others: list[Placed] = []
+    many = list(shape_records.ONE_OF)
+    for one in placed:
+        (others if one.shape.kind in shape_records.ANALYTIC else meshes).append(one)
+    others.sort(key=lambda one: one.shape.kind in many and 1 + many.index(one.shape.kind))
+    return meshes, others
+
+
 def assembled(index: SceneIndex, cache: LoweringCache) -> Geometry:
     """Return the shapes of a scene as rays meet them.
 
     Raises SceneError for a shape that makes no sense, and for more triangles than a tree can hold.
     """
-    kinds = shape_records.ANALYTIC
-    meshes = [one for one in index.placed if one.shape.kind not in kinds]
-    others = [one for one in index.placed if one.shape.kind in kinds]
-    many = list(shape_records.ONE_OF)
-    others.sort(key=lambda one: one.shape.kind in many and 1 + many.index(one.shape.kind))
+    meshes, others = _divided(index.placed)
     single = [one for one in others if one.shape.kind not in shape_records.ONE_OF]
     builder = _Builder(cache, len(single), index.motions)
     for one in meshes:
@@ -144,7 +151,10 @@ def assembled(index: SceneIndex, cache: LoweringCache) -> Geometry:
     first_analytic = len(builder.rows)
     for one in others:
         builder.add(one)
-    boxes = [builder.around(one, np.array([analytic.bounds(one.shape)])) for one in single]
+    boxes = [np.zeros((0, 2, 3), np.float32)]
+    boxes += [builder.around(one, np.array([analytic.bounds(one.shape)])) for one in single]
+    many_boxes = zip(others[len(single) :], builder.many, strict=True)
+    boxes += [builder.around(one, own) for one, own in many_boxes]
     vertices, faces, tags = builder.concatenated()
     return Geometry(
         rows=tuple(builder.rows),
@@ -153,16 +163,7 @@ def assembled(index: SceneIndex, cache: LoweringCache) -> Geometry:
         vertices=vertices,
         faces=faces,
         tags=tags,
-        boxes=np.concatenate(
-            [
-                np.zeros((0, 2, 3), np.float32),
-                *boxes,
-                *(
-                    builder.around(one, own)
-                    for one, own in zip(others[len(single) :], builder.many, strict=True)
-                ),
-            ]
-        ),
+        boxes=np.concatenate(boxes),
         instances=instances,
         emitters=tuple(builder.emitters),
         world_vertices=world_vertices,

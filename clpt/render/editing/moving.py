@@ -291,14 +291,13 @@ class Moving:
                 target.stream.after(getattr(new.to_world, "events", ()))
             device_matrix = device_matrix or self._upload_matrix(ranges, matrix)
             self._run("vertices", ranges, self._local(ranges, "vertices"), device_matrix)
-        if ranges.row["flags"] & _NORMALS:
-            if triangles.smooth(ranges.shape):
-                self._smooth(ranges)
-            else:
-                device_matrix = device_matrix or self._upload_matrix(ranges, matrix)
-                side = -1.0 if ranges.shape.flip_normals else 1.0
-                source = self._local(ranges, "normals")
-                self._run("normals", ranges, source, device_matrix, side=side)
+        if ranges.row["flags"] & _NORMALS and triangles.smooth(ranges.shape):
+            self._smooth(ranges)
+        elif ranges.row["flags"] & _NORMALS:
+            device_matrix = device_matrix or self._upload_matrix(ranges, matrix)
+            side = -1.0 if ranges.shape.flip_normals else 1.0
+            source = self._local(ranges, "normals")
+            self._run("normals", ranges, source, device_matrix, side=side)
         target.moved_tables |= {"vertices", "normals"}
         self._moved.add("triangles")
 

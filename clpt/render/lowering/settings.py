@@ -55,23 +55,9 @@ def settings_of(
 
     density: of wavelengths; sphere: centre and radius of one around the scene [m].
     """
-    scene, film, integrator = index.scene, index.scene.film, index.scene.integrator
     settings = np.zeros((), SETTINGS.dtype)
-    width, height = film.size
-    settings["width"], settings["height"] = width, height
-    settings["crop_x"], settings["crop_y"] = (0, 0) if film.crop is None else film.crop[:2]
-    settings["film_width"], settings["film_height"] = film.width, film.height
-    margin = settings["margin"] = 0 if index.light_paths else index.filter_reach
-    settings["tiles_x"] = -(-(width + 2 * margin) // 4)
-    settings["padded_pixels"] = 16 * settings["tiles_x"] * -(-(height + 2 * margin) // 4)
-    settings["seed"] = scene.seed % 2**32
-    settings["sample_bits"] = min((max(scene.spp, 1) - 1).bit_length(), MOST_SAMPLE_BITS)
-    depth = integrator.max_depth
-    settings["max_depth"] = DEEPEST if depth < 0 else min(depth, DEEPEST)
-    settings["rr_depth"] = min(integrator.rr_depth, DEEPEST)
-    settings["hide_lights"] = integrator.hide_lights
-    settings["alpha"] = index.alpha
-    settings["light_paths"] = index.weighed
+    _set_film(settings, index)
+    _set_paths(settings, index)
     if index.merged:
         _set_photons(settings, index, geometry, sphere[1], found.disperses)
     if index.guided:
@@ -88,18 +74,41 @@ def settings_of(
     settings["analytic_count"] = len(geometry.boxes)
     settings["single_count"] = geometry.single_count
     settings["shape_count"] = len(geometry.rows)
-    settings["lambda_min"], settings["lambda_max"] = film.lambda_min, film.lambda_max
     settings["tanh_min"], settings["tanh_max"] = tanh_ends(density.lo, density.hi)
-    settings["bands"] = film.bands
     settings["density"] = found.density_row
-    matrix, scale = (
-        output_matrix(film, index.mode),
-        film_scale(film, light_level(index, lights, sphere)),
-    )
-    settings["film_scale"] = scale
+    film = index.scene.film
+    matrix = output_matrix(film, index.mode)
+    scale = settings["film_scale"] = film_scale(film, light_level(index, lights, sphere))
     settings["to_first"], settings["to_second"], settings["to_third"] = matrix / scale
     settings["center"], settings["scene_radius"] = sphere
     return settings
+
+
+def _set_film(settings: NDArray[np.void], index: SceneIndex) -> None:
+    """Write the size of the film, and which of its pixels and wavelengths are rendered."""
+    film = index.scene.film
+    width, height = film.size
+    settings["width"], settings["height"] = width, height
+    settings["crop_x"], settings["crop_y"] = (0, 0) if film.crop is None else film.crop[:2]
+    settings["film_width"], settings["film_height"] = film.width, film.height
+    margin = settings["margin"] = 0 if index.light_paths else index.filter_reach
+    settings["tiles_x"] = -(-(width + 2 * margin) // 4)
+    settings["padded_pixels"] = 16 * settings["tiles_x"] * -(-(height + 2 * margin) // 4)
+    settings["alpha"] = index.alpha
+    settings["lambda_min"], settings["lambda_max"] = film.lambda_min, film.lambda_max
+    settings["bands"] = film.bands
+
+
+def _set_paths(settings: NDArray[np.void], index: SceneIndex) -> None:
+    """Write what the sampler and the integrator say of paths."""
+    scene, integrator = index.scene, index.scene.integrator
+    settings["seed"] = scene.seed % 2**32
+    settings["sample_bits"] = min((max(scene.spp, 1) - 1).bit_length(), MOST_SAMPLE_BITS)
+    depth = integrator.max_depth
+    settings["max_depth"] = DEEPEST if depth < 0 else min(depth, DEEPEST)
+    settings["rr_depth"] = min(integrator.rr_depth, DEEPEST)
+    settings["hide_lights"] = integrator.hide_lights
+    settings["light_paths"] = index.weighed
 
 
 def rival_area(scene_radius: float) -> float:

@@ -64,55 +64,72 @@ def light_media(
     What moves is looked at again and again while the shutter is open: a light must stay in one
     medium.
     """
-    scene, rows, motions = index.scene, [], index.motions
-    if index.emitting:
-        name = index.emitting[0].name or index.emitting[0].kind
-        return NOWHERE._replace(
-            refusal=f"no path starts in the medium {name!r}, which gives out light"
-        )
-    known = _Known(scene, index.nested, cache, motions)
-    hole = None if index.nested else known.open_medium()
-    unknown = (
-        ""
-        if hole is None
-        else (
-            f"the boundary of the medium {hole.name or hole.kind!r} is not closed, so that nobody "
-            "knows whether {} is in it"
-        )
-    )
-    afar = sphere[0] + AFAR * sphere[1] * np.ones(3)
-    for i in sources.order:
-        lamp = scene.lights[i]
-        if unknown:
-            return NOWHERE._replace(refusal=unknown.format(f"lights[{i}]"))
-        if lamp.reach == "placed":
-            bounds = light_bounds.of_lamp(lamp)
-            inside = known.along(bounds.low[0], motions.lamps.get(i))
-            if inside is None:
-                return NOWHERE._replace(refusal=CROSSES.format(f"lights[{i}]"))
-            rows.append((inside, 1))
-            continue
-        found = known.along(afar, None)
-        if found or found is None:
-            reason = f"the light of lights[{i}] comes from infinity, where a medium has no end"
-            return NOWHERE._replace(refusal=reason)
-        rows.append((found, 1))
-    ends = (*sources.first, len(sources.power))[1:]
-    for emitter, first, end in zip(geometry.emitters, sources.first, ends, strict=True):
-        if unknown and not _says(emitter.shape):
-            return NOWHERE._replace(refusal=unknown.format(shapes.where(emitter.shape)))
-        number = int(geometry.rows[emitter.shape_row]["number"])
-        into = _around_shape(emitter, known, motions, number)
-        if into is None:
-            reason = f"{shapes.where(emitter.shape)} shines into more than one medium"
-            if motions.moving:
-                reason += " while the shutter is open"
-            return NOWHERE._replace(refusal=reason)
-        rows.append((into, end - first))
+    try:
+        if index.emitting:
+            name = index.emitting[0].name or index.emitting[0].kind
+            raise _NoLightPaths(f"no path starts in the medium {name!r}, which gives out light")
+        known = _Known(index.scene, index.nested, cache, index.motions)
+        hole = None if index.nested else known.open_medium()
+        afar = sphere[0] + AFAR * sphere[1] * np.ones(3)
+        rows = [(_around_lamp(index, i, known, hole, afar), 1) for i in sources.order]
+        ends = (*sources.first, len(sources.power))[1:]
+        for emitter, first, end in zip(geometry.emitters, sources.first, ends, strict=True):
+            number = int(geometry.rows[emitter.shape_row]["number"])
+            rows.append((_around_emitter(index, emitter, number, known, hole), end - first))
+    except _NoLightPaths as refusal:
+        return NOWHERE._replace(refusal=str(refusal))
     extinction = np.concatenate(
         [np.zeros(0), *(np.full(count, _extinction(around)) for around, count in rows)]
     )
     return LightMedia(tuple(rows), "", extinction)
+
+
+class _NoLightPaths(Exception):
+    """The reason for which no path can start at the lights of a scene."""
+
+
+def _around_lamp(
+    index: SceneIndex, number: int, known: _Known, hole: Medium | None, afar: NDArray[np.float64]
+) -> Around:
+    """Return the media around a light of the scene's list; hole: a medium that is not closed.
+
+    afar: a point at which light from infinity begins. Raises _NoLightPaths.
+    """
+    lamp, name = index.scene.lights[number], f"lights[{number}]"
+    if hole is not None:
+        raise _unknown(hole, name)
+    if lamp.reach == "placed":
+        at = light_bounds.of_lamp(lamp).low[0]
+        inside = known.along(at, index.motions.lamps.get(number))
+        if inside is None:
+            raise _NoLightPaths(CROSSES.format(name))
+        return inside
+    found = known.along(afar, None)
+    if found or found is None:
+        reason = f"the light of {name} comes from infinity, where a medium has no end"
+        raise _NoLightPaths(reason)
+    return found
+
+
+def _around_emitter(
+    index: SceneIndex, emitter: Emitter, number: int, known: _Known, hole: Medium | None
+) -> Around:
+    """Return the media that a shape shines into; number: of the shape. Raises _NoLightPaths."""
+    where = shapes.where(emitter.shape)
+    if hole is not None and not _says(emitter.shape):
+        raise _unknown(hole, where)
+    into = _around_shape(emitter, known, index.motions, number)
+    if into is None:
+        moving = " while the shutter is open" if index.motions.moving else ""
+        raise _NoLightPaths(f"{where} shines into more than one medium{moving}")
+    return into
+
+
+def _unknown(hole: Medium, where: str) -> _NoLightPaths:
+    return _NoLightPaths(
+        f"the boundary of the medium {hole.name or hole.kind!r} is not closed, so that nobody "
+        f"knows whether {where} is in it"
+    )
 
 
 def _extinction(around: Around) -> float:

@@ -19,7 +19,7 @@ from clpt.geometry import analytic, shape_records, shapes, spheres, triangles
 from clpt.records import LIGHT
 from clpt.render.analysis.geometry import Emitter
 from clpt.render.analysis.lights import light_bounds
-from clpt.render.analysis.lights.sources import Sources, is_whole
+from clpt.render.analysis.lights.sources import Source, Sources, is_whole
 from clpt.render.analysis.lowering_cache import content
 from clpt.render.contract.light_records import ALONG, BOTH, FRONT, KINDS, VOLUME
 from clpt.render.lowering.encoder import Encoder
@@ -86,27 +86,37 @@ def light_rows(
         weights = _shared(power, infinite)
         same = content(weights)
         rows["pmf"], rows["keep"], rows["alias"] = encoder.cache(alias_table, weights, by=(same,))
-        apart = sum(bool(one.bounds.placed.any()) for one in every)
-        if tree_from is not None and max(len(rows), PLACED_LIGHT_WEIGHT * apart) >= tree_from:
-            bounds = light_bounds.concatenated([one.bounds for one in every])
-            importance = np.concatenate([one.importance for one in every])
-            by = content(importance, *vars(bounds).values())
-            tree = encoder.cache(_tree_words, bounds, importance, by=(by,))
-    kinds = tuple(KINDS[i] for i in np.unique(rows["kind"]))
+        if tree_from is not None and _count(every, len(rows)) >= tree_from:
+            tree = _tree(every, encoder)
+    shine = (rows["shape"] >= 0) & (rows["emission_mode"] != ALONG)
     return LightRows(
         rows=rows,
         power=power,
         radiance=max((one.radiance for one in every), default=0.0),
         infinite=infinite,
-        kinds=kinds,
+        kinds=tuple(KINDS[i] for i in np.unique(rows["kind"])),
         first=sources.first,
         whole=tuple(is_whole(emitter.shape) for emitter in emitters),
-        visible=infinite > 0
-        or bool(((rows["shape"] >= 0) & (rows["emission_mode"] != ALONG)).any()),
+        visible=infinite > 0 or bool(shine.any()),
         two_sided=bool((rows["emission_mode"] == BOTH).any()),
         bounds=tuple(one.bounds for one in every),
         tree=tree,
     )
+
+
+def _count(every: Sequence[Source], rows: int) -> int:
+    """How many lights there are, each at a place of its own for several."""
+    apart = sum(bool(one.bounds.placed.any()) for one in every)
+    return max(rows, PLACED_LIGHT_WEIGHT * apart)
+
+
+def _tree(every: Sequence[Source], encoder: Encoder) -> NDArray[np.uint32]:
+    """The words of the tree over all lights."""
+    bounds = light_bounds.concatenated([one.bounds for one in every])
+    importance = np.concatenate([one.importance for one in every])
+    by = content(importance, *bounds.arrays)
+    made: NDArray[np.uint32] = encoder.cache(_tree_words, bounds, importance, by=(by,))
+    return made
 
 
 def _tree_words(bounds: light_bounds.Bounds, importance: np.ndarray) -> NDArray[np.uint32]:

@@ -19,7 +19,7 @@ from clpt.render.lowering.materials.normal_maps import NormalPerturbation
 from clpt.scene import materials as mt
 from clpt.scene import roles
 from clpt.scene.media import Blend, Phase
-from clpt.scene.params import fields_of
+from clpt.scene.params import Kind, device_params, fields_of
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.shapes import Shape
 from clpt.scene.textures import Texture
@@ -112,14 +112,16 @@ class MaterialWords:
             material = _NULL
         return self._leaf(material, side)
 
-    def _leaf(self, material: Any, side: _Side) -> int:
+    def _leaf(self, material: Scatterer, side: _Side) -> int:
         before = side.perturbation.words(self._encoder) if self._normal_mapped else None
         row = self._encoder.row(material, "materials", before)
         if row >= 1 << 24:
             raise SceneError("the scene has more than 16 million words of material parameters")
-        self.uvs |= any(map(_has_textures, (material, *material.layers)))
+        self.uvs |= _has_textures(material)
         self.tangents |= material.uses_tangents
-        self.absorption |= material.absorption != mt.CLEAR
+        if isinstance(material, mt.Material):
+            self.uvs |= any(map(_has_textures, material.layers))
+            self.absorption |= material.absorption != mt.CLEAR
         if material.transmits:
             self.transmitting.add(material.kind)
         return self._leaves.index(type(material)) << 24 | row
@@ -135,6 +137,7 @@ class MaterialWords:
         return word
 
 
-def _has_textures(kind: Any) -> bool:
-    """Whether a parameter of a kind is a texture."""
-    return any(isinstance(value, Texture) for value in fields_of(kind).values())
+def _has_textures(kind: Kind) -> bool:
+    """Whether a parameter of a kind is a texture that kernels read."""
+    values = fields_of(kind)
+    return any(isinstance(values[name], Texture) for name in device_params(type(kind)))

@@ -173,43 +173,46 @@ class Images:
         wanted, self._wanted = list(self._wanted.values()), {}
         notes = [*_left_out(wanted), *self._fit(wanted)]
         for image in wanted:
-            form = image.form
-            bytes_ = _packs(form, image, self.spectral)
-            texture, halvings = image.texture, image.halvings
-            by = (
-                version(texture.image),
-                texture.raw,
-                image.role,
-                texture.channel,
-                halvings,
-                self.spectral,
-                image.has_levels,
-            )
-            packed: _Packed = self.cache(Images._words, self, image, by=by)
-            height, width = packed.size
-            kind = "packed_bitmap" if bytes_ else "bitmap"
-            if image.has_levels:
-                kind = next(name for name, level in MIPS.items() if level == kind)
-            if store.size("images") + packed.words.size > LARGEST:
-                raise SceneError("all images together have too many texels", where="bitmap.image")
-            curved = form.encoded and not image.texture.raw and not _is_alpha(image)
-            for row in image.rows:
-                row["kind"], row["width"], row["height"] = KINDS.index(kind), width, height
-                row["decode"] = self._decode(curved, store) if bytes_ else 0
-            first = store.append("images", packed.words)
-            self._placed.append((first, packed))
-            for row in image.rows:
-                row["first"] = first
-            if packed.levels is not None:
-                table = np.add(packed.levels, (first, 0, 0)).astype(np.uint32)
-                at = store.append("textures", table.reshape(-1))
-                for row in image.rows:
-                    row["levels"], row["table"] = len(table), at
-            roles.add((kind, image.role.name))
+            roles.add((self._put(image, store), image.role.name))
         for image in wanted:
             image.pixels.let_go()
         self._spectra.clear()
         return notes
+
+    def _put(self, image: _Image, store: TableStore) -> str:
+        """Put an image into the tables, and where it is into its rows; return its kind."""
+        packed = self._packed(image)
+        height, width = packed.size
+        bytes_ = _packs(image.form, image, self.spectral)
+        kind = "packed_bitmap" if bytes_ else "bitmap"
+        if image.has_levels:
+            kind = next(name for name, level in MIPS.items() if level == kind)
+        if store.size("images") + packed.words.size > LARGEST:
+            raise SceneError("all images together have too many texels", where="bitmap.image")
+        curved = image.form.encoded and not image.texture.raw and not _is_alpha(image)
+        for row in image.rows:
+            row["kind"], row["width"], row["height"] = KINDS.index(kind), width, height
+            row["decode"] = self._decode(curved, store) if bytes_ else 0
+        first = store.append("images", packed.words)
+        self._placed.append((first, packed))
+        for row in image.rows:
+            row["first"] = first
+        if packed.levels is not None:
+            table = np.add(packed.levels, (first, 0, 0)).astype(np.uint32)
+            at = store.append("textures", table.reshape(-1))
+            for row in image.rows:
+                row["levels"], row["table"] = len(table), at
+        return kind
+
+    def _packed(self, image: _Image) -> _Packed:
+        """The words of an image, as they were made before if nothing differs."""
+        texture = image.texture
+        by = (
+            *(version(texture.image), texture.raw, image.role, texture.channel),
+            *(image.halvings, self.spectral, image.has_levels),
+        )
+        made: _Packed = self.cache(Images._words, self, image, by=by)
+        return made
 
     def joined(self, table: Words) -> None:
         """Keep the words of the images as parts of the table that they have been joined to."""
