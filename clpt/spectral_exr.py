@@ -94,7 +94,7 @@ class SpectralImage:
         return Tabulated(self.lambdas, values, "zero" if self.emissive else "hold")
 
 
-def find(image: Any, *, emissive: bool, where: str = "image") -> SpectralImage | None:
+def find(image: object, *, emissive: bool, where: str = "image") -> SpectralImage | None:
     """`image` itself if it is spectral, or what is in the file it names; None: it is another image.
 
     where: it stands, for errors that have no file. Raises SceneError if it holds reflectances where

@@ -29,7 +29,7 @@ class Once:
         self._lock = threading.Lock()
         self._made: dict[Any, Any] = {}
 
-    def __call__(self, key: Any, make: Callable[[], _Made]) -> _Made:
+    def __call__(self, key: object, make: Callable[[], _Made]) -> _Made:
         """Return what was made for a key. Raises what `make` raised."""
         with self._lock:
             if key not in self._made:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -12,6 +12,6 @@ EVEN = np.array([[[0.5, 0.5, 1.0]]], np.float32)  # a normal map that bends noth
 GREY.flags.writeable = EVEN.flags.writeable = False
 
 
-def grey_for(name: Any) -> str:
+def grey_for(name: object) -> str:
     """Return the warning of an image for which GREY or EVEN stands."""
     return f"there is no file {str(name)!r}; grey stands for it"

@@ -202,7 +202,7 @@ def attribute(shape: Shape, name: str) -> Points:
     else:
         vertices, faces, _, _ = _in_world(shape)
         count = len(faces) if by_face else len(vertices)
-    given: Any = shape.attributes[name]  # type: ignore[attr-defined]
+    given: Any = shape.attributes[name]
     values = np.asarray(on_host(given), np.float32)
     values = values[:, None] if values.ndim == 1 else values
     if values.shape not in ((count, 1), (count, 3)):

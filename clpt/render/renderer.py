@@ -199,7 +199,7 @@ class Renderer(Resumable):
     def _add_samples(self, first: int, end: int, noise: float | None, watch: Watch) -> bool:
         """Add samples to all pixels, or to those with noise; return whether all were added."""
 
-        def on_batch(_: Any) -> bool:
+        def on_batch(_: object) -> bool:
             if self._stop.is_set() and self._discards:
                 raise _Discarded
             return watch()

@@ -188,7 +188,8 @@ class Blend(Phase):
 
     def check(self) -> None:
         """Raise SceneError for what is no phase function."""
-        for name, part in (("first", self.first), ("second", self.second)):
+        parts: dict[str, object] = {"first": self.first, "second": self.second}
+        for name, part in parts.items():
             if not isinstance(part, Phase):
                 message = f"must be a phase function, not {part!r}"
                 raise SceneError(message, where=f"{self.kind}.{name}")
@@ -701,16 +702,16 @@ def _single_albedo(reflected: Any, g: float) -> Any:
     return (1.0 - s2) / (1.0 - g * s2)
 
 
-def _is_grey(value: Any) -> bool:
+def _is_grey(value: object) -> bool:
     grey = isinstance(value, RGB | RGBUnbounded) and value.r == value.g == value.b
     return grey or isinstance(value, Constant)
 
 
-def _is_zero(value: Any) -> bool:
+def _is_zero(value: object) -> bool:
     return _is_grey(value) and not value.to_rgb("unbounded").any()
 
 
-def _is_dark(value: Any) -> bool:
+def _is_dark(value: object) -> bool:
     """Whether an emission is black."""
     if isinstance(value, RGB | RGBIlluminant | RGBUnbounded):
         return max(value.r, value.g, value.b) == 0.0
@@ -752,7 +753,7 @@ class Mixture(Lattice):
             raise SceneError(message, where=f"{self.kind}.phase")
         super().check()
 
-    def _check_part(self, part: Any, where: str) -> None:
+    def _check_part(self, part: object, where: str) -> None:
         if not isinstance(part, Homogeneous) or isinstance(part, Cloud | Dyed):
             shown = part.kind if isinstance(part, Medium) else repr(part)
             raise SceneError(f"must be homogeneous or a grid, not {shown}", where=where)
@@ -815,7 +816,9 @@ class Mixture(Lattice):
 
     @cached_property
     def _densest(self) -> list[float]:
-        densities = [part.density if isinstance(part, Grid) else None for part in self.parts]
+        densities: list[Any] = [
+            part.density if isinstance(part, Grid) else None for part in self.parts
+        ]
         numbers = [d.get() if hasattr(d, "get") else d for d in densities]
         return [1.0 if one is None else float(np.max(one)) for one in numbers]
 

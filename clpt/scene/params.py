@@ -46,14 +46,14 @@ from clpt.scene.roles import HostForm, Param
 MOST_PARTS, MOST_NESTED = 1000, 64  # of a material, texture, light or medium
 
 
-def _field(default: Any, param: Param) -> Any:
+def _field(default: object, param: Param) -> Any:
     if isinstance(default, (list, dict, np.ndarray)):
         return field(default_factory=lambda: default, metadata={"param": param})
     return field(default=default, metadata={"param": param})
 
 
 def reflectance(
-    default: Any,
+    default: object,
     doc: str,
     *,
     lobe: bool = False,
@@ -73,12 +73,12 @@ def reflectance(
     )
 
 
-def emission(default: Any, doc: str, unit: str, *, textured: bool = False) -> Any:
+def emission(default: object, doc: str, unit: str, *, textured: bool = False) -> Any:
     """Declare an emitted spectrum; a number or an rgb triple means that multiple of D65."""
     return _field(default, Param(roles.EMISSION, doc, unit, low=0.0, textured=textured))
 
 
-def index(default: Any, doc: str, *, zero: bool = False, textured: bool = False) -> Any:
+def index(default: object, doc: str, *, zero: bool = False, textured: bool = False) -> Any:
     """Declare a refractive index or extinction coefficient; may be a name or dispersive.
 
     zero: it may be 0, as a metal's eta and k may.
@@ -86,12 +86,12 @@ def index(default: Any, doc: str, *, zero: bool = False, textured: bool = False)
     return _field(default, Param(roles.INDEX, doc, low=0.0, textured=textured, positive=not zero))
 
 
-def factor(default: Any, doc: str) -> Any:
+def factor(default: object, doc: str) -> Any:
     """Declare a factor: a spectrum without limits; may be a texture."""
     return _field(default, Param(roles.FACTOR, doc, textured=True))
 
 
-def coefficient(default: Any, doc: str, unit: str = "1/m") -> Any:
+def coefficient(default: object, doc: str, unit: str = "1/m") -> Any:
     """Declare a property of the inside of a body; it is no member of its kind's struct.
 
     It acts between surfaces: kernels/media/medium.cl reads it after the kind's row.
@@ -99,7 +99,7 @@ def coefficient(default: Any, doc: str, unit: str = "1/m") -> Any:
     return _field(default, Param(roles.COEFFICIENT, doc, unit, low=0.0))
 
 
-def quantity(default: Any, doc: str, low: float = -math.inf, high: float = math.inf) -> Any:
+def quantity(default: object, doc: str, low: float = -math.inf, high: float = math.inf) -> Any:
     """Declare a number that may depend on the wavelength and is no colour, with its limits."""
     return _field(default, Param(roles.QUANTITY, doc, low=low, high=high))
 
@@ -109,7 +109,7 @@ def angular(doc: str) -> Any:
     return _field((1.0, 1.0), Param(roles.ANGULAR, doc))
 
 
-def reradiation(default: Any, doc: str) -> Any:
+def reradiation(default: object, doc: str) -> Any:
     """Declare a re-radiation matrix; None for no fluorescence."""
     return _field(default, Param(roles.RERADIATION, doc))
 
@@ -125,7 +125,7 @@ def merl(doc: str) -> Any:
 
 
 def real(
-    default: Any,
+    default: object,
     doc: str,
     unit: str = "",
     low: float = -math.inf,
@@ -159,7 +159,7 @@ def layers(doc: str) -> Any:
     return _field((), Param(roles.LAYERS, doc))
 
 
-def host(default: Any, doc: str, unit: str = "", *, form: HostForm | None = None) -> Any:
+def host(default: object, doc: str, unit: str = "", *, form: HostForm | None = None) -> Any:
     """Declare what only the host needs: geometry, matrices, nested kinds.
 
     form: what it holds; None for what the type of the default implies.
@@ -167,7 +167,7 @@ def host(default: Any, doc: str, unit: str = "", *, form: HostForm | None = None
     return _field(default, Param(roles.host(form or _form_of(default)), doc, unit))
 
 
-def _form_of(default: Any) -> HostForm | Literal["host"]:
+def _form_of(default: object) -> HostForm | Literal["host"]:
     """Return the HostForm that a default's type implies, "host" where it implies none."""
     if isinstance(default, np.ndarray) and default.shape in ((3, 3), (4, 4)):
         return "matrix3" if len(default) == 3 else "matrix4"
@@ -187,7 +187,7 @@ class classproperty:
     def __init__(self, function: Callable[[Any], str]):
         self.function = function
 
-    def __get__(self, _: Any, owner: type) -> str:
+    def __get__(self, _: object, owner: type) -> str:
         return self.function(owner)
 
 
@@ -284,7 +284,7 @@ def interior_params(cls: type) -> Mapping[str, Param]:
     return _declared_of(cls, "inside")
 
 
-def _checked(value: Any, param: Param, where: str) -> Any:
+def _checked(value: object, param: Param, where: str) -> Any:
     if isinstance(value, Texture) and param.role.place != "host":
         if not param.textured:
             raise SceneError("cannot be a texture", where=where)

@@ -16,7 +16,7 @@ from clpt.scene.textures import Bitmap
 from clpt.spectral_exr import SpectralImage
 
 
-def spectral_image(texture: Any, role: Role) -> SpectralImage | None:
+def spectral_image(texture: object, role: Role) -> SpectralImage | None:
     """Return a texture's image if it is a bitmap of spectra, in the role of a parameter."""
     if not isinstance(texture, Bitmap):
         return None

@@ -46,7 +46,7 @@ class Role:
     name: str
     place: Literal["row", "inside", "host"] = "row"
 
-    def check(self, value: Any, param: Param, where: str) -> Any:
+    def check(self, value: object, param: Param, where: str) -> Any:
         """Return what is meant by a value that is no texture. Raises SceneError."""
         return value
 
@@ -71,7 +71,7 @@ class Param:
 class Real(Role):
     """A number within its limits."""
 
-    def check(self, value: Any, param: Param, where: str) -> float:
+    def check(self, value: object, param: Param, where: str) -> float:
         if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
             raise SceneError(f"must be a number, not {value!r}", where=where)
         if not math.isfinite(value):
@@ -88,7 +88,7 @@ class Real(Role):
 class Flag(Role):
     """True or false."""
 
-    def check(self, value: Any, param: Param, where: str) -> bool:
+    def check(self, value: object, param: Param, where: str) -> bool:
         if not isinstance(value, (bool, np.bool_)):
             raise SceneError(f"must be true or false, not {value!r}", where=where)
         return bool(value)
@@ -97,7 +97,7 @@ class Flag(Role):
 class Choice(Role):
     """One of the names that the parameter lists."""
 
-    def check(self, value: Any, param: Param, where: str) -> Any:
+    def check(self, value: object, param: Param, where: str) -> Any:
         if value not in param.choices and not (param.optional and value is None):
             raise SceneError(f"{value!r} is none of {', '.join(param.choices)}", where=where)
         return value
@@ -106,7 +106,7 @@ class Choice(Role):
 class Orders(Role):
     """A number for each order of diffraction from -n to n."""
 
-    def check(self, value: Any, param: Param, where: str) -> tuple[float, ...]:
+    def check(self, value: object, param: Param, where: str) -> tuple[float, ...]:
         if not isinstance(value, (list, tuple, np.ndarray)):
             raise SceneError(f"must be a list of numbers, not {value!r}", where=where)
         if len(value) % 2 == 0 or len(value) > 2 * ORDERS + 1:
@@ -127,7 +127,7 @@ class _Part(Protocol):
 class Layers(Role):
     """Thin films, from the outside in."""
 
-    def check(self, value: Any, param: Param, where: str) -> tuple[Any, ...]:
+    def check(self, value: object, param: Param, where: str) -> tuple[Any, ...]:
         if not isinstance(value, (list, tuple)):
             raise SceneError(f"must be a list of layers, not {value!r}", where=where)
         for i, entry in enumerate(value):
@@ -143,7 +143,7 @@ class Data(Role):
     cls: type[Any] = object
     words: str = ""
 
-    def check(self, value: Any, param: Param, where: str) -> Any:
+    def check(self, value: object, param: Param, where: str) -> Any:
         if not isinstance(value, (self.cls, type(None))):
             raise SceneError(f"must be {self.words}, not {value!r}", where=where)
         return value
@@ -165,7 +165,7 @@ class Spectral(Role):
     measured: bool = False
     grey: bool = False
 
-    def check(self, value: Any, param: Param, where: str) -> Any:
+    def check(self, value: object, param: Param, where: str) -> Any:
         if isinstance(value, str) and self.names is not None:
             return self._named(value, where)
         if isinstance(value, Spectrum):

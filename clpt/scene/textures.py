@@ -179,7 +179,7 @@ def _octaves(texture: Any) -> None:
         raise SceneError(message, where=f"{texture.kind}.octaves")
 
 
-def textures_in(value: Any) -> Iterator[Texture]:
+def textures_in(value: object) -> Iterator[Texture]:
     """Yield the textures that a kind's parameters hold, and those in what these hold, and so on."""
     if isinstance(value, (list, tuple)):
         for entry in value:

@@ -281,7 +281,7 @@ def chi_square_tail(x: float, degrees: int) -> float:
     return min(1.0, math.fsum(terms) + (math.erfc(math.sqrt(half)) if odd else 0.0))
 
 
-def _hold(held: Any, message: str) -> None:
+def _hold(held: object, message: str) -> None:
     if not held:
         raise AssertionError(message)
 

@@ -73,7 +73,7 @@ def settings(
                 drawn[name] = _draw_layers(rng) if i % 2 else ()
             else:
                 drawn_from = dataclasses.replace(param, **WIDE.get(name, {}))
-                drawn[name] = DRAWS.get(param.role, _draw_number)(drawn_from, mode, rng)
+                drawn[name] = _draw(drawn_from, mode, rng)
         result.append(drawn | {k: v for k, v in fixed.items() if k in drawn})
     return result
 
@@ -120,6 +120,11 @@ def _draw_spectrum(param: Param, mode: str, rng: np.random.Generator) -> np.ndar
 def _draw_number(param: Param, mode: str, rng: np.random.Generator) -> np.ndarray:
     high = min(param.high, param.low + 100.0)  # lobes no narrower than a grid of bins can tell
     return np.array(param.low + rng.uniform(0.1, 1.0) * (high - param.low))
+
+
+def _draw(param: Param, mode: str, rng: np.random.Generator) -> Any:
+    draw: Callable[..., Any] = DRAWS.get(param.role, _draw_number)
+    return draw(param, mode, rng)
 
 
 # a random value of a parameter as kernels have it, by its role

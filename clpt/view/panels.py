@@ -117,7 +117,7 @@ def for_people(name: str) -> str:
     return shown if len(shown) <= LONGEST_NAME else f"{shown[: LONGEST_NAME - 3]}..."
 
 
-def edited(scene: Scene, target: str, index: int, key: str, value: Any) -> tuple[Scene, Change]:
+def edited(scene: Scene, target: str, index: int, key: str, value: object) -> tuple[Scene, Change]:
     """Return a scene in which a parameter has another value, and how it differs.
 
     value: as in scene.json, but it names no file. Raises CommandError, SceneError.
@@ -193,7 +193,7 @@ def _editable(target: str, key: str, param: Param) -> bool:
     return param.role.name in CONTROLS
 
 
-def _parameter(name: str, param: Param, value: Any, default: Any) -> dict[str, Any]:
+def _parameter(name: str, param: Param, value: object, default: object) -> dict[str, Any]:
     """Return what the page has to know: control, words, unit, limits, choices, value."""
     form = param.role.name
     choices = list(OBSERVERS) if form == "sensor" else list(param.choices)
@@ -216,7 +216,7 @@ def _parameter(name: str, param: Param, value: Any, default: Any) -> dict[str, A
     }
 
 
-def _curve(value: Any, param: Param) -> list[float] | None:
+def _curve(value: object, param: Param) -> list[float] | None:
     """Return a spectrum at CURVE_AT, for a small plot; None for what is none."""
     if param.role not in SPECTRA or isinstance(value, Texture):
         return None
@@ -231,7 +231,7 @@ def _curve(value: Any, param: Param) -> list[float] | None:
         return None
 
 
-def _shown(value: Any, param: Param) -> Any:
+def _shown(value: object, param: Param) -> Any:
     """Return a value as scene.json has it, None where the page cannot show it."""
     if isinstance(value, (Texture, Material, Group)) or not is_plain(param):
         return None
@@ -242,7 +242,7 @@ def _shown(value: Any, param: Param) -> Any:
         return None
 
 
-def read(key: str, value: Any, param: Param) -> Any:
+def read(key: str, value: object, param: Param) -> Any:
     """Return the value of a parameter that a page gave, which names no file.
 
     Raises SceneError, CommandError.

@@ -85,7 +85,9 @@ class CameraType(click.ParamType):
 
     name = "AZ,EL[,DIST]|NAME"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> Orbit | str:
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Orbit | str:
         if isinstance(value, Orbit):
             return value
         text = str(value).strip()
@@ -113,7 +115,9 @@ class CropType(click.ParamType):
 
     name = "X0:X1,Y0:Y1"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[Span, Span]:
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[Span, Span]:
         if isinstance(value, tuple):
             return value
         number = r"(?:(\d{1,9}(?:\.\d{1,9})?)(%?))?"

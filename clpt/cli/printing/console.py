@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from rich.console import Console
 from rich.text import Text
 
@@ -14,7 +12,7 @@ def output_console() -> Console:
     return console if console.is_terminal else Console(width=200)
 
 
-def shown(value: Any) -> Text:
+def shown(value: object) -> Text:
     """Return a value of a table of facts: parts of a list have a line each.
 
     What a file says is no markup, and controls no terminal.
@@ -23,7 +21,7 @@ def shown(value: Any) -> Text:
     return Text("".join(c if c.isprintable() or c == "\n" else "\ufffd" for c in text))
 
 
-def _text(value: Any) -> str:
+def _text(value: object) -> str:
     if value is None or isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, dict):
@@ -35,7 +33,7 @@ def _text(value: Any) -> str:
     return f"{value:,}" if isinstance(value, int) else str(value)
 
 
-def _part(value: Any) -> str:
+def _part(value: object) -> str:
     """Return a value inside of others."""
     several = isinstance(value, (list, tuple))
     return " ".join(str(part) for part in value) if several else str(value)

@@ -26,7 +26,9 @@ class SampleRange(click.ParamType):
 
     name = "FIRST:END"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[int, int]:
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, int]:
         from ...render.film_renderer import MOST_SAMPLES  # here: help needs no OpenCL
 
         found = re.fullmatch(r"(\d{1,10}):(\d{1,10})", str(value).strip())
@@ -41,7 +43,9 @@ class Duration(click.ParamType):
     name = "TIME"
     least = 1e-6
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> float:
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
         text = str(value).strip().lower()
         number = r"(\d+(?:\.\d+)?)"
         found = re.fullmatch(rf"(?:{number}h)?(?:{number}m)?(?:{number}s?)?", text)
@@ -65,7 +69,7 @@ class Address(click.ParamType):
 
     name = "HOST:PORT"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if not isinstance(value, str):
             return value
         try:

@@ -142,7 +142,7 @@ def _check_extensions(document: Document) -> None:
             document.warn(f"extension {name} is not supported and left out")
 
 
-def _text(value: Any) -> str | None:
+def _text(value: object) -> str | None:
     return None if value is None else str(value)
 
 
@@ -161,7 +161,7 @@ def _number(
     return number
 
 
-def _seconds(path: Path, value: Any, name: str = "time") -> float:
+def _seconds(path: Path, value: object, name: str = "time") -> float:
     try:
         return float(value)
     except ValueError:

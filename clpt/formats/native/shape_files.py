@@ -75,7 +75,7 @@ FILES: dict[type[Kind], ShapeFile] = {
 }
 
 
-def in_file(cls: type[Kind], name: str, value: Any) -> bool:
+def in_file(cls: type[Kind], name: str, value: object) -> bool:
     """Return whether a shape's file holds a parameter; the word `smooth` is not in a file."""
     return name in FILES[cls].replaces and not isinstance(value, str)
 

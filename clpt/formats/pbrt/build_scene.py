@@ -217,7 +217,7 @@ def _warn_of_unused(params: Parameters, state: State) -> None:
         state.warn(parameter, f"is not known here and is left out{hint}")
 
 
-def _has_texture(thing: Any) -> bool:
+def _has_texture(thing: object) -> bool:
     """Whether a material or light, or one inside it, has a texture."""
     if isinstance(thing, Texture):
         return True

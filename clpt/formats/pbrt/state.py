@@ -52,7 +52,7 @@ class Shared:
     missing: Missing = "error"
     walks: bool = False  # light walks at random in bodies: no light is too small to be met
 
-    def once(self, key: Any, source: Parameters | Parameter, make: Callable[[], Any]) -> Any:
+    def once(self, key: object, source: Parameters | Parameter, make: Callable[[], Any]) -> Any:
         """Return make(), called once for each key. Raises SceneError where it needs itself."""
         if key not in self.made:
             self.made[key] = None

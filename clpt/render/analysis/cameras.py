@@ -27,8 +27,9 @@ def dispersive_glasses(camera: Camera) -> tuple[Spectrum, ...]:
     """Return the indices of a camera's glasses that differ between wavelengths, each once."""
     if isinstance(camera, Lens):
         return lens.glasses(camera)
-    index = spectra.index(camera.glass) if isinstance(camera, ThinLens) else None
-    return () if index is None or isinstance(index, Constant) else (index,)
+    glass: Any = camera.glass if isinstance(camera, ThinLens) else Constant(1.0)
+    index = spectra.index(glass)
+    return () if isinstance(index, Constant) else (index,)
 
 
 def is_connected(camera: Camera, mode: str) -> bool:

@@ -137,7 +137,7 @@ def _has(material: Any, trait: str) -> bool:
     )
 
 
-def _check_kind(value: Any, base: type, where: str) -> None:
+def _check_kind(value: object, base: type, where: str) -> None:
     if not isinstance(value, base):
         wanted = base.__name__.lower()
         raise SceneError(f"must be of a kind of {wanted}, not {value!r}", where=where)

@@ -146,7 +146,7 @@ def _glow(index: SceneIndex, nodes: Floats) -> Callable[[Spectrum], Floats]:
     return lambda light: whole @ gridded(light, into)
 
 
-def _fluorescent(material: Any) -> Iterator[Reradiation]:
+def _fluorescent(material: object) -> Iterator[Reradiation]:
     """Yield the reradiation matrices of a material and of those inside it."""
     for value in fields_of(material).values() if isinstance(material, Material) else ():
         if isinstance(value, Reradiation):

@@ -24,7 +24,7 @@ COLUMNS: dict[str, tuple[int, type]] = {
 }
 
 
-def is_table(values: Any, kind: str) -> bool:
+def is_table(values: object, kind: str) -> bool:
     """Return whether values are an array on a device as a table is, of words of a numpy kind."""
     return (
         isinstance(values, cl_array.Array)

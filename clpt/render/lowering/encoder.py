@@ -133,7 +133,7 @@ class Encoder:
             self._sources[kind.kind][name].add(source)
         return np.concatenate(made) if made else np.zeros(1, np.uint32)
 
-    def _check(self, value: Any, param: Param, where: str) -> None:
+    def _check(self, value: object, param: Param, where: str) -> None:
         """Raise SceneError for an index of 0; note a table that the film does not reach."""
         if param.positive:
             self.spectra.check_index(value, where)

@@ -39,7 +39,7 @@ class Bounds:
         return len(self.low)
 
     @property
-    def arrays(self) -> tuple[NDArray[Any], ...]:
+    def arrays(self) -> tuple[Any, ...]:
         """The arrays, in the order of the fields."""
         return self.low, self.high, self.axis, self.theta_o, self.theta_e, self.both, self.placed
 

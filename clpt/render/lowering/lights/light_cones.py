@@ -38,7 +38,7 @@ class Cones:
         return cls(axis, np.full(count, EMPTY), np.zeros(count), np.zeros(count, bool))
 
     @property
-    def arrays(self) -> tuple[NDArray[Any], ...]:
+    def arrays(self) -> tuple[Any, ...]:
         """The arrays, in the order of the fields."""
         return self.axis, self.theta_o, self.theta_e, self.both
 

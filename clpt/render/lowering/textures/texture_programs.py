@@ -28,7 +28,7 @@ Code = list[tuple[int, int]]
 Lower = Callable[[Texture, Role], int]
 
 
-def is_composite(value: Any) -> bool:
+def is_composite(value: object) -> bool:
     """Whether a value is a texture that combines others."""
     if isinstance(value, Checkerboard):
         return any(_textured(colour) for colour in (value.color0, value.color1))
@@ -145,7 +145,7 @@ def _number(value: Any, role: Role) -> float | None:
     return None
 
 
-def _textured(value: Any) -> bool:
+def _textured(value: object) -> bool:
     return isinstance(value, Texture)
 
 
