@@ -6,7 +6,7 @@ a box of constant `diffuse`, measured by turns with each of the others.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -131,7 +131,7 @@ def _shade(flight: Flight) -> tuple[int, Taken]:
     """Items that were shaded in a few bounces, and what that took."""
     found: list[tuple[int, Taken]] = []
 
-    def around(step: Step, enqueue: Any) -> None:
+    def around(step: Step, enqueue: Callable[[], Any]) -> None:
         if step.bound.kernel.name == "shade":
             found.append((flight.items(step), timed(flight.device, lambda: [enqueue()])))
         else:

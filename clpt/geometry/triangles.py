@@ -125,7 +125,7 @@ def at_time(shape: Any, time: float) -> Any:
     return replace(shape, **changes)
 
 
-def check_deformation(shape: Any) -> None:
+def check_deformation(shape: Shape) -> None:
     """Raise SceneError for a deformation that is not one of the shape's points."""
     given, place = shape.deformation, f"{where(shape)}.deformation"
     if not isinstance(given, Deformation):

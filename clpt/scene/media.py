@@ -456,7 +456,7 @@ class Dyed(Homogeneous):
         return spectra.Tabulated(out, sums)
 
 
-def _whole(rows: Any, cosines: Any) -> NDArray[np.float64]:
+def _whole(rows: NDArray[Any], cosines: NDArray[Any]) -> NDArray[np.float64]:
     """Integrals over directions of rows (m, n) that are linear between cosines (n,)."""
     return np.pi * ((rows[:, 1:] + rows[:, :-1]) @ np.diff(cosines))
 

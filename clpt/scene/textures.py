@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -172,7 +171,7 @@ def _matrix(texture: Texture, name: str, size: int) -> None:
     object.__setattr__(texture, name, matrix)
 
 
-def _octaves(texture: Any) -> None:
+def _octaves(texture: Noise | Marble) -> None:
     """Raises SceneError for so many octaves that float32 ends before."""
     if not 0 < texture.octaves <= MOST_OCTAVES:
         message = f"must be 1 to {MOST_OCTAVES}, not {texture.octaves}"

@@ -84,19 +84,19 @@ def _values(material: Material, mode: str) -> dict[str, Any]:
     }
 
 
-def _value(value: Any, param: Param, mode: str) -> Any:
+def _value(value: object, param: Param, mode: str) -> Any:
     return VALUES.get(param.role, _numbers)(value, param, mode)
 
 
-def _numbers(value: Any, param: Param, mode: str) -> Any:
+def _numbers(value: object, param: Param, mode: str) -> Any:
     return np.array(value, float)
 
 
-def _same(value: Any, param: Param, mode: str) -> Any:
+def _same(value: object, param: Param, mode: str) -> Any:
     return value
 
 
-def _choice(value: Any, param: Param, mode: str) -> Any:
+def _choice(value: object, param: Param, mode: str) -> Any:
     return np.array(param.choices.index(value))
 
 

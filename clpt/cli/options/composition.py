@@ -136,7 +136,7 @@ class CropType(click.ParamType):
         return Span(*ends[:2]), Span(*ends[2:])
 
 
-def _named(ctx: click.Context, _: Any, value: Orbit | str | None) -> Orbit | None:
+def _named(ctx: click.Context, _: click.Parameter, value: Orbit | str | None) -> Orbit | None:
     """Keep an orbit; a name is the scene's variable `camera`, as loaders know it."""
     if not isinstance(value, str):
         return value

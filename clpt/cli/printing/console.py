@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from rich.console import Console
 from rich.text import Text
 
@@ -33,7 +35,7 @@ def _text(value: object) -> str:
     return f"{value:,}" if isinstance(value, int) else str(value)
 
 
-def _part(value: object) -> str:
+def _part(value: Any) -> str:
     """Return a value inside of others."""
     several = isinstance(value, (list, tuple))
     return " ".join(str(part) for part in value) if several else str(value)

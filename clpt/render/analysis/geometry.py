@@ -210,7 +210,7 @@ class _Builder:
 
         times: at which the vertices have rows, for what belongs to something that deforms.
         """
-        shape: Any = one.shape
+        shape = one.shape
         row = np.zeros((), SHAPE.dtype)
         row["number"], row["light"] = one.number, -1
         self.owners.append((row, shape, self.vertex_count, self.face_count))
@@ -240,7 +240,7 @@ class _Builder:
         return self.motions.swept(one.number, boxes)
 
     def _add_balls(
-        self, shape: Any, row: np.ndarray, times: tuple[float, ...] | None
+        self, shape: Shape, row: np.ndarray, times: tuple[float, ...] | None
     ) -> tuple[Any, Stored]:
         """Append the boxes of many spheres; return the spheres as they are at first, and all.
 
@@ -257,7 +257,7 @@ class _Builder:
         self.many.append(spheres.boxes([balls]))
         return balls, Stored(many=balls)
 
-    def _add_curves(self, shape: Any, row: np.ndarray) -> Stored:
+    def _add_curves(self, shape: Shape, row: np.ndarray) -> Stored:
         """Append the boxes of a shape's pieces."""
         row["prim"] = self.single_count + sum(map(len, self.many))
         found = self.cache(strands.pieces, shape, by=shapes.geometry(shape))
@@ -265,7 +265,7 @@ class _Builder:
         return Stored(many=found)
 
     def _add_triangles(
-        self, shape: Any, row: np.ndarray, times: Sequence[float]
+        self, shape: Shape, row: np.ndarray, times: Sequence[float]
     ) -> tuple[tuple[Any, Any, Any], Stored]:
         """Append a shape's triangles; return their vertices, faces and uvs, and what is stored."""
         by = shapes.geometry(shape)

@@ -240,7 +240,7 @@ class SceneIndex:
         return self.mode == "spectral"
 
 
-def any_of(material: Any, classes: Any) -> bool:
+def any_of(material: mt.Material, classes: type | tuple[type, ...]) -> bool:
     """Return whether a material, or one inside it, is of these classes."""
     return any(isinstance(part, classes) for part in mt.parts(material))
 

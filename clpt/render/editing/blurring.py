@@ -14,7 +14,7 @@ from clpt.geometry import shapes
 from clpt.scene import Scene
 from clpt.scene.motion import Deformation, Shutter, placement, through
 from clpt.scene.params import fields_of
-from clpt.scene.shapes import Curves, Group, Instance, Mesh, Spheres
+from clpt.scene.shapes import Curves, Group, Instance, Mesh, Shape, Spheres
 
 POINTS = ((Mesh, "vertices"), (Curves, "points"), (Spheres, "centers"))
 
@@ -55,7 +55,7 @@ class _Way:
         self.times, self.warnings = times, list[str]()
         self.groups: dict[tuple[int, int], Group] = {}
 
-    def shape(self, old: Any, new: Any) -> Any:
+    def shape(self, old: Shape, new: Shape) -> Shape:
         """A shape that moves, and whose points do."""
         if old is new:
             return new
@@ -76,7 +76,7 @@ class _Way:
             self.groups[key] = replace(new, shapes=inner)
         return self.groups[key]
 
-    def deformed(self, old: Any, new: Any) -> Any:
+    def deformed(self, old: Shape, new: Shape) -> Shape:
         """A shape with keys of its points, if these are others than before."""
         kind, name = next((x for x in POINTS if isinstance(new, x[0])), (None, ""))
         if kind is None or not isinstance(old, kind) or new.deformation is not None:
@@ -111,7 +111,7 @@ class _Way:
             return new
 
 
-def _points(shape: Any, name: str) -> NDArray[np.float32]:
+def _points(shape: Shape, name: str) -> NDArray[np.float32]:
     """The points of a shape on the host, of spheres with the radii (n, 4)."""
     points = np.asarray(on_host(fields_of(shape)[name]), np.float32)
     if not isinstance(shape, Spheres) or points.ndim != 2 or points.shape[1] != 3:

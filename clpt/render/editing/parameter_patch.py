@@ -88,7 +88,7 @@ def _pairs(former: Scene, scene: Scene) -> list[tuple[Any, Any]] | None:
     return [(old, new) for old, new in changed if not isinstance(old, COMPOSITES)]
 
 
-def _pair(old: Any, new: Any, pairs: Replacements) -> bool:
+def _pair(old: Material, new: Material, pairs: Replacements) -> bool:
     """Note which material replaces which; return whether they may differ in values only."""
     if id(old) in pairs:
         return pairs[id(old)][1] is new

@@ -156,7 +156,7 @@ class _Edit:
         """Let a field of a shape have another value."""
         self.changes.setdefault(id(shape), {})[name] = value
 
-    def replace(self, old: Any, new: Any) -> None:
+    def replace(self, old: object, new: object) -> None:
         """Replace an object by another, wherever it stands."""
         self.edited[id(old)] = old, new
 

@@ -25,6 +25,7 @@ from clpt.render.lowering.tables import TableStore, as_words
 from clpt.render.lowering.textures.bitmaps import Images
 from clpt.render.lowering.textures.textures import TextureTable
 from clpt.scene import roles
+from clpt.scene.materials import Material
 from clpt.scene.params import Kind, Texture, device_params, fields_of, interior_params, params
 from clpt.scene.roles import Param, Role, Spectral
 from clpt.spectra import RGB, Constant, Sensor, Tabulated
@@ -144,7 +145,9 @@ class Encoder:
                 f" nothing within the film's {low:g} to {high:g} nm"
             )
 
-    def param_words(self, value: Any, param: Param, owner: Any = None) -> tuple[Words, str]:
+    def param_words(
+        self, value: object, param: Param, owner: Kind | None = None
+    ) -> tuple[Words, str]:
         """Return the words of one parameter and where its value comes from.
 
         owner: the kind that it belongs to, if any.
@@ -157,21 +160,21 @@ class Encoder:
             return made, "texture"
         return ENCODINGS[param.role](self, value, param, owner)
 
-    def named_words(self, kind: str, name: str, value: Any, role: Role) -> tuple[Words, str]:
+    def named_words(self, kind: str, name: str, value: object, role: Role) -> tuple[Words, str]:
         """Return the words of a value that belongs to no kind, and note its source by a name."""
         made, source = self.param_words(value, Param(role))
         self._sources[kind][name].add(source)
         return made, source
 
-    def emission_words(self, value: Any) -> Words:
+    def emission_words(self, value: object) -> Words:
         """Return the five words that `emission_load` reads: a spectrum or a texture."""
         return self.named_words("emission", "value", value, roles.EMISSION)[0]
 
-    def factor_words(self, value: Any) -> Words:
+    def factor_words(self, value: object) -> Words:
         """Return the five words that `factor_load` reads: a reflectance, perhaps a texture."""
         return self.named_words("factor", "value", value, roles.REFLECTANCE)[0]
 
-    def layers_words(self, material: Any) -> tuple[Words, str]:
+    def layers_words(self, material: Material) -> tuple[Words, str]:
         """Return the two words of a material's thin films, and "constant" if there are none.
 
         In spectral mode they are a row for each layer; in RGB mode a table of colours.
@@ -196,7 +199,7 @@ class Encoder:
         return np.array([first, len(material.layers)], np.uint32), "layers"
 
     @staticmethod
-    def _refuse_textured_metal(material: Any) -> None:
+    def _refuse_textured_metal(material: Material) -> None:
         for name in ("eta", "k"):
             if isinstance(fields_of(material).get(name), Texture):
                 raise SceneError(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +17,7 @@ from clpt.render.analysis.wavelengths import Density
 from clpt.render.lowering import guides
 from clpt.render.lowering.lights.light_level import light_level
 from clpt.render.lowering.lights.lights import LightRows
-from clpt.scene.integrators import DEEPEST
+from clpt.scene.integrators import DEEPEST, Vcm
 from clpt.spectra.cie import tanh_ends
 
 LARGEST = 62  # exponent of 4 of a unit of areas, which is float32
@@ -130,7 +129,8 @@ def _set_photons(
 ) -> None:
     """Write what merging needs; the wavefront adds how many light paths leave photons."""
     scene = index.scene
-    integrator: Any = scene.integrator
+    integrator = scene.integrator
+    assert isinstance(integrator, Vcm)
     size = scene.film.width, scene.film.height
     settings["max_depth"] = min(int(settings["max_depth"]), photons.DEEPEST)
     settings["radius"] = integrator.radius or photons.first_radius(

@@ -8,7 +8,7 @@ in a mirror or through glass.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -201,7 +201,7 @@ def _share_seen(index: SceneIndex, geometry: Geometry) -> float:
     return float(solid.sum() / (2.0 * np.pi * (1.0 - math.cos(view.angle))))
 
 
-def _first_with(all_: Iterable[Shape], wanted: Any) -> Shape | None:
+def _first_with(all_: Iterable[Shape], wanted: Callable[[Shape], object]) -> Shape | None:
     """The first shape whose material is as wanted; a material is asked once."""
     asked: set[int] = set()
     for shape in all_:

@@ -26,6 +26,7 @@ from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.scene import Scene
 from clpt.scene.media import Lattice, Medium
 from clpt.scene.motion import Deformation, Keys
+from clpt.scene.shapes import Shape
 
 POINTS = 6  # of a shape that shines
 BEFORE = 1e-4  # how far before it they are, over its size
@@ -226,7 +227,7 @@ def _deformed(
         yield replace(emitter, vertices=way.at(time)[0], faces=faces, keys=1), time
 
 
-def _says(shape: Any) -> bool:
+def _says(shape: Shape) -> bool:
     """Whether a shape says itself in which media it stands."""
     return shape.interior is not None or shape.exterior is not None
 

@@ -211,7 +211,7 @@ def _of_emitter(emitter: Emitter, cache: LoweringCache) -> Source:
     return Source(power, bounds, power, float(means.max(initial=0.0)))
 
 
-def _face_attributes(shape: Shape, value: Any) -> dict[str, NDArray[np.float32]]:
+def _face_attributes(shape: Shape, value: object) -> dict[str, NDArray[np.float32]]:
     """Return the attributes of a shape's triangles that its emission reads, by their names."""
     names = {one.name for one in textures_in(value) if isinstance(one, MeshAttribute)}
     return {name: triangles.attribute(shape, name) for name in names if triangles.per_face(name)}

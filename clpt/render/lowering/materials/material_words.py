@@ -87,14 +87,14 @@ class MaterialWords:
         """Return the word of a surface that is not there."""
         return self._leaf(_NULL, _Side(front=True, two_sided=False))
 
-    def _word(self, material: Any, side: _Side) -> int:
+    def _word(self, material: mt.Material, side: _Side) -> int:
         """The word of a material on a side; the same pair has the same word."""
         key = (id(material), side.key)
         if key not in self._words:
             self._words[key] = self._new_word(material, side)
         return self._words[key]
 
-    def _new_word(self, material: Any, side: _Side) -> int:
+    def _new_word(self, material: mt.Material, side: _Side) -> int:
         if isinstance(material, mt.TwoSided):
             chosen = material.front if side.front or material.back is None else material.back
             return self._word(chosen, dataclasses.replace(side, inside=True))
@@ -126,10 +126,10 @@ class MaterialWords:
             self.transmitting.add(material.kind)
         return self._leaves.index(type(material)) << 24 | row
 
-    def _mixture(self, weight: Any, first: Any, second: Any, side: _Side) -> int:
+    def _mixture(self, weight: object, first: mt.Material, second: mt.Material, side: _Side) -> int:
         return self._mixture_of(weight, [self._word(one, side) for one in (first, second)])
 
-    def _mixture_of(self, weight: Any, children: list[int]) -> int:
+    def _mixture_of(self, weight: object, children: list[int]) -> int:
         words, source = self._encoder.named_words("mixture", "weight", weight, roles.REAL)
         self.uvs |= source == "texture"
         word = MIXTURE << 24 | self._encoder.store.append("mixtures", [*words, *children])

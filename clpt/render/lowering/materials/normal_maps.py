@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
@@ -62,7 +62,7 @@ class NormalPerturbation:
         return made
 
 
-def _real(value: Any, encoder: Encoder) -> Words:
+def _real(value: object, encoder: Encoder) -> Words:
     return encoder.named_words("perturbation", "value", value, roles.REAL)[0]
 
 

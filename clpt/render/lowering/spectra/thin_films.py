@@ -23,7 +23,7 @@ from clpt.render.contract.parameter_words import FILM_COSINES
 from clpt.scene.materials import Layer
 from clpt.scene.params import Kind, params
 from clpt.scene.textures import Texture
-from clpt.spectra import cie
+from clpt.spectra import Spectrum, cie
 from clpt.spectra.spectrum import d65
 
 THICKNESS_STEP = 4.0  # [nm] of the table, where a texture varies the thickness
@@ -124,7 +124,7 @@ def profile(material: Kind) -> Any:
     return next(iter(found.values()), 1.0)
 
 
-def _complex(eta: Any, k: Any, lambdas: Array) -> Array:
+def _complex(eta: Spectrum | str, k: Spectrum | str, lambdas: Array) -> Array:
     """A complex index at the wavelengths."""
     n, extinction = (spectra.index(value).sample(lambdas) for value in (eta, k))
     return n + 1j * extinction

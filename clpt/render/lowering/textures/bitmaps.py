@@ -255,7 +255,7 @@ class Images:
         colours = colours if self.spectral else colours[:, :3]
         return _Packed(np.ascontiguousarray(colours).reshape(-1).view(np.uint32), size)
 
-    def _read(self, image: Any) -> _Pixels:
+    def _read(self, image: object) -> _Pixels:
         """The pixels of an image; a file is decoded once."""
         if isinstance(image, (str, Path)):
             return self.cache(_Pixels, str(image), by=(version(image),))
@@ -301,7 +301,7 @@ def _pool(process: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(min(THREADS, os.cpu_count() or 1), "clpt-images")
 
 
-def _array(image: Any) -> Stored:
+def _array(image: object) -> Stored:
     values = np.asarray(on_host(image))
     values = values[..., None] if values.ndim == 2 else values
     if values.dtype != np.uint8 and values.dtype.kind != "f":
