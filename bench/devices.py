@@ -21,7 +21,8 @@ from rich.table import Table
 import clpt
 from bench import machine
 from clpt import device as dev
-from clpt.cli.options.changes import SceneChanges, changed
+from clpt.cli.options.applied import changed
+from clpt.cli.options.changes import SceneChanges
 
 SCENES = ("scenes/cornell_box", "tests/scenes/textures.xml")
 

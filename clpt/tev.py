@@ -17,11 +17,12 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from .choices import VIEWER
 from .errors import ClptError
 
 log = logging.getLogger(__name__)
 
-HOST, PORT = "127.0.0.1", 14158
+HOST, PORT = VIEWER, 14158
 CREATE, UPDATE = 4, 6  # types of packets; the second is the form with offsets and strides
 PACKET = 64 << 20  # bytes of pixels in a packet, at most
 TIMEOUT = 5.0  # [s] that a viewer may take for anything

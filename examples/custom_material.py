@@ -1,7 +1,6 @@
 """A material that clpt does not have: velvet, whose fibres stand up and light up at its edges.
 
-A material is a dataclass with parameters, and OpenCL functions that sample and evaluate it. It is
-used as any of clpt's own: textured, spectral or rgb, below a mask or a blend.
+A material is a dataclass with parameters, and OpenCL functions that sample and evaluate it.
 """
 
 import sys
@@ -12,9 +11,9 @@ from typing import Any
 import numpy as np
 
 import clpt
-from clpt.scene import Film, cameras, lights, materials, shapes, textures
+from clpt.scene import Film, cameras, lights, materials, shapes
 from clpt.scene.params import real, reflectance
-from clpt.transforms import look_at, rotate, scale
+from clpt.transforms import look_at
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -50,29 +49,32 @@ class Velvet(materials.Material):
         s.weight = spectrum_scale(velvet_eval(m, wo, s.wi), 2.0f * PI);
         return s;
     }
-
     Spectrum velvet_albedo(Velvet m) { return m.colour; }
     """
 
 
+def cloth(material: materials.Material, x: float) -> shapes.Mesh:
+    """Return a hanging cloth with folds, two metres wide."""
+    u, v = np.meshgrid(np.linspace(-1, 1, 161), np.linspace(0, 1, 81))
+    depth = 0.12 * np.sin(9 * u + 1.5 * v) * (0.3 + v) + 0.05 * np.sin(21 * u - 2 * v)
+    i = (np.arange(80)[:, None] * 161 + np.arange(160)).ravel()
+    faces = [np.stack([i, i + a, i + b], 1) for a, b in ((162, 1), (161, 162))]
+    points = {"vertices": np.stack([u + x, 2.4 - 2.4 * v, depth], -1).reshape(-1, 3)}
+    return shapes.Mesh(**points, faces=np.concatenate(faces), normals="smooth", material=material)
+
+
 def scene() -> clpt.Scene:
-    """Three balls: plain paint, velvet, and velvet woven with paint."""
-    paint = materials.Diffuse(reflectance=(0.35, 0.03, 0.05))
-    velvet = Velvet(colour=(0.9, 0.1, 0.15), roughness=0.3)
-    board = textures.Checkerboard(color0=1.0, color1=0.0, to_uv=np.diag([16.0, 8.0, 1.0]))
-    woven = materials.Blend(first=paint, second=velvet, weight=board)
-    placed = [
-        shapes.Sphere(center=(x, 1.0, 0.0), radius=1.0, material=m)
-        for x, m in ((-2.1, paint), (0.0, velvet), (2.1, woven))
-    ]
-    return clpt.Scene(
-        camera=cameras.Perspective(to_world=look_at((0, 2, 8), (0, 0.9, 0), (0, 1, 0)), fov=46),
-        shapes=[*placed, shapes.Rectangle(to_world=rotate((1, 0, 0), -90) @ scale(20.0))],
-        lights=[lights.Constant()],
-        film=Film(width=384, height=192),
-    )
+    """Two cloths of one colour: plain paint, and velvet."""
+    paint, lamp = materials.Diffuse(reflectance=(0.45, 0.04, 0.07)), lights.Area(radiance=(9, 8, 7))
+    cloths = [cloth(paint, -1.15), cloth(Velvet(colour=(0.9, 0.1, 0.15)), 1.15)]
+    above = look_at((-3, 4, 4), (0, 1, 0), (0, 1, 0))
+    camera = cameras.Perspective(to_world=look_at((0, 1.4, 7), (0, 1.2, 0), (0, 1, 0)), fov=42)
+    things = [*cloths, shapes.Rectangle(to_world=above, emission=lamp)]
+    film, sky = Film(width=384, height=216), lights.Constant(radiance=0.35)
+    return clpt.Scene(camera=camera, shapes=things, lights=[sky], film=film)
 
 
 if __name__ == "__main__":
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
-    clpt.write_image(folder / "custom_material.png", clpt.render(scene(), spp=64))
+    clpt.write_image(folder / "custom_material.png", clpt.render(scene(), spp=64), tone="agx")
+    print(f"wrote {folder / 'custom_material.png'}")

@@ -19,7 +19,7 @@ from clpt import spectra
 from clpt.scene import Scene, cameras, integrators, lights, materials, shapes
 from clpt.transforms import look_at, scale, translate
 
-FRAMES, SAMPLES = 4, 32
+FRAMES, SAMPLES = 4, 64
 DEFORM = """
 kernel void deform(global const float *rest, global float *moved, float time)
 {
@@ -74,4 +74,5 @@ with clpt.Renderer(scene(mesh), queue=queue) as renderer:
         renderer.update(vertices={"blob": moved})
         renderer.step(SAMPLES)
         frames.append(renderer.film.get()[:, :, :3])  # waits for the picture
-clpt.write_image(str(folder / "deforming_mesh.png"), np.hstack(frames))
+clpt.write_image(folder / "deforming_mesh.png", np.hstack(frames), tone="neutral")
+print(f"wrote {folder / 'deforming_mesh.png'}")

@@ -1,7 +1,4 @@
-"""Two star clusters meet: an n-body simulation whose bodies are rendered where they are.
-
-The application's own kernel moves them, on its own queue; only pictures come to the host.
-"""
+"""Two star clusters meet: bodies of an n-body simulation, moved and rendered on the device."""
 
 import sys
 from pathlib import Path
@@ -58,7 +55,7 @@ def scene(bodies, rng):
         shapes.Sphere(center=(7, 4, -4), radius=1, emission=lights.Area(radiance=(18, 36, 66))),
     ]
     camera = cameras.Perspective(to_world=look_at((0, 4, 8), (0, -0.2, 0), (0, 1, 0)), fov=27)
-    sky, film = lights.Constant(radiance=(0.08, 0.1, 0.15)), Film(width=200, height=200, mode="rgb")
+    sky, film = lights.Constant(radiance=(0.2, 0.2, 0.3)), Film(width=200, height=200, mode="rgb")
     return clpt.Scene(camera=camera, shapes=things, lights=[sky], film=film)
 
 
@@ -72,9 +69,11 @@ then, pictures = cl_array.empty_like(now), []
 renderer = clpt.Renderer(scene(now, rng), queue=queue)
 for _ in range(FRAMES):
     renderer.update(vertices={"bodies": now})
-    renderer.step(20)
+    renderer.step(48)
     pictures.append(renderer.image())
     for _ in range(STEPS):
         advance(queue, now.shape[:1], None, now.data, np.float32(DT), then.data, speed.data)
         now, then = then, now
-clpt.write_image(Path(sys.argv[1] if len(sys.argv) > 1 else ".") / "nbody.png", np.hstack(pictures))
+picture = Path(sys.argv[1] if len(sys.argv) > 1 else ".") / "nbody.png"
+clpt.write_image(picture, np.hstack(pictures), exposure=0.7, tone="agx")
+print(f"wrote {picture}")

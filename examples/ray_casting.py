@@ -70,7 +70,8 @@ for _ in range(SKY_RAYS):
 sky = 1 - np.mean([array.get() for array in covered], axis=0)
 picture = np.tile(np.float32([0.3, 0.5, 0.85]), (len(met), 1))
 picture[met] = 0.6 * (light + np.float32([0.3, 0.42, 0.65]) * sky[:, None])
-clpt.write_image(str(folder / "ray_casting.png"), picture.reshape(HEIGHT, WIDTH, 3))
+clpt.write_image(folder / "ray_casting.png", picture.reshape(HEIGHT, WIDTH, 3))
+print(f"wrote {folder / 'ray_casting.png'}")
 
 theirs = mesh.ray.intersects_first(origins, directions)
 ours = seconds(lambda: accel.intersect(origins, directions))

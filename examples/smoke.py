@@ -49,18 +49,17 @@ def scene(density):
     smoke = media.Grid(density=density, to_world=box, sigma_t=40, albedo=0.9)
     inside = box @ translate((0.5, 0.5, 0.5)) @ scale(0.5)
     cube = shapes.Cube(to_world=inside, material=materials.Null(), interior=smoke)
-    floor = translate((0, -0.001, 0)) @ rotate((1, 0, 0), -90) @ scale(9)
+    floor = translate((0, -0.001, 0)) @ rotate((1, 0, 0), -90) @ scale(60)
     floor = shapes.Rectangle(to_world=floor, material=materials.Diffuse(reflectance=0.3))
     sun = lights.Directional(direction=(3, -2, -1), irradiance=(5, 4.4, 3.6))
     camera = cameras.Perspective(to_world=look_at((0, 1.3, 5), (0, 0.85, 0), (0, 1, 0)), fov=23)
     film, path = Film(width=130, height=200, mode="rgb"), integrators.Path(max_depth=12)
-    things = {"shapes": [cube, floor], "lights": [sun, lights.Constant(radiance=(0.15, 0.2, 0.3))]}
+    things = {"shapes": [cube, floor], "lights": [sun, lights.Constant(radiance=(0.2, 0.25, 0.35))]}
     return clpt.Scene(camera=camera, film=film, integrator=path, **things)
 
 
-context = cl.create_some_context(interactive=False)
-queue = cl.CommandQueue(context)
-built = cl.Program(queue.context, KERNEL).build("-DNX={} -DNY={} -DNZ={}".format(*SIZE))
+queue = cl.CommandQueue(context := cl.create_some_context(interactive=False))
+built = cl.Program(context, KERNEL).build("-DNX={} -DNY={} -DNZ={}".format(*SIZE))
 advect, press, project = built.advect, built.press, built.project
 flow, after = (cl_array.zeros(queue, (*SIZE, 4), "f4") for _ in range(2))
 old, new, density = (cl_array.zeros(queue, SIZE, "f4") for _ in range(3))
@@ -76,4 +75,6 @@ for step in range(1, FRAMES * STEPS + 1):
         renderer.update(scene=scene(density))
         renderer.step(48)
         pictures.append(renderer.image())
-clpt.write_image(Path(sys.argv[1] if len(sys.argv) > 1 else ".") / "smoke.png", np.hstack(pictures))
+picture = Path(sys.argv[1] if len(sys.argv) > 1 else ".") / "smoke.png"
+clpt.write_image(picture, np.hstack(pictures), tone="agx")
+print(f"wrote {picture}")

@@ -40,3 +40,10 @@ def unknown(line: str) -> str:
     known = {option for parameter in command.params for option in parameter.opts}
     given = {word for word in words if re.match(r"-{1,2}[A-Za-z]", word)}  # not a number below zero
     return " ".join(sorted(given - known))
+
+
+def smaller(line: str, *, spp: int = 1, size: str = "32x32") -> list[str]:
+    """Return the arguments of a command; of a render, with few samples of a small picture."""
+    words = shlex.split(line, comments=True)[1:]
+    renders = words[0] == "render" and "--frames" not in words
+    return words + (["--spp", f"{spp}", "--size", size] if renders else [])

@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, KERNELS = ROOT / "clpt", ROOT / "kernels"
 
 BASE = {
-    "arrays", "budget", "child_processes", "colour", "errors", "host_memory", "images",
+    "arrays", "budget", "child_processes", "choices", "colour", "errors", "host_memory", "images",
     "input_files", "layout", "measured", "numpy_files", "output_files", "records", "spectra",
     "spectral_exr", "tev", "text", "transforms", "version",
 }  # fmt: skip

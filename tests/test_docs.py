@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import ast
 import dataclasses
+import json
 import logging
 import re
+import shlex
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -13,8 +16,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import clpt
+from clpt.scene.params import DEVICE_ROLES
+from docs import figures
 from tests import pages
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -45,6 +51,46 @@ def test_commands_and_options_exist():
     lines = [(page.name, line) for page in PAGES for line in pages.commands(page)]
     unknown = [(name, line, pages.unknown(line)) for name, line in lines]
     assert [": ".join(told) for told in unknown if told[-1]] == []
+
+
+def test_commands_of_the_gallery_make_pictures_of_the_size_that_is_shown():
+    page = (DOCS / "gallery.md").read_text("utf-8").split("## Every kind")[0]
+    shown = re.findall(r"!\[[^\]]*\]\((\S+?)\)\n.*?\n`[^`]*clpt render ([^`]*)`\n", page, re.S)
+    assert len(shown) == page.count("![") > 20
+    wrong = []
+    for picture, command in shown:
+        scene, *words = shlex.split(command)
+        if "--size" in words:
+            size = words[words.index("--size") + 1]
+        else:
+            file = ROOT / scene if scene.endswith(".json") else ROOT / scene / "scene.json"
+            film = json.loads(file.read_text("utf-8"))["film"]
+            size = f"{film['width']}x{film['height']}"
+        if "x".join(map(str, Image.open(DOCS / picture).size)) != size:
+            wrong.append(f"{picture}: {command} makes {size}")
+    assert wrong == []
+
+
+def test_figures_are_those_of_the_benchmark():
+    old = [p.name for p in figures.pages() if figures.written(text := p.read_text("utf-8")) != text]
+    assert old == [], "run python -m docs.figures"
+    assert figures.PLACE.search((ROOT / "README.md").read_text("utf-8"))
+
+
+# Words that a reader whose English is second has to look up, or to read twice.
+HARD = r"\b(?:but for|tells?|told|calm|dull|whence|thence|ajar|lowered|shines?)\b"
+OURS = {"architecture.md", "glossary.md", "scene_format.md"}  # the code's words, or generated
+
+
+def test_pages_use_plain_words():
+    found = [
+        f"{page.name}:{number}: {match[0]}"
+        for page in (*PAGES, ROOT / "README.md")
+        if page.name not in OURS
+        for number, line in enumerate(page.read_text("utf-8").splitlines(), 1)
+        for match in re.finditer(HARD, line)
+    ]
+    assert found == []
 
 
 @pytest.fixture
@@ -212,6 +258,17 @@ LIMITS = (  # on the page, and where the code has them
 def test_limits_are_those_of_the_code(told: str, module: str, name: str, value: int):
     assert told in (DOCS / "limits.md").read_text("utf-8")
     assert getattr(pytest.importorskip(module), name) == value
+
+
+def test_the_site_describes_every_role_of_a_parameter():
+    """Without MkDocs: what the site says of roles is read, not imported."""
+    tree = ast.parse((DOCS / "theme/docstrings.py").read_text("utf-8"))
+    said = next(
+        ast.literal_eval(node.value)
+        for node in tree.body
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "ROLES"
+    )
+    assert set(DEVICE_ROLES) - {"choice"} <= set(said)
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ import clpt
 FOLDER = Path(__file__).resolve().parents[1] / "examples"
 EXAMPLES = sorted(FOLDER.glob("*.py"))
 # Quick tests elsewhere have what these show.
-LONG = ("custom_material", "deforming_mesh", "nbody", "smoke")
+LONG = ("custom_material", "deforming_mesh", "nbody", "smoke", "textured_mesh", "turntable")
 
 
 @pytest.mark.parametrize(
@@ -26,7 +26,9 @@ def test_it_writes_a_picture(
 ):
     monkeypatch.setattr(sys, "argv", [str(example), str(tmp_path)])
     runpy.run_path(str(example), run_name="__main__")
-    picture = clpt.read_image(tmp_path / f"{example.stem}.png")
+    file = tmp_path / f"{example.stem}.png"
+    assert f"wrote {file}" in capsys.readouterr().out
+    picture = clpt.read_image(file)
     assert picture.shape[0] >= 100 and picture.shape[1] >= 100
     assert 0.02 < picture.mean() < 0.98 and picture.std() > 0.02  # neither black, white nor flat
 

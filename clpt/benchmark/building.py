@@ -10,7 +10,7 @@ from typing import Any, get_args
 import numpy as np
 
 from clpt import bvh, device
-from clpt.bvh.layouts import Quality
+from clpt.choices import Quality
 from clpt.rays import Accel
 from clpt.scene import Scene
 

@@ -1,8 +1,9 @@
 """Acceleration structures over triangles and boxes, built on the device."""
 
+from ..choices import Quality
 from .build import Bvh, build, build_boxes, build_parts, choose_layout, choose_tree, outgrows_caches
 from .building import Building
-from .layouts import LAYOUTS, TREES, Quality, shapes_layout, traversal_text
+from .layouts import LAYOUTS, TREES, shapes_layout, traversal_text
 from .refit import rebuild_boxes, refit, refit_boxes
 
 __all__ = [

@@ -13,11 +13,12 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
+from ..choices import Quality
 from ..device import Device
 from ..errors import SceneError
 from .building import Array, Building
 from .keyed import keyed
-from .layouts import BOX_LAYOUTS, LAYOUTS, Mesh, Part, Quality
+from .layouts import BOX_LAYOUTS, LAYOUTS, Mesh, Part
 
 log = logging.getLogger(__name__)
 

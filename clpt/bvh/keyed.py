@@ -9,9 +9,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..choices import Quality
 from ..records import TREE_BITS
 from .building import Building
-from .layouts import LAYOUTS, Mesh, Packed, Part, Quality, refit_nodes
+from .layouts import LAYOUTS, Mesh, Packed, Part, refit_nodes
 
 WORDS = {"binary": (8, 16), "wide8": (64, 88), "compact": (20, 12)}  # of a node, and of a leaf
 _FARTHEST = 1e38  # of boxes of what is not there: finite, so that no product with 0 is NaN

@@ -5,18 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Literal
 
 import numpy as np
 import pyopencl as cl
 
+from ..choices import Quality
 from ..records import TREE_BITS
 from . import tree, wide
 from .building import Building
 
-Quality = Literal["high", "fast"]
-"""high: the surface area heuristic down to the leaves, on CPUs large trees improved by reinsertion;
-fast: leaves are cut out of a curve."""
 REINSERT_LIMIT = 10_000  # triangles; below, the program takes longer to load than it saves
 
 _COLLAPSE, _REFIT = "bvh/collapse.cl", "bvh/refit.cl"

@@ -7,14 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import click
-from rich.table import Table
 
-from ..formats import load
-from ..images import READERS
-from .files.image_contents import read_contents
-from .files.targets import is_film
+from ..formats import locate
 from .options.loading_options import loading_options
-from .printing.console import output_console, shown
 
 
 @click.command()
@@ -26,13 +21,20 @@ def info(scene: Path, variables: dict[str, Any], as_json: bool) -> None:
 
     Of a film, a checkpoint or an image, what it says of itself: see `clpt inspect` for its values.
     """
+    locate(scene)
+    # Imported where they are needed: help needs none of them, and some bring OpenCL.
+    from ..formats import load
+    from ..images import READERS
+    from .files.targets import is_film
+
     contents: dict[str, Any]
-    # Imported where they are needed: they bring OpenCL.
     if is_film(scene):
         from .files.film_contents import film_summary
 
         contents = film_summary(scene)
     elif scene.suffix.lower() in READERS:
+        from .files.image_contents import read_contents
+
         contents = dict(read_contents(scene).facts)
     else:
         loaded = load(scene, **variables)
@@ -42,6 +44,10 @@ def info(scene: Path, variables: dict[str, Any], as_json: bool) -> None:
     if as_json:
         click.echo(json.dumps(contents, indent=2))
         return
+    from rich.table import Table
+
+    from .printing.console import output_console, shown
+
     table = Table(show_header=False, title=shown(scene), title_justify="left")
     for name, value in contents.items():
         table.add_row(name.replace("_", " "), shown(value))

@@ -7,13 +7,10 @@ from typing import Any
 
 import click
 
-from clpt.render.codegen.programs import film_sources, sources
-from clpt.render.lowering.scene import lower
-
 from .. import output_files
-from ..bvh.layouts import LAYOUTS
+from ..choices import LAYOUTS
 from ..errors import SceneError
-from ..formats import load
+from ..formats import load, locate
 from .options.loading_options import loading_options
 
 
@@ -28,7 +25,7 @@ from .options.loading_options import loading_options
     help="Paths per work-item: 1 as on a GPU, 8 or 16 as on a CPU.",
 )  # fmt: skip
 @click.option(
-    "--layout", type=click.Choice(list(LAYOUTS)), default="wide8", show_default=True,
+    "--layout", type=click.Choice(LAYOUTS), default="wide8", show_default=True,
     help="Acceleration structure of the triangles.",
 )  # fmt: skip
 @loading_options
@@ -38,6 +35,10 @@ def kernels(scene: Path, folder: Path, lanes: str, layout: str, variables: dict[
     Each is a complete program for any OpenCL compiler. No device is needed. On a CPU a render has
     their functions in one program.
     """
+    locate(scene)
+    from ..render.codegen.programs import film_sources, sources  # here: help needs no OpenCL
+    from ..render.lowering.scene import lower
+
     features = lower(load(scene, **variables)).features
     queued = len(features.materials.kinds) > 1
     made = film_sources(features, layout)

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import click
-from rich.table import Table
 
-from .. import lenses
 from ..errors import SceneError
-from ..lenses.glasses import LINE_C, LINE_D, LINE_F
-from .printing.console import output_console
 from .process.extras import extra
 
 
 @click.command()
 @click.argument("lens")
 @click.option(
-    "--wavelengths", default=f"{LINE_F},{LINE_D},{LINE_C}", show_default=True, metavar="A,B,...",
-    help="At which it is looked at [nm].",
+    "--wavelengths", default="486.1327,587.5618,656.2725", show_default=True,
+    metavar="A,B,...", help="At which it is looked at [nm]; by default the lines F, d and C.",
 )  # fmt: skip
 @click.option(
     "--fields", default="0,10,20", show_default=True, metavar="A,B,...",
@@ -38,6 +33,10 @@ def lens(
     Lengths are in millimetres; pupils stand behind the first and the last surface. A spot's size is
     the root of its mean squared radius.
     """
+    from .. import lenses  # here: help needs no numpy
+    from .printing import lens as tables
+    from .printing.console import output_console
+
     made = lenses.read(lens) if Path(lens).suffix else lenses.library(lens)
     if f_number is not None:
         made = made.with_stop(lenses.paraxial.stop_radius(made, f_number))
@@ -47,43 +46,14 @@ def lens(
     console.print(
         f"{made.name}, {len(made.surfaces)} surfaces" + f"; {made.source}" * bool(made.source)
     )
-    console.print(_cardinal(made, waves))
-    console.print(_spots(made, waves, angles))
+    console.print(tables.near_axis(made, waves))
+    console.print(tables.of_spots(made, waves, angles))
     if plot is not None:
         with extra("plot", "a plot"):
             from .plots import lens as lens_plot  # here: matplotlib is an extra, and slow to import
 
         lens_plot.write(plot, made, waves, angles)
         click.echo(str(plot), err=True)
-
-
-def _cardinal(lens: lenses.Prescription, waves: Sequence[float]) -> Table:
-    """Return what a lens does near its axis, a row for each wavelength [nm]."""
-    table = Table(box=None, pad_edge=False)
-    headings = ("nm", "focal length", "back focus", "f-number", "entrance pupil", "exit pupil")
-    for heading in headings:
-        table.add_column(heading, justify="right")
-    for wavelength in waves:
-        found = lenses.cardinal(lens, wavelength)
-        table.add_row(
-            f"{wavelength:g}", f"{found.focal_length:.5g}", f"{found.back_focus:.5g}",
-            f"{found.f_number:.4g}", f"{2.0 * found.entrance_radius:.4g} at {found.entrance:.4g}",
-            f"{2.0 * found.exit_radius:.4g} at {found.exit:.4g}",
-        )  # fmt: skip
-    return table
-
-
-def _spots(lens: lenses.Prescription, waves: Sequence[float], angles: Sequence[float]) -> Table:
-    """Return the spots of points at angles [degrees], a row for each and a wavelength [nm]."""
-    table = Table(box=None, pad_edge=False)
-    for heading in ("degrees", "nm", "spot [um]", "light through"):
-        table.add_column(heading, justify="right")
-    for angle in angles:
-        for wavelength in waves:
-            spot = lenses.spots.spot(lens, angle, wavelength)
-            size = f"{spot.radius * 1e3:.4g}" if len(spot.points) else "-"
-            table.add_row(f"{angle:g}", f"{wavelength:g}", size, f"{spot.through:.3f}")
-    return table
 
 
 def _numbers(text: str, option: str, low: float, high: float) -> list[float]:

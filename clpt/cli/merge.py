@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from ..errors import SceneError
-from ..render.film import film_file
-from ..render.film.saved_film import SavedFilm, other_devices
+from ..formats import locate
 from ..version import VERSION
-from .files import checkpoints, outputs
 from .files.targets import checked
 from .options.grading import GradingOptions, grading_options, names_option
 from .options.records import with_records
 from .options.scene_options import denoise_option
+
+if TYPE_CHECKING:
+    from ..render.film.saved_film import SavedFilm
 
 
 @click.command()
@@ -41,6 +43,11 @@ def merge(
     (NAME.resume.exr) are films too. Films of another scene, setting or version are refused, and
     those that have a sample that another one has. No device is needed.
     """
+    for film in films:
+        locate(film)
+    from ..render.film.saved_film import other_devices  # here: help needs no OpenCL
+    from .files import checkpoints, outputs
+
     how = graded.grading
     targets = checked(paths)
 
@@ -67,6 +74,8 @@ def merge(
 
 def added(films: tuple[Path, ...]) -> SavedFilm:
     """Return the film of the samples of all. Raises SceneError, which names files."""
+    from ..render.film import film_file
+
     total = film_file.read(films[0])
     for path in films[1:]:
         try:

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
-from rich.table import Table
 
-from .. import mie as theory
-from .. import output_files, spectra
+from .. import output_files
+from ..choices import DROP_SIZES
 from ..errors import SceneError
-from ..formats.native.write import write_medium
 from .options.records import with_records
-from .printing.console import output_console
 from .process.extras import extra
+
+if TYPE_CHECKING:
+    import numpy as np
 
 DIGITS = 6  # of the table in a file
 
@@ -45,7 +44,7 @@ class Indices:
 @click.command()
 @click.argument("radius", type=float)
 @click.option(
-    "--law", default="log_normal", show_default=True, type=click.Choice(theory.LAWS),
+    "--law", default="log_normal", show_default=True, type=click.Choice(DROP_SIZES),
     help="How many drops have which radius: RADIUS is that of all, the median, or the effective"
     " radius (Hansen and Travis 1974).",
 )  # fmt: skip
@@ -91,6 +90,10 @@ def mie(drops: Drops, indices: Indices, output: Path | None, plot: Path | None) 
 
     It follows from Mie's theory (1908), for each wavelength. Without -o, a table of it is shown.
     """
+    from .. import mie as theory  # here: help needs no numpy
+    from ..formats.native.write import write_medium
+    from .printing.mie import print_medium
+
     at = _wavelengths(indices.wavelengths)
     medium = theory.droplets(
         theory.sizes(drops.law, drops.radius * 1e-6, drops.spread, drops.radii), drops.share,
@@ -113,10 +116,12 @@ def mie(drops: Drops, indices: Indices, output: Path | None, plot: Path | None) 
         mie_plot.write(plot, medium, title)
         click.echo(str(plot), err=True)
     if output is None and plot is None:
-        _print(medium, at)
+        print_medium(medium, at)
 
 
 def _wavelengths(text: str) -> np.ndarray:
+    import numpy as np
+
     try:
         first, last, step = map(float, text.split(","))
         if not (0.0 < first <= last and step > 0.0 and (last - first) / step < 2000.0):
@@ -133,18 +138,7 @@ def _index(text: str, column: Any) -> Any:
     except ValueError:
         pass
     if Path(text).suffix:
+        from .. import spectra
+
         return spectra.read_index(Path(text), column)
     return text
-
-
-def _print(medium: Any, at: np.ndarray) -> None:
-    table = Table(box=None, pad_edge=False)
-    for heading in ("nm", "sigma_t [1/m]", "albedo", "mean cosine", "back [1/sr]"):
-        table.add_column(heading, justify="right")
-    phase = medium.phase
-    moment = phase.values * phase.cosines
-    g = np.pi * ((moment[:, 1:] + moment[:, :-1]) @ np.diff(phase.cosines))
-    sigma_t, albedo = (each.sample(at) for each in (medium.sigma_t, medium.albedo))
-    for row in zip(at, sigma_t, albedo, g, phase.values[:, 0], strict=True):
-        table.add_row(*(f"{value:.6g}" for value in row))
-    output_console().print(table)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 
+from ..formats import locate
 from .options.records import with_records
 from .options.scene_options import SceneOptions, denoise_option, scene_options
 from .options.verbosity import verbose_option
@@ -26,6 +27,8 @@ def warm(scenes: tuple[Path, ...], options: SceneOptions, verbose: int, quiet: b
     Give the options of the renders that come: mode, size, device and others decide what is
     compiled. Scenes of the same kinds of materials, lights and shapes share programs.
     """
+    for scene in scenes:
+        locate(scene)
     from .opening.makers import DeviceMaker
     from .opening.scenes import open_scene
     from .printing.display import display

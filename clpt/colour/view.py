@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from clpt.arrays import Floats32
+from clpt.choices import OCIO_CONFIG
 from clpt.errors import SceneError, UnknownKindError
 
-DEFAULT_CONFIG = "ocio://default"  # the config for computer graphics that comes with OpenColorIO
 REC709 = "Linear Rec.709 (sRGB)"  # of OpenColorIO's own config
 
 # A table's axes: more points about black than among highlights. What is outside is clamped.
@@ -51,7 +51,7 @@ class View:
         *,
         display: str | None = None,
         look: str | None = None,
-        config: str = DEFAULT_CONFIG,
+        config: str = OCIO_CONFIG,
     ):
         ocio = _opencolorio()
         self.config = os.environ.get("OCIO", "") if config == "$OCIO" else config
@@ -98,7 +98,7 @@ class View:
         return Table(values, (float(low), float(high), NEAR, 0.0))
 
 
-def views(config: str = DEFAULT_CONFIG) -> dict[str, tuple[str, ...]]:
+def views(config: str = OCIO_CONFIG) -> dict[str, tuple[str, ...]]:
     """Return the views of a config by display. Raises SceneError."""
     loaded = _loaded(_opencolorio(), config)
     return {display: tuple(loaded.getViews(display)) for display in loaded.getDisplays()}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
+from clpt.choices import DENOISERS
 from clpt.errors import UnknownKindError
 from clpt.scene import Scene
 from clpt.scene.integrators import (
@@ -15,14 +16,13 @@ from clpt.scene.integrators import (
     Vcm,
 )
 
-METHODS = ("oidn", "statistical")
 LAYERS = ("denoising_albedo", "denoising_normal")
 
 
 def check_method(method: str) -> str:
     """Return the name of a denoiser. Raises UnknownKindError."""
-    if method not in METHODS:
-        raise UnknownKindError("denoiser", str(method), METHODS, where="denoise")
+    if method not in DENOISERS:
+        raise UnknownKindError("denoiser", str(method), DENOISERS, where="denoise")
     return method
 
 

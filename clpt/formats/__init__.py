@@ -5,14 +5,16 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 from clpt import budget as budgets
 from clpt.budget import Budget
+from clpt.choices import Missing
 from clpt.errors import SceneError
-from clpt.formats.missing import Missing
-from clpt.scene import Scene
-from clpt.scene.materials import Material
+
+if TYPE_CHECKING:  # a name of a file is looked up without the kinds of scenes
+    from clpt.scene import Scene
+    from clpt.scene.materials import Material
 
 FORMATS = {  # the module whose `load` reads files of a suffix, imported when it is used
     ".json": "native",
@@ -116,6 +118,8 @@ def save(scene: Scene, path: str | Path, /) -> None:
     Raises TypeError for what is no scene; SceneError for another suffix, for a buffer on a device,
     and where a file cannot be written.
     """
+    from clpt.scene import Scene
+
     path = Path(path)
     if not isinstance(scene, Scene):
         raise TypeError(f"clpt.save writes a clpt.Scene, not {type(scene).__name__}")

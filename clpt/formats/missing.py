@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 
-Missing = Literal["error", "grey"]
 GREY = np.full((1, 1, 3), 0.5, np.float32)
 EVEN = np.array([[[0.5, 0.5, 1.0]]], np.float32)  # a normal map that bends nothing
 GREY.flags.writeable = EVEN.flags.writeable = False

@@ -5,6 +5,7 @@ its bytes stand in another file. What a file says of its numbers is heeded: colo
 709 unless data is asked for. docs/images.md has a table of what is honoured in which format.
 """
 
+from clpt.choices import WRITABLE
 from clpt.images.exr import matrix_of
 from clpt.images.exr_files import attributes, part_names, write_channels
 from clpt.images.layers import read_channels, read_layers
@@ -23,7 +24,7 @@ from clpt.images.transfer import (
     to_rec709,
     to_srgb8,
 )
-from clpt.images.writing import WRITABLE, check_output, write, write_stored
+from clpt.images.writing import check_output, write, write_stored
 
 __all__ = [
     "READERS",

@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt import output_files
+from clpt.choices import WRITABLE
 from clpt.colour.view import View
 from clpt.errors import SceneError
 from clpt.images import exr, hdr, npy, pfm
 from clpt.images.png_files import Metadata, png
 from clpt.images.transfer import to_codes, to_rec709
 from clpt.spectra.spaces import chromaticities
-
-WRITABLE = (".exr", ".png", ".hdr", ".pfm", ".npy")
 
 
 def write(

@@ -4,10 +4,10 @@
 """
 
 from .droplets import DENSE, angles, droplets
-from .sizes import LAWS, Sizes, sizes
+from .sizes import Sizes, sizes
 from .sphere import Spheres, spheres
 from .water import water_index
 
 __all__ = [
-    "DENSE", "LAWS", "Sizes", "Spheres", "angles", "droplets", "sizes", "spheres", "water_index",
+    "DENSE", "Sizes", "Spheres", "angles", "droplets", "sizes", "spheres", "water_index",
 ]  # fmt: skip

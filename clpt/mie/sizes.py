@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.choices import DROP_SIZES
 from clpt.errors import SceneError
 
-LAWS = ("mono", "log_normal", "gamma")
 BEYOND = 1e-6  # share of the cross sections that may be left out at each end
 WIDEST = 2.0  # of `spread`: of these laws nobody measured any wider
 
@@ -36,8 +36,8 @@ def sizes(law: str, radius: float, spread: float = 0.0, count: int = 200) -> Siz
 
     Raises SceneError for another law, and numbers that it cannot have.
     """
-    if law not in LAWS:
-        raise SceneError(f"{law!r} is none of {', '.join(LAWS)}", where="law")
+    if law not in DROP_SIZES:
+        raise SceneError(f"{law!r} is none of {', '.join(DROP_SIZES)}", where="law")
     if not (np.isfinite(radius) and radius > 0.0):
         raise SceneError(f"{radius:g} m; it must be above 0", where="radius")
     if law == "mono":

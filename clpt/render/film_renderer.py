@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from clpt.arrays import Image
+from clpt.choices import MOST_SAMPLES
 from clpt.errors import SceneError
 from clpt.render.contents import FilmOwner
 from clpt.render.contract.features import Features
@@ -37,7 +38,6 @@ from clpt.version import VERSION
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-MOST_SAMPLES = 2**31 - 1
 
 OnProgress = Callable[[Progress], bool | None]
 

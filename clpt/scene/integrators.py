@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from clpt.choices import AUTO, MOST_LIGHT_PATHS
 from clpt.errors import SceneError, UnknownKindError
 from clpt.scene.layers import LAYERS
 from clpt.scene.params import Kind, choice, emission, fields_of, flag, host, real
@@ -17,10 +18,8 @@ from clpt.spectra.spaces import TEMPERATURES
 from clpt.spectra.spectrum import LONGEST, SHORTEST
 
 MOST_BANDS = 1024
-MOST_LIGHT_PATHS = 64  # for a sample of the camera
 FEWEST_LIGHT_PATHS = 1.0 / 64
 DEEPEST = 4000  # path state has 12 bits for the depth
-AUTO = "auto"  # light paths as suits the scene
 MOST_GROUPS = 64  # of wavelengths
 MOST_PHOTON_MEMORY = 8192  # [MiB]; words of photons are numbered by 31 bits
 NARROWEST = 0.01  # [nm], a range of wavelengths

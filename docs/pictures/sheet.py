@@ -30,7 +30,7 @@ def sheet() -> str:
         count = PER_ROW.get(category, 3)
         cells += [""] * (-len(cells) % count)
         rows = [cells[at : at + count] for at in range(0, len(cells), count)]
-        table = [[""] * count, ["---"] * count, *rows]
+        table = [rows[0], ["---"] * count, *rows[1:]]
         parts.append(f"### {HEADINGS[category]}\n")
         parts.append("\n".join(f"| {' | '.join(row)} |" for row in table) + "\n")
     return "\n".join(parts)

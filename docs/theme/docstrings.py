@@ -37,6 +37,10 @@ ROLES = {
     roles.RERADIATION: "`spectra.Reradiation`",
     roles.ORDERS_OF_LIGHT: "numbers",
     roles.LAYERS: "`Layer`s",
+    roles.QUANTITY: "spectrum",
+    roles.ANGULAR: "rows of numbers",
+    roles.MEASUREMENT: "`measured.Measurement`",
+    roles.MERL: "`measured.MerlTable`",
 }
 
 

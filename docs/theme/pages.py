@@ -35,17 +35,31 @@ MODULES = {
     "clpt.scene": "scene",
     **{
         f"clpt.scene.{category}": category
-        for category in ("cameras", "shapes", "materials", "textures", "lights", "integrators")
+        for category in (
+            "cameras", "shapes", "materials", "textures", "lights", "media", "motion",
+            "integrators",
+        )
     },
     "clpt.scene.values": "values",
     "clpt.spectra": "spectra",
     "clpt.transforms": "transforms",
+    "clpt.colour": "colour",
+    "clpt.denoise": "denoise",
+    "clpt.lenses": "lenses",
+    "clpt.mie": "mie",
+    "clpt.measured": "measured",
     "clpt.device": "device",
     "clpt.bvh": "bvh",
     "clpt.benchmark": "benchmark",
     "clpt.testing": "testing",
     "clpt.trimesh_ray": "trimesh_ray",
 }
+PARTS = {  # modules on the page of their package, which exports no names itself
+    "clpt.colour": ("tones", "view"),
+    "clpt.denoise": ("oidn", "statistical", "needs"),
+}
+DEEPER = {"heading_level": 3}
+PAIR = re.compile(r"^```json\n(.*?)^```\n\n?^```python\n(.*?)^```\n", re.M | re.S)
 LINK = re.compile(r"(!?)\[((?:`[^`]*`|[^\]\[])*)\]\((?!\w+:)([^)#\s]*)(#[^)\s]*)?\)")
 
 
@@ -55,8 +69,10 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         files.append(File.generated(config, page, abs_src_path=str(ROOT / source)))
     files.append(File.generated(config, "api/clpt.md", content=names_of_clpt()))
     for module, page in MODULES.items():
-        text = f"# `{module}`\n\n::: {module}\n"
-        files.append(File.generated(config, f"api/{page}.md", content=text))
+        parts = [f"# `{module}`", f"::: {module}"]
+        for part in PARTS.get(module, ()):
+            parts += [f"## `{module}.{part}`", f"::: {module}.{part}\n    options: {DEEPER}"]
+        files.append(File.generated(config, f"api/{page}.md", content="\n\n".join(parts)))
     files.append(File.generated(config, "command_line.md", content=command_line()))
     for picture in sorted(ROOT.glob("scenes/*/picture*.png")):
         name = picture.relative_to(ROOT).as_posix()
@@ -82,7 +98,17 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
         relative = posixpath.relpath(page_path, posixpath.dirname(own) or ".")
         return f"{picture}[{text}]({relative}{anchor})"
 
-    return LINK.sub(relinked, markdown)
+    return PAIR.sub(_tabs, LINK.sub(relinked, markdown))
+
+
+def _tabs(match: re.Match[str]) -> str:
+    """Return tabs for a block of JSON that a block of Python follows."""
+    parts = []
+    for title, language, code in (("JSON", "json", match[1]), ("Python", "python", match[2])):
+        block = f"```{language}\n{code}```\n"
+        inside = re.sub(r"^(?=.)", "    ", block, flags=re.M)
+        parts.append(f'=== "{title}"\n\n{inside}')
+    return "\n".join(parts)
 
 
 def names_of_clpt() -> str:
@@ -121,7 +147,7 @@ def _home(name: str) -> str:
 def command_line() -> str:
     """Return a page with the help of every command."""
     context = click.Context(cli, info_name="clpt", terminal_width=90, max_content_width=90)
-    parts = ["# Command line", _help(cli, context)]
+    parts = ["# Command line", _commands(context)]
     for name in cli.list_commands(context):
         command = cli.get_command(context, name)
         if command is not None:
@@ -134,6 +160,16 @@ def command_line() -> str:
                         _help(inner, click.Context(inner, own, part)),
                     ]
     return "\n\n".join(parts)
+
+
+def _commands(context: click.Context) -> str:
+    """Return a table of the commands, each with the first sentence of its help."""
+    rows = ["| command | what it does |", "| --- | --- |"]
+    for name in cli.list_commands(context):
+        if (command := cli.get_command(context, name)) is not None and not command.hidden:
+            summary = command.get_short_help_str(limit=1000).replace("|", "\\|")
+            rows.append(f"| [clpt {name}](#clpt-{name}) | {summary} |")
+    return "\n".join(rows)
 
 
 def _help(command: click.Command, context: click.Context) -> str:

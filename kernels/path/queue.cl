@@ -57,25 +57,3 @@ called void queue_return(Slab path, Slab more, constant BlockWords *words, const
     for (uint i = 0; i < words->changed; i++) slab_scatter(path, words->path_words[i], block, slots, active);
     for (uint i = 0; i < more_count; i++) slab_scatter(more, more_words[i], block, slots, active);
 }
-
-/* How many collisions in media paths are taken through in a block at a time. */
-#define WALK 16
-
-/* Whether a block of paths that wait for a kind of phase function takes a further step through the medium, the n-th:
- * while more than half of the lanes wait for it still. Others are put to rest, and *ended keeps their states. */
-called int queue_walks(Slab path, Slab hit, int kind, int n, integer *ended, uint block)
-{
-    union { integer all; int each[LANES]; } kinds;
-    kinds.all = waiting_kind(path, hit, block);
-    mask walks = kinds.all == kind;
-    *ended = sel_i(walks, *ended, *ended | load_path_state(path, block));
-    store_path_state(path, block, !walks, (integer)(0));
-    int count = 0;
-    for (uint i = 0; i < LANES; i++) count += kinds.each[i] == kind;
-    return n < WALK && 2 * count > LANES;
-}
-/* Wakes those that were put to rest. */
-called void queue_walked(Slab path, integer ended, uint block)
-{
-    store_path_state(path, block, ended != 0, ended);
-}

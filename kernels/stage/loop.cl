@@ -8,9 +8,7 @@
  */
 #include "core/base.cl"
 #include "interface/stage.cl"
-#include "generated/loop_args.cl"
-#include "path/queue.cl"
-#include "generated/loop.cl"
+#include "stage/bounce.cl"
 
 kernel NO_VECTORIZE void loop(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, global uint *queue, uint share, uint bounces,
                               uint restart, uint which, global const volatile uint *leave)
@@ -23,10 +21,10 @@ kernel NO_VECTORIZE void loop(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, global uint *que
     for (uint bounce = 0; bounce < bounces && !(leave && *leave); bounce++) {
         int left = 0;
         for (uint at = first; at < end; at += LANES) {
-            loop_begin(SLAB_PASSED, SCENE_PASSED, LOOP_PASSED, which, at);
+            bounce_begin(at, at + LANES);
             left |= any((load_path_state(path, at) & PATH_DONE) == 0);
         }
         if (!left) break;
-        loop_bounce(SLAB_PASSED, SCENE_PASSED, LOOP_PASSED, which, queue, first, end);
+        bounce_paths(SLAB_PASSED, SCENE_PASSED, LOOP_PASSED, which, queue, first, end);
     }
 }

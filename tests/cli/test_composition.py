@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 
 from clpt import images, transforms
 from clpt.__main__ import run
-from clpt.cli.options.changes import SceneChanges, changed
-from clpt.cli.options.composition import CameraType, Composition, CropType, Orbit, composed, up_of
+from clpt.cli.options.applied import changed, composed, up_of
+from clpt.cli.options.changes import SceneChanges
+from clpt.cli.options.composition import CameraType, Composition, CropType, Orbit
 from clpt.errors import SceneError
 from clpt.formats import load
 from clpt.formats.meshes import framing

@@ -10,7 +10,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from clpt.cli.inspect import PixelType
-from clpt.cli.options.changes import SceneChanges, changed
+from clpt.cli.options.applied import changed
+from clpt.cli.options.changes import SceneChanges
 from clpt.cli.options.composition import CameraType, CropType
 from clpt.cli.options.loading_options import Bytes
 from clpt.cli.options.values import LightPaths, Names, SensorName, Size, White

@@ -57,11 +57,15 @@ class Machines:
         return process
 
     def end(self, process: subprocess.Popen) -> None:
-        """Kill a worker, and wait until the scheduler has noticed."""
+        """Kill a worker, and wait until the scheduler has noticed.
+
+        The scheduler may have given up more workers: one that was stopped runs, and is no worker.
+        """
         process.kill()
         process.wait()
         self.started.remove(process)
-        self.wait(sum(one.poll() is None for one in self.started))
+        left = sum(one.poll() is None for one in self.started)
+        wait_until(lambda: len(self.client.nthreads()) <= left, f"{left} workers")
 
     def wait(self, number: int) -> None:
         """Wait until there are so many workers."""

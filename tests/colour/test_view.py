@@ -5,6 +5,7 @@ import pytest
 
 import clpt
 from clpt import device, images
+from clpt.choices import OCIO_CONFIG
 from clpt.colour import view as views
 from clpt.colour.view import View
 from clpt.device import DeviceArray
@@ -87,7 +88,7 @@ def test_a_curve_follows_a_view_again(on_device, aces):
 def test_a_config_in_a_file(tmp_path, aces):
     """A config of one's own, with a look."""
     path = tmp_path / "config.ocio"
-    config = ocio.Config.CreateFromFile(views.DEFAULT_CONFIG)
+    config = ocio.Config.CreateFromFile(OCIO_CONFIG)
     darker = ocio.CDLTransform(slope=[0.5] * 3)
     config.addLook(ocio.Look(name="half", processSpace="ACEScg", transform=darker))
     path.write_text(config.serialize())

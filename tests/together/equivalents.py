@@ -18,6 +18,9 @@ from numpy.typing import NDArray
 import clpt
 from clpt import device as dev
 from clpt import spectra
+from clpt.errors import SceneError
+from clpt.render.editing.rebuild import refusal
+from clpt.render.lowering.scene import lower
 from clpt.scene import Scene, integrators, materials, media, shapes, textures
 from clpt.scene.motion import Deformation, Keys, Shutter
 
@@ -292,11 +295,21 @@ def saved_and_loaded(scene: Scene, samples: int) -> Values:
 # Other ways to render -------------------------------------------------------------------------
 
 
+def before_update(scene: Scene) -> Scene:
+    """A part of a scene whose renderer may go on with the whole; the scene where there is none."""
+    other = dataclasses.replace(scene, shapes=scene.shapes[:1], lights=scene.lights[:1], seed=9)
+    if not (other.lights or other.shapes):
+        return scene
+    try:
+        former = lower(other)
+    except SceneError:  # as a box is open without its lid
+        return scene
+    return scene if refusal(former, lower(scene, former=former)) else other
+
+
 def updated(scene: Scene, samples: int) -> Values:
     """By a renderer that had another scene before, with some samples taken."""
-    other = dataclasses.replace(scene, shapes=scene.shapes[:1], lights=scene.lights[:1], seed=9)
-    first = other if other.lights or other.shapes else scene
-    with clpt.Renderer(first) as renderer:
+    with clpt.Renderer(before_update(scene)) as renderer:
         renderer.run(1)
         renderer.update(scene=scene)
         renderer.reset(seed=scene.seed)

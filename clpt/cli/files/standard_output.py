@@ -12,8 +12,8 @@ from pathlib import Path
 
 import click
 
+from ...choices import WRITABLE
 from ...errors import SceneError
-from ...images import WRITABLE
 
 STANDARD = Path("-")
 FORMATS = (*(suffix[1:] for suffix in WRITABLE), "film")

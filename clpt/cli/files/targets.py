@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ... import images, output_files
+from ... import output_files
 from ...errors import SceneError
 
 FILM = ".film"  # suffix of films, which hold all that a picture was made of
@@ -21,6 +21,8 @@ def default(scene: Path) -> tuple[Path, ...]:
 
 def checked(paths: tuple[Path, ...]) -> tuple[Path, ...]:
     """Return the paths if files of these names can be written there. Raises SceneError."""
+    from ... import images  # here: help needs no numpy
+
     for path in paths:
         if path.suffix.lower() != FILM:
             images.check_output(path)

@@ -13,7 +13,7 @@ from ... import device as dev
 from ...device import share_compilers
 from ...render.analysis.checks import check
 from ...scene import Scene
-from ..options.changes import changed
+from ..options.applied import changed
 from ..options.scene_options import SceneOptions
 from ..printing.display import Display
 from ..process.stopping import prompt

@@ -2,17 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 from typing import Any
 
-import click
-
-from ...denoise.needs import prepared
-from ...scene import Scene, kinds
-from ...scene.integrators import AUTO, NO_AOV, Auto
-from ...scene.params import Kind, fields_of, params
-from .composition import Composition, composed
+from .composition import Composition
 from .records import record_of
 
 
@@ -81,61 +74,3 @@ class SceneChanges:
     def of(cls, **options: Any) -> SceneChanges:
         """Return the record of options by their names."""
         return record_of(cls, options)
-
-
-def changed(scene: Scene, changes: SceneChanges) -> Scene:
-    """Return the scene as the options want it.
-
-    Raises click.BadParameter, and SceneError for an invalid film.
-    """
-    sampling, film = changes.sampling, changes.film.values()
-    if changes.composition.crop is not None:
-        film["crop"] = None  # that of the file may not fit the new size
-    if sampling.noise is not None:
-        scene = dataclasses.replace(scene, noise=sampling.noise or None)
-    given: dict[str, Any] = {"spp": sampling.spp, "seed": sampling.seed}
-    given = {name: value for name, value in given.items() if value is not None}
-    if changes.transport.sampler is not None:
-        given["sampler"] = kinds("sampler")[changes.transport.sampler]()
-    given["film"] = dataclasses.replace(scene.film, **film)
-    given["integrator"] = _integrator(scene.integrator, changes.transport)
-    scene = composed(dataclasses.replace(scene, **given), changes.composition)
-    return prepared(scene, changes.denoise)
-
-
-PARAMETERS = {  # of integrators, and what an integrator without one has not
-    "max_depth": "depth",
-    "light_paths": "light paths beside it",
-    "radius": "photons",
-    "guiding": "guiding",
-}
-
-
-def _integrator(how: Any, transport: Transport) -> Any:
-    """Return an integrator, as the options want it. Raises click.BadParameter."""
-    if transport.integrator is not None and transport.integrator != how.kind:
-        how = _of_kind(transport.integrator, how)
-    if isinstance(how, Auto) and transport.implied != how.kind:
-        how = _of_kind(transport.implied, how)
-    for name, what in PARAMETERS.items():
-        value = vars(transport)[name]
-        if value is None:
-            continue
-        if not hasattr(how, name):
-            message = f"the integrator {how.kind} has no {what}"
-            raise click.BadParameter(message, param_hint=f"--{name.replace('_', '-')}")
-        how = dataclasses.replace(how, **{name: value})
-    return how
-
-
-def _of_kind(name: str, old: Kind) -> Any:
-    """Return an integrator of another kind, with the parameters that both have."""
-    known = kinds("integrator")
-    if name not in known:
-        message = NO_AOV if name == "aov" else f"{name!r} is none of {', '.join(known)}"
-        raise click.BadParameter(message, param_hint="--integrator")
-    given = {key: value for key, value in fields_of(old).items() if key in params(known[name])}
-    if name == "vcm" and "light_paths" in given:  # a whole number, 1 or more
-        number = given.pop("light_paths")
-        given |= {} if number == AUTO else {"light_paths": max(round(number), 1)}
-    return known[name](**given)

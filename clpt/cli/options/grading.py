@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import click
 
-from ...colour.tones import TONES
-from ...colour.view import DEFAULT_CONFIG, View
-from ...render.film.layer_channels import SETS
+from ...choices import CHANNEL_NAMES, OCIO_CONFIG, TONES
 from .records import Command, with_options
+
+if TYPE_CHECKING:
+    from ...colour.view import View
 
 
 @dataclass(frozen=True)
@@ -18,13 +20,13 @@ class Grading:
     """The form of pictures in files.
 
     exposure [stops]; tone: a curve of clpt.colour.tones; view: of OpenColorIO, instead; names: of
-    channels of an .exr, a set of clpt.render.film.layer_channels.SETS.
+    channels of an .exr, a set of clpt.choices.CHANNEL_NAMES.
     """
 
     exposure: float = 0.0
     tone: str = "none"
     view: View | None = None
-    names: str = SETS[0]
+    names: str = CHANNEL_NAMES[0]
 
 
 @dataclass(frozen=True)
@@ -37,17 +39,19 @@ class GradingOptions:
     display: str | None
     look: str | None
     ocio: str
-    names: str = SETS[0]
+    names: str = CHANNEL_NAMES[0]
 
     @cached_property
     def grading(self) -> Grading:
         """The grading that the options ask for. Raises SceneError, click.UsageError."""
         if not (self.view or self.display or self.look):
-            if self.ocio != DEFAULT_CONFIG:
+            if self.ocio != OCIO_CONFIG:
                 raise click.UsageError("--ocio needs --view or --display")
             return Grading(self.exposure, self.tone or "none", names=self.names)
         if self.tone is not None:
             raise click.UsageError("a view has its own tone curve; leave out --tone")
+        from ...colour.view import View  # here: help needs no numpy
+
         seen = View(self.view, display=self.display, look=self.look, config=self.ocio)
         return Grading(self.exposure, view=seen, names=self.names)
 
@@ -55,7 +59,7 @@ class GradingOptions:
 _OPTIONS = (
     click.option("--exposure", type=float, default=0.0, help="Brighten .png by this many stops."),
     click.option(
-        "--tone", type=click.Choice([*TONES]), help="Tone curve of .png.  [default: none]"
+        "--tone", type=click.Choice(TONES), help="Tone curve of .png.  [default: none]"
     ),
     click.option(
         "--view", metavar="NAME", help="Make .png by this view of OpenColorIO: clpt[colour]."
@@ -63,13 +67,13 @@ _OPTIONS = (
     click.option("--display", metavar="NAME", help="The display of the view."),
     click.option("--look", metavar="NAME", help="A look before the view."),
     click.option(
-        "--ocio", metavar="CONFIG", default=DEFAULT_CONFIG, show_default=True,
+        "--ocio", metavar="CONFIG", default=OCIO_CONFIG, show_default=True,
         help="Where views are from: a config.ocio, ocio://NAME, or $OCIO.",
     ),
 )  # fmt: skip
 
 names_option = click.option(
-    "--names", type=click.Choice(SETS), default=SETS[0], show_default=True,
+    "--names", type=click.Choice(CHANNEL_NAMES), default=CHANNEL_NAMES[0], show_default=True,
     help="What .exr files call layers: depth.Z, or ViewLayer.Denoising Depth.Z.",
 )  # fmt: skip
 

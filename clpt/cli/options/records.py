@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import inspect
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, TypeVar, cast
 
@@ -45,9 +46,9 @@ def record_of(form: Callable[..., Made], given: Mapping[str, Any]) -> Made:
     An option that the command does not have leaves the field's default.
     """
     made: dict[str, Any] = {}
-    for name, parameter in inspect.signature(form, eval_str=True).parameters.items():
-        if dataclasses.is_dataclass(parameter.annotation):
-            made[name] = record_of(parameter.annotation, given)  # type: ignore[arg-type]
+    for name, inner in _fields(form).items():
+        if inner is not None:
+            made[name] = record_of(inner, given)
         elif name in given:
             made[name] = given[name]
     return form(**made)
@@ -55,8 +56,21 @@ def record_of(form: Callable[..., Made], given: Mapping[str, Any]) -> Made:
 
 def _names(form: Callable[..., Any]) -> Iterator[str]:
     """Yield the names of the options that a record takes."""
-    for name, parameter in inspect.signature(form, eval_str=True).parameters.items():
-        if dataclasses.is_dataclass(parameter.annotation):
-            yield from _names(parameter.annotation)  # type: ignore[arg-type]
+    for name, inner in _fields(form).items():
+        if inner is not None:
+            yield from _names(inner)
         else:
             yield name
+
+
+def _fields(form: Callable[..., Any]) -> dict[str, Callable[..., Any] | None]:
+    """Return the fields of a record by their names, with the record that is the type of each.
+
+    A record is looked up in the form's module; other types may not be imported yet.
+    """
+    known = vars(sys.modules[form.__module__])
+    fields: dict[str, Any] = {}
+    for name, parameter in inspect.signature(form).parameters.items():
+        found = known.get(parameter.annotation)
+        fields[name] = found if dataclasses.is_dataclass(found) else None
+    return fields

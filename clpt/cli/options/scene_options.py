@@ -5,22 +5,30 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
-from ...bvh.layouts import LAYOUTS, Quality
-from ...denoise.needs import METHODS
+from ...choices import (
+    DENOISERS,
+    INTEGRATORS,
+    LAYERS,
+    LAYOUTS,
+    MODES,
+    SAMPLERS,
+    SPACES,
+    Missing,
+    Quality,
+)
 from ...formats import load
-from ...formats.missing import Missing
-from ...scene import Scene, kinds
-from ...scene.layers import LAYERS
-from ...spectra import spaces
-from .changes import SceneChanges, changed
+from .changes import SceneChanges
 from .composition import composition_options
 from .loading_options import Bytes, loading_options
 from .records import Command, with_options
 from .values import LightPaths, Names, SensorName, Size, White
+
+if TYPE_CHECKING:
+    from ...scene import Scene
 
 
 @dataclass(frozen=True)
@@ -74,18 +82,20 @@ class SceneOptions:
 
     def scene(self, file: Path, progress: Callable[[float, str], None] | None = None) -> Scene:
         """Return the scene of a file, changed. Raises SceneError, click.BadParameter."""
+        from .applied import changed
+
         return changed(self.loading.read(file, progress), self.changes)
 
 
 denoise_option = click.option(
-    "--denoise", type=click.Choice(METHODS), is_flag=False, flag_value=METHODS[0],
+    "--denoise", type=click.Choice(DENOISERS), is_flag=False, flag_value=DENOISERS[0],
     help="Take noise away: oidn is Open Image Denoise of clpt[denoise]; statistical needs nothing. "
-    f"The noisy picture is kept as a layer of .exr.  [default: none; alone: {METHODS[0]}]",
+    f"The noisy picture is kept as a layer of .exr.  [default: none; alone: {DENOISERS[0]}]",
 )  # fmt: skip
 
 _OPTIONS = (
     click.option(
-        "--mode", type=click.Choice(["spectral", "rgb"]), help="Whether light is spectra or RGB."
+        "--mode", type=click.Choice(MODES), help="Whether light is spectra or RGB."
     ),
     click.option("--size", type=Size(), help="Size of the picture."),
     click.option(
@@ -94,7 +104,7 @@ _OPTIONS = (
     ),
     click.option("--threads", type=click.IntRange(1), help="Cores of a CPU to use, at most."),
     click.option(
-        "--bvh", "layout", type=click.Choice([*LAYOUTS]),
+        "--bvh", "layout", type=click.Choice(LAYOUTS),
         help="Acceleration structure of the triangles.",
     ),
     click.option(
@@ -102,10 +112,10 @@ _OPTIONS = (
         help="fast: built sooner, a little slower to trace.",
     ),
     click.option(
-        "--integrator", metavar="NAME", help=f"One of {', '.join(kinds('integrator'))}."
+        "--integrator", metavar="NAME", help=f"One of {', '.join(INTEGRATORS)}."
     ),
     click.option(
-        "--sampler", type=click.Choice([*kinds("sampler")]),
+        "--sampler", type=click.Choice(SAMPLERS),
         help="Where random numbers come from.",
     ),
     click.option(
@@ -131,7 +141,7 @@ _OPTIONS = (
         "--white-balance", type=White(), help="What becomes white: none, D65, 3200 or x,y."
     ),
     click.option(
-        "--output-space", type=click.Choice(spaces.SPACES), help="Colour space of the picture."
+        "--output-space", type=click.Choice(SPACES), help="Colour space of the picture."
     ),
     click.option(
         "--bands", type=click.IntRange(0), help="Bands of a spectral picture, for .npy and .exr."

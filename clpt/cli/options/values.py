@@ -8,10 +8,8 @@ from typing import Any
 
 import click
 
+from ...choices import AUTO, MOST_LIGHT_PATHS, OBSERVERS
 from ...errors import nearest
-from ...scene.integrators import AUTO, MOST_LIGHT_PATHS
-from ...spectra import read_sensor
-from ...spectra.sensors import OBSERVERS
 
 LARGEST = 65536  # pixels of a side
 
@@ -39,7 +37,11 @@ class SensorName(click.ParamType):
     name = "NAME-OR-FILE"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        return value if value in OBSERVERS else read_sensor(value)
+        if value in OBSERVERS:
+            return value
+        from ...spectra import read_sensor  # here: help needs no tables of spectra
+
+        return read_sensor(value)
 
 
 class LightPaths(click.ParamType):

@@ -64,8 +64,8 @@ def _rendered(job: Job) -> int:
         from .frames import render_frames
 
         return render_frames(job, display(job.quiet, None))
-    targets.checked(job.targets)
     locate(job.scene)
+    targets.checked(job.targets)
     from .picture import render_picture
 
     return render_picture(job, display(job.quiet, job.until.limit))

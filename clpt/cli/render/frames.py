@@ -27,7 +27,7 @@ from ...version import VERSION
 from ..files import outputs, targets
 from ..opening.devices import choose_devices
 from ..opening.makers import AnyRenderer, Maker, cluster_makers, device_makers
-from ..options.changes import changed
+from ..options.applied import changed
 from ..printing.display import Display, clock
 from ..process.stopping import STATUS, stops
 from . import video

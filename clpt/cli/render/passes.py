@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from ...render.film_renderer import MOST_SAMPLES
+from ...choices import MOST_SAMPLES
 from ...render.progress import Progress
 from ...render.wavefront.wavefront import Counts
 from ..opening.makers import DEVICE_SECONDS, AnyRenderer

@@ -5,12 +5,11 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from ... import tev
-from ...scene import Scene
+from ...choices import MOST_SAMPLES, VIEWER
 from ..files.standard_output import FORMATS
 from ..files.targets import default
 from ..options.changes import Sampling
@@ -19,6 +18,9 @@ from ..options.records import Command, with_options
 from ..options.scene_options import SceneOptions
 from ..options.workers import Workers
 from .frame_values import Frames
+
+if TYPE_CHECKING:
+    from ...scene import Scene
 
 
 class SampleRange(click.ParamType):
@@ -29,8 +31,6 @@ class SampleRange(click.ParamType):
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> tuple[int, int]:
-        from ...render.film_renderer import MOST_SAMPLES  # here: help needs no OpenCL
-
         found = re.fullmatch(r"(\d{1,10}):(\d{1,10})", str(value).strip())
         if not found or not int(found[1]) < int(found[2]) <= MOST_SAMPLES:
             self.fail(f"{value!r} is no range of samples such as 0:1024", param, ctx)
@@ -72,6 +72,8 @@ class Address(click.ParamType):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if not isinstance(value, str):
             return value
+        from ... import tev  # here: help needs no numpy
+
         try:
             return tev.address(value)
         except ValueError as error:
@@ -270,7 +272,7 @@ _SEED = click.option(
 
 
 tev_option = click.option(
-    "--tev", type=Address(), is_flag=False, flag_value=tev.HOST,
+    "--tev", type=Address(), is_flag=False, flag_value=VIEWER,
     help="Show the picture in tev or HDRView while it is rendered.  [default: 127.0.0.1:14158]",
 )  # fmt: skip
 

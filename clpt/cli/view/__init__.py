@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from ...formats import locate
 from ..options.grading import grading_options
 from ..options.records import with_records
 from ..options.scene_options import scene_options
@@ -46,6 +47,7 @@ def view(scene: Path, settings: Settings, verbose: int) -> int:
     The line that is printed is the page's address. It opens the page once, on this machine; the
     page makes addresses for others. The scene's file is read again when it changes. Ctrl-C ends it.
     """
+    locate(scene)
     from .page import show  # here: help needs neither OpenCL nor a server
 
     return show(scene, settings)

@@ -8,6 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from clpt.choices import Missing
 from clpt.errors import SceneError
 from clpt.formats.gltf import (
     animation,
@@ -26,7 +27,6 @@ from clpt.formats.gltf import (
 from clpt.formats.gltf.document import Document
 from clpt.formats.meshes import framing
 from clpt.formats.meshes.mesh import MeshFile
-from clpt.formats.missing import Missing
 from clpt.scene import Scene
 from clpt.scene.shapes import Mesh
 

@@ -17,8 +17,8 @@ from typing import Any, NoReturn, TypeVar
 from urllib.parse import unquote, unquote_to_bytes
 
 from clpt import budget, input_files, text
+from clpt.choices import Missing
 from clpt.errors import SceneError
-from clpt.formats.missing import Missing
 
 T = TypeVar("T")
 REQUIRED: Any = object()

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
+from clpt.choices import Missing
 from clpt.errors import SceneError
 from clpt.formats.meshes import mesh
-from clpt.formats.missing import Missing
 from clpt.scene import Scene, cameras, integrators, lights, shapes
 from clpt.scene.cameras import Perspective
 from clpt.scene.materials import Diffuse

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import budget, images, transforms
+from clpt.choices import Missing
 from clpt.errors import SceneError
 from clpt.formats.meshes import corners, mtl, obj, off, ply, stl
 from clpt.formats.meshes.named_files import find
 from clpt.formats.meshes.triangles import TANGENTS, Triangles, attributes
-from clpt.formats.missing import Missing
 from clpt.geometry.normals import smooth_normals
 from clpt.scene.materials import Diffuse, Material, TwoSided
 from clpt.scene.shapes import Mesh

@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import images, input_files, spectra, text
+from clpt.choices import Missing
 from clpt.errors import SceneError
 from clpt.formats.meshes.named_files import find
-from clpt.formats.missing import EVEN, GREY, Missing, grey_for
+from clpt.formats.missing import EVEN, GREY, grey_for
 from clpt.scene.lights import Area
 from clpt.scene.materials import (
     Blend,

@@ -11,8 +11,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from clpt.choices import Missing
 from clpt.formats.meshes.framing import framing_camera, world_bounds
-from clpt.formats.missing import Missing
 from clpt.formats.mitsuba import sensors
 from clpt.formats.mitsuba.bsdfs import bsdf
 from clpt.formats.mitsuba.emitters import emitter

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
+from clpt.choices import Missing
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
-from clpt.formats.missing import GREY, Missing, grey_for
+from clpt.formats.missing import GREY, grey_for
 from clpt.formats.mitsuba.xml import MAX_NESTING, Document, Element
 from clpt.scene.motion import Keys
 

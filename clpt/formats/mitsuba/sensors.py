@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from clpt import lenses
+from clpt.choices import AUTO
 from clpt.errors import UnknownKindError
 from clpt.formats.mitsuba.media import around
 from clpt.formats.mitsuba.properties import Context, Properties, unknown
@@ -345,8 +346,8 @@ def _light_paths(props: Properties) -> float | str:
     """Ours, see docs/mitsuba_plugins.md: Mitsuba's path has no such parameter."""
     child = props.named.get("light_paths")
     if child is not None and child.tag == "string":
-        return props.text("light_paths", "", (integrators.AUTO,))
-    return integrators.AUTO if child is None else props.number("light_paths", 0.0)
+        return props.text("light_paths", "", (AUTO,))
+    return AUTO if child is None else props.number("light_paths", 0.0)
 
 
 def _vcm(props: Properties) -> Integrator:

@@ -13,6 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from clpt import spectra
+from clpt.choices import AUTO
 from clpt.formats.native import json_schema, lenses, motion, reradiation, sensors
 from clpt.formats.native import spectra as json_spectra
 from clpt.formats.native.cursor import Cursor
@@ -21,7 +22,6 @@ from clpt.formats.native.spectra import kind_name
 from clpt.formats.native.transforms import matrix
 from clpt.measured import Measurement, MerlTable
 from clpt.scene import kinds
-from clpt.scene.integrators import AUTO
 from clpt.scene.materials import Layer, Material
 from clpt.scene.media import Medium
 from clpt.scene.motion import Deformation

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from clpt import budget, measured, spectra
+from clpt.choices import Missing
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
 from clpt.formats import volumes
-from clpt.formats.missing import EVEN, GREY, Missing, grey_for
+from clpt.formats.missing import EVEN, GREY, grey_for
 from clpt.formats.native import forms, shape_files
 from clpt.formats.native.cursor import Cursor, parse
 from clpt.formats.native.spectra import find_file, kind_name

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from clpt import budget, numpy_files
+from clpt.choices import Missing
 from clpt.formats import ies
 from clpt.formats.meshes import mesh, particles, strands
 from clpt.formats.meshes.triangles import TANGENTS
-from clpt.formats.missing import Missing
 from clpt.formats.native.cursor import Cursor
 from clpt.formats.native.spectra import find_file
 from clpt.formats.volumes import distances

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from clpt.formats.missing import Missing
+from clpt.choices import Missing
 from clpt.formats.pbrt import build_scene, camera_film, films, reader
 from clpt.formats.pbrt.build_scene import Progress
 from clpt.formats.pbrt.files import Contents

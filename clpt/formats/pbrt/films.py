@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from clpt.choices import MOST_LIGHT_PATHS
 from clpt.errors import UnknownKindError
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.state import Definition, State
 from clpt.scene import integrators
-from clpt.scene.integrators import MOST_LIGHT_PATHS, Film, Filter, Integrator, Sampler
+from clpt.scene.integrators import Film, Filter, Integrator, Sampler
 
 FILMS = ("rgb", "gbuffer", "spectral")
 GBUFFER = ("albedo", "position", "geometric_normal", "shading_normal", "uv")

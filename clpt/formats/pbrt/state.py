@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 
 from clpt import input_files, transforms
+from clpt.choices import Missing
 from clpt.errors import LONGEST_NAME, SceneError
-from clpt.formats.missing import Missing, grey_for
+from clpt.formats.missing import grey_for
 from clpt.formats.pbrt.params import Parameter, Parameters
 from clpt.scene.materials import Material
 from clpt.scene.motion import Keys

@@ -81,21 +81,25 @@ def members(features: Features) -> dict[str, list[str]]:
 
 
 def blocks_text(kinds: Sequence[Features]) -> str:
-    """Return `blocks_0` and further, one a kind of paths: the words of a slot that a block takes.
+    """Return the words of a slot's state that a block takes: `BLOCK_WORDS(which)` for paths.
 
-    They are of the slot's state; of a path those that shading may change are first.
+    Of a path those that shading may change are first.
     """
     numbers = "".join(f"    uint {name};\n" for name in ("path", "changed", "hit", "shadow"))
     arrays = "".join(f"    uchar {r.name.lower()}_words[{r.words}];\n" for r in SLABS)
     t = next(m.word for m in SHADOW.members if m.name == "t")
     rows = [f"typedef struct {{\n{numbers}{arrays}}} BlockWords;", f"#define SHADOW_T {t}"]
-    for which, features in enumerate(kinds):
+    values = []
+    for features in kinds:
         kept = members(features)
         own = {name: _words(features, name, names) for name, names in kept.items()}
         counts = [str(len(own[name])) for name in ("path", "changed", "hit", "shadow")]
         lists = (", ".join(map(str, own[record.name.lower()])) for record in SLABS)
-        values = ", ".join([*counts, *(f"{{{words}}}" for words in lists)])
-        rows.append(f"constant BlockWords blocks_{which} = {{{values}}};")
+        values.append(", ".join([*counts, *(f"{{{words}}}" for words in lists)]))
+    table = ", ".join(f"{{{one}}}" for one in values)
+    rows.append(f"constant BlockWords block_words[{len(kinds)}] = {{{table}}};")
+    which = "which" if len(kinds) > 1 else "0"
+    rows.append(f"#define BLOCK_WORDS(which) (&block_words[{which}])")
     return "\n".join([*rows, ""])
 
 

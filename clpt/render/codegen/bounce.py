@@ -1,18 +1,23 @@
-"""The stages of a bounce in their order, and the text that takes paths through them in the loop."""
+"""The stages of a bounce in their order, and the verbs of kernels/stage/bounce.cl."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from clpt.render.codegen import signatures
-from clpt.render.codegen.dispatch import indented
+from clpt.render.codegen.dispatch import function
 from clpt.render.contract.features import Features
+
+# what a bounce does, in its order
+VERBS = ("begin", "show", "intersect", "flight", "deposit", "train", "mix", "shade", "join")
 
 
 @dataclass(frozen=True)
 class Stage:
-    """A stage of a bounce: its program, its kernel there, how many slots a work-item serves."""
+    """A stage of a bounce: what it does, its program, its kernel there, slots of a work-item."""
 
+    verb: str
     program: str
     kernel: str
     lanes: int
@@ -20,26 +25,31 @@ class Stage:
 
 def order(features: Features, layout: str, lanes: int, interleaved: bool = False) -> list[Stage]:
     """Return the stages of a bounce in their order, but for sorting."""
+    return [*_order(features, layout, lanes, interleaved)]
+
+
+def _order(features: Features, layout: str, lanes: int, interleaved: bool) -> Iterator[Stage]:
     tracing, joining = trace_lanes(layout, lanes), join_lanes(features, layout, lanes, interleaved)
     begin, join = begin_and_join(features)
-    bounce = [Stage(begin, begin, lanes)]
+    yield Stage("begin", begin, begin, lanes)
     if begin == "flare":
-        return [*bounce, Stage(join, join, joining)]
+        yield Stage("join", join, join, joining)
+        return
     if features.shows_lights:
-        bounce.append(Stage(join, join, joining))
-    bounce.append(Stage("intersect", "intersect", lanes if interleaved else tracing))
+        yield Stage("show", join, join, joining)
+    yield Stage("intersect", "intersect", "intersect", lanes if interleaved else tracing)
     if features.media.present:
-        bounce.append(Stage(flight(features), "flight", lanes))
+        yield Stage("flight", flight(features), "flight", lanes)
     if deposits(features):
-        bounce.append(Stage("deposit", "deposit", lanes))
+        yield Stage("deposit", "deposit", "deposit", lanes)
     if trains(features):
-        bounce.append(Stage("train", "train", lanes))
+        yield Stage("train", "train", "train", lanes)
     if features.materials.mixtures:
-        bounce.append(Stage("mix", "mix_materials", lanes))
-    bounce += [Stage(f"shade_{kind}", "shade", lanes) for kind in features.materials.kinds]
+        yield Stage("mix", "mix", "mix_materials", lanes)
+    for kind in features.materials.kinds:
+        yield Stage("shade", f"shade_{kind}", "shade", lanes)
     if joins(features) and any(not cls.delta for cls in features.materials.leaves):
-        bounce.append(Stage(join, join, joining))
-    return bounce
+        yield Stage("join", join, join, joining)
 
 
 def begin_and_join(features: Features) -> tuple[str, str]:
@@ -68,8 +78,13 @@ def trains(features: Features) -> bool:
 
 
 def flight(features: Features) -> str:
-    """Return the program that takes rays through media: that of light paths does without aims."""
-    return "flight_of_light" if features.transport.light_paths and features.media.aims else "flight"
+    """Return the program that takes rays through media.
+
+    That of light paths does without aims, and adds to no layers.
+    """
+    layers = features.media.emissive and bool(features.film.layers.lights)
+    of_light = features.transport.light_paths and (features.media.aims or layers)
+    return "flight_of_light" if of_light else "flight"
 
 
 def trace_lanes(layout: str, lanes: int) -> int:
@@ -90,41 +105,6 @@ def has_both(features: Features) -> bool:
     return len(features.passes) > 1 and not features.transport.lit_ghosts
 
 
-def loop_text(features: Features, layout: str, lanes: int, interleaved: bool) -> str:
-    """Return the functions that stage/loop.cl calls: `loop_begin` and `loop_bounce`.
-
-    `loop_bounce` has all other stages in their order; of the kind of paths `which`, where a scene
-    has two.
-    """
-    bounces = [
-        [
-            _call(features, own, layout, stage, which)
-            for stage in order(own, layout, lanes, interleaved)
-        ]
-        for which, own in enumerate(features.passes)
-    ]
-    lines = list(dict.fromkeys(call.declaration for calls in bounces for call in calls))
-    head = "(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, uint which, "
-    begins = [[calls[0].at("at")] for calls in bounces]
-    lines += [f"inline void loop_begin{head}uint at)", "{", *_of_each(begins), "}"]
-    rests = [calls[1:] for calls in bounces]
-    same = _same(rests)
-    own = []
-    for which, (kind, calls) in enumerate(zip(features.passes, bounces, strict=True)):
-        words = f"blocks_{which}"
-        own.append(_bounce_text(calls[1 + same :], _walk_text(kind, calls, words), words))
-    lines += [
-        f"inline void loop_bounce{head}global uint *queue, uint first, uint end)",
-        "{",
-        "    SLABS",
-        "    uint starts[BSDF_COUNT + 1], block = settings->slots + get_global_id(0) * LANES;",
-        *indented(*_bounce_text(rests[0][:same], [], "")),
-        *_of_each(own),
-        "}",
-    ]
-    return "\n".join([*lines, ""])
-
-
 @dataclass(frozen=True)
 class _Call:
     """A call of a stage in the loop, where it is a function.
@@ -140,18 +120,57 @@ class _Call:
         own = "".join(f", {type_}" for type_, _ in self.args)
         return f"void loop_{self.stage.program}(SLAB_ARGS, SCENE_ARGS{own}, uint at);"
 
-    def at(self, slot: str) -> str:
-        """Return the call for the slots from `slot` on."""
+    @property
+    def text(self) -> str:
+        """The statement that calls it for the slots from `slot` on."""
         own = "".join(f", {passed}" for _, passed in self.args)
-        return f"loop_{self.stage.program}(SLAB_PASSED, SCENE_PASSED{own}, {slot});"
+        return f"loop_{self.stage.program}(SLAB_PASSED, SCENE_PASSED{own}, slot);"
 
-    def through(self, first: str, end: str) -> str:
-        """Return the statement that calls it for a range of slots."""
+    @property
+    def through(self) -> str:
+        """The statement that calls it for the slots from `first` to `end`."""
         step = "LANES" if self.stage.lanes > 1 else "1"
-        return f"for (uint at = {first}; at < {end}; at += {step}) {self.at('at')}"
+        return f"for (uint slot = first; slot < end; slot += {step}) {self.text}"
 
 
-def _call(features: Features, own: Features, layout: str, stage: Stage, which: int) -> _Call:
+def stages_text(features: Features, layout: str, lanes: int, interleaved: bool) -> str:
+    """Return the stages of the loop as functions, and the verbs of kernels/stage/bounce.cl.
+
+    A verb takes the slots from `first` to `end` through a stage, with the arguments of the loop. It
+    asks `which` paths are traced, where they differ in it, and does nothing where none has it.
+    """
+    passes = [
+        [_call(features, own, layout, stage) for stage in order(own, layout, lanes, interleaved)]
+        for own in features.passes
+    ]
+    declared = dict.fromkeys(call.declaration for calls in passes for call in calls)
+    found = {
+        verb: [[call for call in calls if call.stage.verb == verb] for calls in passes]
+        for verb in VERBS
+    }
+    shading = found.pop("shade")
+    head = "void bounce_shade_at(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, uint which, int kind, uint slot)"
+    kinds = enumerate(features.materials.leaves)
+    phases = " || ".join(f"(kind) == {i}" for i, cls in kinds if cls.is_phase)
+    of_camera = [[not own.transport.light_paths] for own in features.passes]
+    rows = [
+        *declared,
+        *(_verb(verb, calls) for verb, calls in found.items()),
+        function(head, *_cases(max(shading, key=len))),
+        f"#define PATHS_ARE_SHADED {_asked(shading)}",
+        f"#define PATHS_WALK {_asked(of_camera)}",
+        f"#define kind_is_phase(kind) ({phases or 0})",
+    ]
+    return "\n".join([*rows, ""])
+
+
+def walks(features: Features) -> bool:
+    """Whether the camera's paths go from collision to collision in media."""
+    of_camera = not features.transport.light_paths
+    return of_camera and any(cls.is_phase for cls in features.materials.leaves)
+
+
+def _call(features: Features, own: Features, layout: str, stage: Stage) -> _Call:
     """The call of a stage for one kind of paths, whose features are `own`."""
     begin, join = begin_and_join(own)
     groups = {
@@ -165,98 +184,35 @@ def _call(features: Features, own: Features, layout: str, stage: Stage, which: i
     }
     args = [(type_, name) for name, type_ in groups.get(stage.kernel, {}).items()]
     if stage.kernel == "shade" and has_both(features):
-        args.append(("uint ", str(which)))
+        args.append(("uint ", "which"))
     return _Call(stage, tuple(args))
 
 
-def _same(bounces: list[list[_Call]]) -> int:
-    """Return the number of calls before shading that all kinds of paths have in common.
+def _verb(verb: str, passes: list[list[_Call]]) -> str:
+    """The macro of a verb, for each kind of paths at most one call.
 
-    Compilers put into the loop what is called in one place alone, which saves some hundredths of
-    the time.
+    It stands there once where it is the same for all: compilers put into the loop what is called in
+    one place alone, which saves some hundredths of the time.
     """
-    first, *others = bounces
-    same = 0
-    while first[same].stage.kernel != "shade" and all(o[same] == first[same] for o in others):
-        same += 1
-    return same
+    each = [calls[0].through if calls else "" for calls in passes]
+    if len(set(each)) == 1:
+        rows = [each[0]]
+    else:
+        rows = [f"if (which == {i}) {{ {one} }}" for i, one in enumerate(each) if one]
+    return " \\\n    ".join([f"#define bounce_{verb}(first, end)", *filter(None, rows)])
 
 
-def _of_each(texts: list[list[str]]) -> list[str]:
-    """Statements for each kind of paths, of which `which` is traced."""
-    if len(texts) == 1:
-        return indented(*texts[0])
-    rows = []
-    for which, text in enumerate(texts):
-        rows += [f"if (which == {which}) {{", *indented(*text), "}"]
-    return indented(*rows)
+def _cases(shading: list[_Call]) -> list[str]:
+    """Statements that shade by the kind of material."""
+    if len(shading) == 1:
+        return [shading[0].text]
+    cases = (f"case {kind}: {call.text} break;" for kind, call in enumerate(shading))
+    return ["switch (kind) {", *cases, "}"]
 
 
-def _bounce_text(calls: list[_Call], walk: list[str], words: str) -> list[str]:
-    """Return statements that take slots through stages.
-
-    walk: what is done before shading; words: of a slot's state, which are sorted.
-    """
-    shading = [call for call in calls if call.stage.kernel == "shade"]
-    sort = "queue_sort(path, hit, queue, starts, first, end);"
-    lines = []
-    for call in calls:
-        if call not in shading:
-            lines.append(call.through("first", "end"))
-            continue
-        kind = shading.index(call)
-        if kind == 0:
-            lines += [sort, *walk, *([sort] if walk else [])]
-        begins, ends = f"starts[{kind}]", f"starts[{kind + 1}]"
-        lines += [
-            f"if (queue_is_dense({ends} - {begins}, end - first)) {{",
-            f"    {call.through('first', 'end')}",
-            "} else {",
-            f"    for (uint entry = {begins}; entry < {ends}; entry += LANES) {{",
-            f"        queue_take(path, hit, shadow, &{words}, queue, entry, {ends}, block);",
-            f"        {call.at('block')}",
-            f"        {_return_text('shadow', words, ends)}",
-            "    }",
-            "}",
-        ]
-    return lines
-
-
-def _return_text(slab: str, words: str, ends: str) -> str:
-    """The statement that brings back paths and a slab."""
-    own = f"{words}.{slab}_words, {words}.{slab}"
-    return f"queue_return(path, {slab}, &{words}, {own}, queue, entry, {ends}, block);"
-
-
-def _walk_text(own: Features, calls: list[_Call], words: str) -> list[str]:
-    """Return statements that take the camera's paths in media from collision to collision.
-
-    They do so in a block while most of its lanes have one; own: the paths' features; calls: all
-    of a bounce.
-    """
-    shading = [call for call in calls if call.stage.kernel == "shade"]
-    if not shading:
-        return []
-    rest = [call for call in calls[1:] if call not in shading]
-    join = [call for call in rest if calls.index(call) > calls.index(shading[0])]
-    of_camera = () if own.transport.light_paths else own.materials.leaves
-    phases = {cls.kind for cls in of_camera if cls.is_phase}
-    lines = []
-    for kind, call in enumerate(shading):
-        if call.stage.program.removeprefix("shade_") not in phases:
-            continue
-        begins, ends = f"starts[{kind}]", f"starts[{kind + 1}]"
-        again = [*join, *(one for one in rest if one not in join)]
-        lines += [
-            f"for (uint entry = {begins}; entry < {ends}; entry += LANES) {{",
-            "    integer ended = 0;",
-            f"    queue_take(path, hit, shadow, &{words}, queue, entry, {ends}, block);",
-            f"    for (int n = 0; queue_walks(path, hit, {kind}, n, &ended, block); n++) {{",
-            f"        {call.at('block')}",
-            *(f"        {one.through('block', 'block + LANES')}" for one in again),
-            "    }",
-            "    queue_walked(path, ended, block);",
-            f"    {_return_text('hit', words, ends)}",
-            "}",
-        ]
-    return lines
+def _asked(passes: list[list[object]]) -> str:
+    """The condition for those kinds of paths that have something."""
+    having = [i for i, found in enumerate(passes) if any(found)]
+    if len(having) in (0, len(passes)):
+        return str(int(bool(having)))
+    return f"(which == {having[0]})"

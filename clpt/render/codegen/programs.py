@@ -146,7 +146,7 @@ def loop_sources(
         **_shared(features, layout),
         **signatures.loop_files(features, layout),
         "generated/block.cl": blocks.blocks_text(features.passes),
-        "generated/loop.cl": bounce.loop_text(features, layout, lanes, interleaved),
+        "generated/bounce_stages.cl": bounce.stages_text(features, layout, lanes, interleaved),
     }
     loop = _source("loop", files, flags.of_scene(features), lanes)
     parts = {name: made[name].with_private(name) for name in used}

@@ -23,21 +23,15 @@ log = logging.getLogger(__name__)
 
 GAP = 256  # words that are written though they are the same, rather than by two commands
 MOST_WRITES = 64  # beyond which the whole range between the first and the last is one write
-FIXED = (
-    "width",
-    "height",
-    "margin",
-    "crop_x",
-    "crop_y",
-    "film_width",
-    "film_height",
-    "bands",
-    "alpha",
-    "light_paths",
-    "guide_paths",
-    "photon_places",
-    "photon_pixels",
-)
+OF_FILM = (
+    "width", "height", "margin", "crop_x", "crop_y", "film_width", "film_height", "bands", "alpha",
+)  # fmt: skip
+OF_PATHS = {
+    "light_paths": "light paths",
+    "guide_paths": "guiding",
+    "photon_places": "photons",
+    "photon_pixels": "photons",
+}
 
 
 @dataclass(frozen=True)
@@ -71,19 +65,13 @@ def prepare(wavefront: Wavefront, lowered: Lowered, refit: bool = False) -> Call
     if the features differ, trees if triangles or boxes do; of tables the words that differ are
     written. The picture is then that of a new renderer.
 
-    Raises SceneError for a film of another size, KernelBuildError, MemoryBudgetError; nothing has
-    changed then.
+    Raises SceneError as `refusal` says, KernelBuildError, MemoryBudgetError; nothing has changed
+    then.
     """
     scene, paths = wavefront.scene, wavefront.paths
-    if any(scene.lowered.settings[name] != lowered.settings[name] for name in FIXED):
-        raise SceneError(
-            "its size, bands, alpha, the reach of its filter, light paths and guiding stay; make a "
-            "new Renderer",
-            where="film",
-        )
-    former, new = scene.lowered.features.film.layers, lowered.features.film.layers
-    if (former.names, former.light_groups) != (new.names, new.light_groups):
-        raise SceneError("other layers need a new Renderer", where="film.layers")
+    refused = refusal(scene.lowered, lowered)
+    if refused is not None:
+        raise refused
     changes = _changes(wavefront, lowered, refit)
     with scene.buffers.all_or_nothing():
         staged = _stage(wavefront, lowered, changes)
@@ -103,6 +91,24 @@ def prepare(wavefront: Wavefront, lowered: Lowered, refit: bool = False) -> Call
             scene.buffers.release(replaced.pop())
 
     return take
+
+
+def refusal(former: Lowered, new: Lowered) -> SceneError | None:
+    """Return why a renderer of one lowering cannot go on with another; None if it can."""
+    old, now = former.settings, new.settings
+    if any(old[name] != now[name] for name in OF_FILM):
+        message = "its size, bands, alpha and the reach of its filter stay; make a new Renderer"
+        return SceneError(message, where="film")
+    layers, others = former.features.film.layers, new.features.film.layers
+    if (layers.names, layers.light_groups) != (others.names, others.light_groups):
+        return SceneError("other layers need a new Renderer", where="film.layers")
+    changed = next((what for name, what in OF_PATHS.items() if old[name] != now[name]), None)
+    if changed is None:
+        return None
+    had, has = former.features.media.present, new.features.media.present
+    cause = f", as the scene has {'media now' if has else 'no media now'}" if had != has else ""
+    message = f"{changed} must stay as before, and would not{cause}; make a new Renderer"
+    return SceneError(message, where=f"integrator {new.integrator.kind}")
 
 
 def _changes(wavefront: Wavefront, lowered: Lowered, refit: bool) -> _Changes:

@@ -36,7 +36,7 @@ class DenoisedNoise:
     """Tells how far the picture of a renderer is from the truth once it is denoised.
 
     renderer: with halves; on: the device that denoises; method: a name of
-    clpt.denoise.needs.METHODS.
+    clpt.choices.DENOISERS.
     """
 
     def __init__(self, renderer: Pictures, on: device.Device, method: str):

@@ -8,6 +8,7 @@ import numpy as np
 
 from clpt import device
 from clpt.arrays import Image
+from clpt.choices import DENOISERS
 from clpt.denoise import needs
 from clpt.denoise.oidn import Oidn
 from clpt.denoise.statistical import Statistical
@@ -18,7 +19,7 @@ from clpt.render.film.pictures import Pictures, Still
 class DenoisedPicture(Still):
     """The picture of a source as it is now, without most of its noise.
 
-    method: a name of clpt.denoise.needs.METHODS, by default the source's own. Layers help where the
+    method: a name of clpt.choices.DENOISERS, by default the source's own. Layers help where the
     film has them, see clpt.denoise.needs. A film of bands is denoised in all of them, and its
     colours by themselves. The picture is not in the promise of equal bits.
 
@@ -29,7 +30,7 @@ class DenoisedPicture(Still):
     """
 
     def __init__(self, source: Pictures, method: str | None = None):
-        self.method = needs.check_method(method or source.denoise or needs.METHODS[0])
+        self.method = needs.check_method(method or source.denoise or DENOISERS[0])
         self._source, self.form = source.developed(), source.form
         self._noisy, self._image = self._source.colours(), self._source.image()
         self._layers = self._source.layers()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import logging
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -16,11 +17,14 @@ import clpt
 from clpt import device
 from clpt import transforms as tf
 from clpt.errors import MemoryBudgetError, SceneError
+from clpt.render.editing.rebuild import refusal
+from clpt.render.lowering.scene import lower
 from clpt.scene import Scene
 from clpt.scene import materials as m
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Film, Path
 from clpt.scene.lights import Area, Point
+from clpt.scene.media import Homogeneous
 from clpt.scene.shapes import Mesh, Rectangle, Sphere
 from clpt.scene.textures import Bitmap
 
@@ -184,6 +188,16 @@ def test_what_cannot_be_changes_nothing(renderer: clpt.Renderer) -> None:
     np.testing.assert_array_equal(picture(renderer), before)
     renderer.update(scene=dataclasses.replace(now, shapes=[*now.shapes, SIDE]))
     check(renderer)
+
+
+def test_what_paths_learn_stays() -> None:
+    """Guiding is left aside in media: an update that brings some is refused, and names both."""
+    guided = dataclasses.replace(scene(), integrator=Path(guiding=True))
+    fog = dataclasses.replace(FLOOR, exterior=Homogeneous(sigma_s=0.1))
+    foggy = dataclasses.replace(guided, shapes=[*guided.shapes, fog])
+    refused = refusal(lower(guided), lower(foggy))
+    assert refused is not None and re.search("path.*guiding.*has media now", str(refused)), refused
+    assert refusal(lower(guided), lower(dataclasses.replace(guided, seed=3))) is None
 
 
 def test_arrays_of_the_device(renderer: clpt.Renderer) -> None:

@@ -58,14 +58,14 @@ kernel void probe(SLAB_ARGS, global uint *queue, global uint *queue_starts, uint
 kernel void probe(SLAB_ARGS, global const uint *queue, uint entry, uint end, uint block)
 {
     SLABS
-    queue_take(path, hit, shadow, &blocks_0, queue, entry, end, block);
+    queue_take(path, hit, shadow, BLOCK_WORDS(0), queue, entry, end, block);
     mask all = mask_of(1);
     store_path_state(path, block, all, load_path_sample(path, block) + load_hit_prim(hit, block));
     store_path_pdf(path, block, all, load_path_pdf(path, block) * 2.0f);
     store_shadow_t(shadow, block, all, load_shadow_t(shadow, block) * 2.0f);
     store_hit_t(hit, block, all, (real)(-1.0f));
-    constant uchar *words = blocks_0.shadow_words;
-    queue_return(path, shadow, &blocks_0, words, blocks_0.shadow, queue, entry, end, block);
+    constant uchar *words = BLOCK_WORDS(0)->shadow_words;
+    queue_return(path, shadow, BLOCK_WORDS(0), words, BLOCK_WORDS(0)->shadow, queue, entry, end, block);
 }
 """,
 }

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.choices import AUTO
 from clpt.geometry import analytic, shape_records, shapes, triangles
 from clpt.render.analysis import cameras, surroundings
 from clpt.render.analysis.geometry import Emitter, Geometry
@@ -25,7 +26,7 @@ from clpt.render.analysis.lights.look import Look
 from clpt.render.analysis.lights.sources import Sources
 from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.scene import materials as mt
-from clpt.scene.integrators import AUTO, Auto, Integrator, Path, Vcm, shared
+from clpt.scene.integrators import Auto, Integrator, Path, Vcm, shared
 from clpt.scene.lights import CubeMap, Envmap, Sky
 from clpt.scene.shapes import Shape
 

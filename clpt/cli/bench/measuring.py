@@ -1,126 +1,31 @@
-"""`clpt bench`: how fast rays, stages, builds and starts are on a device, and beside a record."""
+"""Figures of `clpt bench`, and their tables."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
-from pathlib import Path
 from typing import Any
 
-import click
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from .. import benchmark
-from .. import device as dev
-from ..benchmark import comparing, records, scenes
-from ..benchmark.comparing import Ratio
-from ..benchmark.figures import Figure
-from ..bvh import TREES
-from ..device.context import trial
-from .options.records import with_records
-from .printing.console import output_console
-from .process.extras import extra
+from ... import benchmark
+from ... import device as dev
+from ...benchmark import comparing, records, scenes
+from ...benchmark.comparing import Ratio
+from ...benchmark.figures import Figure
+from ...choices import TREES
+from ...device.context import trial
+from ..printing.console import output_console
+from .settings import STAGES, Report
 
 SLOWER = 3  # the exit status if a figure was refused, or is below --fail-below
-STAGES = (
-    "generate", "emit", "intersect", "mix", "shade", "shadow", "splat", "append", "accumulate",
-)  # fmt: skip
 HEADINGS = ("figure", "", "unit", "±", "GB/s", "of a copy", "")
 
 
-@dataclass(frozen=True)
-class Subject:
-    """Things to measure, and how often: see `clpt.benchmark.measure`."""
-
-    scene: str | None
-    stages: tuple[str, ...]
-    layouts: tuple[str, ...]
-    mode: str | None
-    rounds: int
-    count: int | None
-
-    def settings(self) -> dict[str, Any]:
-        """Return the arguments of `clpt.benchmark.measure`. Raises click.BadParameter."""
-        parts, only, kinds = _chosen(self.stages)
-        return {
-            "parts": parts, "only": only, "kinds": kinds, "scene": self.scene,
-            "layouts": self.layouts or TREES, "mode": self.mode, "rounds": self.rounds,
-            "count": self.count,
-        }  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Report:
-    """Files that get figures, and a record to compare them with."""
-
-    target: Path | None
-    record: Path | None
-    fail_below: float | None
-    plot: Path | None
-
-    def check(self) -> None:
-        """Raise what is wrong with a file, before anything is measured."""
-        if self.fail_below is not None and self.record is None:
-            raise click.UsageError("--fail-below compares: give --compare FILE too")
-        if self.plot is not None:
-            with extra("plot", "a plot"):
-                from .plots import bench as bench_plot  # here: matplotlib is an extra, and slow
-
-            bench_plot.check(self.plot)
-        _ = self.before
-
-    @cached_property
-    def before(self) -> list[dict[str, Any]] | None:
-        """The figures of the record."""
-        return None if self.record is None else records.read(self.record)
-
-
-@click.command()
-@click.option("--scene", help="A scene's file or folder, or atrium or cornell, made from formulas.")
-@click.option(
-    "--stage", "stages", multiple=True, metavar="NAME",
-    help="What to measure: see --list; repeat it for several.  [default: all but shading]",
-)  # fmt: skip
-@click.option("--layout", "layouts", multiple=True, type=click.Choice(TREES), help="Of the trees.")
-@click.option("--mode", type=click.Choice(["spectral", "rgb"]), help="What light is made of.")
-@click.option("--device", help="Index or part of the name of a device, or all.")
-@click.option(
-    "--rounds", type=click.IntRange(1), default=5, show_default=True, help="Of each figure."
-)
-@click.option("--count", type=click.IntRange(64), help="Rays of a set.")
-@click.option(
-    "--json", "target", type=click.Path(path_type=Path), help="Append JSON lines to a file."
-)
-@click.option(
-    "--compare", "record", type=click.Path(path_type=Path),
-    help="JSON lines to compare with, earlier ones or of another device.",
-)  # fmt: skip
-@click.option(
-    "--fail-below", type=float, metavar="RATIO",
-    help="With --compare: exit with 3 if a figure is below this ratio, beyond noise.",
-)  # fmt: skip
-@click.option(
-    "--plot", "plot", type=click.Path(path_type=Path),
-    help="Plot the figures to a .png, .svg or .pdf; of several devices the last one's.",
-)  # fmt: skip
-@click.option("--list", "list_all", is_flag=True, help="List what can be measured, and where.")
-@with_records(subject=Subject, report=Report)
-def bench(subject: Subject, report: Report, device: str | None, list_all: bool) -> int:
-    """Measure rays, stages of rendering, builds and starts of an OpenCL device.
-
-    Figures are medians of rounds; ± is half the distance of their quartiles. A result that cannot
-    be true (rays not traced, wrong hits, times below what memory allows)
-    is refused: it is not recorded, and the exit status is 3.
-    """
+def tell_of_devices(device: str | None, settings: Mapping[str, Any], report: Report) -> int:
+    """Measure the devices of a name, or all, and tell of them; return the exit status."""
     console = output_console()
-    if list_all:
-        _list(console)
-        return 0
-    report.check()
-    settings = subject.settings()
     failed = [_report(console, info, settings, report) for info in _infos(device)]
     return SLOWER if any(failed) else 0
 
@@ -144,32 +49,11 @@ def _report(
         _show_ratios(console, ratios, limit)
         failed |= limit is not None and any(ratio.below(limit) for ratio in ratios)
     if report.plot is not None:
-        from .plots import bench as bench_plot
+        from ..plots import bench as bench_plot
 
         then = {figures.index(one.figure): float(one.then["value"]) for one in ratios}
         bench_plot.write(report.plot, f"{info.label}, clpt bench", figures, then)
     return failed
-
-
-def _chosen(names: Sequence[str]) -> tuple[list[str], list[str], list[str]]:
-    """Return parts, and stages and kinds of material if not all. Raises click.BadParameter."""
-    parts: list[str] = []
-    only: list[str] = []
-    kinds: list[str] = []
-    for name in names:
-        if name in benchmark.PARTS:
-            parts.append(name)
-        elif name.startswith("shading_"):
-            kinds.append(name.removeprefix("shading_"))
-        elif name.split("_")[0] in STAGES:
-            only.append(name)
-        else:
-            known = ", ".join([*benchmark.PARTS, *STAGES])
-            raise click.BadParameter(f"{name!r} is none of {known}", param_hint="--stage")
-    for part, chosen in (("stages", only), ("shading", kinds)):
-        if chosen and part not in parts:
-            parts.append(part)
-    return parts or list(benchmark.DEFAULT_PARTS), only, kinds
 
 
 def _infos(device: str | None) -> list[dev.DeviceInfo]:
@@ -244,8 +128,9 @@ def _show_ratios(console: Console, ratios: Sequence[Ratio], limit: float | None)
     console.print(table)
 
 
-def _list(console: Console) -> None:
+def show_list() -> None:
     """Print what --stage, --scene, --layout and --device accept."""
+    console = output_console()
     rows = {
         **benchmark.PARTS,
         "a stage": "of `stages` alone: " + ", ".join(STAGES),

@@ -1,0 +1,98 @@
+"""What the compilers of GPUs that are not here make of every program of the scenes.
+
+`GPU_COMPILERS` names the folder into which bench/gpu_compilers/unpack.sh has unpacked them; without
+it those are taken that are installed. A compiler that is missing is told and left out. --json keeps
+a row a program; texts that stand there are not compiled again.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+from rich.table import Table
+
+from bench import machine
+from bench.gpu_compilers import programs, results
+from bench.gpu_compilers.results import Row
+from bench.gpu_compilers.vendors import VENDORS, CompilerError, Vendor
+
+
+def compiled(vendor: Vendor, device: str, program: programs.Program) -> Row:
+    """A row: what became of a program, or the error."""
+    row: Row = {"device": device, "digest": program.digest, "stage": program.stage}
+    row |= {"scene": program.scene, "mode": program.mode}
+    try:
+        return row | vars(vendor.figures(program.text, device))
+    except CompilerError as error:
+        return row | {"error": str(error)}
+
+
+def measure(vendors: list[Vendor], given: list[programs.Program], known: list[Row]) -> Iterator[Row]:
+    """Yield a row for each device and program that is not known; devices of each vendor in turn."""
+    done = {(row["device"], row["digest"]) for row in known}
+    for number in range(max(len(vendor.devices) for vendor in vendors)):
+        for vendor in vendors:
+            for device in vendor.devices[number : number + 1]:
+                for program in given:
+                    if (device, program.digest) not in done:
+                        yield compiled(vendor, device, program)
+
+
+def present() -> list[Vendor]:
+    """Vendors whose compilers are here; others are told."""
+    found = []
+    for vendor in VENDORS:
+        if vendor.missing:
+            click.echo(f"{vendor.name} is left out: {', '.join(vendor.missing)} not found", err=True)
+        else:
+            found.append(vendor)
+    return found
+
+
+@click.command(help=__doc__)
+@click.option("--json", "json_file", type=click.Path(path_type=Path), help="a row a program")
+@click.option("--device", "devices", multiple=True, help="these alone")
+@click.option("--scene", "names", multiple=True, help="these alone")
+@click.option("--seconds", type=float, help="after which no further program is compiled")
+@click.option("--keep", is_flag=True, help="write the page and the picture in bench/results")
+def main(
+    json_file: Path | None,
+    devices: tuple[str, ...],
+    names: tuple[str, ...],
+    seconds: float | None,
+    keep: bool,
+) -> None:
+    os.nice(5)
+    given = programs.of_scenes(p for p in programs.scenes() if not names or p.name in names)
+    known = results.read(json_file) if json_file else []
+    digests = {program.digest for program in given}
+    rows = [row for row in known if row["digest"] in digests]
+    end = time.monotonic() + seconds if seconds else float("inf")
+    vendors = [vendor.only(devices) for vendor in present()]
+    for row in measure([vendor for vendor in vendors if vendor.devices], given, rows):
+        rows.append(row)
+        if "error" in row:
+            click.echo(f"{row['device']} {row['scene']} {row['stage']}: {row['error']}", err=True)
+        machine.append(json_file, "gpu_compilers", [row])
+        if time.monotonic() > end:
+            break
+    stages = results.of_stages(rows)
+    if keep:
+        results.keep(stages)
+    machine.console().print(_summary(stages))
+
+
+def _summary(stages: list[Row]) -> Table:
+    columns = ("device", "stage", "programs", "registers", "occupancy", "stack", "spilled", "seconds")
+    table = Table(*columns)
+    for row in stages:
+        table.add_row(*(str(row.get(name, "")) for name in columns))
+    return table
+
+
+if __name__ == "__main__":
+    main()

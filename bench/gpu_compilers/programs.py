@@ -1,0 +1,75 @@
+"""The programs of the scenes as a GPU gets them: one lane, along queues, in two layouts of trees."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import clpt
+from bench import machine
+from clpt import device
+from clpt.render.codegen import programs
+from clpt.render.contract.features import Features
+from clpt.render.lowering.scene import lower
+
+MODES = ("rgb", "spectral")
+LAYOUTS = ("compact", "wide8")
+
+
+@dataclass(frozen=True)
+class Program:
+    """A text, and where it stands first.
+
+    stage: with its layout, if the text hangs on that.
+    """
+
+    text: str
+    stage: str
+    scene: str
+    mode: str
+
+    @property
+    def digest(self) -> str:
+        """What is equal for equal texts."""
+        return hashlib.sha256(self.text.encode()).hexdigest()[:16]
+
+
+def scenes() -> list[Path]:
+    """The scenes that stand in files."""
+    return sorted(path.parent for path in (machine.ROOT / "scenes").glob("*/scene.json"))
+
+
+def of_scenes(paths: Iterable[Path], modes: Iterable[str] = MODES) -> list[Program]:
+    """Every text of scenes once."""
+    found: dict[str, Program] = {}
+    layouts: dict[str, set[str]] = {}
+    for path in paths:
+        scene = clpt.load(path)
+        for mode in modes:
+            film = dataclasses.replace(scene.film, mode=mode)
+            features = lower(dataclasses.replace(scene, film=film)).features
+            for layout in LAYOUTS:
+                for stage, source in _sources(features, layout):
+                    program = Program(source.text, stage, path.name, mode)
+                    found.setdefault(source.text, program)
+                    layouts.setdefault(source.text, set()).add(layout)
+    return [_named(program, layouts[text]) for text, program in found.items()]
+
+
+def _sources(features: Features, layout: str) -> Iterator[tuple[str, device.Source]]:
+    """The texts of a picture, by the names of their stages."""
+    for own in features.passes:
+        yield from programs.sources(own, layout, 1, queued=True).items()
+    yield from programs.film_sources(features, layout).items()
+    yield from programs.noise_sources(features, layout).items()
+
+
+def _named(program: Program, layouts: set[str]) -> Program:
+    """The program of a stage; with its layout, if only one has this text."""
+    if len(layouts) > 1:
+        return program
+    (layout,) = layouts
+    return dataclasses.replace(program, stage=f"{program.stage} {layout}")

@@ -1,0 +1,57 @@
+"""`clpt bench`: how fast rays, stages, builds and starts are on a device, and beside a record."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from ...choices import MODES, TREES
+from ..options.records import with_records
+from .settings import Report, Subject
+
+
+@click.command()
+@click.option("--scene", help="A scene's file or folder, or atrium or cornell, made from formulas.")
+@click.option(
+    "--stage", "stages", multiple=True, metavar="NAME",
+    help="What to measure: see --list; repeat it for several.  [default: all but shading]",
+)  # fmt: skip
+@click.option("--layout", "layouts", multiple=True, type=click.Choice(TREES), help="Of the trees.")
+@click.option("--mode", type=click.Choice(MODES), help="What light is made of.")
+@click.option("--device", help="Index or part of the name of a device, or all.")
+@click.option(
+    "--rounds", type=click.IntRange(1), default=5, show_default=True, help="Of each figure."
+)
+@click.option("--count", type=click.IntRange(64), help="Rays of a set.")
+@click.option(
+    "--json", "target", type=click.Path(path_type=Path), help="Append JSON lines to a file."
+)
+@click.option(
+    "--compare", "record", type=click.Path(path_type=Path),
+    help="JSON lines to compare with, earlier ones or of another device.",
+)  # fmt: skip
+@click.option(
+    "--fail-below", type=float, metavar="RATIO",
+    help="With --compare: exit with 3 if a figure is below this ratio, beyond noise.",
+)  # fmt: skip
+@click.option(
+    "--plot", "plot", type=click.Path(path_type=Path),
+    help="Plot the figures to a .png, .svg or .pdf; of several devices the last one's.",
+)  # fmt: skip
+@click.option("--list", "list_all", is_flag=True, help="List what can be measured, and where.")
+@with_records(subject=Subject, report=Report)
+def bench(subject: Subject, report: Report, device: str | None, list_all: bool) -> int:
+    """Measure rays, stages of rendering, builds and starts of an OpenCL device.
+
+    Figures are medians of rounds; ± is half the distance of their quartiles. A result that cannot
+    be true (rays not traced, wrong hits, times below what memory allows)
+    is refused: it is not recorded, and the exit status is 3.
+    """
+    from .measuring import show_list, tell_of_devices  # here: help needs no OpenCL
+
+    if list_all:
+        show_list()
+        return 0
+    report.check()
+    return tell_of_devices(device, subject.settings(), report)

@@ -1,0 +1,92 @@
+"""The options of `clpt bench`, as records."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ...choices import TREES
+from ..process.extras import extra
+
+STAGES = (
+    "generate", "emit", "intersect", "mix", "shade", "shadow", "splat", "append", "accumulate",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Subject:
+    """Things to measure, and how often: see `clpt.benchmark.measure`."""
+
+    scene: str | None
+    stages: tuple[str, ...]
+    layouts: tuple[str, ...]
+    mode: str | None
+    rounds: int
+    count: int | None
+
+    def settings(self) -> dict[str, Any]:
+        """Return the arguments of `clpt.benchmark.measure`. Raises click.BadParameter."""
+        parts, only, kinds = _chosen(self.stages)
+        return {
+            "parts": parts, "only": only, "kinds": kinds, "scene": self.scene,
+            "layouts": self.layouts or TREES, "mode": self.mode, "rounds": self.rounds,
+            "count": self.count,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Report:
+    """Files that get figures, and a record to compare them with."""
+
+    target: Path | None
+    record: Path | None
+    fail_below: float | None
+    plot: Path | None
+
+    def check(self) -> None:
+        """Raise what is wrong with a file, before anything is measured."""
+        if self.fail_below is not None and self.record is None:
+            raise click.UsageError("--fail-below compares: give --compare FILE too")
+        if self.plot is not None:
+            with extra("plot", "a plot"):
+                from ..plots import bench as bench_plot  # here: matplotlib is an extra, and slow
+
+            bench_plot.check(self.plot)
+        _ = self.before
+
+    @cached_property
+    def before(self) -> list[dict[str, Any]] | None:
+        """The figures of the record."""
+        if self.record is None:
+            return None
+        from ...benchmark import records  # here: help needs no OpenCL
+
+        return records.read(self.record)
+
+
+def _chosen(names: Sequence[str]) -> tuple[list[str], list[str], list[str]]:
+    """Return parts, and stages and kinds of material if not all. Raises click.BadParameter."""
+    from ... import benchmark  # here: help needs no OpenCL
+
+    parts: list[str] = []
+    only: list[str] = []
+    kinds: list[str] = []
+    for name in names:
+        if name in benchmark.PARTS:
+            parts.append(name)
+        elif name.startswith("shading_"):
+            kinds.append(name.removeprefix("shading_"))
+        elif name.split("_")[0] in STAGES:
+            only.append(name)
+        else:
+            known = ", ".join([*benchmark.PARTS, *STAGES])
+            raise click.BadParameter(f"{name!r} is none of {known}", param_hint="--stage")
+    for part, chosen in (("stages", only), ("shading", kinds)):
+        if chosen and part not in parts:
+            parts.append(part)
+    return parts or list(benchmark.DEFAULT_PARTS), only, kinds

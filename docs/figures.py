@@ -1,0 +1,175 @@
+"""Writes the tables of figures in README.md and docs/*.md: `python -m docs.figures`.
+
+A table stands between <!-- figures: NAME --> and <!-- end of figures -->. NAME is a function of
+`TABLES`; its numbers are the newest records of bench/results.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bench.report import RESULTS, table
+
+ROOT = Path(__file__).resolve().parents[1]
+PLACE = re.compile(r"(<!-- figures: (\w+) -->\n).*?(<!-- end of figures -->)", re.S)
+AVX2, AVX512 = "AMD EPYC avx2", "AMD EPYC avx512f"
+NAMES = {"cornell": "Cornell box", "glass": "glass with caustics"}
+
+Record = dict[str, Any]
+
+
+def written(page: str) -> str:
+    """Return a page with its tables made anew; an unknown name raises KeyError."""
+    return PLACE.sub(lambda match: f"{match[1]}\n{TABLES[match[2]]()}\n{match[3]}", page)
+
+
+def pages() -> list[Path]:
+    """Return the pages that may have figures."""
+    return [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+@cache
+def records() -> list[Record]:
+    """Return all records of bench/results, the oldest first."""
+    lines = [line for file in sorted(RESULTS.glob("2*.jsonl")) for line in file.open("rb")]
+    return sorted(map(json.loads, lines), key=lambda record: str(record["date"]))
+
+
+def newest(bench: str, **about: Any) -> Record:
+    """Return the newest record of a bench with these values; raises KeyError if there is none."""
+    for record in reversed(records()):
+        if record["bench"] == bench and about.items() <= record.items():
+            return record
+    raise KeyError(f"bench/results has no {bench} with {about}")
+
+
+def names(bench: str, name: str, **about: Any) -> list[str]:
+    """Return the values that a name has in the records of a bench, in the order of their coming."""
+    found = [r[name] for r in records() if r["bench"] == bench and about.items() <= r.items()]
+    return list(dict.fromkeys(found))
+
+
+def shown(value: float) -> str:
+    """Return two or three digits."""
+    return f"{value:.3g}" if value >= 10 else f"{value:.2f}"
+
+
+
+def efficiency() -> str:
+    """Return clpt's efficiency over Mitsuba's: three scenes, and the mean of all."""
+
+    def ratios(processor: str, mode: str, scenes: Iterable[str]) -> list[float]:
+        about = {"processor": processor, "mode": mode, "threads": 1, "as_file": False}
+        return [newest("efficiency", scene=s, **about)["efficiency_ratio"] for s in scenes]
+
+    columns = [(p, mode) for p in (AVX2, AVX512) for mode in ("rgb", "spectral")]
+    body = [
+        [NAMES.get(s, s), *(f"{ratios(p, mode, [s])[0]:.1f}" for p, mode in columns)]
+        for s in ("cornell", "atrium", "glass")
+    ]
+    means = ["geometric mean of all scenes"]
+    for processor, mode in columns:
+        about = {"processor": processor, "mode": mode, "threads": 1, "as_file": False}
+        found = ratios(processor, mode, names("efficiency", "scene", **about))
+        means.append(f"{np.exp(np.mean(np.log(found))):.1f} (of {len(found)})")
+    heads = ["clpt : Mitsuba 3", "AVX2, RGB", "AVX2, spectral", "AVX-512, RGB", "AVX-512, spectral"]
+    return table(heads, [*body, means])
+
+
+def samplers() -> str:
+    """Return the errors of 64 samples by each sampler."""
+    about = {"processor": AVX2, "mode": "rgb", "renderer": "clpt", "threads": 1}
+    kinds = ("sobol", "independent")
+    body = [
+        [
+            NAMES.get(scene, scene),
+            *(f"{newest('renders', scene=scene, sampler=k, **about)['relmse']:.4f}" for k in kinds),
+        ]
+        for scene in ("cornell", "atrium", "glass")
+    ]
+    return table(["scene", *(f"`{kind}`" for kind in kinds)], body)
+
+
+def modes() -> str:
+    """Return what wavelengths cost beside RGB."""
+    body = []
+    for name, what in (("time_ratio", "time"), ("relmse_ratio", "error")):
+        for scene in ("cornell", "atrium"):
+            value = newest("spectral", processor=AVX2, scene=scene)[name]
+            body.append([f"{what}, {NAMES.get(scene, scene)}", "1", f"{value:.2f}"])
+    for name, what in (("cold", "without"), ("warm", "with")):
+        own = [newest("startup", renderer="clpt", mode=mode)[name] for mode in ("rgb", "spectral")]
+        body.append([f"start {what} caches", *(f"{seconds:.1f} s" for seconds in own)])
+    return table(["", "`rgb`", "`spectral`"], body)
+
+
+def effects() -> str:
+    """Return what effects of wavelengths cost."""
+    found = [newest("effects", effect=effect) for effect in names("effects", "effect")]
+    return table(
+        ["effect", "time", "variance"],
+        ([r["effect"], shown(r["time_ratio"]), shown(r["variance_ratio"])] for r in found),
+    )
+
+
+def layouts() -> str:
+    """Return rates of rays by the layout of the tree."""
+    kinds = ("wide8", "compact", "binary")
+    about = {"processor": AVX2, "scene": "atrium", "rays": "diffuse", "query": "closest"}
+    rates = [newest("rays", layout=kind, **about)["value"] for kind in kinds]
+    return table(
+        ["layout", *(f"`{kind}`" for kind in kinds)],
+        [["million rays a second", *(f"{rate:.1f}" for rate in rates)]],
+    )
+
+
+def sizes() -> str:
+    """Return time and memory by the number of triangles."""
+    found = [newest("sizes", triangles=count) for count in sorted(names("sizes", "triangles"))]
+    return table(
+        ["triangles", "time of a ray [µs]", "memory at the peak [GiB]"],
+        (
+            [f"{r['triangles']:,}", f"{r['us_per_ray']:.2f}", f"{r['peak'] / 2**30:.2f}"]
+            for r in found
+        ),
+    )
+
+
+def denoisers() -> str:
+    """Return how much less error denoised pictures have: both denoisers, by samples."""
+    body = []
+    for scene in names("denoising", "scene"):
+        cells = [f"`{scene}`"]
+        for gain in ("gain", "bands_gain"):
+            for spp in (16, 64):
+                figures = [f"{kind}, {spp} spp" for kind in ("oidn", "statistical")]
+                own = [newest("denoising", scene=scene, figure=f)[gain] for f in figures]
+                cells.append(" : ".join(f"{value:.3g}" for value in own))
+        body.append(cells)
+    heads = ["gain, `oidn` : `statistical`", "16 samples", "64 samples", "bands, 16", "bands, 64"]
+    return table(heads, body)
+
+
+TABLES: dict[str, Callable[[], str]] = {
+    one.__name__: one
+    for one in (efficiency, samplers, modes, effects, layouts, sizes, denoisers)
+}
+
+
+def main() -> None:
+    for page in pages():
+        text = page.read_text("utf-8")
+        if (new := written(text)) != text:
+            page.write_text(new, "utf-8")
+            print(page.relative_to(ROOT))
+
+
+if __name__ == "__main__":
+    main()
