@@ -204,7 +204,7 @@ def _own(
 
 
 def _analytic(
-    shape: Any,
+    shape: Shape,
     whole: Prototype,
     prototypes: list[Prototype],
     warnings: list[str],

@@ -58,7 +58,7 @@ def _check(mesh: Mesh, name: str) -> None:
         raise SceneError(message, where=name)
     if mesh.displacement is None:
         return
-    image: Any = mesh.displacement
+    image = mesh.displacement
     if mesh.uvs is None or not isinstance(image, Bitmap) or image.mapping != "uv":
         message = "displacement needs uvs, and a bitmap that is laid out by them"
         raise SceneError(message, where=name)
@@ -129,7 +129,8 @@ def _displaced(mesh: Mesh, parts: Parts, name: str) -> Parts:
         points, normals, uvs = (_grown(one, edges) for one in (points, normals, uvs))
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = normals / np.where(length > 0.0, length, 1.0)
-    image: Any = mesh.displacement
+    image = mesh.displacement
+    assert image is not None
     moved = points + mesh.displacement_scale * heights(image, uvs)[:, None] * normals
     _, welded, own = _welded(points, faces)
     shares = np.bincount(own)

@@ -100,7 +100,7 @@ def check_options(scene: Scene, options: Mapping[str, Any]) -> None:
             raise SceneError(message, where=name)
 
 
-def check_changes(camera: object, **by_key: Any) -> None:
+def check_changes(camera: object, **by_key: object) -> None:
     """Raise SceneError for what `Renderer.update` cannot take as a camera or as changes by key."""
     if camera is not None and not isinstance(camera, Camera):
         message = f"must be a camera, such as clpt.scene.cameras.Perspective, not {camera!r}"

@@ -371,7 +371,7 @@ class Film(Kind):
         return x, y, width, height
 
 
-def _white_balance(given: Any) -> Any:
+def _white_balance(given: Any) -> str | float | tuple[float, float]:
     """A name, a temperature [K] or (x, y), checked. Raises SceneError."""
     where = "film.white_balance"
     if isinstance(given, str):

@@ -704,7 +704,7 @@ def inner(material: Material) -> Iterator[tuple[str, Material]]:
             yield name, part
 
 
-def parts(material: Any) -> Iterator[Material]:
+def parts(material: Material) -> Iterator[Material]:
     """A material and those inside it; nothing of what is no material."""
     if isinstance(material, Material):
         yield material

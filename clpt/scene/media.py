@@ -30,7 +30,7 @@ from clpt.scene.params import (
 )
 from clpt.scene.params import emission as emitted
 from clpt.scene.scatterer import Scatterer
-from clpt.scene.values import Matrix4, SpectrumLike
+from clpt.scene.values import Matrix4, SpectrumLike, Vector3
 from clpt.scene.volumes import Volume, check_volume, resampled
 from clpt.spectra import (
     RGB,
@@ -436,7 +436,8 @@ class Dyed(Homogeneous):
 
     @cached_property
     def _collisions(self) -> Phase:
-        dye: Any = self.dye
+        dye = self.dye
+        assert dye is not None
         scatters, sent = super().coefficients(True)[1], self.coefficients(True)[1]
         strength = self.strength * self.scale
         over = np.maximum(sent.sample(WIDEST), 1e-30)
@@ -450,8 +451,8 @@ class Dyed(Homogeneous):
     @property
     def _given(self) -> Spectrum:
         """Return the spectrum that the dye emits under light that is equal at all wavelengths."""
-        dye: Any = self.dye
-        out, into, values = dye.table
+        assert self.dye is not None
+        out, into, values = self.dye.table
         sums = 0.5 * (values[:, 1:] + values[:, :-1]) @ np.diff(into)
         return spectra.Tabulated(out, sums)
 
@@ -501,8 +502,8 @@ class Cloud(Lattice, Homogeneous):
     density: float = real(1.0, "how much of the noise becomes cloud", low=0.0)
     wispiness: float = real(1.0, "how much the noise is shifted", low=0.0, high=100.0)
     frequency: float = real(5.0, "cells of the first octave along a unit length", low=0.0, high=1e4)
-    low: Any = host((0.0, 0.0, 0.0), "a corner of the box", form="vector")
-    high: Any = host((1.0, 1.0, 1.0), "the opposite one", form="vector")
+    low: Vector3 = host((0.0, 0.0, 0.0), "a corner of the box", form="vector")
+    high: Vector3 = host((1.0, 1.0, 1.0), "the opposite one", form="vector")
     resolution: int = host(
         0, "points along the longest side of the box; 0: two for each cell of the finest octave, "
         f"from {CLOUD_LEAST} to {CLOUD_MOST}"

@@ -163,7 +163,7 @@ def _keyed(values: Any, where: str, count: int, widths: tuple[int, ...]) -> NDAr
     return found
 
 
-def placement(thing: Any) -> NDArray[np.float64] | None:
+def placement(thing: object) -> NDArray[np.float64] | None:
     """Return where a shape, light or camera is, (4, 4); None for what is at no place."""
     if hasattr(thing, "to_world"):
         return np.asarray(thing.to_world, np.float64)

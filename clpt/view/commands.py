@@ -293,7 +293,7 @@ def _shown(value: object) -> str:
     return text if len(text) <= 40 else f"{text[:40]}..."
 
 
-def _check_value(value: Any, levels: int) -> int:
+def _check_value(value: object, levels: int) -> int:
     """Return how many parts a value has.
 
     Raises CommandError for what is nested too deeply, and numbers too large or not finite.

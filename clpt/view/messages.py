@@ -31,7 +31,7 @@ def as_json(message: object) -> str:
         return json.dumps(finite(message))
 
 
-def finite(value: Any) -> Any:
+def finite(value: object) -> Any:
     """Return a message in which what is no finite number is None."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None

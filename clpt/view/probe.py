@@ -19,7 +19,7 @@ from clpt.device import Device
 from clpt.render.renderer import Renderer
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Camera, Matrix, Orthographic, Perspective
-from clpt.scene.integrators import Box, Direct, Path, Whitted, shared
+from clpt.scene.integrators import Box, Direct, Integrator, Path, Whitted, shared
 from clpt.scene.params import fields_of
 from clpt.scene.shapes import Group, Instance, Shape
 from clpt.view.messages import Reply, answering
@@ -62,7 +62,7 @@ def window(camera: Camera, film: Film, x: int, y: int) -> Camera | None:
     return None
 
 
-def pixel_of(scene: Scene, x: int, y: int, bands: int, integrator: Any) -> Scene:
+def pixel_of(scene: Scene, x: int, y: int, bands: int, integrator: Integrator) -> Scene:
     """Return a scene that shows the pixel (x, y) of another one alone."""
     camera = window(scene.camera, scene.film, x, y)
     size: dict[str, Any] = {"width": 1, "height": 1, "crop": None}
@@ -72,7 +72,7 @@ def pixel_of(scene: Scene, x: int, y: int, bands: int, integrator: Any) -> Scene
     return dataclasses.replace(scene, camera=camera, film=film, integrator=integrator, noise=None)
 
 
-def plain(integrator: Any) -> tuple[Any, str]:
+def plain(integrator: Integrator) -> tuple[Integrator, str]:
     """Return an integrator that renders one pixel well, and what to say if it is another."""
     if isinstance(integrator, (Direct, Whitted)):
         return integrator, ""

@@ -39,6 +39,7 @@ from clpt.spectra import (
     Spectrum,
     Tabulated,
 )
+from clpt.spectra.spectrum import Outside
 
 LUMINANCE = (0.212671, 0.715160, 0.072169)  # of Rec. 709, as Mitsuba has it
 VOLUMES = ("constvolume", "gridvolume")
@@ -58,12 +59,12 @@ def emission(props: Properties, name: str, *, textured: bool = False) -> Any:
     return value
 
 
-def index(props: Properties, name: str, default: Any) -> Any:
+def index(props: Properties, name: str, default: object) -> Any:
     """Take an optical constant of a conductor: a number, a colour, a spectrum or a texture."""
     return _take(props, name, INDEX, default)
 
 
-def factor(props: Properties, name: str, default: Any) -> Any:
+def factor(props: Properties, name: str, default: object) -> Any:
     """Take a spectrum without limits: a number, a colour, a spectrum or a texture."""
     return _take(props, name, FACTOR, default)
 
@@ -111,7 +112,7 @@ def real(props: Properties, name: str, default: float) -> float | Texture:
     return made
 
 
-def _take(props: Properties, name: str, role: Spectral, default: Any) -> Any:
+def _take(props: Properties, name: str, role: Spectral, default: object) -> Any:
     child = props.take(name)
     if child is None:
         return default
@@ -168,7 +169,7 @@ def _spectrum(child: Element, role: Spectral, props: Properties, name: str) -> A
         raise child.error("must be a number, a colour, a spectrum or a texture")
     if child.type:
         return _plugin(child, role, props)
-    outside: Any = "hold" if role.measured else "zero"
+    outside: Outside = "hold" if role.measured else "zero"
     if "filename" in child.attributes:
         path = props.context.document.find_file(child, child.attributes["filename"])
         if role is INDEX:

@@ -8,6 +8,7 @@ fields, or `values` [[nm, value], ...], or a `file`.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Collection
 from typing import Any
 
 from clpt import input_files, spectra
@@ -17,6 +18,7 @@ from clpt.formats.native.cursor import Cursor
 from clpt.scene.integrators import NO_AOV
 from clpt.scene.roles import COEFFICIENT, EMISSION, INDEX, Spectral
 from clpt.spectra import Spectrum
+from clpt.spectra.spectrum import Outside
 
 SPECTRA: dict[str, type[Spectrum]] = {
     "constant": spectra.Constant,
@@ -52,7 +54,7 @@ def _read(cursor: Cursor, role: Spectral) -> Any:
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return cursor.number()
     cursor.expect(dict, "a number, [r, g, b] or a spectrum")
-    outside: Any = "hold" if role.measured else "zero"
+    outside: Outside = "hold" if role.measured else "zero"
     if "file" in value:
         return _from_file(cursor, role, outside)
     if "values" in value and "type" not in value:
@@ -65,7 +67,7 @@ def _read(cursor: Cursor, role: Spectral) -> Any:
     return _typed(cursor)
 
 
-def _from_file(cursor: Cursor, role: Spectral, outside: Any) -> Spectrum:
+def _from_file(cursor: Cursor, role: Spectral, outside: Outside) -> Spectrum:
     cursor.check_keys("spectrum", ("file",))
     path = find_file(cursor.at("file"))
     if role is INDEX:
@@ -112,7 +114,7 @@ def write(spectrum: Spectrum | str, role: Spectral) -> Any:
     return {"type": kind, **fields}
 
 
-def kind_name(cursor: Cursor, category: str, known: Any) -> str:
+def kind_name(cursor: Cursor, category: str, known: Collection[str]) -> str:
     """Return the `type` of an object. Raises SceneError, UnknownKindError."""
     if "type" not in cursor.expect(dict):
         raise cursor.error("needs the key 'type'")

@@ -26,6 +26,7 @@ from clpt.scene.materials import Material
 from clpt.scene.media import HenyeyGreenstein, Homogeneous, Isotropic
 from clpt.scene.roles import COEFFICIENT, INDEX, REAL, REFLECTANCE
 from clpt.scene.textures import Texture
+from clpt.scene.values import IndexLike, Textured, TexturedNumber
 
 THICKNESS = 0.01  # of pbrt's coats, in mean free paths
 
@@ -58,7 +59,7 @@ def coat(params: Parameters, state: State) -> float:
     return thickness
 
 
-def plastic(base: Any, eta: Any, alpha: Any) -> Material:
+def plastic(base: Textured, eta: IndexLike, alpha: TexturedNumber) -> Material:
     given = {"diffuse_reflectance": base, "int_ior": eta, "ext_ior": 1.0, "nonlinear": True}
     if smooth(alpha):
         return both(materials.Plastic(**given))

@@ -48,7 +48,7 @@ TEXTURE = Spectral("texture", colour=None)  # what textures are made of
 
 
 def spectrum(
-    params: Parameters, name: str, role: Spectral, state: State, default: Any = None
+    params: Parameters, name: str, role: Spectral, state: State, default: object = None
 ) -> Any:
     """Take a number or a spectrum in the role of a parameter of ours; `default` where not given.
 

@@ -44,7 +44,9 @@ FLOATS = (".exr", ".hdr", ".pfm")  # whose numbers are no colours where a float 
 FILTERS = {"point": "nearest", "bilinear": "bilinear", "trilinear": "trilinear", "ewa": "trilinear"}
 
 
-def textured(params: Parameters, name: str, role: Role, state: State, default: Any = None) -> Any:
+def textured(
+    params: Parameters, name: str, role: Role, state: State, default: object = None
+) -> Any:
     """Take a value or a texture in a role of ours; REAL is a number or a float texture.
 
     A texture is made once for all parameters that name it. Raises SceneError with the location.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NoReturn
+from typing import NoReturn
 
 from clpt.errors import SceneError
 from clpt.geometry import shapes
@@ -12,6 +12,7 @@ from clpt.geometry.motion import check as check_motion
 from clpt.render.analysis.bodies import check_bodies
 from clpt.render.analysis.cameras import CONNECTED, dispersive_glasses
 from clpt.scene import Scene
+from clpt.scene import materials as mt
 from clpt.scene.cameras import Camera
 from clpt.scene.integrators import (
     HAVE_LAYERS,
@@ -129,7 +130,7 @@ def _gives_other_light(medium: Medium | None) -> bool:
     return any(one.fluoresces for phase in phases for one in phase.leaves)
 
 
-def _has(material: Any, trait: str) -> bool:
+def _has(material: mt.Material, trait: str) -> bool:
     """Whether a material, or one inside it, has a trait of its class."""
     parts = fields_of(material).values()
     return getattr(material, trait, False) or any(

@@ -29,7 +29,7 @@ class LoweringCache:
         self._made: dict[Any, tuple[Any, Any]] = {}
 
     def __call__(
-        self, make: Callable[..., Made], *given: Any, by: tuple[Any, ...] | None = None
+        self, make: Callable[..., Made], *given: object, by: tuple[Any, ...] | None = None
     ) -> Made:
         """Return make(*given); the same object as before for what was given before.
 

@@ -49,7 +49,7 @@ class _Ranges:
     """
 
     row: NDArray[Any]
-    shape: Any
+    shape: Shape
     vertices: tuple[int, int]
     faces: tuple[int, int]
     mirrored: bool = False
@@ -163,7 +163,7 @@ class Moving:
         return backwards[::-1]
 
     def _plan_shape(
-        self, ranges: _Ranges, old: Any, new: Any, device_matrix: Location | None
+        self, ranges: _Ranges, old: Shape, new: Shape, device_matrix: Location | None
     ) -> list[Action]:
         """Return the actions that move a shape. Raises CannotMove."""
         name = _name(new)
@@ -191,13 +191,13 @@ class Moving:
         if given.get("vertices") is not before.get("vertices"):
             if not ranges.whole:
                 raise CannotMove(f"{name} has triangles without an area")
-            if not on_device(new.vertices):
+            if not on_device(given["vertices"]):
                 points = triangles.points(new)
                 if len(points) != count:
                     raise CannotMove(f"{name} has {len(points)} vertices, and had {count}")
         return [lambda: self._move_vertices(ranges, new, points, matrix, device_matrix)]
 
-    def _plan_analytic(self, ranges: _Ranges, new: Any) -> list[Action]:
+    def _plan_analytic(self, ranges: _Ranges, new: Shape) -> list[Action]:
         """Return the actions that move an analytic shape. Raises CannotMove if its kind changes."""
         shape = ranges.shape if isinstance(new, Instance) else new
         matrix = shapes.placement(new) @ ranges.own
@@ -206,7 +206,7 @@ class Moving:
             raise CannotMove(f"the transform of {_name(new)} makes triangles of it")
         if isinstance(shape, Spheres):
             act = self._spheres.plan(ranges.row, shape, matrix)
-        elif isinstance(shape, Curves):
+        elif isinstance(in_world, Curves):
             act = self._plan_curves(ranges, in_world)
         else:
             act = self._plan_single(ranges, in_world)
@@ -234,10 +234,11 @@ class Moving:
 
         return act
 
-    def _plan_curves(self, ranges: _Ranges, shape: Any) -> Callable[[Boxes], None]:
+    def _plan_curves(self, ranges: _Ranges, shape: Curves) -> Callable[[Boxes], None]:
         """Return the action that gives curves other pieces, as many as before, and other boxes."""
         owners = self.target.lowered.owners
-        lowered: Any = next(owner for row, owner, _, _ in owners if row is ranges.row)
+        lowered = next(owner for row, owner, _, _ in owners if row is ranges.row)
+        assert isinstance(lowered, Curves)
         pieces, prim = strands.pieces(shape, cut_as=lowered), int(ranges.row["prim"])
         box = strands.boxes(pieces)
         words = self.target.lowered.tables["geometry"]
@@ -383,7 +384,7 @@ class Moving:
         self._moved.clear()
 
 
-def _check_fields(old: Any, new: Any) -> None:
+def _check_fields(old: Shape, new: object) -> None:
     """Raise CannotMove if more than what moves differs between two shapes."""
     if not isinstance(new, Shape) or type(old) is not type(new):
         raise CannotMove(f"{_name(old)} becomes something else")

@@ -6,7 +6,7 @@ They lie on a device, or are those of clouds, which are worked out there.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import pyopencl.array as cl_array
@@ -48,7 +48,7 @@ def stays_there(medium: Grid) -> bool:
 
     They do if it is float32 on a device, z fastest, in 16 bits a point, without colours or light.
     """
-    density: Any = medium.density
+    density = medium.density
     more = [fields_of(medium)[name] for name in ON_POINTS]
     plain = medium.bits == 16 and medium.light is None and all(one is None for one in more)
     return plain and (

@@ -209,22 +209,22 @@ class Encoder:
                 )
 
 
-def _spectrum(encoder: Encoder, value: Any, param: Param, owner: Any) -> tuple[Words, str]:
+def _spectrum(encoder: Encoder, value: Any, param: Param, owner: object) -> tuple[Words, str]:
     assert isinstance(param.role, Spectral)
     return encoder.spectra.words(value, param.role)
 
 
-def _number(encoder: Encoder, value: Any, param: Param, owner: Any) -> tuple[Words, str]:
+def _number(encoder: Encoder, value: Any, param: Param, owner: object) -> tuple[Words, str]:
     number = param.choices.index(value) if param.choices else int(value)
     return np.array([number], np.uint32), str(number)
 
 
-def _real(encoder: Encoder, value: Any, param: Param, owner: Any) -> tuple[Words, str]:
+def _real(encoder: Encoder, value: Any, param: Param, owner: object) -> tuple[Words, str]:
     plain = value.value if isinstance(value, Constant) else value
     return np.array([as_words([plain])[0], 0], np.uint32), "constant"
 
 
-def _orders(encoder: Encoder, value: Any, param: Param, owner: Any) -> tuple[Words, str]:
+def _orders(encoder: Encoder, value: Any, param: Param, owner: object) -> tuple[Words, str]:
     beyond = (ORDERS_WORDS - len(value)) // 2
     return as_words(np.pad(value, beyond)), "constant"
 

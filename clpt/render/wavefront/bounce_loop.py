@@ -69,7 +69,7 @@ class Kernels:
             self.programs[name] = make()
             self.seconds += time.perf_counter() - start
 
-    def bind(self, program: str, name: str, **more: Any) -> device.BoundKernel:
+    def bind(self, program: str, name: str, **more: object) -> device.BoundKernel:
         """Return a kernel of a program with its arguments, by the names in its signature."""
         kernel = self.programs[program].kernel(name)
         arguments = {**self.arguments(), **more}

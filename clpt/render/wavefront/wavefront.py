@@ -214,7 +214,7 @@ class Wavefront:
             loop.bind_again()
 
     def auxiliary_kernel(
-        self, texts: dict[str, device.Source], name: str, **more: Any
+        self, texts: dict[str, device.Source], name: str, **more: object
     ) -> device.BoundKernel:
         """Return a kernel beside the bounce, of the program of its name, with its own arguments."""
         self.kernels.build(texts)

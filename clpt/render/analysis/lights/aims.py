@@ -5,7 +5,6 @@ from __future__ import annotations
 import heapq
 from collections.abc import Callable, Collection, Iterator
 from itertools import count
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,7 +93,6 @@ def sharp_pieces(
     ends = [*(face for _, _, _, face in own[1:]), len(geometry.faces)]
     firsts = len(geometry.faces) - sum(placed.triangles) + np.cumsum((0, *placed.triangles))[:-1]
     boxes = geometry.boxes.astype(np.float64)
-    shape: Any
     for i, ((row, shape, _, face), end) in enumerate(zip(own, ends, strict=True)):
         if not wanted(shape.material):
             continue

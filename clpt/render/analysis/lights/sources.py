@@ -25,7 +25,7 @@ from clpt.render.analysis.lights.triangle_means import triangle_means
 from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.render.contract.light_records import INFINITE, RECORDS
 from clpt.scene import lights
-from clpt.scene.lights import DirectionalArea, Light
+from clpt.scene.lights import Area, DirectionalArea, Light
 from clpt.scene.media import Medium
 from clpt.scene.params import fields_of, params
 from clpt.scene.roles import EMISSION
@@ -184,10 +184,11 @@ def _of_bricks(glow: Glow) -> Bounds:
 def _of_emitter(emitter: Emitter, cache: LoweringCache) -> Source:
     """Return the source of a shape that emits."""
     shape = emitter.shape
-    emission: Any = shape.emission  # an area light, of either kind
+    emission = shape.emission
+    assert isinstance(emission, (Area, DirectionalArea))
     along = isinstance(emission, DirectionalArea)
     both = not along and emission.two_sided
-    value = emission.irradiance if along else emission.radiance
+    value = emission.radiance if isinstance(emission, Area) else emission.irradiance
     strength = 1.0 if along else 2.0 * np.pi if both else np.pi
     if is_whole(shape):
         bright = light_power.brightness(value)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,7 +25,7 @@ from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.lights import light_tree
 from clpt.render.lowering.lights.brick_lights import BrickLights
 from clpt.render.lowering.lights.non_shape_lights import blank_row, lower_lamp
-from clpt.scene.lights import DirectionalArea, Light
+from clpt.scene.lights import Area, DirectionalArea, Light
 
 PLACED_LIGHT_WEIGHT = (
     6  # triangles that a light at a place of its own counts as, where a tree is thought of
@@ -145,9 +144,10 @@ def _brick_rows(bricks: BrickLights, encoder: Encoder) -> np.ndarray:
 def _emitter_rows(emitter: Emitter, encoder: Encoder) -> np.ndarray:
     """The rows of a shape that emits."""
     shape = emitter.shape
-    emission: Any = shape.emission  # an area light, of either kind
+    emission = shape.emission
+    assert isinstance(emission, (Area, DirectionalArea))
     along = isinstance(emission, DirectionalArea)
-    value = emission.irradiance if along else emission.radiance
+    value = emission.radiance if isinstance(emission, Area) else emission.irradiance
     radiance = encoder.store.append("light_params", encoder.emission_words(value))
     kind = "triangle"
     if is_whole(shape):
