@@ -46,6 +46,9 @@ class Role:
     name: str
     place: Literal["row", "inside", "host"] = "row"
 
+    def __str__(self) -> str:
+        return self.name
+
     def check(self, value: object, param: Param, where: str) -> Any:
         """Return what is meant by a value that is no texture. Raises SceneError."""
         return value

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import clpt
 from clpt import SceneError
 from clpt.formats.native import forms
 from clpt.render.codegen import parameters
@@ -51,3 +54,13 @@ def test_a_texture_is_refused_where_it_cannot_be() -> None:
     ):
         with pytest.raises(SceneError, match="cannot be a texture"):
             given()
+
+
+def test_a_colour_is_no_curve_of_a_sensor(tmp_path: Path) -> None:
+    file = tmp_path / "scene.json"
+    curves = '[[0.1, 0.2, 0.3], 1.0, {"type": "constant", "value": 2.0}]'
+    text = '{"camera": {"type": "perspective"}, "film": {"sensor": {"curves": CURVES}}}'
+    file.write_text(text.replace("CURVES", curves))
+    with pytest.raises(SceneError, match=r"curves\[0\].*must be a number") as caught:
+        clpt.load(file)
+    assert caught.value.file == file
