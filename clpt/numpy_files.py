@@ -77,6 +77,8 @@ def _header(file: BinaryIO) -> tuple[int, np.dtype[Any], tuple[int, ...], bool]:
     shape, fortran, dtype = read(file)
     if dtype.hasobject or dtype.itemsize == 0 or min(shape, default=0) < 0:
         raise ValueError(f"it holds no numbers, but {dtype}")
+    if any(type(length) is not int for length in shape):  # True is a length for NumPy's parser
+        raise ValueError(f"its shape is {shape}")
     return file.tell(), dtype, shape, fortran
 
 

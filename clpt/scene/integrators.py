@@ -56,6 +56,17 @@ class Integrator(Kind):
                 raise SceneError(f"must be {least}, not {depth!r}", where=f"{self.kind}.{name}")
 
 
+LONG = 64  # depth from which panes of thin glass on the way do not matter
+
+
+def is_long(max_depth: int) -> bool:
+    """Return whether paths are so long that it does not matter whether panes of glass count.
+
+    Other renderers count them. Light of so many bounces is below a thousandth of the picture.
+    """
+    return max_depth == -1 or max_depth >= LONG
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Path(Integrator):
     """Path tracing with next-event estimation and multiple importance sampling (power heuristic).
@@ -78,7 +89,7 @@ class Path(Integrator):
         form="number_or_auto",
     )
     free_panes: bool = flag(
-        False, "thin glass is as a null surface where light goes straight through it: no depth"
+        True, "thin glass is as a null surface where light goes straight through it: no depth"
     )
     guiding: bool = host(
         False, "directions are learned from light paths before the first sample; without others"
@@ -150,6 +161,7 @@ class Auto(Integrator):
     max_depth: int = host(8, "longest path, as of `path`; -1: no limit")
     rr_depth: int = host(3, "depth from which Russian roulette may end a path")
     hide_lights: bool = flag(False, "the camera sees through lights, also those on shapes")
+    free_panes: bool = flag(True, "as of `path`")
 
 
 def shared(integrator: Integrator) -> dict[str, Any]:

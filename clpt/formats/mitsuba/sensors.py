@@ -339,7 +339,10 @@ def _depths(props: Properties, usual: int = -1) -> dict[str, Any]:
 
 
 def _path(props: Properties) -> Integrator:
-    return integrators.Path(**_depths(props), light_paths=_light_paths(props))
+    depths = _depths(props)
+    # with free panes lights behind them are hidden too, as by `volpath`
+    free = integrators.is_long(depths["max_depth"]) and not depths["hide_lights"]
+    return integrators.Path(**depths, light_paths=_light_paths(props), free_panes=free)
 
 
 def _light_paths(props: Properties) -> float | str:

@@ -203,7 +203,7 @@ def integrator(definition: Definition | None, film: Film) -> Integrator:
     film: whose pixels share pbrt's photons.
     """
     if definition is None:
-        return integrators.Path(max_depth=6)
+        return integrators.Path(max_depth=6, free_panes=False)
     params, state = definition.params, definition.state
     if definition.kind in ("ao", "function"):
         raise params.error("this integrator shows no light; use 'path'")
@@ -215,11 +215,12 @@ def integrator(definition: Definition | None, film: Film) -> Integrator:
     if depth < 0:
         raise params.error(f"'maxdepth' cannot be negative: {depth}")
     longest = min(depth, MOST_DEPTH) + 1
+    free = integrators.is_long(longest)
     if definition.kind in OTHERS:
         state.warn(params, CHOSEN)
-        return integrators.Auto(max_depth=longest)
+        return integrators.Auto(max_depth=longest, free_panes=free)
     if definition.kind != "sppm":
-        return integrators.Path(max_depth=longest)
+        return integrators.Path(max_depth=longest, free_panes=free)
     state.warn(params, PHOTONS)
     return integrators.Vcm(max_depth=longest, **_photons(params, film))
 

@@ -221,7 +221,14 @@ def test_integrators(scene):
     made = scene('<integrator type="prbvolpath"/>').integrator
     assert made.free_panes and made.max_depth == 6
     assert not scene('<integrator type="prb"/>').integrator.free_panes
-    assert not scene('<integrator type="path"/>').integrator.free_panes
+    for inside, free in (
+        ("", True),
+        ('<integer name="max_depth" value="65"/>', True),
+        ('<integer name="max_depth" value="9"/>', False),  # where each pane counts in Mitsuba
+        ('<boolean name="hide_emitters" value="true"/>', False),
+    ):
+        made = scene(f'<integrator type="path">{inside}</integrator>').integrator
+        assert made.free_panes is free
 
 
 def test_shapes(scene):

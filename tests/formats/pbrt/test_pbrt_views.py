@@ -224,7 +224,9 @@ def test_samplers_and_integrators(scene):
     assert (made.spp, type(made.sampler)) == (9, integrators.Sobol)
     assert made.extra["sampler"] == "independent"
     assert made.integrator.max_depth == 6
-    assert scene('Integrator "volpath" "integer maxdepth" 65').integrator.max_depth == 66
+    long = scene('Integrator "volpath" "integer maxdepth" 65').integrator
+    assert long.max_depth == 66 and long.free_panes
+    assert not scene('Integrator "path" "integer maxdepth" 6').integrator.free_panes
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from clpt import transforms as tf
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
 from clpt.scene.cameras import Perspective
-from clpt.scene.integrators import Path
+from clpt.scene.integrators import Auto, Path, is_long
 from clpt.scene.lights import Constant, Point
 from clpt.scene.shapes import Rectangle
 from tests.pictures.builders import ALBEDO, facing_down
@@ -63,10 +63,11 @@ def test_a_stack_of_panes(depth: int, free: bool) -> None:
     assert_mean(images, [seen(depth, free)] * 3, 0.01)
 
 
-def test_no_pane_is_free_by_itself() -> None:
+def test_panes_are_free_unless_a_file_counts_them() -> None:
     """An odd depth: a path through all four panes takes four of five steps."""
     assert seen(4, False) < 0.2 < 0.7 < seen(1, True)
-    assert not Path().free_panes
+    assert Path().free_panes and Auto().free_panes
+    assert [is_long(depth) for depth in (-1, 1, 8, 64, 65)] == [True, False, False, True, True]
 
 
 def passed(cosine: np.ndarray) -> np.ndarray:
