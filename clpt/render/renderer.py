@@ -587,7 +587,7 @@ def _lights_moved(former: Scene, scene: Scene) -> bool:
 
 
 def _placement(light: Light) -> tuple[Any, ...]:
-    """What a light has but for what it gives out."""
+    """Return the parameters of a light that say where it is."""
     values = fields_of(light)
     return tuple(values[n] for n, p in params(type(light)).items() if p.role.place == "host")
 

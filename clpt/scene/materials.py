@@ -82,7 +82,7 @@ class Material(Scatterer):
 
     @property
     def absorption(self) -> SpectrumLike:
-        """How much a metre of the inside absorbs [1/m]."""
+        """The absorption of the inside [1/m]."""
         return CLEAR
 
     @property

@@ -78,7 +78,7 @@ class Kernels:
 
 @dataclass(frozen=True)
 class Ending:
-    """How a run of a bounce loop ends that is stopped.
+    """The way in which a run of a bounce loop ends that is stopped.
 
     leave: raised, it lets the run leave its paths in flight, where the device runs the loop and
     sees it: then on_batch must raise; None: nothing does. seconds: in which it is to end [s], None

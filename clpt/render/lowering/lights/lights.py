@@ -104,7 +104,7 @@ def light_rows(
 
 
 def _count(every: Sequence[Source], rows: int) -> int:
-    """How many lights there are, each at a place of its own for several."""
+    """Return how many lights there are; each at a place of its own counts for several."""
     apart = sum(bool(one.bounds.placed.any()) for one in every)
     return max(rows, PLACED_LIGHT_WEIGHT * apart)
 
