@@ -141,7 +141,7 @@ class DeviceWorker:
 
 def added(a: Counts, b: Counts) -> Counts:
     """Return the sums of what happened."""
-    return Counts(**{name: value + getattr(b, name) for name, value in vars(a).items()})
+    return Counts(**{name: value + vars(b)[name] for name, value in vars(a).items()})
 
 
 def device_names(devices: list[Device]) -> list[str]:
