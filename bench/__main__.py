@@ -33,7 +33,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "noise": (),
     "instancing": (),
     "embedding": (),
-    "startup": (),
+    "starting": (),
     "compiling": (),
     "shares": (),
     "devices": (),

@@ -14,11 +14,11 @@ as values at 610, 550 and 460 nm: Mitsuba would cut them at 1, as if they were r
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
 import tempfile
-import time
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ from rich.table import Table
 import clpt
 from bench import machine
 from bench.renders import SCENES
-from bench.startup import SMALL
+from bench.starting import WATCH
 from bench.workers import find_llvm
 
 MITSUBA = """
@@ -105,23 +105,20 @@ class Contender:
             os.makedirs(folder, exist_ok=True)
         threads = {"POCL_MAX_PTHREAD_COUNT": str(len(self.cores))}
         cores = ",".join(map(str, self.cores))
-        kilobytes = self.caches / "kilobytes"
-        small = [sys.executable, "-I", "-S", "-c", SMALL, str(kilobytes)]
-        command = ["taskset", "-c", cores, *small, sys.executable, *arguments]
+        report = self.caches / "report.json"
+        watch = [sys.executable, "-I", "-S", "-c", WATCH, str(report)]
+        command = ["taskset", "-c", cores, *watch, sys.executable, *arguments]
         with tempfile.TemporaryFile("w+") as words:
-            start = time.perf_counter()
-            process = subprocess.Popen(
+            done = subprocess.run(
                 command, cwd=machine.ROOT, env={**os.environ, **caches, **threads},
                 stdout=words, stderr=words,
             )  # fmt: skip
-            _, status, usage = os.wait4(process.pid, 0)
-            seconds = time.perf_counter() - start
-            process.returncode = os.waitstatus_to_exitcode(status)
-            if process.returncode:
+            if done.returncode:
                 words.seek(0)
-                last = (words.read().strip().splitlines() or [f"status {process.returncode}"])[-1]
+                last = (words.read().strip().splitlines() or [f"status {done.returncode}"])[-1]
                 raise RuntimeError(f"{self.name}: {last[:300]}")
-        return usage.ru_utime + usage.ru_stime, seconds, int(kilobytes.read_text()) * 1024
+        clock, processor, memory = json.loads(report.read_text())
+        return processor, clock, memory
 
 
 def relative_mse(image: NDArray[np.floating], reference: NDArray[np.floating]) -> float:

@@ -76,19 +76,19 @@ def stages(rows: Sequence[Row]) -> str:
     return text + table(["scene", "mode", "layout", *names], map(cells, found))
 
 
-def startup(rows: Sequence[Row]) -> str:
-    """Whole processes; in brackets, processor time."""
+def starting(rows: Sequence[Row]) -> str:
+    """Whole processes: processor time with all children; in brackets by the clock."""
+    names = ("cold", "another", "warm")
 
     def cells(row: Row) -> list[str]:
-        ratio = row.get("memory_ratio")
-        return [
-            str(row["renderer"]),
-            str(row["mode"]),
-            *(f"{row[name]:.2f} s ({row[f'{name}_cpu']:.2f} s)" for name in ("cold", "warm")),
-            f"{row['memory'] / 2**20:.0f} MiB" + (f" ({ratio:.2f} of Mitsuba's)" if ratio else ""),
-        ]
+        times = (
+            f"{row[name]:.2f} s ({row[f'{name}_clock']:.2f} s)" if name in row else ""
+            for name in names
+        )
+        memory = (f"{row[f'{name}_memory'] / 2**20:.0f} MiB" for name in ("cold", "warm"))
+        return [str(row["scene"]), str(row["renderer"]), *times, *memory]
 
-    return table(["renderer", "mode", "cold", "warm", "peak memory, atrium"], map(cells, rows))
+    return table(["scene", "renderer", *names, "peak cold", "peak warm"], map(cells, rows))
 
 
 def plain(rows: Sequence[Row]) -> str:
@@ -261,7 +261,7 @@ TABLES: dict[str, Callable[[Sequence[Row]], str]] = {
     "measured": plain,
     "motion": plain,
     "hair": plain,
-    "startup": startup,
+    "starting": starting,
     "viewing": plain,
     "compiling": plain,
     "traversal": plain,

@@ -16,6 +16,7 @@ def main() -> None:
     """Run the command line and leave with its exit status."""
     streams.make_safe()
     allocator.return_large_blocks()
+    allocator.collect_later()
     stopping.raise_at_signals()
     # PoCL compiles a kernel once for its binary, and once more for each size of groups, if it may
     os.environ.setdefault("POCL_WORK_GROUP_SPECIALIZATION", "0")

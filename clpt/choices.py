@@ -32,7 +32,11 @@ DENOISERS = ("oidn", "statistical")
 TONES = ("none", "reinhard", "aces", "agx", "neutral")
 OCIO_CONFIG = "ocio://default"  # the config for computer graphics that comes with OpenColorIO
 CHANNEL_NAMES = ("clpt", "blender")  # sets of names of channels in an .exr
-WRITABLE = (".exr", ".png", ".hdr", ".pfm", ".npy")
+FOR_SCREENS = (".png", ".jpg", ".jpeg", ".webp")  # files of 8 bits, which exposure concerns
+WRITABLE = (".exr", *FOR_SCREENS, ".hdr", ".pfm", ".npy")
+Exposure = float | Literal["auto"]
+"""Stops by which files of 8 bits are brightened, or those that suit the picture."""
+
 VIEWER = "127.0.0.1"  # where tev and HDRView listen
 
 DROP_SIZES = ("mono", "log_normal", "gamma")  # laws of the sizes of drops

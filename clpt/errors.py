@@ -100,6 +100,11 @@ class DeviceError(ClptError, RuntimeError):
     """No device, or one that cannot do what is asked."""
 
 
+def _size(nbytes: int) -> str:
+    """A size of memory for people to read."""
+    return f"{nbytes / 2**20:.0f} MiB" if nbytes >= 2**20 else f"{nbytes / 2**10:.0f} KiB"
+
+
 class MemoryBudgetError(DeviceError, MemoryError):
     """More device memory is needed than there is.
 
@@ -108,8 +113,8 @@ class MemoryBudgetError(DeviceError, MemoryError):
 
     def __init__(self, what: str, asked: int | None, available: int | None, advice: str):
         self.asked, self.available = asked, available
-        needs = "more memory" if asked is None else f"{asked / 2**20:.0f} MiB"
-        has = "no more" if available is None else f"{available / 2**20:.0f} MiB"
+        needs = "more memory" if asked is None else _size(asked)
+        has = "no more" if available is None else _size(available)
         super().__init__(f"{what} needs {needs}, the device has {has}: {advice}")
 
 

@@ -5,8 +5,8 @@ with the device. Four forms of text are made of a record:
 
 - `uniform_text`: a struct of scalars in memory, the same for all lanes (settings, cameras);
 - `row_text`: a lane struct and a loader that gathers one row per lane from a table of words;
-- `slab_text`: a load and a store per member for structure-of-arrays slabs, where each word is a
-  stream of its own;
+- `slab_text`: a load and a store per member for slabs, where each word of SLAB_BLOCK slots stands
+  side by side (kernels/core/slab.cl);
 - `select_text`: a lane struct that is never in memory, its value of nothing and the choice of two.
 """
 
@@ -17,6 +17,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+
+SLAB_BLOCK = 32  # of kernels/core/slab.cl; a CPU's lanes divide it
 
 # type: (words, uniform form, lane form, components as the text names them)
 _XYZ = (".x", ".y", ".z")
@@ -125,6 +127,11 @@ class Record:
         """Size in 4-byte words."""
         return sum(m.words for m in self.members)
 
+    @property
+    def step(self) -> int:
+        """Words of a slot in a slab: odd, as distances of powers of two collide in a cache."""
+        return self.words | 1
+
     def without(self, *names: str) -> Record:
         """Return the record without members of these names."""
         kept = [m for m in self.members if m.name not in names]
@@ -232,7 +239,7 @@ class Record:
         store one does nothing. So kernels need not ask whether a scene has them.
         """
         lower = self.snake_name
-        parts = [f"#define {lower.upper()}_WORDS {self.words}"]
+        parts = [f"#define {lower.upper()}_STEP {self.step}"]
         for m in self.members:
             lane = TYPES[m.type][2]
             if m.name in unused:

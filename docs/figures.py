@@ -61,7 +61,6 @@ def shown(value: float) -> str:
     return f"{value:.3g}" if value >= 10 else f"{value:.2f}"
 
 
-
 def efficiency() -> str:
     """Return clpt's efficiency over Mitsuba's: three scenes, and the mean of all."""
 
@@ -157,9 +156,20 @@ def denoisers() -> str:
     return table(heads, body)
 
 
+def media() -> str:
+    """Return clpt's efficiency in media over the better of Mitsuba's integrators."""
+    about = {"renderer": "clpt"}
+    body = []
+    both = [set(names("media", "scene", mode=mode, **about)) for mode in ("rgb", "spectral")]
+    for scene in sorted(set.intersection(*both)):
+        own = [newest("media", scene=scene, mode=m, **about) for m in ("rgb", "spectral")]
+        body.append([scene, *(f"{record['efficiency_ratio']:.1f}" for record in own)])
+    return table(["scene", "RGB", "spectral"], body)
+
+
 TABLES: dict[str, Callable[[], str]] = {
     one.__name__: one
-    for one in (efficiency, samplers, modes, effects, layouts, sizes, denoisers)
+    for one in (efficiency, samplers, modes, effects, layouts, sizes, denoisers, media)
 }
 
 

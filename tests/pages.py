@@ -25,6 +25,13 @@ def commands(page: Path) -> list[str]:
     return [line.split("   ")[0] for line in lines if line.startswith("clpt ")]
 
 
+def lost(line: str, root: Path) -> list[str]:
+    """Return the files of the repository that a command names and that are not there."""
+    words = shlex.split(line, comments=True)
+    named = [word for word in words if word.startswith(("scenes/", "tests/", "examples/"))]
+    return [word for word in named if not (root / word).exists()]
+
+
 def unknown(line: str) -> str:
     """Return what a line names that clpt does not have, a command or options; else nothing."""
     context = cli.make_context("clpt", ["devices"])
@@ -43,7 +50,9 @@ def unknown(line: str) -> str:
 
 
 def smaller(line: str, *, spp: int = 1, size: str = "32x32") -> list[str]:
-    """Return the arguments of a command; of a render, with few samples of a small picture."""
+    """Return the arguments of a command; of a render, with few samples and, if it names no size,
+    of a small picture."""
     words = shlex.split(line, comments=True)[1:]
-    renders = words[0] == "render" and "--frames" not in words
-    return words + (["--spp", f"{spp}", "--size", size] if renders else [])
+    if words[0] == "render" and "--frames" not in words:
+        words += ["--spp", f"{spp}"] + ([] if "--size" in words else ["--size", size])
+    return words

@@ -16,9 +16,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from PIL import Image
 
 import clpt
+from clpt.cli import cli
 from clpt.scene.params import DEVICE_ROLES
 from docs import figures
 from tests import pages
@@ -91,6 +93,28 @@ def test_pages_use_plain_words():
         for match in re.finditer(HARD, line)
     ]
     assert found == []
+
+
+def test_commands_name_files_of_the_repository_that_are_there():
+    lines = [(page.name, line) for page in PAGES for line in pages.commands(page)]
+    assert [(name, pages.lost(line, ROOT)) for name, line in lines if pages.lost(line, ROOT)] == []
+
+
+TYPED = ("rendering.md", "recipes.md", "tutorial.md", "noise.md", "denoising.md")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", TYPED)
+def test_commands_run_as_typed(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    for name in ("scenes", "tests"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    monkeypatch.chdir(tmp_path)
+    for text in pages.blocks(DOCS / page, "json"):
+        (tmp_path / "pawn.json").write_text(text, "utf-8")
+    for line in pages.commands(DOCS / page):
+        words = pages.smaller(line.split(" > ")[0], spp=2)
+        done = CliRunner().invoke(cli, words)
+        assert done.exit_code == 0, f"{line}: {done.output}"
 
 
 @pytest.fixture
@@ -207,6 +231,21 @@ def test_the_code_of_architecture(run: Run, capsys: pytest.CaptureFixture):
     assert capsys.readouterr().out == "real True\n"
 
 
+@pytest.mark.slow
+def test_the_recipes(run: Run):
+    run("recipes.md")
+    for name in ("object", "glass", "gold", "focus", "product", "outdoors", "cloud"):
+        picture = clpt.read_image(f"{name}.png")
+        assert picture.shape == (30, 40, 3) and 0.01 < picture.mean() < 0.95, name
+
+
+@pytest.mark.slow
+def test_the_code_of_media_and_sky(run: Run):
+    names = run("media.md")
+    assert names["renderer"].samples == 4 and 0.1 < names["renderer"].image().mean() < 1.0
+    assert run("sky.md")["body"].interior is not None
+
+
 def test_the_code_of_colour(run: Run):
     pytest.importorskip("PyOpenColorIO", reason="OpenColorIO is not installed")
     names = run("colour.md")
@@ -228,7 +267,7 @@ def test_the_code_of_limits(run: Run):
 
 LIMITS = (  # on the page, and where the code has them
     ("65 536 pixels", "clpt.cli.options.values", "LARGEST", 65536),
-    ("67 108 864 pixels", "clpt.render.analysis.checks", "LARGEST", 67108864),
+    ("67 108 864 pixels", "clpt.render.analysis.checks.film", "LARGEST", 67108864),
     ("| 1024 |", "clpt.scene.integrators", "MOST_BANDS", 1024),
     ("| 4000 |", "clpt.render.lowering.settings", "DEEPEST", 4000),
     ("715 827 882", "clpt.bvh.build", "MOST", 715827882),

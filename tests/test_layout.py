@@ -10,7 +10,7 @@ import pytest
 
 from clpt import device
 from clpt.device import kernels_folder
-from clpt.layout import TYPES, Constants, Record, bits
+from clpt.layout import SLAB_BLOCK, TYPES, Constants, Record, bits
 from clpt.records import CONSTANTS, LIGHT, PATH, SETTINGS, SHAPE, SLABS
 from clpt.render.codegen.signatures import scene_text
 from clpt.render.contract import camera_records
@@ -90,11 +90,10 @@ def test_offsets_on_the_device(opened: device.Device, record: Record) -> None:
 @pytest.mark.parametrize("lanes", [1, 8, 16])
 def test_slab_members_go_in_and_out(opened: device.Device, lanes: int) -> None:
     """Every word of a slab, loaded and stored elsewhere member by member, lands where it should."""
-    stride = 48
     rng = np.random.default_rng(1)
-    source = rng.normal(size=(PATH.words, stride)).astype(np.float32)
+    source = rng.normal(size=(2, PATH.step, SLAB_BLOCK)).astype(np.float32)
     target = np.zeros_like(source)
-    slots = np.arange(16, 16 + lanes, dtype=np.uint32)
+    slots = np.arange(48, 48 + lanes, dtype=np.uint32)
     lane_mask = (rng.random(lanes) < 0.6).astype(np.uint32)
     read = "(*(global const integer *)d)" if lanes > 1 else "((integer)d[0])"
     moves = "".join(
@@ -104,13 +103,14 @@ def test_slab_members_go_in_and_out(opened: device.Device, lanes: int) -> None:
         '#include "core/base.cl"\n'
         "kernel void probe(global float *a, global float *b, global const uint *c, "
         "global const uint *d)\n{\n"
-        f"    Slab from = {{a, {stride}}}, to = {{b, {stride}}};\n"
+        f"    Slab from = {{a, {PATH.step}}}, to = {{b, {PATH.step}}};\n"
         f"    uint at = c[0];\n    mask m = {read} != 0;\n{moves}}}\n"
     )
     run(opened, kernel, lanes, source, target, slots, lane_mask)
     expected = np.zeros_like(source)
     kept = slots[lane_mask != 0]
-    expected[:, kept] = source[:, kept]
+    block, within = kept // SLAB_BLOCK, kept % SLAB_BLOCK
+    expected[block, : PATH.words, within] = source[block, : PATH.words, within]
     assert np.array_equal(target, expected)
 
 

@@ -70,6 +70,16 @@ def test_it_shows_a_live_picture(shown, tmp_path, monkeypatch, capsys):
 
 def test_it_can_be_read_at_once():
     assert sum(len(cell.splitlines()) for cell in CELLS) < 80
-    kept = json.loads(NOTEBOOK.read_text("utf-8"))["cells"]
-    assert not any(cell.get("outputs") for cell in kept)  # they would change with every run
+
+
+def test_it_is_stored_with_its_pictures():
+    cells = json.loads(NOTEBOOK.read_text("utf-8"))["cells"]
+    outputs = [output for cell in cells for output in cell.get("outputs", [])]
+    kinds = {kind for output in outputs for kind in output.get("data", ())}
+    assert len(outputs) >= 4 and {"image/png", "image/jpeg"} <= kinds
+    assert not any(output["output_type"] == "error" for output in outputs)
+    assert NOTEBOOK.stat().st_size < 1 << 20
+
+
+def test_the_list_of_examples_names_it():
     assert f"`{NOTEBOOK.name}`" in (NOTEBOOK.parent / "README.md").read_text("utf-8")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -68,5 +69,5 @@ def test_a_command_runs_as_typed(line: str, clone: Path):
     words = pages.smaller(line, spp=2)  # a denoiser needs two samples
     done = CliRunner().invoke(cli, words)
     assert done.exit_code == 0, done.output
-    written = [name for option, name in zip(words, words[1:], strict=False) if option == "-o"]
+    written = [name for option, name in pairwise(words) if option == "-o"]
     assert [name for name in written if not (clone / name).exists()] == []

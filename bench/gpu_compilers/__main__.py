@@ -57,17 +57,21 @@ def present() -> list[Vendor]:
 @click.option("--json", "json_file", type=click.Path(path_type=Path), help="a row a program")
 @click.option("--device", "devices", multiple=True, help="these alone")
 @click.option("--scene", "names", multiple=True, help="these alone")
+@click.option("--longest", type=int, help="so many of each stage and mode alone, the longest texts")
 @click.option("--seconds", type=float, help="after which no further program is compiled")
 @click.option("--keep", is_flag=True, help="write the page and the picture in bench/results")
 def main(
     json_file: Path | None,
     devices: tuple[str, ...],
     names: tuple[str, ...],
+    longest: int | None,
     seconds: float | None,
     keep: bool,
 ) -> None:
     os.nice(5)
     given = programs.of_scenes(p for p in programs.scenes() if not names or p.name in names)
+    if longest:
+        given = programs.longest(given, longest)
     known = results.read(json_file) if json_file else []
     digests = {program.digest for program in given}
     rows = [row for row in known if row["digest"] in digests]

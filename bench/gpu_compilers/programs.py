@@ -8,9 +8,12 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import click
+
 import clpt
 from bench import machine
 from clpt import device
+from clpt.errors import SceneError
 from clpt.render.codegen import programs
 from clpt.render.contract.features import Features
 from clpt.render.lowering.scene import lower
@@ -43,11 +46,15 @@ def scenes() -> list[Path]:
 
 
 def of_scenes(paths: Iterable[Path], modes: Iterable[str] = MODES) -> list[Program]:
-    """Every text of scenes once."""
+    """Every text of scenes once; scenes whose files are not made are told and left out."""
     found: dict[str, Program] = {}
     layouts: dict[str, set[str]] = {}
     for path in paths:
-        scene = clpt.load(path)
+        try:
+            scene = clpt.load(path)
+        except SceneError as error:
+            click.echo(f"{path.name} is left out: {error}", err=True)
+            continue
         for mode in modes:
             film = dataclasses.replace(scene.film, mode=mode)
             features = lower(dataclasses.replace(scene, film=film)).features
@@ -57,6 +64,14 @@ def of_scenes(paths: Iterable[Path], modes: Iterable[str] = MODES) -> list[Progr
                     found.setdefault(source.text, program)
                     layouts.setdefault(source.text, set()).add(layout)
     return [_named(program, layouts[text]) for text, program in found.items()]
+
+
+def longest(given: Iterable[Program], count: int) -> list[Program]:
+    """Of each stage and mode the longest texts: what asks for most."""
+    groups: dict[tuple[str, str], list[Program]] = {}
+    for program in sorted(given, key=lambda one: -len(one.text)):
+        groups.setdefault((program.stage, program.mode), []).append(program)
+    return [program for own in groups.values() for program in own[:count]]
 
 
 def _sources(features: Features, layout: str) -> Iterator[tuple[str, device.Source]]:

@@ -211,11 +211,10 @@ def amd(text: str, device: str, folder: Path) -> Figures:
     if find("llvm-objdump"):
         lines = run(folder, "llvm-objdump", "-d", "--no-show-raw-insn", "k.o")
         counts = counted(re.findall(r"^\s+([vsfgbd]\w+)", lines, re.MULTILINE), AMD)
-    spilled = most(r"VGPRs Spill: (\d+)", said) + most(r"SGPRs Spill: (\d+)", said)
     return Figures(
         most(r"\bVGPRs: (\d+)", said),
         most(r"ScratchSize \[bytes/lane\]: (\d+)", said),
-        spilled,
+        most(r"VGPRs Spill: (\d+)", said),  # scalar ones go to vector registers
         least(r"Occupancy \[waves/SIMD\]: (\d+)", said),
         size_of((folder / "k.o").read_bytes()),
         *counts,

@@ -77,7 +77,7 @@ class Flight:
         buffer = wave.paths.arguments[f"{record.name.lower()}_words"]
         streams = np.empty((member.words, self.slots), _TYPES.get(member.type, np.float32))
         for i, stream in enumerate(streams):
-            wave.stream.read(buffer, stream, 4 * (member.word + i) * wave.paths.stride)
+            wave.stream.read_rows(buffer, stream, wave.paths.rows(record, member.word + i))
         return streams[0] if member.words == 1 else np.ascontiguousarray(streams.T)
 
     @property

@@ -86,7 +86,7 @@ def _figure(
 ) -> Figure:
     """Return the speed of a stage; rounds in which no slot had work for it are left out."""
     busy = [(items, taken) for items, taken in found if items]
-    within = 4 * sum(record.words for record in SLABS) * flight.slots
+    within = 4 * sum(record.step for record in SLABS) * flight.slots
     speeds = tuple(items * 1e-6 / taken.device for items, taken in busy)
     more: dict[str, Any] = {"stage": name, "slots": flight.slots}
     if not busy:

@@ -10,7 +10,8 @@ import logging
 
 import click
 
-from .options.verbosity import verbose_option
+from ..errors import nearest
+from .options.verbosity import Handler, verbose_option
 
 COMMANDS = {  # with the first words of their help, for which nothing is imported
     "render": "Render each SCENE: a scene file, a mesh or a folder.",
@@ -21,11 +22,13 @@ COMMANDS = {  # with the first words of their help, for which nothing is importe
     "cluster": "Render on several machines; see also `clpt worker`.",
     "devices": "List the OpenCL devices, with the one that would be used and why.",
     "info": "Show what the file or folder SCENE holds, without rendering it.",
-    "inspect": "Show what the image or film FILE holds; plot the spectra of pixels, or their "
-    "channels.",
+    "inspect": "Show what the image or film FILE holds, and the values of its pixels.",
+    "convert": "Write the image or film SOURCE as TARGET, in another format or for a screen.",
+    "compare": "Measure how the image or film A differs from B.",
     "kernels": "Write the OpenCL programs that render SCENE, one file each.",
     "mie": "Make the medium of spheres of RADIUS micrometres: fog, mist, milk.",
     "lens": "Tell of LENS: a file (.dat, .zmx, .txt) or a name of the library.",
+    "completion": "Let the TAB key of a SHELL complete clpt's commands, options and values.",
     "bench": "Measure rays, stages of rendering, builds and starts of an OpenCL device.",
 }
 
@@ -35,6 +38,15 @@ class _Listed(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(self.commands)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        name = args[0]
+        known = self.list_commands(ctx)
+        if name not in known and not name.startswith("-") and not ctx.resilient_parsing:
+            ctx.fail(f"there is no command {name!r}{nearest(name, known)}")
+        return super().resolve_command(ctx, args)
 
 
 class _Commands(_Listed):
@@ -49,8 +61,8 @@ class _Commands(_Listed):
         return getattr(importlib.import_module(f"{__name__}.{cmd_name}"), cmd_name)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        listed = {name: click.Command(name, help=text) for name, text in COMMANDS.items()}
-        _Listed(commands=listed).format_commands(ctx, formatter)
+        with formatter.section("Commands"):
+            formatter.write_dl([*COMMANDS.items()])
 
 
 def _tell_version(ctx: click.Context, _: click.Parameter, asked: bool) -> None:
@@ -71,6 +83,6 @@ def _tell_version(ctx: click.Context, _: click.Parameter, asked: bool) -> None:
 @click.pass_context
 def cli(ctx: click.Context, verbose: int) -> None:
     """clpt, a spectral path tracer in OpenCL."""
-    logging.basicConfig(format="clpt: %(levelname)s: %(message)s")
+    logging.basicConfig(handlers=[Handler()], format="%(message)s")
     if ctx.invoked_subcommand is None:
         click.echo(ctx.get_help())

@@ -7,11 +7,13 @@ import json
 import click
 
 from ..errors import DeviceError
+from .options.verbosity import verbose_option
 
 
 @click.command()
 @click.option("--json", "json_wanted", is_flag=True, help="Write JSON instead of a table.")
-def devices(json_wanted: bool) -> None:
+@verbose_option("Show full names and drivers; log more, twice for everything.")
+def devices(json_wanted: bool, verbose: int) -> None:
     """List the OpenCL devices, with the one that would be used and why.
 
     Each is tried with a trivial kernel. Choose another one by --device NAME-OR-INDEX or by the
@@ -22,6 +24,7 @@ def devices(json_wanted: bool) -> None:
     from ..device.context import selection, trial
     from .printing.console import output_console
     from .printing.devices import as_json, table
+    from .printing.names import device_name
 
     listed = device.devices()
     if not listed:
@@ -34,9 +37,8 @@ def devices(json_wanted: bool) -> None:
     try:
         choice = selection()
     except DeviceError:
-        console.print(table(listed, failures, None))
+        console.print(table(listed, failures, None, bool(verbose)))
         raise
-    console.print(table(listed, failures, choice.info.index))
-    console.print(
-        f"Taken: [{choice.info.index}] {choice.info.label} ({choice.reason})", markup=False
-    )
+    console.print(table(listed, failures, choice.info.index, bool(verbose)))
+    name = choice.info.label if verbose else device_name(choice.info)
+    console.print(f"Taken: [{choice.info.index}] {name} ({choice.reason})", markup=False)

@@ -38,9 +38,10 @@ def info(scene: Path, variables: dict[str, Any], as_json: bool) -> None:
         contents = dict(read_contents(scene).facts)
     else:
         loaded = load(scene, **variables)
-        from .files.scene_contents import summary
+        from .files.scene_contents import summary, tidy
 
         contents = summary(loaded)
+        contents = contents if as_json else tidy(contents)
     if as_json:
         click.echo(json.dumps(contents, indent=2))
         return

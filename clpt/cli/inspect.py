@@ -10,7 +10,6 @@ from typing import Any
 import click
 
 from ..formats import locate
-from .files.targets import is_film
 from .process.extras import extra
 
 Pixel = tuple[int, int]  # x, y from the top left
@@ -38,27 +37,31 @@ class PixelType(click.ParamType):
 )  # fmt: skip
 @click.option(
     "-o", "--output", type=click.Path(path_type=Path),
-    help="The plot, .png, .svg or .pdf; FILE's name with .spectrum.png in this folder by default.",
+    help="Plot the pixels to this file: .png, .svg or .pdf. Needs clpt[plot].",
 )  # fmt: skip
+@click.option("--plot", is_flag=True, help="Plot them to FILE's name with .spectrum.png, here.")
 @click.option("--json", "as_json", is_flag=True, help="Write JSON instead of tables.")
-def inspect(file: Path, pixels: tuple[Pixel, ...], output: Path | None, as_json: bool) -> None:
-    """Show what the image or film FILE holds; plot the spectra of pixels, or their channels.
+def inspect(
+    file: Path, pixels: tuple[Pixel, ...], output: Path | None, plot: bool, as_json: bool
+) -> None:
+    """Show what the image or film FILE holds, and the values of its pixels.
 
     Of a spectral EXR file the values at its wavelengths are shown, of any other image its channels,
     linear.
     """
+    if (plot or output is not None) and not pixels:
+        raise click.UsageError("a plot is of pixels: name one by --at X,Y")
     locate(file)
     from .files import shown_images  # here: help needs no numpy
-    from .files.film_contents import film_contents
-    from .files.image_contents import read_contents
+    from .files.conversions import contents
 
-    image = film_contents(file) if is_film(file) else read_contents(file)
+    image = contents(file)
     values = {pixel: image.pixel(pixel) for pixel in pixels}
     if as_json:
         click.echo(json.dumps(shown_images.as_json(image, values), indent=2))
     else:
         shown_images.print_tables(image, values)
-    if pixels:
+    if plot or output is not None:
         with extra("plot", "a plot"):
             from .plots import pixels as plots  # here: matplotlib is an extra, and slow to import
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 @click.argument("films", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option(
     "-o", "--output", "paths", multiple=True, required=True, type=click.Path(path_type=Path),
-    help="Where to write: .film .exr .png .hdr .pfm .npy; may be given several times.",
+    help="Where to write: .film .exr .png .jpg .webp .hdr .pfm .npy; may be given several times.",
 )  # fmt: skip
 @denoise_option
 @grading_options
@@ -55,6 +55,8 @@ def merge(
         if not quiet:
             click.echo(text, err=True)
 
+    if text := how.unused(targets):
+        note(f"clpt: warning: {text}")
     total = added(films)
     for change in other_devices(total.sessions, total.sessions[0].device):
         note(f"clpt: warning: the films are of several classes of devices: {change}")

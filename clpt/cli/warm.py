@@ -9,12 +9,13 @@ from pathlib import Path
 import click
 
 from ..formats import locate
+from .options.headings import Grouped
 from .options.records import with_records
 from .options.scene_options import SceneOptions, denoise_option, scene_options
 from .options.verbosity import verbose_option
 
 
-@click.command()
+@click.command(cls=Grouped)
 @click.argument("scenes", type=click.Path(path_type=Path), nargs=-1, required=True)
 @scene_options
 @denoise_option

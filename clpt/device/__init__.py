@@ -17,7 +17,7 @@ from .flag import Flag
 from .program import Argument, BoundKernel, Kernel, Program
 from .refusals import refused, wait
 from .source import Part, Source, Virtual, assemble, kernels_folder
-from .stream import Events, Stream, tiles
+from .stream import Events, Rows, Stream, tiles
 from .timing import Timing, Timings
 
 __all__ = [
@@ -33,6 +33,7 @@ __all__ = [
     "Kernel",
     "Part",
     "Program",
+    "Rows",
     "Source",
     "Stream",
     "Timing",

@@ -43,6 +43,7 @@ def build(device: Device, source: Source, options: Sequence[str] = ()) -> Progra
     program = _known(device, source, flags, on_disk)
     if program is not None:
         return program
+    device.builds.on_compile()
     start = time.perf_counter()
     program = _from_source(device, source, flags)
     if on_disk:  # a binary is compiled to the end, a program of the driver may not be
@@ -97,6 +98,7 @@ def compile_ahead(device: Device, sources: Mapping[str, Source], main: str) -> N
         if not disk_cache.holds(part):
             text, options = next(declarations.forms(device, source.text, flags))
             job = Job(device.info.platform, device.info.name, " ".join(options), text)
+            device.builds.on_compile()
             device.compilers.submit(part, job)
 
 
@@ -138,6 +140,7 @@ def _part(device: Device, source: Source, flags: list[str]) -> cl.Program:
 
 def _compiled(device: Device, source: Source, flags: list[str]) -> cl.Program:
     """Return a part of a program that this process compiles. Raises KernelBuildError."""
+    device.builds.on_compile()
     try:
         make = partial(native_programs.compile_part, device.context, device.info.cl_device)
         part = declarations.built(device, source.text, flags, make)
@@ -194,7 +197,7 @@ def build_all(
         futures = {name: pool.submit(build, device, s, options) for name, s in sources.items()}
         programs = {name: future.result() for name, future in futures.items()}
     seconds, built = time.perf_counter() - start, device.builds.programs - before
-    log.info("%d programs in %.2f s, %d of them built", len(programs), seconds, built)
+    log.info("programs: %d in %.2f s, %d of them by the driver", len(programs), seconds, built)
     return programs
 
 

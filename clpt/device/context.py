@@ -7,7 +7,7 @@ import functools
 import logging
 import os
 import threading
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -97,6 +97,15 @@ class DeviceInfo:
             return False
         return bool(has & cl.device_svm_capabilities.FINE_GRAIN_BUFFER)
 
+    @cached_property
+    def slot(self) -> tuple[int, ...] | None:
+        """Where the device is on the machine's bus, None where the driver does not tell."""
+        try:
+            found = self.cl_device.pci_bus_info_khr
+        except (AttributeError, cl.Error):
+            return None
+        return found.pci_domain, found.pci_bus, found.pci_device, found.pci_function
+
     @property
     def label(self) -> str:
         """Platform and device, for people to read."""
@@ -120,11 +129,14 @@ class Builds:
     """The programs that have been built so far, and the seconds that took (summed over threads).
 
     cached: how many of them came from clpt's own cache; drivers do not tell about theirs.
+    on_compile: called when a program, or a part of one, is about to be given to a compiler; threads
+    call it.
     """
 
     programs: int = 0
     cached: int = 0
     seconds: float = 0.0
+    on_compile: Callable[[], None] = lambda: None
     _lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
 
     def add(self, seconds: float, cached: bool) -> None:
@@ -236,7 +248,8 @@ def choose_all(
 ) -> list[Device]:
     """Open several devices.
 
-    which: "all", where of the runtimes of one CPU the fastest is taken; "gpu", all GPUs; or names
+    which: "all", where of the runtimes of one CPU the fastest is taken, and of a GPU's the first
+    that works; "gpu", all GPUs likewise; or names
     or indexes as `choose` takes them, a sequence, or a text with commas such as "0,2". Devices that
     are open already stay as they are. threads: of each of those that are CPUs.
 
@@ -273,15 +286,17 @@ def names_several(which: str | None) -> bool:
 def _group(name: str) -> Iterator[DeviceInfo]:
     """All devices, or all GPUs, that work. Raises DeviceError where there is none."""
     found, taken = by_preference(devices()), 0
+    slots: set[tuple[int, ...]] = set()
     processors = [info for info in found if info.is_cpu]
     best = _by_speed(processors)[0][0] if processors and name != "gpu" else None
     for info in found:
         slower = best is not None and info.platform != best.platform and _same_processor(info, best)
-        if slower or (name == "gpu" and info.kind != "gpu"):
+        if slower or info.slot in slots or (name == "gpu" and info.kind != "gpu"):
             continue
         failure = None if _key(info) in _opened else trial(info)
         if failure is None:
             taken += 1
+            slots |= {info.slot} if info.slot else set()
             yield info
         else:
             log.warning("%s is passed over: %s", info.label, failure)
@@ -453,7 +468,7 @@ def _cl_devices() -> Iterator[cl.Device]:
     try:
         platforms = runtimes.platforms()
     except cl.Error as error:
-        log.warning("no OpenCL platform: %s", error)
+        log.info("no OpenCL platform: %s", error)  # who needs a device says so
         return
     for platform in sorted(platforms, key=lambda platform: platform.name):
         try:

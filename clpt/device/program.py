@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -133,6 +134,7 @@ class BoundKernel:
         }
         self._values: dict[str, Any] = {}  # as the driver has them
         self._numbers: dict[str, Any] = {}  # as the caller gave them
+        self._most: int | None = None  # work-items of a group that the device runs it in
         self.bind(**named)
 
     def bind(self, **named: Any) -> None:
@@ -181,12 +183,31 @@ class BoundKernel:
         Raises DeviceError if the driver refuses it, MemoryBudgetError if memory has run out.
         """
         try:
+            group = self._fitting(queue, local_size)
             return cl.enqueue_nd_range_kernel(
-                queue, self._cl_kernel, global_size, local_size, wait_for=wait_for
+                queue, self._cl_kernel, global_size, group, wait_for=wait_for
             )
         except cl.Error as error:
             where = f"kernel {self.kernel.name!r} at {global_size}, {local_size}"
             raise refused(where, error) from error
+
+    def _fitting(
+        self, queue: cl.CommandQueue, local_size: Sequence[int] | None
+    ) -> Sequence[int] | None:
+        """The size of a group, halved until the device can run the kernel in such groups."""
+        if local_size is None:
+            return None
+        if self._most is None:
+            self._most = most_items(self._cl_kernel, queue.device)
+        size = list(local_size)
+        while math.prod(size) > max(self._most, 1):
+            size[size.index(max(size))] //= 2
+        return size
+
+
+def most_items(kernel: cl.Kernel, device: cl.Device) -> int:
+    """Return how many work-items of a kernel a group on a device has at most."""
+    return int(kernel.get_work_group_info(cl.kernel_work_group_info.WORK_GROUP_SIZE, device))
 
 
 def read_signatures(program: cl.Program) -> Signatures:

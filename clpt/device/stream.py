@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,21 @@ def tiles(width: int, height: int) -> tuple[tuple[int, int], tuple[int, int]]:
     """
     across, down = TILE
     return (-(-width // across) * across, -(-height // down) * down), TILE
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Parts of a buffer: where the first begins, their size, and their distance [bytes]."""
+
+    first: int
+    size: int
+    pitch: int
+    count: int
+
+    @property
+    def region(self) -> tuple[int, int, int]:
+        """What they are as OpenCL's commands take a rectangle."""
+        return self.size, self.count, 1
 
 
 class Stream:
@@ -73,6 +89,17 @@ class Stream:
         command = cl.enqueue_fill_buffer
         return self._enqueue("a fill", nbytes, command, buffer, np.uint32(word), offset, nbytes)
 
+    def fill_rows(self, buffer: cl.Buffer, word: int, rows: Rows) -> cl.Event:
+        """Enqueue that rows of a buffer become one repeated word."""
+        flags = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR
+        host = np.full(rows.count * rows.size // 4, word, np.uint32)
+        staged = host_buffer(self.queue.context, flags, host)
+        return self._enqueue(
+            "a fill", host.nbytes, cl.enqueue_copy, buffer, staged,
+            src_origin=(0, 0, 0), src_pitches=(rows.size,),
+            dst_origin=(rows.first, 0, 0), dst_pitches=(rows.pitch,), region=rows.region,
+        )  # fmt: skip
+
     def copy(self, target: cl.Buffer, source: cl.Buffer, **offsets: int) -> cl.Event:
         """Enqueue a copy on the device; offsets: as of `pyopencl.enqueue_copy`."""
         size = offsets.get("byte_count", source.size)
@@ -94,6 +121,17 @@ class Stream:
         """Return a buffer's content in an array; wait for it."""
         if into.nbytes:
             wait(self.read_later(source, into, offset), "a copy to the host")
+        return into
+
+    def read_rows(self, source: cl.Buffer, into: np.ndarray, rows: Rows) -> np.ndarray:
+        """Return rows of a buffer in an array, one behind the other; wait for them."""
+        event = self._enqueue(
+            "a copy to the host", into.nbytes, cl.enqueue_copy, into, source,
+            buffer_origin=(rows.first, 0, 0), buffer_pitches=(rows.pitch,),
+            host_origin=(0, 0, 0), host_pitches=(rows.size,), region=rows.region,
+            is_blocking=False,
+        )  # fmt: skip
+        wait(self._keep(event), "a copy to the host")
         return into
 
     def read_later(self, source: cl.Buffer, into: np.ndarray, offset: int = 0) -> cl.Event:

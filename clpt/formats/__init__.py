@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
 import importlib
+import itertools
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
@@ -36,6 +38,7 @@ WITH_VARIABLES = ("mitsuba", "gltf")
 # The scene of a folder: the first of these, else the one with the folder's name, else the only one.
 IN_FOLDERS = ("scene.json", "scene.xml", "scene.pbrt", "scene-v4.pbrt")
 SCENES = (".xml", ".pbrt", ".pbrt.gz", ".glb", ".gltf")
+MOST_COMPARED, CLOSE = 4096, 0.7  # names of a folder, and how near one is that is meant
 MOST_NAMED = 8  # scenes of a folder that a message names
 
 __all__ = ["FORMATS", "load", "locate", "save"]
@@ -84,7 +87,8 @@ def _load(
         known = " ".join(FORMATS)
         raise SceneError(f"unknown format {path.suffix!r}; known: {known}", file=path)
     if "camera" in variables and kind not in WITH_VARIABLES:
-        message = f"only .xml and glTF have cameras to choose from, no {variables['camera']!r}"
+        message = f"only .xml and glTF have cameras to choose from, no {variables['camera']!r}; "
+        message += "--camera AZIMUTH,ELEVATION such as 45,20 looks at all of a scene"
         raise SceneError(message, file=path)
     if variables and kind not in WITH_VARIABLES:
         raise SceneError(
@@ -148,7 +152,28 @@ def locate(path: str | Path, /) -> Path:
         raise
     except (OSError, ValueError) as error:
         raise SceneError(f"cannot be read: {error}", file=path) from None
-    raise SceneError("there is no such file", file=path)
+    raise SceneError(f"there is no such file{_nearest_file(path)}", file=path)
+
+
+def _nearest_file(path: Path) -> str:
+    """Return the end of a message: scenes and folders of nearly the same name, if there are any.
+
+    Of a path whose folder is not there, folders near the first one that is missing.
+    """
+    while not path.parent.is_dir() and path.parent != path:
+        path = path.parent
+    try:
+        names = [
+            one.name
+            for one in itertools.islice(path.parent.iterdir(), MOST_COMPARED)
+            if one.is_dir() or one.name.lower().endswith(tuple(FORMATS))
+        ]
+    except OSError:
+        return ""
+    near = difflib.get_close_matches(path.name, names, n=2, cutoff=CLOSE)
+    return (
+        f"; did you mean {' or '.join(str(path.parent / name) for name in near)}?" if near else ""
+    )
 
 
 def scenes_folder() -> Path:

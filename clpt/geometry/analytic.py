@@ -22,6 +22,14 @@ UNEVEN = 1e-5  # relative difference of lengths or cosine of axes from which a s
 PADDING = 1e-6  # of the size of an analytic shape, for what float32 rounds in its kernel
 
 
+def check(shape: shapes.Sphere | shapes.Spheres | shapes.Cylinder) -> None:
+    """Raise SceneError for a sphere, many or a cylinder that its transform makes none."""
+    if isinstance(shape, shapes.Cylinder):
+        row(shape)
+    elif not np.array_equal(shape.to_world, transforms.IDENTITY):
+        _even_axes(placement(shape)[:3, :3], shape)
+
+
 def row(shape: Shape) -> Words:
     """Return the words of a rectangle, sphere, disk or cylinder in `geometry`, placed.
 

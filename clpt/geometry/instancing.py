@@ -113,8 +113,7 @@ def sort(
 
     moving: indices of those that move. Their triangles are instances, each with its own.
     A sphere or tube that an instance stretches becomes a mesh; a line about it goes to `warnings`.
-    Raises SceneError for an instance whose transform is singular, a projection, or stretches many
-    spheres.
+    Raises SceneError for an instance whose transform is singular or a projection.
     """
     placed: list[Placed] = []
     prototypes: list[Prototype] = []

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
+from clpt.geometry.shapes import where
 from clpt.scene import subdivision
 from clpt.scene.pixels import pixels
 from clpt.scene.roles import REAL
@@ -32,10 +33,9 @@ def is_refined(mesh: Mesh) -> bool:
 def refined(mesh: Mesh, parts: Parts, name: str) -> Parts:
     """Return vertices, faces, normals and uvs of a finer mesh, from those of its arrays.
 
-    name: for messages. Raises SceneError for what cannot be subdivided or displaced, and for a mesh
-    that gets too large.
+    name: for messages. The mesh is one that `check` accepts. Raises SceneError for a surface that
+    is none, and for a mesh that gets too large.
     """
-    _check(mesh, name)
     vertices, faces, normals, uvs = parts
     points, faces = vertices.astype(np.float64), faces.astype(np.int64)
     smooth = None if normals is None else normals.astype(np.float64)
@@ -49,13 +49,18 @@ def refined(mesh: Mesh, parts: Parts, name: str) -> Parts:
     return vertices, faces.astype(np.uint32), normals, uvs
 
 
-def _check(mesh: Mesh, name: str) -> None:
+def check(mesh: Mesh) -> None:
+    """Raise SceneError for what cannot be subdivided or displaced."""
+    if mesh.subdivision == 0 and mesh.displacement is None:
+        return
+    name = where(mesh)
     if not 0 <= mesh.subdivision <= DEEPEST:
         message = f"subdivision must be 0 to {DEEPEST}, not {mesh.subdivision}"
         raise SceneError(message, where=name)
-    if mesh.attributes or mesh.tangents is not None:
-        message = "a mesh that is subdivided or displaced has no attributes and no tangents"
-        raise SceneError(message, where=name)
+    made = "subdivided" if mesh.displacement is None else "displaced"
+    for found, what in ((mesh.attributes, "attributes"), (mesh.tangents is not None, "tangents")):
+        if found:
+            raise SceneError(f"a mesh that is {made} has no {what}", where=name)
     if mesh.displacement is None:
         return
     image = mesh.displacement

@@ -139,7 +139,7 @@ def check_deformation(shape: Shape) -> None:
     if given.points.shape[1:] != own and not with_radii:
         message = f"its keys have {given.points.shape[1:]} where {name} are {own}"
         raise SceneError(message, where=place)
-    if shape.kind != "mesh":
+    if not isinstance(shape, Mesh):
         if given.normals is not None:
             raise SceneError(f"{shape.kind} take no normals", where=place)
         return

@@ -5,7 +5,8 @@ its bytes stand in another file. What a file says of its numbers is heeded: colo
 709 unless data is asked for. docs/images.md has a table of what is honoured in which format.
 """
 
-from clpt.choices import WRITABLE
+from clpt.choices import FOR_SCREENS, WRITABLE
+from clpt.images.brightness import auto_exposure, levels, stops
 from clpt.images.exr import matrix_of
 from clpt.images.exr_files import attributes, part_names, write_channels
 from clpt.images.layers import read_channels, read_layers
@@ -27,13 +28,16 @@ from clpt.images.transfer import (
 from clpt.images.writing import check_output, write, write_stored
 
 __all__ = [
+    "FOR_SCREENS",
     "READERS",
     "WRITABLE",
     "Stored",
     "attributes",
+    "auto_exposure",
     "check_input",
     "check_output",
     "decoded",
+    "levels",
     "linear_to_srgb",
     "log_notes",
     "matrix_of",
@@ -46,6 +50,7 @@ __all__ = [
     "read_stored",
     "srgb8_steps",
     "srgb_to_linear",
+    "stops",
     "straight",
     "to_codes",
     "to_rec709",

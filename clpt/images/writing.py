@@ -9,13 +9,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt import output_files
-from clpt.choices import WRITABLE
+from clpt.arrays import Floats32
+from clpt.choices import FOR_SCREENS, WRITABLE, Exposure
 from clpt.colour.view import View
 from clpt.errors import SceneError
-from clpt.images import exr, hdr, npy, pfm
+from clpt.images import exr, hdr, npy, pfm, screen_files
+from clpt.images.brightness import stops
 from clpt.images.png_files import Metadata, png
 from clpt.images.transfer import to_codes, to_rec709
 from clpt.spectra.spaces import chromaticities
+
+WITH_ALPHA = (".png", ".webp")  # of FOR_SCREENS
 
 
 def write(
@@ -24,7 +28,7 @@ def write(
     *,
     half: bool = True,
     metadata: Metadata | None = None,
-    exposure: float = 0.0,
+    exposure: Exposure = 0.0,
     layers: Mapping[str, ArrayLike] | None = None,
     space: str = "rec709",
     tone: str = "none",
@@ -36,13 +40,14 @@ def write(
     .exr: half, or float where `half` is False or half numbers do not reach the brightest pixel,
     with attributes from `metadata` and further `layers` in float, name -> (h, w) as the channel of
     that name, or (h, w, 3) as its .R, .G, .B; prefix: before R, G and B of the image, such as
-    "ViewLayer.Combined.". .png: sRGB transfer, 8 bit, scaled by 2^exposure, with texts from
-    `metadata`; NaN is black there, values beyond [0, 1] are clipped. .hdr, .pfm, .npy: as it is.
+    "ViewLayer.Combined.". .png, .jpg, .webp: sRGB transfer, 8 bit, scaled by 2^exposure, with texts
+    from `metadata`; NaN is black there, values beyond [0, 1] are clipped. exposure: "auto" is that
+    of `clpt.images.auto_exposure`. .hdr, .pfm, .npy: as it is.
     space: of the colours, see clpt.spectra.spaces; an .exr states it by its chromaticities, an .hdr
-    by its primaries. A .png is converted to sRGB and a .pfm to Rec. 709, white to white, which is
-    what they mean; an .npy is not converted.
-    tone: of a .png, see clpt.colour.tones; view: of a .png, a `clpt.View` of OpenColorIO, in the
-    place of tone and sRGB transfer.
+    by its primaries. Files for screens are converted to sRGB and a .pfm to Rec. 709, white to
+    white, which is what they mean; an .npy is not converted.
+    tone: of files for screens, see clpt.colour.tones; view: of them, a `clpt.View` of OpenColorIO,
+    in the place of tone and sRGB transfer.
 
     Raises SceneError if the suffix, the space or the tone is unknown, the shape does not fit or the
     file cannot be made.
@@ -60,9 +65,8 @@ def write(
         if suffix == ".exr":
             said = {**stated, **(metadata or {})}
             exr.write(path, pixels, half, said, layers or {}, prefix)
-        elif suffix == ".png":
-            codes = to_codes(to_rec709(pixels, space), exposure, tone, view)
-            output_files.write(path, png(codes, metadata))
+        elif suffix in FOR_SCREENS:
+            _write_for_screens(path, to_rec709(pixels, space), exposure, tone, view, metadata)
         elif suffix == ".hdr":
             hdr.write(path, pixels, space)
         elif suffix == ".pfm":
@@ -73,6 +77,22 @@ def write(
         raise
     except (OSError, RuntimeError, ValueError) as error:
         raise SceneError(f"cannot be written: {error}", file=path) from error
+
+
+def _write_for_screens(
+    path: Path,
+    pixels: Floats32,
+    exposure: Exposure,
+    tone: str,
+    view: View | None,
+    metadata: Metadata | None,
+) -> None:
+    """Write linear Rec. 709 as codes of a screen. Raises as `write`."""
+    suffix = path.suffix.lower()
+    if pixels.shape[2] == 4 and suffix not in WITH_ALPHA:
+        pixels = pixels[..., :3] * pixels[..., 3:]
+    codes = to_codes(pixels, stops(exposure, pixels), tone, view)
+    output_files.write(path, screen_files.encode(suffix, codes, metadata))
 
 
 def write_stored(path: Path, values: NDArray[np.uint8]) -> None:

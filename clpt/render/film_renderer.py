@@ -178,9 +178,10 @@ class FilmRenderer(FilmOwner, Pictures):
 
     def _so_far(self, end: int, seconds: float) -> Progress:
         """Return how far a run is after some seconds; end: the number after its last sample."""
-        counts = self.counts
+        counts, chosen = self.counts, self._adaptive
         mean = counts.samples / self._pixels
-        return Progress(mean, end, counts.samples, counts.rays, seconds, self.active)
+        noise = None if chosen is None else chosen.level
+        return Progress(mean, end, counts.samples, counts.rays, seconds, self.active, noise)
 
     def cancel(self, *, discard: bool = False) -> None:
         """Let the `run` of another thread, or else the next one, stop soon and return False.

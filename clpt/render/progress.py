@@ -10,7 +10,8 @@ class Progress:
     """The progress of a render at some time.
 
     samples, total: per pixel, in the mean; paths: samples of all pixels; rays: traced so far;
-    seconds: since the first; active: the share of the pixels that are not finished.
+    seconds: since the first; active: the share of the pixels that are not finished; noise: of the
+    picture so far, relative, None where it is not measured.
     """
 
     samples: float
@@ -19,3 +20,4 @@ class Progress:
     rays: int
     seconds: float
     active: float = 1.0
+    noise: float | None = None

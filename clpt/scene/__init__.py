@@ -78,7 +78,7 @@ class Scene:
             check_noise(self.noise)
 
 
-def check_noise(noise: object) -> None:
+def check_noise(noise: Any) -> None:
     """Raise SceneError for what is no limit of noise."""
     number = isinstance(noise, numbers.Real) and not isinstance(noise, bool)
     if not number or not 0.0 < noise < math.inf:

@@ -231,7 +231,7 @@ def _file(path: Path, where: str) -> str:
     return DIGEST + hashed.hexdigest()
 
 
-def _digest(values: object) -> str:
+def _digest(values: Any) -> str:
     text = json.dumps(values if isinstance(values, list) else dict(values), sort_keys=True)
     return DIGEST + hashlib.sha256(text.encode()).hexdigest()
 

@@ -708,7 +708,7 @@ def _is_grey(value: object) -> bool:
     return grey or isinstance(value, Constant)
 
 
-def _is_zero(value: object) -> bool:
+def _is_zero(value: Any) -> bool:
     return _is_grey(value) and not value.to_rgb("unbounded").any()
 
 

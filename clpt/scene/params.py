@@ -274,6 +274,12 @@ def _field_names(cls: Any) -> tuple[str, ...]:
     return tuple(field.name for field in dataclasses.fields(cls))
 
 
+def place_of(kind: Kind, name: str) -> str:
+    """Return the name of a parameter for messages, with the name of its material."""
+    named = fields_of(kind).get("name")
+    return f"{kind.kind}.{name}" + (f" of {named!r}" if named else "")
+
+
 def device_params(cls: type) -> Mapping[str, Param]:
     """Return the parameters that the kernels read."""
     return _declared_of(cls, "row")

@@ -40,11 +40,12 @@ class Role:
     """A role of a parameter; this one takes any value.
 
     name: in kernels and files. place: "row" of what kernels read of a kind; "inside", behind that,
-    of a body; "host" where kernels have nothing of that name.
+    of a body; "host" where kernels have nothing of that name. advice: where a number is too large.
     """
 
     name: str
     place: Literal["row", "inside", "host"] = "row"
+    advice: str = ""
 
     def __str__(self) -> str:
         return self.name
@@ -82,7 +83,9 @@ class Real(Role):
         if abs(value) > LARGEST:
             raise SceneError(f"{value:g} is beyond {LARGEST:g}, where float32 ends", where=where)
         if not param.low <= value <= param.high:
-            raise SceneError(f"{value} is outside [{param.low:g}, {param.high:g}]", where=where)
+            advice = f"; {param.role.advice}" if param.role.advice and value > param.high else ""
+            message = f"{value} is outside [{param.low:g}, {param.high:g}]{advice}"
+            raise SceneError(message, where=where)
         if param.positive and value == 0.0:
             raise SceneError("must be above 0", where=where)
         return float(value)
@@ -268,7 +271,9 @@ ANGULAR = Role("angular")
 RERADIATION = Data("reradiation", cls=Reradiation, words="a re-radiation matrix")
 MEASUREMENT = Data("measurement", cls=Measurement, words="a Measurement of clpt.measured")
 MERL = Data("merl", cls=MerlTable, words="a MerlTable of clpt.measured")
-REFLECTANCE = Spectral("reflectance", meaning="reflectance", colour=RGB)
+REFLECTANCE = Spectral(
+    "reflectance", advice="colours are 0 to 1, linear", meaning="reflectance", colour=RGB
+)
 EMISSION = Emission("emission", meaning="emission", colour=RGBIlluminant, names=spectra.illuminant)
 INDEX = Index("index", names=spectra.index, measured=True, grey=True)
 FACTOR = Factor("factor")

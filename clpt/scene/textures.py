@@ -178,6 +178,17 @@ def _octaves(texture: Noise | Marble) -> None:
         raise SceneError(message, where=f"{texture.kind}.octaves")
 
 
+def attributes_in(value: object) -> set[str]:
+    """Return the names of the attributes of meshes that the textures in a kind read."""
+    names: set[str] = set()
+    for texture in textures_in(value):
+        if isinstance(texture, MeshAttribute):
+            names.add(texture.name)
+        elif isinstance(texture, Placed) and texture.mapping == "uv1":
+            names |= set(SECOND_UV)
+    return names
+
+
 def textures_in(value: object) -> Iterator[Texture]:
     """Yield the textures that a kind's parameters hold, and those in what these hold, and so on."""
     if isinstance(value, (list, tuple)):
@@ -186,5 +197,6 @@ def textures_in(value: object) -> Iterator[Texture]:
     elif isinstance(value, Kind):
         if isinstance(value, Texture):
             yield value
-        for inner in fields_of(value).values():
-            yield from textures_in(inner)
+        for part in fields_of(value).values():
+            if isinstance(part, (Kind, list, tuple)):
+                yield from textures_in(part)

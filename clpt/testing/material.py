@@ -85,7 +85,8 @@ def _values(material: Material, mode: str) -> dict[str, Any]:
 
 
 def _value(value: object, param: Param, mode: str) -> Any:
-    return VALUES.get(param.role, _numbers)(value, param, mode)
+    change: Callable[..., Any] = VALUES.get(param.role, _numbers)
+    return change(value, param, mode)
 
 
 def _numbers(value: object, param: Param, mode: str) -> Any:

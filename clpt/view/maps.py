@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from clpt import images
 from clpt.arrays import Bytes, Image
+from clpt.colour.false_colours import SCALE, false_colours
 from clpt.denoise import oidn
 from clpt.render.film.layer_preview import viewable
 from clpt.scene.layers import LAYERS
@@ -20,11 +21,6 @@ SURFACES = tuple(n for n, layer in LAYERS.items() if layer.form in ("near", "lon
 MAPS: Final = (PICTURE, DENOISED, SAMPLES, ERROR, *SURFACES)  # each is a choice in the page
 
 
-# From few to many: of matplotlib's "inferno", which is as even in grey.
-COLOURS: Final = (
-    "#000004", "#1b0c41", "#4a0c6b", "#781c6d", "#a52c60", "#cf4446", "#ed6925", "#fb9b06",
-    "#f7d13d", "#fcffa4",
-)  # fmt: skip
 LEAST_ERROR, MOST_ERROR = 0.001, 1.0  # relative, the ends of the scale
 WINDOW = 9  # pixels of a side: over so many differences the error is a mean, by a tent
 DARK = 0.01  # of the picture's mean: what is darker counts as if it were as bright
@@ -41,7 +37,7 @@ class Legend:
 
     low: str
     high: str
-    colours: tuple[str, ...] = COLOURS
+    colours: tuple[str, ...] = SCALE
 
 
 def layer(name: str, values: NDArray[np.float32]) -> Bytes:
@@ -54,7 +50,7 @@ def samples(film: Image) -> tuple[Bytes, Legend]:
     count = film[..., 3]
     low, high = float(count.min()), max(float(count.max()), 1.0)
     share = (count - low) / (high - low) if high > low else np.ones_like(count)
-    return _coloured(share), Legend(f"{low:.0f}", f"{high:.0f} samples")
+    return false_colours(share), Legend(f"{low:.0f}", f"{high:.0f} samples")
 
 
 class ErrorMap:
@@ -104,17 +100,9 @@ class ErrorMap:
             return None
         share = np.log(np.maximum(error, LEAST_ERROR) / LEAST_ERROR)
         share /= np.log(MOST_ERROR / LEAST_ERROR)
-        return _coloured(share), Legend(f"{100 * LEAST_ERROR:g} %", f"{100 * MOST_ERROR:g} % error")
-
-
-def _coloured(share: NDArray[Any]) -> Bytes:
-    """Return numbers from 0 to 1 as colours of the scale."""
-    table = np.array([[int(one[i : i + 2], 16) for i in (1, 3, 5)] for one in COLOURS], float)
-    at = np.linspace(0.0, 1.0, len(table))
-    fine = np.linspace(0.0, 1.0, 256)
-    steps = np.stack([np.interp(fine, at, column) for column in table.T], axis=1)
-    index = np.clip(np.rint(255.0 * share), 0, 255).astype(np.uint8)
-    return np.rint(steps).astype(np.uint8)[index]
+        return false_colours(share), Legend(
+            f"{100 * LEAST_ERROR:g} %", f"{100 * MOST_ERROR:g} % error"
+        )
 
 
 def _around(values: NDArray[np.float64]) -> NDArray[np.float64]:

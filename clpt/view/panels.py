@@ -216,7 +216,7 @@ def _parameter(name: str, param: Param, value: object, default: object) -> dict[
     }
 
 
-def _curve(value: object, param: Param) -> list[float] | None:
+def _curve(value: Any, param: Param) -> list[float] | None:
     """Return a spectrum at CURVE_AT, for a small plot; None for what is none."""
     if param.role not in SPECTRA or isinstance(value, Texture):
         return None

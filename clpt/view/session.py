@@ -366,7 +366,7 @@ class Session(CameraWork):
         if state is None:
             raise CommandError(f"there is nothing to {verb}")
         now = self.scene
-        kept = {"camera": now.camera, "spp": now.spp, "noise": now.noise}
+        kept: dict[str, Any] = {"camera": now.camera, "spp": now.spp, "noise": now.noise}
         self._show(dataclasses.replace(state.scene, **kept), Change(whole=True), state.look)
         self._tell_state()
 

@@ -125,13 +125,14 @@ INTEGRATORS = {
         spp=256,
     ),
     "vcm": traced(
-        "A point light: its caustic on the floor, and the same in the mirror.",
+        "With a point light in the place of the lamp: its caustic, which `path` never finds, "
+        "on the floor and in the mirror.",
         integrators.Vcm(),
         spp=192,
     ),
     "direct": traced("Straight from the lamp: the ceiling stays dark.", integrators.Direct()),
     "whitted": traced(
-        "A point light: hard shadows, mirrors, glass, and the same ambient light everywhere.",
+        "With a point light in the place of the lamp: hard shadows, and ambient light everywhere.",
         integrators.Whitted(max_depth=8, ambient=(0.12, 0.12, 0.12)),
         spp=64,
     ),

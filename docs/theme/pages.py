@@ -36,7 +36,13 @@ MODULES = {
     **{
         f"clpt.scene.{category}": category
         for category in (
-            "cameras", "shapes", "materials", "textures", "lights", "media", "motion",
+            "cameras",
+            "shapes",
+            "materials",
+            "textures",
+            "lights",
+            "media",
+            "motion",
             "integrators",
         )
     },
@@ -58,6 +64,7 @@ PARTS = {  # modules on the page of their package, which exports no names itself
     "clpt.colour": ("tones", "view"),
     "clpt.denoise": ("oidn", "statistical", "needs"),
 }
+SHOWN = {*MODULES, *(f"{package}.{part}" for package, parts in PARTS.items() for part in parts)}
 DEEPER = {"heading_level": 3}
 PAIR = re.compile(r"^```json\n(.*?)^```\n\n?^```python\n(.*?)^```\n", re.M | re.S)
 LINK = re.compile(r"(!?)\[((?:`[^`]*`|[^\]\[])*)\]\((?!\w+:)([^)#\s]*)(#[^)\s]*)?\)")
@@ -131,7 +138,7 @@ def names_of_clpt() -> str:
                 "inherited_members": True,
             }
             parts.append(
-                f"[`{name}`][{own}]" if module in MODULES else f"::: {own}\n    options: {options}"
+                f"[`{name}`][{own}]" if module in SHOWN else f"::: {own}\n    options: {options}"
             )
     return "\n\n".join(parts)
 

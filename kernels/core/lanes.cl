@@ -18,6 +18,16 @@
 #define called inline
 #endif
 
+/* Before loops of a GPU. Its registers cannot be indexed, so what indexes a small array is UNROLLED: else the array
+ * lies in memory. What is seldom run and long is ROLLED: instructions are fetched from memory too. */
+#if LANES == 1 && !defined(NOT_INLINED)
+#define UNROLLED _Pragma("unroll")
+#define ROLLED _Pragma("unroll 1")
+#else
+#define UNROLLED
+#define ROLLED
+#endif
+
 #define CAT_(a, b) a##b
 #define CAT(a, b) CAT_(a, b)
 

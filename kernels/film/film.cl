@@ -60,10 +60,12 @@ inline integer film_add(global const Settings *settings, global uint *film, mask
         if (!at_lane[i]) continue;
         global uint *at = film + film_at(settings, planes[i], pixels[i]);
         uint count = 0;
-        for (int word = 0; word < FILM_GROUP_WORDS; word += word == FILM_SAMPLES ? 1 : 3) {
+        sums_add_word(at + FILM_SAMPLES * stream, words[FILM_SAMPLES * LANES + i]);
+        UNROLLED
+        for (int sum = 0; sum < (FILM_GROUP_WORDS - 1) / 3; sum++) {
+            int word = 3 * sum + (3 * sum >= FILM_SAMPLES);
             const uint *w = words + word * LANES + i;
-            if (word == FILM_SAMPLES) sums_add_word(at + word * stream, w[0]);
-            else count += sums_add(at + word * stream, stream, w[0], w[LANES], w[2 * LANES]);
+            count += sums_add(at + word * stream, stream, w[0], w[LANES], w[2 * LANES]);
         }
         ((int *)&full)[i] = (int)count;
     }

@@ -38,7 +38,8 @@ inline void footprint_add(global long4 *first, const real *across, const real *d
 {
     for (int y = 0; y < FILTER_TAPS; y++)
         for (int x = 0; x < FILTER_TAPS; x++) {
-            float f = ((const float *)(across + x))[i] * ((const float *)(down + y))[i];
+            real column = spread_tap(across, x), row = spread_tap(down, y);
+            float f = ((const float *)&column)[i] * ((const float *)&row)[i];
             global long4 *pixel = first + (y * FOOTPRINT + x) * FOOTPRINT_VECTORS;
             pixel[0] += convert_long4(value * f * FOOTPRINT_UNITS);
 #if USES_ALPHA
@@ -60,6 +61,7 @@ inline uint footprint_leave(global const Settings *settings, global uint *film, 
 {
     size_t stream = settings->padded_pixels;
     uint full = 0;
+    ROLLED
     for (int i = 0; i < FOOTPRINT * FOOTPRINT; i++) {
         global long4 *pixel = own + i * FOOTPRINT_VECTORS;
         long4 v = pixel[0];

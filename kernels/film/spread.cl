@@ -40,11 +40,24 @@ inline Spread spread_point(Scene scene, integer x, integer y, vec2 offset)
     return s;
 }
 
+/* f[i]; on a GPU without an index into an array. */
+inline real spread_tap(const real *f, int i)
+{
+#if LANES == 1
+    real found = f[0];
+    UNROLLED
+    for (int k = 1; k < FILTER_TAPS; k++) found = k == i ? f[k] : found;
+    return found;
+#else
+    return f[i];
+#endif
+}
+
 /* Whether the picture has the pixel `i` of those that may hold the point, where it is stored, and f there. */
 inline mask spread_pixel(global const Settings *settings, Spread s, int i, integer *pixel_index, real *f)
 {
     integer x = s.x + i % FILTER_TAPS, y = s.y + i / FILTER_TAPS;
-    *f = s.across[i % FILTER_TAPS] * s.down[i / FILTER_TAPS];
+    *f = spread_tap(s.across, i % FILTER_TAPS) * spread_tap(s.down, i / FILTER_TAPS);
     *pixel_index = film_pixel_index(settings, x, y);
     return (*f != 0.0f) & (x >= 0) & (x < settings->width) & (y >= 0) & (y < settings->height);
 }
@@ -62,6 +75,7 @@ inline mask spread_pixel(global const Settings *settings, Spread s, int i, integ
 inline integer spread_add(Scene scene, SPREAD_ARGS, mask m, mask colours, integer plane, Spread s, Light light)
 {
     integer full = 0;
+    ROLLED
     for (int i = 0; i < SPREAD_PIXELS; i++) {
         integer pixel_index;
         real f;

@@ -43,7 +43,7 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
 }
 
 #if !SHADES_BOTH
-void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active)
+inline void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active)
 {
     Vertex v = vertex_load(scene, path, hit, at, active);
     light_path_vertex(scene, path, shadow, at, active, v);

@@ -50,7 +50,7 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
 }
 
 #if !SHADES_BOTH
-void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active SHADE_ARGS)
+inline void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active SHADE_ARGS)
 {
     Vertex v = vertex_load(scene, path, hit, at, active);
     path_vertex(scene, path, shadow, at, active, v SHADE_PASSED);

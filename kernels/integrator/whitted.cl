@@ -33,7 +33,7 @@ inline integer whitted_light(Scene scene, Slab shadow, uint at, mask active, Ver
 }
 #endif
 
-void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active)
+inline void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active)
 {
     global const Settings *settings = scene.settings;
     Vertex v = vertex_load(scene, path, hit, at, active);

@@ -70,9 +70,11 @@ constant float coat_azimuth[4] = {0.923880f, 0.382683f, -0.382683f, -0.923880f};
 called real coat_transmittance_thinner(Microfacets d, real cos_i, real eta)
 {
     real sin_i = sqrt_r(1.0f - cos_i * cos_i), inv = 1.0f / eta, a2 = sqr(d.alpha_u), sum = 0.0f, seen = 1e-20f;
+    ROLLED
     for (int i = 0; i < 3; ++i) {
         real radius = sel(d.beckmann, (real)(coat_radius_beckmann[i]), (real)(coat_radius_ggx[i])) * d.alpha_u;
         real cos_h = 1.0f / sqrt(1.0f + radius * radius), lean = sin_i * radius;
+        ROLLED
         for (int j = 0; j < 4; ++j) {
             real area = max_r(cos_i + lean * coat_azimuth[j], (real)(0.0f));
             real c = min_r(area * cos_h, (real)(1.0f));

@@ -15,12 +15,14 @@ Spectrum packed_bitmap_reflectance(PackedBitmap t, Scene scene, TexturePoint poi
     PackedTexel texels[4];
     real weights[4];
     int corners = bitmap_corners(b);
-    for (int corner = 0; corner < corners; corner++) {
+    UNROLLED
+    for (int corner = 0; corner < 4 && corner < corners; corner++) {
         integer index = bitmap_corner(image, b, corner, &weights[corner]);
         texels[corner] = spectrum_packed_words(scene.images, t.first, index);
     }
     Spectrum sum = spectrum_of(0.0f);
-    for (int corner = 0; corner < corners; corner++) {
+    UNROLLED
+    for (int corner = 0; corner < 4 && corner < corners; corner++) {
         Spectrum texel = spectrum_packed_texel(scene.images, texels[corner], t.decode, lambdas);
         sum = spectrum_madd(texel, weights[corner], sum);
     }

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
 
+import click
 import pytest
 
 from clpt import choices
 from clpt.bvh import layouts
-from clpt.cli import COMMANDS
+from clpt.cli import COMMANDS, cli
+from clpt.cli.options.headings import HEADINGS, OTHER, Grouped
 from clpt.colour import tones
 from clpt.render.film import layer_channels
 from clpt.scene import kinds
@@ -57,6 +61,31 @@ def unexpected(names: set[str]) -> list[str]:
 @pytest.mark.parametrize("command", COMMANDS)
 def test_help_imports_little(command: str) -> None:
     assert unexpected(loaded(command, "--help")) == []
+
+
+@pytest.mark.parametrize("command", ["render", "view", "warm"])
+def test_options_stand_under_a_heading(command: str) -> None:
+    """Each once, in a screen of 80 columns, and examples are command lines that are understood."""
+    one = cli.get_command(click.Context(cli), command)
+    assert isinstance(one, Grouped)
+    options = {p.name for p in one.params if isinstance(p, click.Option)}
+    grouped = [name for names in HEADINGS.values() for name in names]
+    assert options - {*grouped} == {"verbose", "quiet"} and len({*grouped}) == len(grouped)
+    told = one.get_help(click.Context(one, info_name=command, max_content_width=80))
+    assert max(map(len, told.splitlines())) <= 80
+    headings = [line[:-1] for line in told.splitlines() if re.fullmatch(r"[A-Z].*:", line)]
+    assert headings[-2:] == [OTHER, "Examples"] or (command == "warm" and headings[-1] == OTHER)
+    for line, _ in one.examples:
+        program, name, *words = shlex.split(line)
+        assert (program, name) == ("clpt", command)
+        one.make_context(name, words)
+
+
+def test_headings_are_of_options_that_there_are() -> None:
+    """All that stands under a heading is an option of some command."""
+    commands = [cli.get_command(click.Context(cli), name) for name in COMMANDS]
+    known = {p.name for one in commands if one for p in one.params}
+    assert {name for names in HEADINGS.values() for name in names} - known == set()
 
 
 @pytest.mark.parametrize(

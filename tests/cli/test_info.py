@@ -5,12 +5,13 @@ from __future__ import annotations
 import base64
 import dataclasses
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from clpt.__main__ import run
-from clpt.cli.files.scene_contents import summary
+from clpt.cli.files.scene_contents import summary, tidy
 from clpt.formats import load
 from clpt.scene import Film
 
@@ -112,3 +113,18 @@ def test_what_a_file_may_say_besides(scenes, tmp_path):
         "width": 3, "height": 4, "crop": [1, 2, 3, 4], "of": [9, 8], "mode": "spectral",
         "filter": "box", "bands": 5, "alpha": True,
     }  # fmt: skip
+
+
+def test_people_are_told_what_there_is_only(tmp_path, capsys):
+    """No zeros, nothing twice, and bounds without the noise of floats; JSON has it all."""
+    scene = str(Path(__file__).resolve().parents[2] / "scenes" / "prism")
+    assert run(["info", scene, "--json"]) == 0
+    whole = json.loads(capsys.readouterr().out)
+    assert whole["triangles_instanced"] == whole["triangles"] and whole["spheres"] == 0
+    assert run(["info", scene]) == 0
+    told = capsys.readouterr().out
+    assert "(-6, 0, -6) to (6, 1.05, 6)" in told
+    for words in ("instanced", "spheres", "in file", "none", "e-16", "animations"):
+        assert words not in told
+    flat = tidy({"bounds": [[0.0, 1.0, 2.0], [0.0, 1.0, 2.0]], "spp": 4, "warnings": []})
+    assert flat == {"bounds": [[0.0, 1.0, 2.0], [0.0, 1.0, 2.0]], "spp": 4}

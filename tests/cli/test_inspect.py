@@ -39,7 +39,7 @@ def shows(path) -> bool:
 def test_spectra(here, capsys, emissive):
     made = SpectralImage(VALUES, NM, emissive, exposure=1.0)
     spectral_exr.write("a.exr", made)
-    assert run(["inspect", "a.exr", "--at", "5,3", "--at", "0, 1", "--json"]) == 0
+    assert run(["inspect", "a.exr", "--at", "5,3", "--at", "0, 1", "--json", "--plot"]) == 0
     out, err = capsys.readouterr()
     told = json.loads(out)
     assert told["wavelengths"] == NM.tolist()
@@ -62,6 +62,12 @@ def test_a_table(here, capsys):
     assert (here / "b.svg").read_text().startswith("<?xml")
 
 
+def test_it_writes_nothing_unasked(here):
+    spectral_exr.write("a.exr", SpectralImage(VALUES, NM))
+    assert run(["inspect", "a.exr", "--at", "2,1"]) == 0
+    assert [p.name for p in here.iterdir()] == ["a.exr"]
+
+
 def test_without_a_pixel_it_tells_of_the_file(here, capsys):
     spectral_exr.write("a.exr", SpectralImage(VALUES, NM))
     assert run(["inspect", "a.exr"]) == 0
@@ -72,7 +78,7 @@ def test_without_a_pixel_it_tells_of_the_file(here, capsys):
 @pytest.mark.parametrize("name", ["a.png", "a.exr", "a.hdr", "a.npy"])
 def test_other_images(here, capsys, name):
     images.write(name, np.full((2, 3, 3), [0.25, 0.5, 1.0]), half=False)
-    assert run(["inspect", name, "--at", "2,1", "--json"]) == 0
+    assert run(["inspect", name, "--at", "2,1", "--json", "--plot"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["channels"] == ["R", "G", "B"]
     np.testing.assert_allclose(told["pixels"][0]["values"], [0.25, 0.5, 1.0], atol=5e-3)
@@ -99,7 +105,8 @@ def test_layers_and_values_that_are_not_finite(here, capsys):
         (["a.exr", "--at", "1;2"], "'1;2' does not look like 120,80"),
         (["a.exr", "--at", "0,0", "-o", "a.jpg"], "a plot is written to .png"),
         (["a.exr", "--at", "0,0", "-o", "none/a.png"], "cannot be written"),
-        (["none.exr"], "no such image file"),
+        (["a.exr", "--plot"], "name one by --at X,Y"),
+        (["none.exr"], "no such file"),
         (["text.exr"], "not a readable image"),
         (["text.doc"], "unknown image suffix"),
     ],
@@ -125,7 +132,9 @@ def test_without_matplotlib_the_extra_is_named(here, capsys, monkeypatch):
     monkeypatch.delitem(sys.modules, "clpt.cli.plots.pixels")
     monkeypatch.delattr("clpt.cli.plots.pixels")
     monkeypatch.setitem(sys.modules, "matplotlib.axes", None)
-    assert run(["inspect", "a.exr", "--at", "0,0"]) == 2
+    assert run(["inspect", "a.exr", "--at", "0,0"]) == 0
+    assert capsys.readouterr().err == ""
+    assert run(["inspect", "a.exr", "--at", "0,0", "--plot"]) == 2
     out, err = capsys.readouterr()
     assert "400 nm" in out
     assert 'a plot needs matplotlib: install it by pip install "clpt[plot]"' in err

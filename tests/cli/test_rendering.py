@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import io
 import signal
+import sys
 import threading
 import time
+from types import SimpleNamespace
 
 import pytest
 from rich.console import Console
 
 from clpt.cli.opening.makers import DEVICE_SECONDS
+from clpt.cli.printing import display
 from clpt.cli.printing.display import Bar, Lines, clock, figures
+from clpt.cli.printing.names import device_name, device_names
 from clpt.cli.process import stopping
+from clpt.cli.render import report
 from clpt.cli.render.passes import GROWTH, End, pass_size, render_samples
 from clpt.render.progress import Progress
 
@@ -116,7 +121,9 @@ def test_size_of_a_pass():
 
 def test_figures():
     told = figures(Progress(32.4, 64, 2_000_000, 9_000_000, 2.0), 0.5)
-    assert list(told.values()) == ["32/64 spp", "1 Msamples/s", "4.5 Mrays/s", "0:02", "0:02 left"]
+    assert list(told.values()) == ["32/64 spp", "", "", "4.5 Mrays/s", "0:02", "0:02 left"]
+    noisy = figures(Progress(32.4, 0, 2_000_000, 9_000_000, 2.0, 0.25, 0.0312), 0.5)
+    assert (noisy["open"], noisy["noise"]) == ("25% of the pixels left", "noise 3.1 %")
     assert clock(59.6) == "1:00" and clock(3661) == "1:01:01"
 
 
@@ -145,14 +152,74 @@ def test_lines_come_now_and_then(monkeypatch, capsys):
 
 
 def test_a_terminal_gets_a_bar():
-    bar = Bar(limit=None)
-    bar.console = Console(file=io.StringIO(), force_terminal=True, width=120, highlight=False)
-    with bar.phase("building kernels"):
-        pass
+    bar = Bar(None, "a_{box}")
+    bar.console = Console(file=io.StringIO(), force_terminal=True, width=80, highlight=False)
+    with bar.compiling("building kernels") as compiles:
+        compiles()
     with bar.rendering():
         bar.show(Progress(1.0, 64, 31_250, 100_000, 1.5))
         bar.show(Progress(64.0, 64, 2_000_000, 9_000_000, 2.0))
     bar.note("a warning with [brackets]")
     told = bar.console.file.getvalue()
-    for words in ("64/64 spp", "1 Msamples/s", "4.5 Mrays/s", "0:00 left", "[brackets]"):
+    for words in ("64/64 spp", "a_{box}", "4.5 Mrays/s", "0:00 left", "[brackets]"):
         assert words in told
+
+
+def test_compilers_are_told_of_where_they_take_long(monkeypatch, capsys):
+    """What a cache has, of clpt or of the driver, is there within the patience."""
+    lines = Lines()
+    with lines.compiling("building kernels") as compiles:
+        compiles()
+    with lines.compiling("building kernels"):
+        pass
+    assert not capsys.readouterr().err
+    told = threading.Event()
+    monkeypatch.setattr(display, "PATIENCE", 0.001)
+    monkeypatch.setattr(lines, "note", lambda text: (print(text), told.set()))
+    with lines.compiling("building kernels") as compiles:
+        compiles(), compiles()
+        assert told.wait(60)
+    assert capsys.readouterr().out == "building kernels ...\n"
+
+
+def test_a_text_stands_at_once_and_goes(monkeypatch, capsys):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    bar = Bar(None, "a_box")
+    bar.begin("a_box ...")
+    assert capsys.readouterr().err == "a_box ..."
+    bar.note("a_box  8x8")
+    assert capsys.readouterr().err.startswith("\r\x1b[2K")
+
+
+@pytest.mark.parametrize(
+    "info, name",
+    [
+        (("Portable Computing Language", "pthread-skylake-avx512-AMD EPYC"), "PoCL AMD EPYC"),
+        (("Portable Computing Language", "cpu-haswell-Intel(R) Xeon(R) CPU @ 2.20GHz"),
+         "PoCL Intel Xeon"),
+        (("NVIDIA CUDA", "NVIDIA H100 80GB HBM3"), "NVIDIA H100 80GB HBM3"),
+        (("rusticl", "llvmpipe"), "rusticl llvmpipe"),
+    ],
+)  # fmt: skip
+def test_short_names_of_devices(info, name):
+    one = SimpleNamespace(platform=info[0], name=info[1])
+    assert device_name(one) == name
+    assert device_names([one, one]) == f"2 x {name}"
+
+
+SO_FAR = ", with the picture so far; 4.2 s in all"
+
+
+@pytest.mark.parametrize(
+    "mean, end, line",
+    [
+        (64.0, End(64), "64 spp, 4.2 s in all"),
+        (28.44, End(64, stopped=[2]), f"stopped at 28 of 64 spp{SO_FAR}"),
+        (0.25, End(stopped=[2]), f"stopped at 0.25 spp{SO_FAR}"),
+    ],
+)  # fmt: skip
+def test_the_last_line(mean, end, line):
+    paths = SimpleNamespace(paths=SimpleNamespace(pixels=100))
+    counts = SimpleNamespace(samples=100 * mean)
+    renderer = SimpleNamespace(counts=counts, wavefront=paths, first_sample=0)
+    assert report.ending(renderer, end, 4.2) == line

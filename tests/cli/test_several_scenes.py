@@ -33,7 +33,7 @@ def test_what_fails_does_not_stop_the_rest(meshes, capsys):
     error = capsys.readouterr().err
     for words in (
         "none.xml (1 of 3)", "clpt: error: none.xml: there is no such file", "clpt: error: b.obj:",
-        f"{CORNELL} (3 of 3)", "of_cornell_box.npy  1 spp",
+        f"{CORNELL} (3 of 3)", "of_cornell_box.npy\n", "\n1 spp, ",
         "clpt: error: 2 of 3 scenes failed: none.xml, b.obj\n",
     ):  # fmt: skip
         assert words in error

@@ -89,6 +89,19 @@ def test_a_driver_that_fails_is_passed_over(machine, monkeypatch, caplog):
     assert "the compiler is broken" in caplog.text
 
 
+def test_a_gpu_of_two_platforms_is_taken_once(machine, monkeypatch):
+    """As rusticl and a vendor's driver may both have it; the first that works."""
+    gpus = property(lambda info: (0, 1, 0, 0) if info.kind == "gpu" else None)
+    monkeypatch.setattr(context.DeviceInfo, "slot", gpus)
+    monkeypatch.setattr(context, "trial", lambda info: "no" if info.name == "Fast 1" else None)
+    assert [one.info.name for one in context.choose_all("gpu")] == ["Fast 2"]
+    monkeypatch.setattr(context, "trial", lambda info: None)
+    assert [one.info.name for one in context.choose_all("gpu")] == ["Fast 1"]
+    assert [one.info.name for one in context.choose_all("all")] == ["Fast 1", "Old Core"]
+    monkeypatch.setattr(context.DeviceInfo, "slot", None)
+    assert [one.info.name for one in context.choose_all("gpu")] == ["Fast 1", "Fast 2"]
+
+
 def test_no_driver_works(machine, monkeypatch):
     monkeypatch.setattr(context, "trial", lambda info: "it is broken")
     with pytest.raises(DeviceError, match="no OpenCL device works: Beta Fast 1"):

@@ -8,6 +8,7 @@ import pytest
 
 from clpt.device import Buffers, Stream, host_buffer, refusals
 from clpt.errors import DeviceError, MemoryBudgetError
+from tests.device.bad_device import driver_error
 
 CODE = cl.status_code
 COMMANDS = {  # of PyOpenCL: by what of clpt they are called
@@ -18,12 +19,6 @@ COMMANDS = {  # of PyOpenCL: by what of clpt they are called
     "enqueue_marker": lambda stream, _: stream.mark(),
     "Buffer": lambda stream, _: host_buffer(stream.queue.context, 0, np.zeros(4)),
 }
-
-
-def driver_error(code: int) -> cl.Error:
-    """The error that PyOpenCL makes of a driver's code."""
-    cls = cl.MemoryError if code == CODE.MEM_OBJECT_ALLOCATION_FAILURE else cl.RuntimeError
-    return cls(cl._cl._ErrorRecord(msg="no", code=code, routine="clEnqueue"))
 
 
 @pytest.fixture

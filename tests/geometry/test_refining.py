@@ -99,8 +99,10 @@ def test_images_are_read_as_on_the_device():
     ],
 )
 def test_refused(more, message):
+    mesh = Mesh(**{**SQUARE, **more})
     with pytest.raises(SceneError, match=message):
-        triangles.triangulate(Mesh(**{**SQUARE, **more}))
+        refining.check(mesh)
+        triangles.triangulate(mesh)
 
 
 def test_of_pbrt(tmp_path):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from clpt.errors import SceneError
-from clpt.render.analysis.filters import radius
+from clpt.render.analysis.filters import radius, value
 from clpt.render.lowering.camera import filters
 from clpt.scene import integrators as scene
 from clpt.scene.params import params
@@ -60,7 +60,7 @@ def test_samples_follow_the_filter(chosen):
     even, half = (np.arange(n) + 0.5) / n, np.full(n, 0.5)
     end = radius(chosen)
     edges = np.linspace(-end, end, 4001)
-    integral = np.concatenate([[0], np.cumsum(filters.value(chosen, (edges[1:] + edges[:-1]) / 2))])
+    integral = np.concatenate([[0], np.cumsum(value(chosen, (edges[1:] + edges[:-1]) / 2))])
     for axis, u in enumerate((np.column_stack([even, half]), np.column_stack([half, even]))):
         offsets, weights = sampled(chosen, u)
         along = offsets[:, axis]
@@ -134,7 +134,7 @@ def test_same_functions_as_mitsuba(chosen):
     x = np.linspace(0.0, 0.999 * radius(chosen), 57)
     values = np.array([theirs.eval(float(v)) for v in x])
     assert theirs.radius() == pytest.approx(radius(chosen))
-    ours = filters.value(chosen, x)
+    ours = value(chosen, x)
     scale = values[0] / ours[0]  # only the shape matters
     within = 7e-4 if chosen.kind == "gaussian" else 2e-6  # theirs is a polynomial
     np.testing.assert_allclose(ours * scale, values, atol=within * abs(values[0]))

@@ -11,6 +11,7 @@ from scipy.stats import chi2
 from clpt import transforms as T
 from clpt.errors import SceneError
 from clpt.geometry import triangles
+from clpt.render.analysis.checks.lights import check_light
 from clpt.render.analysis.lights import image_lights
 from clpt.render.analysis.lights.image_lights import face_coordinates, face_directions
 from clpt.render.contract import light_records
@@ -657,5 +658,6 @@ def test_brightness_of_a_texture_is_its_mean():
 )
 def test_bad_lights_are_named(lamp, words):
     with pytest.raises(SceneError) as caught:
+        check_light(lamp)
         lit([lamp])
     assert words in str(caught.value)

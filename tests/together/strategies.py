@@ -2,7 +2,8 @@
 
 A kind is drawn by being listed, and its parameters by their roles (`clpt.scene.roles`);
 a new role or form needs an entry in ROLES or FORMS here. Images and grids are tiny. The first
-choice is always the plainest, so that a scene shrinks to what a failure needs.
+choice is always the plainest, so that a scene shrinks to what a failure needs. What the rules of
+`clpt.render.analysis.checks` refuse is left out of parts and of scenes, but of a few.
 """
 
 from __future__ import annotations
@@ -17,9 +18,16 @@ import numpy as np
 
 from clpt import bvh, measured, spectra, transforms
 from clpt.errors import SceneError
+from clpt.geometry import shapes as geometry
 from clpt.lenses import Prescription, Surface
 from clpt.render.analysis.bodies import BENDS, OPEN
 from clpt.render.analysis.cameras import CONNECTED
+from clpt.render.analysis.checks import check
+from clpt.render.analysis.checks.cameras import check_camera
+from clpt.render.analysis.checks.lights import check_light
+from clpt.render.analysis.checks.materials import check_material
+from clpt.render.analysis.checks.shapes import check_shapes
+from clpt.render.analysis.checks.textures import check_textures
 from clpt.scene import (
     Scene,
     cameras,
@@ -44,6 +52,7 @@ DEEPEST = 3  # kinds in kinds
 MOST_GIVEN = 4  # parameters of a kind that are not its defaults
 BANDS = np.array([400.0, 500.0, 600.0, 700.0])  # [nm]
 SIZE = 4  # pixels of a film's side
+PLAIN = integrators.Film(width=SIZE, height=SIZE)
 
 
 class Drawer:
@@ -105,7 +114,7 @@ class Drawer:
             if name in chosen or (needed and name not in {**own, **given}):
                 own[name] = self.value(cls, name, param)
         self.depth -= 1
-        return _valid(cls, {**own, **given}, drop=chosen)
+        return _valid(cls, {**own, **given}, drop=[*chosen, *LOOSE])
 
     def value(self, cls: type, name: str, param: Param) -> Any:
         if param.textured and self.depth <= DEEPEST and self.maybe():
@@ -135,15 +144,31 @@ class Drawer:
 
 
 def _valid(cls: type[Kind], given: dict[str, Any], drop: Sequence[str]) -> Any:
-    """A kind without those parameters that contradict the others."""
-    for name in [*drop, None]:
+    """A kind without those parameters that contradict the others: one, or the first of them."""
+    names = [name for name in drop if name in given]
+    without = [[], *([name] for name in names), *(names[:n] for n in range(2, len(names) + 1))]
+    for left_out in without:
         try:
-            return cls(**given)
-        except SceneError:
-            if name is None:
-                raise
-            given.pop(name, None)
-    raise AssertionError
+            part = cls(**{name: value for name, value in given.items() if name not in left_out})
+            _check(part)
+            return part
+        except SceneError as error:
+            refused = error
+    raise refused
+
+
+def _check(part: Kind) -> None:
+    """Raise SceneError for a part that no scene may have."""
+    if isinstance(part, shapes.Shape):
+        check_shapes([part])
+    elif isinstance(part, cameras.Camera):
+        check_camera(part, PLAIN)
+    elif isinstance(part, materials.Material):
+        check_material(part, PLAIN)
+    elif isinstance(part, lights.ON_SHAPES):
+        check_textures(part)
+    elif isinstance(part, lights.Light):
+        check_light(part)
 
 
 # Parameters by role --------------------------------------------------------------------------
@@ -421,6 +446,10 @@ def _sky(self: Drawer) -> dict[str, Any]:
     return {**{name: usual[name] for name in given}, **self.one([{}, low]), "ground": 0.2}
 
 
+def _envmap(self: Drawer) -> dict[str, Any]:
+    return {"image": self.one([one for one in _images() if getattr(one, "emissive", True)])}
+
+
 def _tabulated(self: Drawer) -> dict[str, Any]:
     return self.one(
         [
@@ -430,6 +459,7 @@ def _tabulated(self: Drawer) -> dict[str, Any]:
     )
 
 
+LOOSE = ("deformation", "attributes", "tangents", "normals", "uvs")  # that a mesh may do without
 WHOLE: dict[type, Callable[[Drawer], dict[str, Any]]] = {  # parameters that depend on one another
     shapes.Mesh: _mesh,
     shapes.Spheres: _spheres,
@@ -438,6 +468,7 @@ WHOLE: dict[type, Callable[[Drawer], dict[str, Any]]] = {  # parameters that dep
     media.Cloud: _cloud,
     media.Tabulated: _tabulated,
     lights.Sky: _sky,
+    lights.Envmap: _envmap,
 }
 
 # Scenes --------------------------------------------------------------------------------------
@@ -448,8 +479,61 @@ PLACED_LIGHTS = tuple(cls for cls in lights.KINDS if cls not in lights.ON_SHAPES
 def scene_of(choose: Callable[[int], int]) -> Scene:
     """A scene of the tables' kinds, by choices as `Drawer` has them; of zeros alone the plainest.
 
-    What the lowering refuses is rare, but not left out.
+    What `check` refuses is rare, but not left out.
     """
+    scene = _any_scene(choose)
+    return scene if choose(FEW) == FEW else accepted(scene)
+
+
+FEW = 15  # scenes of which one may have what is refused
+MOST_LEFT_OUT = 16
+
+
+def accepted(scene: Scene) -> Scene:
+    """A scene without what `check` refuses in it, one after the other."""
+    for _ in range(MOST_LEFT_OUT):
+        try:
+            check(scene)
+            break
+        except SceneError as error:
+            scene = _plainer(scene, error.where or "")
+    return scene
+
+
+def _plainer(scene: Scene, where: str) -> Scene:
+    """A scene in which what stands there is as plain as can be."""
+    part, _, name = where.partition(".")
+    if part == "film":
+        film = dataclasses.replace(scene.film, **{name: defaults(integrators.Film)[name]})
+        return dataclasses.replace(scene, film=film)
+    if part.startswith("lights["):
+        at = int(part[len("lights[") : -1])
+        return dataclasses.replace(scene, lights=[*scene.lights[:at], *scene.lights[at + 1 :]])
+    if part == "integrator":
+        return dataclasses.replace(scene, integrator=integrators.Path())
+    left = [_plain_shape(shape, where) for shape in scene.shapes]
+    if any(new is not old for new, old in zip(left, scene.shapes, strict=True)):
+        return dataclasses.replace(scene, shapes=[one for one in left if one is not None])
+    return dataclasses.replace(scene, camera=cameras.Perspective())
+
+
+def _plain_shape(shape: Any, where: str) -> Any:
+    """A shape without what its kind can do without, if it is what stands there; or nothing."""
+    inner = getattr(getattr(shape, "group", None), "shapes", ())
+    names = {geometry.where(one) for one in (shape, *inner)}
+    if where.partition(".")[0] not in names:
+        return shape
+    usual = defaults(shapes.Mesh)
+    plain = {name: usual[name] for name in SURFACE}
+    made = None if inner else dataclasses.replace(shape, **plain)
+    return made if made is None or shown(made) != shown(shape) else None
+
+
+SURFACE = ("material", "emission", "interior", "exterior", "priority", "motion")
+
+
+def _any_scene(choose: Callable[[int], int]) -> Scene:
+    """A scene of whatever goes together, or not."""
     self = Drawer(choose)
     integrator = self.kind(integrators.KINDS)
     traced = isinstance(integrator, integrators.ParticleTracer)

@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from clpt.errors import SceneError
+from clpt.render.analysis.checks import check
 from clpt.render.lowering.scene import lower
 from clpt.scene import Scene
 from tests.front_end import CLANG, errors
@@ -58,13 +59,21 @@ def drawn(choose: Callable[[int], int]) -> tuple[Scene, Way]:
 def attempt(scene: Scene, way: Way) -> tuple[str, list[str]]:
     """The rule that refuses a scene and no texts; or how it fails; or "" and its texts."""
     try:
-        return "", texts(lower(scene).features, way)
+        check(scene)
     except SceneError as error:
         return f"refused: {re.sub(r'[0-9.]+', 'n', error.message)[:80]}", []
     except Exception as error:
-        last = traceback.extract_tb(error.__traceback__)[-1]
-        place = "/".join(Path(last.filename).parts[-3:])
-        return f"failed: {type(error).__name__} at {place}:{last.lineno}: {error}"[:200], []
+        return _failure(error), []
+    try:
+        return "", texts(lower(scene).features, way)
+    except Exception as error:  # what `check` has let pass is not refused any more
+        return _failure(error), []
+
+
+def _failure(error: Exception) -> str:
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    place = "/".join(Path(last.filename).parts[-3:])
+    return f"failed: {type(error).__name__} at {place}:{last.lineno}: {error}"[:200]
 
 
 def kind_of(error: str) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from clpt.errors import SceneError
+from clpt.render.analysis.checks import check
 from clpt.render.lowering.scene import lower
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Lens, Perspective
@@ -111,11 +112,13 @@ def test_parts_that_once_did_not_go_together(parts: str, mode: str) -> None:
 @hypothesis.given(scenes(), ways())
 def test_scenes_build(scene: Scene, way: Way) -> None:
     try:
-        features = lower(scene).features
+        check(scene)
     except SceneError as error:
         assert error.where and "\n" not in str(error)
         hypothesis.reject()
-    except Exception as error:
+    try:
+        features = lower(scene).features
+    except Exception as error:  # what `check` has let pass is not refused any more
         raise AssertionError(f"{error!r} of\n{shown(scene)}") from error
     for error in errors(texts(features, way)):
         assert not error, f"{error[:2000]}\n{way}\n{shown(scene)}"

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from clpt.errors import SceneError
+from clpt.render.analysis.checks import check
 from clpt.scene import Scene
 from clpt.scene.materials import Diffuse
 from tests.together import equivalents
@@ -122,11 +123,12 @@ def test_grey_is_grey() -> None:
 @pytest.mark.parametrize("seed", range(DRAWN))
 def test_drawn_scenes(seed: int) -> None:
     """What needs no other program, of random scenes."""
+    scene = drawn(seed)
     try:
-        scene = drawn(seed)
-        whole = rendered(scene, SPP)
+        check(scene)
     except SceneError:
         pytest.skip("no such scene")
+    whole = rendered(scene, SPP)
     ties = "shapes in the other order"  # which of two surfaces at one place is met
     for name in set(CHEAP) - {ties}:
         try:

@@ -9,6 +9,7 @@ import pytest
 
 from clpt import Renderer
 from clpt.errors import SceneError
+from clpt.render.analysis.checks import check
 from tests.together.strategies import scene_of, shown
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("one_context")]
@@ -21,10 +22,11 @@ def test_scenes_render(seed: int) -> None:
     while True:
         scene = scene_of(lambda most: choose.randint(0, most))
         try:
-            renderer = Renderer(scene)
+            check(scene)
             break
         except SceneError:
             continue
+    renderer = Renderer(scene)
     try:
         renderer.run(1)
         picture = np.asarray(renderer.image())

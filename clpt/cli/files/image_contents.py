@@ -174,7 +174,7 @@ def _layers(channels: dict[str, np.ndarray]) -> Iterator[str]:
         picture = not layer and letter in "RGBAY"
         groups.setdefault(layer or ("picture" if picture else letter), []).append(name)
     for layer, names in sorted(groups.items(), key=lambda group: group[0] != "picture"):
-        letters = sorted((name.rpartition(".")[2] for name in names), key=_in_order)
+        letters = sorted((name.rpartition(".")[2] for name in names), key=in_order)
         stored = " ".join(sorted({TYPES[str(channels[name].dtype)] for name in names}))
         values = np.stack([channels[name] for name in names])
         finite = values[np.isfinite(values)]
@@ -185,8 +185,8 @@ def _layers(channels: dict[str, np.ndarray]) -> Iterator[str]:
         yield f"{layer}{own}: {stored}{spread}{bad}"
 
 
-def _in_order(letter: str) -> tuple[int, str]:
-    """The key that sorts channels as people name them: R before G, and X before Y."""
+def in_order(letter: str) -> tuple[int, str]:
+    """Return the key that sorts channels as people name them: R before G, and X before Y."""
     return "RGBA".find(letter) if letter in "RGBA" else len("RGBA"), letter
 
 

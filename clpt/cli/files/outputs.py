@@ -74,7 +74,7 @@ def write_all(
         try:
             write(path, source, stats, grading)
             name = "standard output" if is_standard(path) else path
-            tell(f"{name}  {stats['spp']:.4g} spp, {stats['seconds']:.1f} s")
+            tell(str(name))
         except FAILURES as error:
             rescued = _rescue(path, film, source, stats, grading)
             failures.append(f"{failure(path, error)}; {rescued}")
@@ -128,7 +128,7 @@ def write(
         layer_channels.write_layers(path, source, names=grading.names, metadata=stats)
     else:
         picture = source.colours() if form.bands else source.image()
-        if path.suffix.lower() == ".png":
+        if path.suffix.lower() in images.FOR_SCREENS:
             picture = images.straight(picture)
         images.write(
             path, picture, metadata=stats, space=form.output_space, exposure=grading.exposure,

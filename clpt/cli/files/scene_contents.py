@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from typing import Any
@@ -11,6 +12,7 @@ from ...geometry.triangles import triangulate
 from ...scene import Scene, materials, shapes, textures
 from ...scene.params import Kind, fields_of
 
+DIGITS = 4  # of bounds that people read
 OF_FILES = ("scenes", "variables", "asset")  # what some formats tell besides
 FLAT_TRIANGLES = {shapes.Rectangle: 2, shapes.Cube: 12}
 
@@ -53,6 +55,30 @@ def summary(scene: Scene) -> dict[str, Any]:
         **{name: scene.extra[name] for name in OF_FILES if scene.extra.get(name)},
         "warnings": scene.warnings,
     }
+
+
+def tidy(contents: dict[str, Any]) -> dict[str, Any]:
+    """Return a summary for people: without what a scene does not have, and bounds rounded."""
+    same = {"triangles_instanced": "triangles", "sampler_in_file": "sampler"}
+    kept = {
+        name: value
+        for name, value in contents.items()
+        if value not in (0, None, [], {}, "", ()) and value != contents.get(same.get(name, ""))
+    }
+    if kept.get("format") == "native":
+        kept["format"] = "scene.json"
+    if "bounds" in kept:
+        kept["bounds"] = _rounded(kept["bounds"])
+    return kept
+
+
+def _rounded(bounds: list[list[float]]) -> list[list[float]]:
+    """Return corners to DIGITS digits of the largest side."""
+    side = max(high - low for low, high in zip(*bounds, strict=True))
+    if not 0.0 < side < math.inf:
+        return bounds
+    places = DIGITS - 1 - math.floor(math.log10(side))
+    return [[round(number, places) + 0.0 for number in corner] for corner in bounds]
 
 
 def _arrays(shape: shapes.Shape) -> int:

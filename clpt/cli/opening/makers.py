@@ -8,8 +8,6 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from ... import device as dev
-from ...cluster.cluster_renderer import ClusterRenderer
-from ...cluster.multi_renderer import MultiRenderer
 from ...render.pictures import DevicePictures
 from ...render.progress import Progress
 from ...render.renderer import Renderer
@@ -17,11 +15,14 @@ from ...scene import Scene
 from ..options.scene_options import SceneOptions
 from ..options.workers import Workers
 from ..printing.display import Display
+from ..printing.names import device_names
 from ..process.stopping import prompt
-from .workers import Watch, connected
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # one device has no use for what several need
     from distributed import Client
+
+    from ...cluster.cluster_renderer import ClusterRenderer
+    from .workers import Watch
 
 OVERLAP = 2  # pictures of a cluster at a time: workers begin the next one while the last one ends
 DEVICE_SECONDS = 3.0  # of a pass: at its end few paths are left; only there is there a checkpoint
@@ -72,8 +73,10 @@ class DeviceMaker(Maker):
 
     def make(self, scene: Scene, shown: Display, first_sample: int = 0) -> AnyRenderer:
         """Return a new renderer of a scene; note its warnings."""
-        names = " and ".join(on.info.name for on in self.devices)
-        with prompt(dev.kill_compilers), shown.phase(f"building kernels for {names}"):
+        text = f"building kernels for {device_names([on.info for on in self.devices])}"
+        with prompt(dev.kill_compilers), shown.compiling(text) as compiles:
+            for on in self.devices:
+                on.builds.on_compile = compiles
             renderer = new_renderer(scene, self.devices, first_sample=first_sample, **self._made)
         for warning in renderer.warnings:
             shown.note(f"clpt: warning: {warning}")
@@ -101,6 +104,8 @@ class ClusterMaker(Maker):
 
     def make(self, scene: Scene, shown: Display, first_sample: int = 0) -> ClusterRenderer:
         """Return a new renderer of a scene, whose warnings the watch notes."""
+        from ...cluster.cluster_renderer import ClusterRenderer
+
         others = [one.renderer for one in self._others if one.renderer and one is not self]
         self.renderer = ClusterRenderer(
             scene, self._client, beside=others[0] if others else None, first_sample=first_sample,
@@ -130,6 +135,8 @@ class ClusterMaker(Maker):
 def new_renderer(scene: Scene, devices: list[dev.Device], **made: Any) -> AnyRenderer:
     """Return a renderer on one device, or on several."""
     if len(devices) > 1:
+        from ...cluster.multi_renderer import MultiRenderer
+
         return MultiRenderer(scene, devices, **made)
     return Renderer(scene, devices[0], **made)
 
@@ -148,6 +155,8 @@ def cluster_makers(
     workers: Workers, options: SceneOptions, pictures: int, shown: Display
 ) -> Iterator[list[ClusterMaker]]:
     """Yield makers of the workers at an address; pictures: that may be rendered at a time."""
+    from .workers import Watch, connected
+
     device = options.machine.device
     several = workers.number is None or dev.names_several(device)
     made = options.made | {"device": None if several else device}  # one alone makes the pictures

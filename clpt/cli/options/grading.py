@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from ...choices import CHANNEL_NAMES, OCIO_CONFIG, TONES
+from ...choices import CHANNEL_NAMES, FOR_SCREENS, OCIO_CONFIG, TONES, Exposure
 from .records import Command, with_options
+from .values import Stops
 
 if TYPE_CHECKING:
     from ...colour.view import View
@@ -19,21 +21,39 @@ if TYPE_CHECKING:
 class Grading:
     """The form of pictures in files.
 
-    exposure [stops]; tone: a curve of clpt.colour.tones; view: of OpenColorIO, instead; names: of
-    channels of an .exr, a set of clpt.choices.CHANNEL_NAMES.
+    exposure [stops], or "auto"; tone: a curve of clpt.colour.tones; view: of OpenColorIO, instead;
+    names: of channels of an .exr, a set of clpt.choices.CHANNEL_NAMES.
     """
 
-    exposure: float = 0.0
+    exposure: Exposure = 0.0
     tone: str = "none"
     view: View | None = None
     names: str = CHANNEL_NAMES[0]
+
+    def unused(self, targets: tuple[Path, ...]) -> str | None:
+        """Return a sentence on options that concern none of the files, None without such."""
+        given = {
+            "--exposure": self.exposure != 0.0,
+            "--tone": self.tone != "none",
+            "--view": self.view is not None,
+        }
+        names = [name for name, was in given.items() if was]
+        if not names or for_screens(targets):
+            return None
+        suffixes = " ".join(FOR_SCREENS)
+        return f"{' and '.join(names)} without effect: of {suffixes} only, others keep the light"
+
+
+def for_screens(targets: tuple[Path, ...]) -> list[Path]:
+    """Return the files that exposure and tone curve concern."""
+    return [path for path in targets if path.suffix.lower() in FOR_SCREENS]
 
 
 @dataclass(frozen=True)
 class GradingOptions:
     """The options of `grading_options` and `names_option`."""
 
-    exposure: float
+    exposure: Exposure
     tone: str | None
     view: str | None
     display: str | None
@@ -57,9 +77,13 @@ class GradingOptions:
 
 
 _OPTIONS = (
-    click.option("--exposure", type=float, default=0.0, help="Brighten .png by this many stops."),
     click.option(
-        "--tone", type=click.Choice(TONES), help="Tone curve of .png.  [default: none]"
+        "--exposure", type=Stops(), default=0.0,
+        help="Brighten .png, .jpg and .webp by so many stops; auto: to a middle grey.",
+    ),
+    click.option(
+        "--tone", type=click.Choice(TONES),
+        help="Tone curve of .png, .jpg and .webp.  [default: none]",
     ),
     click.option(
         "--view", metavar="NAME", help="Make .png by this view of OpenColorIO: clpt[colour]."

@@ -8,10 +8,12 @@ from typing import Any
 
 import click
 
-from ...choices import AUTO, MOST_LIGHT_PATHS, OBSERVERS
+from ...choices import AUTO, MOST_LIGHT_PATHS, MOST_SAMPLES, OBSERVERS
 from ...errors import nearest
 
 LARGEST = 65536  # pixels of a side
+MOST_NOISE = 0.5  # that --noise takes: beyond, a few samples of each pixel are enough
+MOST_STOPS = 120.0  # float32 has not many more
 
 
 class Size(click.ParamType):
@@ -29,6 +31,51 @@ class Size(click.ParamType):
         if not (1 <= width <= LARGEST and 1 <= height <= LARGEST):
             self.fail(f"{width}x{height}: each side can be 1 to {LARGEST} pixels", param, ctx)
         return width, height
+
+
+class Noise(click.ParamType):
+    """A share such as 0.02 or 2%, at most MOST_NOISE; 0 for none."""
+
+    name = "SHARE"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> float:
+        found = re.fullmatch(r"(\d{1,9}(?:\.\d*)?|\.\d+)(?:e-?\d{1,2})?( ?%)?", str(value).strip())
+        if not found:
+            self.fail(f"{value!r} does not look like 0.02 or 2%", param, ctx)
+        share = float(str(value).strip().rstrip(" %")) / (100.0 if found[2] else 1.0)
+        if share > MOST_NOISE:
+            advice = f"; write {share:g}% or {share / 100.0:g}" if not found[2] else ""
+            self.fail(f"{value} is a noise above {MOST_NOISE:.0%}{advice}", param, ctx)
+        return share
+
+
+class Count(click.ParamType):
+    """A whole number from 1 on, such as 256, 1k or 1M."""
+
+    name = "N"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> int:
+        found = re.fullmatch(r"(\d{1,10})(?:\.(\d{1,6}))?([kM]?)", str(value).strip())
+        number = 0.0
+        if found:
+            number = (
+                float(f"{found[1]}.{found[2] or 0}") * {"": 1, "k": 1000, "M": 1000_000}[found[3]]
+            )
+        if not found or number != int(number):
+            self.fail(f"{value!r} is no whole number such as 256, 1k or 1M", param, ctx)
+        if not 1 <= number <= MOST_SAMPLES:
+            self.fail(f"{value} is outside of 1 to {MOST_SAMPLES}", param, ctx)
+        return int(number)
+
+
+class Stops(click.ParamType):
+    """A number of stops, or auto."""
+
+    name = "STOPS-OR-AUTO"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> float | str:
+        limits = click.FloatRange(-MOST_STOPS, MOST_STOPS)
+        return AUTO if value == AUTO else limits(value, param, ctx)
 
 
 class SensorName(click.ParamType):

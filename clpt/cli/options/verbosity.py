@@ -8,10 +8,21 @@ from typing import Any, TypeVar
 
 import click
 
+from ..process import failures
+
 LEVELS = (logging.WARNING, logging.INFO, logging.DEBUG)
 _COUNT = "clpt.verbosity"  # in what nested contexts share
 
 Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+class Handler(logging.Handler):
+    """Prints messages of clpt's log as the commands print theirs: clpt: warning: ..."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print a message as one line."""
+        failures.clear_line()
+        click.echo(f"clpt: {record.levelname.lower()}: {self.format(record)}", err=True)
 
 
 def verbose_option(text: str) -> Callable[[Command], Command]:

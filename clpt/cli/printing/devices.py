@@ -5,6 +5,7 @@ from __future__ import annotations
 from rich.table import Table
 
 from ...device.context import DeviceInfo, selection
+from .names import device_name
 
 
 def as_json(listed: tuple[DeviceInfo, ...], failures: dict[int, str | None]) -> dict[str, object]:
@@ -19,34 +20,31 @@ def as_json(listed: tuple[DeviceInfo, ...], failures: dict[int, str | None]) -> 
 
 
 def table(
-    listed: tuple[DeviceInfo, ...], failures: dict[int, str | None], taken: int | None
+    listed: tuple[DeviceInfo, ...],
+    failures: dict[int, str | None],
+    taken: int | None,
+    verbose: bool = False,
 ) -> Table:
-    """Return a table of devices; taken: the index of the one that would be used."""
+    """Return a table of devices, of 80 columns or less where they work.
+
+    taken: the index of the one that would be used; verbose: whether it has their full names and
+    their drivers.
+    """
     made = Table(box=None, pad_edge=False)
-    for heading in (
-        "",
-        "platform",
-        "device",
-        "kind",
-        "units",
-        "memory",
-        "lanes",
-        "driver",
-        "state",
-    ):
+    names = ("platform", "device", "driver") if verbose else ("device",)
+    for heading in ("", *names, "kind", "units", "memory", "lanes", "state"):
         right = heading in ("units", "memory", "lanes")
         made.add_column(heading, justify="right" if right else "left", overflow="fold")
     for info in listed:
         failure = failures[info.index]
+        own = (info.platform, info.name, info.driver) if verbose else (device_name(info),)
         made.add_row(
             f"{'*' if info.index == taken else ' '} {info.index}",
-            info.platform,
-            info.name,
+            *own,
             info.kind.upper() if info.kind != "accelerator" else info.kind,
             str(info.compute_units),
             f"{info.global_mem / 2**30:.1f} GiB",
             str(info.lanes),
-            info.driver,
             "works" if failure is None else f"fails: {failure}",
             style="bold" if info.index == taken else None,
         )

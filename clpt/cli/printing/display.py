@@ -3,32 +3,43 @@
 from __future__ import annotations
 
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ...render.progress import Progress
+from ..process import failures
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 EVERY = 5.0  # seconds between lines
-PATIENCE = 1.0  # seconds of reading a scene before there is a bar
+PATIENCE = 1.0  # seconds of reading or compiling before a line or a bar tells of it
+WIDE, NARROW, ROOMY = 24, 10, 100  # columns of a bar, and of a terminal for the wide one
 REFRESH = 0.1  # seconds between changes of the bar
+LONGEST_NAME = 16  # characters of a scene's name beside the bar
 
 
-def display(quiet: bool, limit: float | None) -> Display:
-    """Return the display that suits stderr. limit: seconds that the render may take, or None."""
+def display(quiet: bool, limit: float | None, name: str = "") -> Display:
+    """Return the display that suits stderr.
+
+    limit: seconds that the render may take, or None; name: of the scene.
+    """
     if quiet:
-        return Display(limit)
-    return Bar(limit) if sys.stderr.isatty() else Lines(limit)
+        return Display(limit, name)
+    return Bar(limit, name) if sys.stderr.isatty() else Lines(limit, name)
 
 
 class Display:
     """Shows nothing; the base of those that do."""
 
-    def __init__(self, limit: float | None = None):
-        self.limit = limit
+    def __init__(self, limit: float | None = None, name: str = ""):
+        self.limit, self.name = limit, name
         self.last = time.perf_counter()
         self.since: tuple[float, float] | None = None
 
@@ -36,6 +47,14 @@ class Display:
     def phase(self, text: str) -> Iterator[None]:
         """Show a text meanwhile."""
         yield
+
+    @contextmanager
+    def compiling(self, text: str) -> Iterator[Callable[[], None]]:
+        """Yield a function that any thread calls when a compiler begins; show it if it lasts."""
+        yield lambda: None
+
+    def begin(self, text: str) -> None:
+        """Show a text at once, until something else is shown."""
 
     @contextmanager
     def loading(self, name: str) -> Iterator[Callable[[float, str], None]]:
@@ -62,8 +81,9 @@ class Display:
         return True
 
     def fraction(self, progress: Progress) -> float:
-        """Return the share of the render that is done: of its samples or time, the larger."""
+        """Return the share of the render that is done: of samples, pixels or time, the largest."""
         done = progress.samples / progress.total if progress.total else 0.0
+        done = max(done, 1.0 - progress.active)
         return min(1.0, max(done, progress.seconds / self.limit if self.limit else 0.0))
 
     def figures(self, progress: Progress) -> dict[str, str]:
@@ -85,6 +105,26 @@ class Lines(Display):
         yield
 
     @contextmanager
+    def compiling(self, text: str) -> Iterator[Callable[[], None]]:
+        timer = threading.Timer(PATIENCE, self._compiles, [text])
+        timer.daemon = True
+        lock, begun = threading.Lock(), []
+
+        def begin() -> None:
+            with lock:
+                if not begun:
+                    begun.append(True)
+                    timer.start()
+
+        try:
+            yield begin
+        finally:
+            timer.cancel()
+
+    def _compiles(self, text: str) -> None:
+        self.note(f"{text} ...")
+
+    @contextmanager
     def loading(self, name: str) -> Iterator[Callable[[float, str], None]]:
         last = time.perf_counter()
 
@@ -99,7 +139,7 @@ class Lines(Display):
     def show(self, progress: Progress) -> None:
         numbers = self.figures(progress)
         if self.due(progress, EVERY):
-            self.note("  ".join(numbers.values()).rstrip())
+            self.note("  ".join(filter(None, numbers.values())))
 
     def note(self, text: str) -> None:
         click.echo(text, err=True)
@@ -108,11 +148,22 @@ class Lines(Display):
 class Bar(Lines):
     """A spinner for every phase, then a bar."""
 
-    def __init__(self, limit: float | None = None):
-        super().__init__(limit)
+    def __init__(self, limit: float | None = None, name: str = ""):
+        super().__init__(limit, name)
+        self._begun = False  # whether the text of `begin` stands on the screen
+
+    def begin(self, text: str) -> None:
+        click.echo(text, err=True, nl=False)  # before rich is imported, which takes its time
+        self._begun = True
+
+    @cached_property
+    def console(self) -> Console:
+        """The terminal, without the text of `begin`."""
         from rich.console import Console
 
-        self.console = Console(stderr=True, highlight=False)
+        if self._begun:
+            failures.clear_line()
+        return Console(stderr=True, highlight=False)
 
     @contextmanager
     def phase(self, text: str) -> Iterator[None]:
@@ -120,13 +171,22 @@ class Bar(Lines):
             yield
 
     @contextmanager
+    def compiling(self, text: str) -> Iterator[Callable[[], None]]:
+        with self.console.status(self.name) as status:
+            yield lambda: status.update(text)
+
+    @contextmanager
     def loading(self, name: str) -> Iterator[Callable[[float, str], None]]:
         from rich.progress import BarColumn, TextColumn
         from rich.progress import Progress as RichProgress
 
-        columns = TextColumn(f"reading {name}"), BarColumn(24), TextColumn("{task.description}")
+        columns = (
+            TextColumn("reading {task.fields[name]}", markup=False),
+            BarColumn(24),
+            TextColumn("{task.description}", markup=False),
+        )
         bar = RichProgress(*columns, console=self.console, transient=True)
-        task, began = bar.add_task("", total=1.0), time.perf_counter()
+        task, began = bar.add_task("", total=1.0, name=name), time.perf_counter()
 
         def tell(fraction: float, what: str) -> None:
             if time.perf_counter() - began >= PATIENCE:
@@ -143,10 +203,13 @@ class Bar(Lines):
         from rich.progress import BarColumn, TextColumn
         from rich.progress import Progress as RichProgress
 
-        columns = [TextColumn(f"{{task.fields[{name}]}}") for name in FIGURES]
-        bar = RichProgress(BarColumn(24), *columns, console=self.console, auto_refresh=False)
+        columns = [TextColumn(f"{{task.fields[{name}]}}") for name in FIGURES if name != "open"]
+        width = WIDE if self.console.width >= ROOMY else NARROW
+        name = TextColumn("{task.description}", markup=False)
+        shape = BarColumn(width, complete_style="cyan", finished_style="green")
+        bar = RichProgress(name, shape, *columns, console=self.console, auto_refresh=False)
         nothing: dict[str, Any] = dict.fromkeys(FIGURES, "")
-        self._task = bar.add_task("", total=1.0, **nothing)
+        self._task = bar.add_task(self.name[:LONGEST_NAME], total=1.0, **nothing)
         with bar:
             self._bar = bar
             yield
@@ -161,7 +224,7 @@ class Bar(Lines):
         self.console.print(text, markup=False)
 
 
-FIGURES = ("samples", "speed", "rays", "elapsed", "left")
+FIGURES = ("samples", "open", "noise", "rays", "elapsed", "left")
 
 
 def figures(
@@ -175,14 +238,20 @@ def figures(
     seconds, done = max(progress.seconds, 1e-9), fraction - since[1]
     left = f"{clock((seconds - since[0]) * (1.0 - fraction) / done)} left" if done > 0.0 else ""
     samples = f"{int(progress.samples)}{f'/{progress.total}' if progress.total else ''} spp"
-    left_over = f", {progress.active:.0%} of the pixels left" if progress.active < 1.0 else ""
+    noise = "" if progress.noise is None else f"noise {percent(progress.noise)}"
     return {
-        "samples": samples + left_over,
-        "speed": f"{progress.paths / seconds * 1e-6:.3g} Msamples/s",
+        "samples": samples,
+        "open": f"{progress.active:.0%} of the pixels left" if progress.active < 1.0 else "",
+        "noise": noise,
         "rays": f"{progress.rays / seconds * 1e-6:.3g} Mrays/s",
         "elapsed": clock(progress.seconds),
         "left": left,
     }
+
+
+def percent(share: float) -> str:
+    """Return a share in percent, with two digits."""
+    return f"{float(f'{100.0 * share:.2g}'):g} %"
 
 
 def clock(seconds: float) -> str:

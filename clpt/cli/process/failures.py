@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import traceback
 from pathlib import Path
 
@@ -27,7 +28,14 @@ def message_of(error: Exception) -> tuple[str, int]:
 
 def complain(message: str) -> None:
     """Print an error as one line."""
+    clear_line()
     click.echo(f"clpt: error: {' '.join(message.split())}", err=True)
+
+
+def clear_line() -> None:
+    """Remove what a display has left in the line of the cursor, on a terminal."""
+    if sys.stderr.isatty():
+        click.echo("\r\x1b[2K", err=True, nl=False)
 
 
 def _keep_traceback() -> str:

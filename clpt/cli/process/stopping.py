@@ -41,7 +41,7 @@ def status(error: BaseException | None) -> int:
 def tell() -> None:
     """Say that a signal ends the command, on a terminal whose cursor a bar may have hidden."""
     if sys.stderr.isatty():
-        click.echo("\r\x1b[2K\x1b[?25h", err=True, nl=False)
+        click.echo("\x1b[?25h", err=True, nl=False)
     failures.complain("interrupted")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import click
@@ -9,14 +10,23 @@ import click
 from ...formats import locate
 from ..files import targets
 from ..options.grading import grading_options, names_option
+from ..options.headings import Grouped
 from ..options.records import with_records
 from ..options.scene_options import denoise_option, scene_options
 from ..options.verbosity import verbose_option
 from ..options.workers import worker_options
 from .settings import Job, Settings, picture_options, tev_option
 
+EXAMPLES = (
+    ("clpt render scenes/cornell_box --spp 1k -o box.exr -o box.png", "Two files of one picture."),
+    ("clpt render pawn.ply --camera 45,20 --env sky.exr --tone agx", "A mesh under a sky."),
+    ("clpt render scenes/prism --noise 2% --time 10m", "Until there is little noise, or no time."),
+    ("clpt render truck.glb --exposure auto -o truck.jpg", "As bright as a screen shows it."),
+    ("clpt render room.xml --cluster local:2 --every 30s", "Two workers; a picture to look at."),
+)
 
-@click.command()
+
+@click.command(cls=Grouped, examples=EXAMPLES)
 @click.argument(
     "scenes", metavar="SCENE...", nargs=-1, required=True, type=click.Path(path_type=Path)
 )
@@ -58,6 +68,7 @@ def render(scenes: tuple[Path, ...], form: str | None, settings: Settings) -> in
 
 def _rendered(job: Job) -> int:
     """Render the picture of a scene, or its frames; return the exit status."""
+    began = time.perf_counter()
     from ..printing.display import display
 
     if job.animation.frames is not None:
@@ -66,6 +77,9 @@ def _rendered(job: Job) -> int:
         return render_frames(job, display(job.quiet, None))
     locate(job.scene)
     targets.checked(job.targets)
+    name = targets.name_of(job.scene)
+    shown = display(job.quiet, job.until.limit, name)
+    shown.begin(f"{name} ...")
     from .picture import render_picture
 
-    return render_picture(job, display(job.quiet, job.until.limit))
+    return render_picture(job, shown, began)

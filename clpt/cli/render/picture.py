@@ -16,9 +16,11 @@ from ...scene import Scene
 from ..files import checkpoints, outputs
 from ..opening.makers import AnyRenderer, DeviceMaker, Maker, cluster_makers, device_makers
 from ..opening.scenes import open_scene, read_scene
+from ..options.grading import for_screens
 from ..printing.display import Display
+from ..printing.names import device_names
 from ..process.stopping import STATUS, stops
-from . import report
+from . import brightness, report
 from .passes import End, render_samples
 from .refused import refusals
 from .settings import Job
@@ -26,17 +28,21 @@ from .so_far import PictureSoFar
 from .tev_viewer import showing
 
 
-def render_picture(job: Job, shown: Display) -> int:
+def render_picture(job: Job, shown: Display, began: float) -> int:
     """Render the picture of a scene and write its files; return the exit status.
+
+    began: the command, or the scene of several [s of time.perf_counter].
 
     Raises what the render raises, after the picture so far and the film are written.
     """
-    began = time.perf_counter()
+    if text := job.graded.grading.unused(job.targets):
+        shown.note(f"clpt: warning: {text}")
     former = _Former.find(job, shown.note)
     with ExitStack() as resources:
         opened = _open(job, former, shown, resources)
         renderer = opened.maker.make(opened.scene, shown, job.until.first)
         resources.callback(renderer.close)
+        shown.note(report.header(shown.name, renderer, opened.where))
         end = former.go_on(renderer, job.until.end(opened.scene), shown.note)
         opened.tell_before(job.verbose)
         picture = _Picture(job, renderer, former, shown)
@@ -47,6 +53,7 @@ def render_picture(job: Job, shown: Display) -> int:
             ends = End(end, shown.limit, renderer.scene.noise, stopped)
             picture.render(opened.maker, ends, show_picture)
             picture.finish(bool(stopped))
+            shown.note(report.ending(renderer, ends, time.perf_counter() - began))
         opened.tell_after(job.verbose)
         if stopped:
             opened.maker.stop()
@@ -94,6 +101,13 @@ class _Opened:
     maker: Maker
     devices: DeviceMaker | None = None
     loading: float = 0.0
+
+    @property
+    def where(self) -> str:
+        """Who renders, in short."""
+        if self.devices is None:
+            return f"workers of {self.maker.name}"
+        return device_names([on.info for on in self.devices.devices])
 
     def tell_before(self, verbose: int) -> None:
         """Print what the devices have made of the scene."""
@@ -178,7 +192,13 @@ class _Picture:
     def _warn(self, share: float) -> None:
         """Note pixels without a sample, and samples that the film refused."""
         few = [f"only {share:.1%} of the pixels have a sample; others are black"] * (share < 1.0)
-        for text in [*few, *refusals(self._renderer)]:
+        grading, targets = self._job.graded.grading, self._job.targets
+        told = [*few, *refusals(self._renderer)]
+        if self._has_samples:
+            if grading.exposure == "auto" and for_screens(targets):
+                self._shown.note(f"exposure {brightness.exposure_found(self._renderer):+.1f} stops")
+            told += brightness.remarks(self._renderer, grading, targets)
+        for text in told:
             self._shown.note(f"clpt: warning: {text}")
 
     @property

@@ -6,6 +6,31 @@ import click
 
 from ...cluster.multi_renderer import MultiRenderer
 from ..opening.makers import AnyRenderer
+from .passes import End
+
+TIMES = {  # of RenderStats.seconds
+    "lower": "time to encode the scene",
+    "trees": "time to build trees",
+    "ready": "time until it is ready",
+}
+
+
+def header(name: str, renderer: AnyRenderer, where: str) -> str:
+    """Return the line that says what is rendered, how and where."""
+    film, asked, chosen = renderer.scene.film, renderer.scene.integrator.kind, renderer.stats
+    how = asked if asked == chosen.integrator else f"{asked} -> {chosen.integrator}"
+    size = f"{film.size[0]}x{film.size[1]}"
+    return "  ".join((name, size, film.mode, how, where))
+
+
+def ending(renderer: AnyRenderer, end: End, seconds: float) -> str:
+    """Return the line that says how far the render came, in so many seconds of all."""
+    mean = renderer.counts.samples / renderer.wavefront.paths.pixels
+    samples = f"{mean:.0f}" if mean >= 10 or mean == int(mean) else f"{mean:.2g}"
+    if not end.stopped:
+        return f"{samples} spp, {seconds:.1f} s in all"
+    of = "" if end.samples is None else f" of {end.samples - renderer.first_sample}"
+    return f"stopped at {samples}{of} spp, with the picture so far; {seconds:.1f} s in all"
 
 
 def before(renderer: AnyRenderer, loading: float) -> None:
@@ -18,7 +43,8 @@ def before(renderer: AnyRenderer, loading: float) -> None:
         seen = f"{stats.triangles_instanced:,} triangles seen"
         parts += [f"{stats.instances:,} instances", seen]
     if stats.analytic:
-        parts.append(f"{stats.analytic:,} shapes as they are")
+        shapes = "shape" if stats.analytic == 1 else "shapes"
+        parts.append(f"{stats.analytic:,} {shapes} without triangles")
     _line("geometry", ", ".join(parts))
     _line("lights", f"{stats.lights:,}")
     if stats.reason:
@@ -35,16 +61,14 @@ def before(renderer: AnyRenderer, loading: float) -> None:
         _line(f"tree {name}", layout + _bytes(size))
     for name, size in sorted(stats.tables.items(), key=lambda item: -item[1]):
         _line(f"table {name}", _bytes(size))
-    _line("paths", f"{first.paths.slots:,} in flight, {first.lanes} to a work-item")
+    _line("paths", f"{first.paths.slots:,} at a time, {first.lanes} in each vector")
     _line("device memory", _bytes(stats.memory))
     others = stats.programs - stats.programs_cached
-    kept = f"{stats.programs_cached} from clpt's cache, {others} from the driver or its cache"
+    kept = f"{stats.programs_cached} from clpt's cache, {others} by the driver or from its cache"
     _line("programs", f"{stats.programs} in {stats.seconds['programs']:.2f} s: {kept}")
-    _line("seconds to load", f"{loading:.2f}")
-    for name in ("lower", "trees", "ready"):
-        _line(
-            f"seconds {'until ' if name == 'ready' else 'for '}{name}", f"{stats.seconds[name]:.2f}"
-        )
+    _line("time to read the file", f"{loading:.2f} s")
+    for name, what in TIMES.items():
+        _line(what, f"{stats.seconds[name]:.2f} s")
 
 
 def after(renderer: AnyRenderer) -> None:
@@ -53,7 +77,7 @@ def after(renderer: AnyRenderer) -> None:
         for one in renderer.shares:
             lost = f", failed: {one.failure}" if one.failure else ""
             _line(f"share {one.share:.1%}", f"{one.rate * 1e-6:.3g} Mpaths/s, {one.name}{lost}")
-    _line("seconds until a sample", f"{renderer.stats.seconds.get('first_sample', 0.0):.2f}")
+    _line("time to the first sample", f"{renderer.stats.seconds.get('first_sample', 0.0):.2f} s")
     if renderer.scene.noise is not None:
         samples = renderer.film.get()[..., 3]
         done = 1.0 - renderer.active

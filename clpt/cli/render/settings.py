@@ -16,6 +16,7 @@ from ..options.changes import Sampling
 from ..options.grading import GradingOptions
 from ..options.records import Command, with_options
 from ..options.scene_options import SceneOptions
+from ..options.values import Count, Noise
 from ..options.workers import Workers
 from .frame_values import Frames
 
@@ -217,8 +218,9 @@ _OUTPUT = (
     click.option(
         "-o", "--output", "paths", multiple=True,
         type=click.Path(path_type=Path, allow_dash=True),
-        help="Where to write: .exr .png .hdr .pfm .npy, or - for the standard output; may be given "
-        "several times; {scene} is the scene's name, {camera} that of --camera all.  "
+        help="Where to write: .exr .png .jpg .webp .hdr .pfm .npy, or - for the standard "
+        "output; may be given several times; {scene} is the scene's name, {camera} that of "
+        "--camera all.  "
         "[default: {scene}.exr and {scene}.png]",
     ),
     click.option(
@@ -231,10 +233,10 @@ _OUTPUT = (
     ),
 )  # fmt: skip
 _UNTIL = (
-    click.option("--spp", type=click.IntRange(1, 2**31 - 1), help="Samples per pixel."),
+    click.option("--spp", type=Count(), help="Samples per pixel: 256, 1k, 1M."),
     click.option(
-        "--noise", type=click.FloatRange(0.0), metavar="SHARE",
-        help="Stop sampling pixels with less noise, such as 0.02 of their light, after --denoise "
+        "--noise", type=Noise(),
+        help="Stop sampling pixels with less noise, such as 2% of their light, after --denoise "
         "if that is given; 0: never.",
     ),
     click.option("--time", "limit", type=Duration(), help="Stop after 30s, 5m, 1h30m."),

@@ -8,14 +8,22 @@ import click
 
 from ...formats import locate
 from ..options.grading import grading_options
+from ..options.headings import Grouped
 from ..options.records import with_records
 from ..options.scene_options import scene_options
+from ..options.values import Count, Noise
 from ..options.verbosity import verbose_option
 from ..options.workers import worker_options
 from .settings import Settings
 
+EXAMPLES = (
+    ("clpt view scenes/cornell_box", "Opens the page in this machine's browser."),
+    ("clpt view pawn.ply --env sky.exr --size 640x360", "A mesh under a sky."),
+    ("clpt view scenes/prism --host 0.0.0.0 --no-browser", "For the browsers of other machines."),
+)
 
-@click.command()
+
+@click.command(cls=Grouped, examples=EXAMPLES)
 @click.argument("scene", type=click.Path(path_type=Path))
 @click.option("--port", type=click.IntRange(0, 65535), default=0, help="0: any that is free.")
 @click.option(
@@ -33,8 +41,8 @@ from .settings import Settings
     metavar="VIEW.json", help="Begin with a view that the page has saved.",
 )  # fmt: skip
 @worker_options("Render on workers, as of `clpt render`.")
-@click.option("--spp", type=click.IntRange(1, 2**31 - 1), help="Samples per pixel.")
-@click.option("--noise", type=click.FloatRange(0.0), metavar="SHARE", help="As of `clpt render`.")
+@click.option("--spp", type=Count(), help="Samples per pixel: 256, 1k, 1M.")
+@click.option("--noise", type=Noise(), help="As of `clpt render`.")
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), help="Seed of the random numbers.")
 @scene_options
 @grading_options

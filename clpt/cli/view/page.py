@@ -73,6 +73,8 @@ def _display(settings: Settings) -> Display:
     """Return how the picture is shown at first. Raises SceneError, click.UsageError."""
     grading = settings.graded.grading
     tone = OF_VIEW if grading.view else grading.tone
+    if grading.exposure == "auto":
+        raise click.UsageError("--exposure auto is for files: give the page a number to begin with")
     return Display(grading.exposure, tone, grading.view)
 
 

@@ -52,7 +52,8 @@ def load(path: Path, missing: Missing = "error", /, **variables: Any) -> Scene:
     and cameras their own numbers. `camera` and `scene` choose by number or name.
     `shutter` [s] is how long light comes to the film from `time` on, while nodes move.
     `variant` chooses among material variants. `lumens`: of a watt, by which punctual lights are
-    divided. `multiple_scattering`: 1 keeps what facets reflect to each other.
+    divided; of files of Blender 683 by itself. `multiple_scattering`: 1 keeps what facets reflect
+    to each other.
     missing: see clpt.load. Raises SceneError with the JSON path of what is wrong.
     """
     if "shutter" in variables:
@@ -114,7 +115,7 @@ def _open(
     if unknown:
         known = ", ".join(VARIABLES)
         raise SceneError(f"glTF has no variable {unknown[0]!r}; known: {known}", file=path)
-    document.lumens = _number(path, variables, "lumens", 1.0, 1e-6, 1e6)
+    document.lumens = _number(path, variables, "lumens", lights.lumens_of(document), 1e-6, 1e6)
     document.multiple_scattering = _number(path, variables, "multiple_scattering", 0.0, 0.0, 1.0)
     document.variant = variants.chosen(document, _text(variables.get("variant")))
     _check_extensions(document)
@@ -161,7 +162,7 @@ def _number(
     return number
 
 
-def _seconds(path: Path, value: object, name: str = "time") -> float:
+def _seconds(path: Path, value: Any, name: str = "time") -> float:
     try:
         return float(value)
     except ValueError:

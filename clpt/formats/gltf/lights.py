@@ -2,21 +2,45 @@
 
 A picture's values are photometric, as glTF's are: a light of 1 cd at a distance of 1 m gives 1 lux,
 and a white surface under 1 lux shows 1 / pi. Emission of 1 shows 1. The variable `lumens` divides
-punctual lights alone: by 683 lm/W they are as strong beside emission as in Blender.
+punctual lights alone. Blender's exporter multiplies its watts by 683 lm/W in its lighting mode
+"Standard", but not emission: of its files `lumens` is 683 by itself, see `lumens_of`.
 """
 
 from __future__ import annotations
 
 import math
+import re
+from contextlib import suppress
 
 from clpt.arrays import Matrix
+from clpt.errors import SceneError
 from clpt.formats.gltf.cameras import FROM_GLTF, rigid
-from clpt.formats.gltf.document import Element
+from clpt.formats.gltf.document import Document, Element
 from clpt.formats.gltf.nodes import Graph
 from clpt.scene.lights import Directional, Light, Point, Spot
 from clpt.spectra import RGBIlluminant
 
 NAME = "KHR_lights_punctual"
+BLENDER = re.compile(r"Khronos glTF Blender I/O v(\d{1,4})\.(\d{1,4})")
+WITH_MODES = 3, 6  # the first version of that exporter with lighting modes
+LUMENS = 683.0  # of a watt, in its mode "Standard"
+DIMMEST = 100.0  # [cd], [lx] of a file's strongest light in that mode: 2 W, or a seventh of 1 W/m^2
+
+
+def lumens_of(document: Document) -> float:
+    """Return the lumens of a watt by which a file's exporter multiplied its lights, 1 for none.
+
+    683 of Blender's, unless no light reaches DIMMEST: the file is then of its mode "Unitless". The
+    lights are thereby as strong beside emission and sky as in Blender.
+    """
+    extension, generator = document.root.extension(NAME), ""
+    with suppress(SceneError):
+        generator = document.root.needed("asset").text("generator", "")
+    found = BLENDER.match(generator)
+    if extension is None or found is None or (int(found[1]), int(found[2])) < WITH_MODES:
+        return 1.0
+    strengths = [element.number("intensity", 1.0) for element in extension.children("lights")]
+    return LUMENS if max(strengths, default=0.0) >= DIMMEST else 1.0
 
 
 def lights_of(graph: Graph) -> list[Light]:

@@ -133,7 +133,7 @@ def checked(path: Path | None, name: str, given: Arrays, warnings: list[str]) ->
     faces = given.faces
     with np.errstate(over="ignore", invalid="ignore"):
         points = np.ascontiguousarray(given.vertices, np.float32)
-        finite = np.isfinite(points).all(axis=1)
+        finite = np.asarray(np.isfinite(points).all(axis=1))
     if fault := _fault(faces, finite):
         raise SceneError(fault, file=path, where=name or None)
     used = np.zeros(len(points), bool)

@@ -21,6 +21,7 @@ from clpt.formats.located import Located
 
 LARGEST_INTEGER = 2**31 - 1
 PER_LETTER = 16  # bytes of memory for each letter of JSON, while it is read
+QUOTED = 40  # letters on each side of a mistake that a message quotes
 SKIPPED = re.compile(r"[\s,:]*")
 NAMES = {
     dict: "an object", list: "a list", str: "a string", bool: "true or false", float: "a number",
@@ -130,7 +131,7 @@ def parse(path: Path, confined: bool = False) -> Cursor:
         budget.check(PER_LETTER * len(text), "its JSON", path)
         value = json.loads(text, object_pairs_hook=_object)
     except json.JSONDecodeError as error:
-        raise SceneError(f"is not JSON: {error.msg}", file=path, line=error.lineno) from None
+        raise _syntax_error(error, path) from None
     except RecursionError:
         raise SceneError("is nested too deeply", file=path) from None
     except ValueError as error:
@@ -138,6 +139,17 @@ def parse(path: Path, confined: bool = False) -> Cursor:
     cursor = Cursor(value, path, text, confined=confined)
     cursor.expect(dict)
     return cursor
+
+
+def _syntax_error(error: json.JSONDecodeError, path: Path) -> SceneError:
+    """Return an error with line and column, and the text around it."""
+    lines = error.doc.splitlines()
+    line = lines[error.lineno - 1] if error.lineno <= len(lines) else ""
+    start = max(0, min(error.colno - 1, len(line)) - QUOTED)
+    quoted = line[start : error.colno - 1 + QUOTED].strip()
+    where = f" in: {quoted}" if quoted else ""
+    message = f"column {error.colno}: is not JSON: {error.msg}{where}"
+    return SceneError(message, file=path, line=error.lineno)
 
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any] | DuplicateKey:

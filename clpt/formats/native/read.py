@@ -26,6 +26,7 @@ KEYS = (
     "$schema", "name", "camera", "film", "integrator", "sampler", "materials", "media", "groups",
     "shapes",    "lights", "spp", "noise", "seed",
 )  # fmt: skip
+FILM_KEYS = frozenset(params(integrators.Film))
 
 
 def load(
@@ -65,6 +66,9 @@ class _Reader:
     def scene(self) -> Scene:
         """Read the whole file."""
         root = self.root
+        of_film = next((key for key in root.value if key not in KEYS and key in FILM_KEYS), None)
+        if of_film is not None:
+            raise root.at(of_film).error("stands inside of 'film'")
         root.check_keys("a scene", KEYS)
         if "camera" not in root.value:
             raise root.error("needs a 'camera'")
@@ -110,6 +114,8 @@ class _Reader:
                 values[key] = forms.read(child, declared[key], self)
             elif key not in (*other_keys, *shortcut):
                 known = (*declared, *shortcut)
+                if key in KEYS and len(cursor.path) == 1:
+                    raise child.error(f"stands at the top of the file, beside {cursor.path[0]!r}")
                 raise UnusedParameterError(cls.kind, key, known, **child.location())
         if shortcut and "metal" in cursor.value:
             if "eta" in values or "k" in values:

@@ -19,14 +19,14 @@ from clpt.formats.native import forms
 from clpt.formats.native.reradiation import RERADIATIONS
 from clpt.formats.native.shape_files import FILES
 from clpt.formats.native.spectra import SPECTRA
-from clpt.scene import KINDS, integrators, materials
+from clpt.scene import KINDS, integrators, materials, shapes
 from clpt.scene.params import Kind, defaults, params
 
 INTRODUCTION = """# scene.json
 
-`python -m clpt.formats.native.reference` makes this page from the dataclasses in `clpt/scene`: a
-name here is the class's name there, and every parameter is one of its fields. `scenes/schema.json`
-says the same to an editor: begin a file with `"$schema": "../schema.json"`.
+A scene is a JSON file, or the same in Python: each `type` here is a dataclass of `clpt.scene`, and
+each parameter is one of its fields. Begin a file with `"$schema": "../schema.json"`; your editor
+then knows all names and limits.
 
 ```json
 {
@@ -38,6 +38,21 @@ says the same to an editor: begin a file with `"$schema": "../schema.json"`.
              {"type": "mesh", "file": "teapot.ply", "material": {"type": "dielectric"}}],
   "lights": [{"type": "constant", "radiance": "D65"}]
 }
+```
+
+```python
+from clpt.scene import Film, Scene, cameras, lights, materials, shapes
+from clpt.transforms import look_at
+
+red = materials.Diffuse(reflectance=(0.6, 0.05, 0.04))
+glass = materials.Dielectric()
+scene = Scene(
+    camera=cameras.Perspective(fov=40, to_world=look_at([0, 1, 5], [0, 1, 0], [0, 1, 0])),
+    film=Film(width=640, height=480),
+    shapes=[shapes.Sphere(center=(0, 1, 0), material=red),
+            shapes.Mesh.from_trimesh(teapot, material=glass)],
+    lights=[lights.Constant(radiance="D65")],
+)
 ```
 
 ## A scene
@@ -71,7 +86,8 @@ applied first: `{"translate": [x, y, z]}`, `{"scale": s}` or `{"scale": [x, y, z
 plane of u and v.
 
 **Spectra** are a number (the same at every wavelength), `[r, g, b]` in linear Rec. 709, a name, or
-an object. What a number or a colour means depends on the parameter's role:
+an object. Reflectances, emissions and factors may be `"#rrggbb"` too: a colour in sRGB, as colour
+pickers show it. What a number or a colour means depends on the parameter's role:
 
 | role | number | `[r, g, b]` | name | a table beyond its ends |
 | --- | --- | --- | --- | --- |
@@ -89,6 +105,13 @@ illuminants A and D65 end at 830 nm and are dark beyond. Beyond their bands, spe
 reflectances hold, and those of light are dark.
 """
 
+ENDING = """## How this page is made
+
+`python -m clpt.formats.native.reference` makes it from the dataclasses in `clpt/scene`. Examples of
+kinds have the defaults of some parameters. [The JSON Schema](../scenes/schema.json) is made of the
+same declarations.
+"""
+EXAMPLE = 3  # parameters that the example of a kind has at most
 HEADINGS = {
     "camera": "Cameras", "shape": "Shapes", "material": "Materials", "texture": "Textures",
     "medium": "Media", "phase": "Phase functions",
@@ -105,7 +128,7 @@ def text() -> str:
             parts += ["## Film\n", _summary(integrators.Film), _table(integrators.Film)]
         if category == "material":
             parts += ["## Layers\n", _summary(materials.Layer), _table(materials.Layer)]
-    return "\n".join(parts)
+    return "\n".join([*parts, ENDING])
 
 
 def _spectra() -> list[str]:
@@ -148,7 +171,35 @@ def _reradiations() -> list[str]:
 
 
 def _kind(category: str, cls: type[Kind]) -> str:
-    return f"### `{cls.kind}`\n\n{_summary(cls)}{_picture(category, cls)}\n{_table(cls)}"
+    shown = "\n".join([_summary(cls) + _picture(category, cls), *map(_blocks, example(cls))])
+    return f"### `{cls.kind}`\n\n{shown}\n{_table(cls)}"
+
+
+def example(cls: type[Kind]) -> list[tuple[str, str]]:
+    """Return a kind as scene.json and Python have it, with the defaults of some parameters.
+
+    Empty for a kind that is nothing without a file or a group.
+    """
+    if cls in FILES or cls is shapes.Instance:
+        return []
+    default, own = defaults(cls), vars(cls).get("__annotations__", {})
+    plain = {n: default[n] for n in params(cls) if n in own and _is_plain(default[n])}
+    chosen = dict(list(plain.items())[:EXAMPLE])
+    given = ", ".join(f"{name}={value!r}" for name, value in chosen.items())
+    code = f"{cls.__module__.rpartition('.')[2]}.{cls.__name__}({given})"
+    return [(json.dumps({"type": cls.kind, **chosen}), code)]
+
+
+def _is_plain(value: object) -> bool:
+    """Return whether a value is numbers, which files and Python write alike."""
+    each = value if isinstance(value, tuple) else (value,)
+    return bool(each) and all(type(one) in (int, float) for one in each)
+
+
+def _blocks(both: tuple[str, str]) -> str:
+    """Return a block of JSON and one of Python, which the site shows as tabs."""
+    text, code = both
+    return f"```json\n{text}\n```\n\n```python\n{code}\n```\n"
 
 
 def _picture(category: str, cls: type[Kind]) -> str:

@@ -1,25 +1,30 @@
 """Spectra in scene.json, read and written.
 
-A number is constant; [r, g, b] is a colour; as emission either means that multiple of D65. A name
-is a glass as an index, and an illuminant as emission; an object has a `type` from SPECTRA and its
-fields, or `values` [[nm, value], ...], or a `file`.
+A number is constant; [r, g, b] is a colour, linear, and "#rrggbb" is one in sRGB; as emission each
+means that multiple of D65. A name is a glass as an index, and an illuminant as emission; an object
+has a `type` from SPECTRA and its fields, or `values` [[nm, value], ...], or a `file`.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Collection
 from typing import Any
 
-from clpt import input_files, spectra
+import numpy as np
+
+from clpt import images, input_files, spectra
 from clpt.errors import UnknownKindError
 from clpt.formats.colour import colour
 from clpt.formats.native.cursor import Cursor
 from clpt.scene.integrators import NO_AOV
-from clpt.scene.roles import COEFFICIENT, EMISSION, INDEX, Spectral
+from clpt.scene.roles import COEFFICIENT, EMISSION, FACTOR, INDEX, REFLECTANCE, Spectral
 from clpt.spectra import Spectrum
 from clpt.spectra.spectrum import Outside
 
+HEX = r"#([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})"
+HEX_ROLES = (REFLECTANCE, EMISSION, FACTOR)  # those of colours
 SPECTRA: dict[str, type[Spectrum]] = {
     "constant": spectra.Constant,
     "tabulated": spectra.Tabulated,
@@ -43,6 +48,8 @@ def read(cursor: Cursor, role: Spectral) -> Any:
 
 def _read(cursor: Cursor, role: Spectral) -> Any:
     value = cursor.value
+    if isinstance(value, str) and value.startswith("#") and role in HEX_ROLES:
+        return colour(role, _hex(cursor))
     if isinstance(value, str) and role is INDEX:
         if value.lower() not in spectra.glasses():
             raise UnknownKindError("glass", value, spectra.glasses(), **cursor.location())
@@ -65,6 +72,15 @@ def _read(cursor: Cursor, role: Spectral) -> Any:
         lambdas, samples = zip(*rows, strict=True)
         return spectra.Tabulated(lambdas, samples, outside)
     return _typed(cursor)
+
+
+def _hex(cursor: Cursor) -> tuple[float, ...]:
+    """Return #rrggbb, sRGB as colour pickers have it, as linear Rec. 709."""
+    match = re.fullmatch(HEX, cursor.value)
+    if match is None:
+        raise cursor.error(f'{cursor.value!r} is no colour such as "#aa2020"')
+    codes = np.array([int(code, 16) for code in match.groups()], np.float32)
+    return tuple(float(part) for part in images.srgb_to_linear(codes / np.float32(255.0)))
 
 
 def _from_file(cursor: Cursor, role: Spectral, outside: Outside) -> Spectrum:

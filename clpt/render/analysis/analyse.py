@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.errors import SceneError
 from clpt.geometry.motion import at_rest
 from clpt.render.analysis import open_boundaries
 from clpt.render.analysis.bodies import matter_of
-from clpt.render.analysis.checks import check
+from clpt.render.analysis.checks import check_at_rest
 from clpt.render.analysis.geometry import Geometry, assembled
 from clpt.render.analysis.index import SceneIndex
 from clpt.render.analysis.lights.aims import aims
@@ -76,7 +75,7 @@ def analyse(scene: Scene, cache: LoweringCache, before: Before | None = None) ->
     Raises SceneError where the scene makes no sense: it names the shape, light or material.
     """
     scene = at_rest(scene)
-    check(scene)
+    check_at_rest(scene, cache)
     index = replace(SceneIndex.of(scene), lit_before=before.lit_ghosts if before else None)
     geometry = assembled(index, cache)
     sphere = geometry.bounding_sphere()
@@ -112,8 +111,6 @@ def _media_at_lights(
     if not index.has_media or not index.may_have_light_paths:
         return index, NOWHERE
     found = light_media(index, geometry, sources, sphere, cache)
-    if found.refusal and index.light_paths:
-        raise SceneError(f"no light paths: {found.refusal}", where="integrator")
     return replace(index, lit_media=found.refusal), found
 
 

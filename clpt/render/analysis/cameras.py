@@ -58,7 +58,7 @@ def view_of(camera: Camera, width: int, height: int) -> View | None:
     """
     if isinstance(camera, Lens):
         return None
-    pinhole = MEMBERS[type(camera)](camera, width, height)
+    pinhole = members(camera, width, height)
     if "extent" not in pinhole:
         return None
     matrix, extent = pinhole["to_world"], pinhole["extent"]
@@ -77,11 +77,23 @@ def origin_of(camera: Camera, width: int, height: int) -> NDArray[np.float64]:
     if isinstance(camera, Lens):
         front = [0.0, 0.0, lens.front(camera, height / width)]
         return np.asarray(transforms.transform_points(rigid(camera), front), np.float64)
-    members = MEMBERS[type(camera)](camera, width, height)
-    if "to_world" in members:
-        return np.asarray(members["to_world"], np.float64)[:3, 3]
-    near = np.asarray(members["near"], np.float64)
+    found = members(camera, width, height)
+    if "to_world" in found:
+        return np.asarray(found["to_world"], np.float64)[:3, 3]
+    near = np.asarray(found["near"], np.float64)
     return near[:3] / near[3]
+
+
+def members(camera: Camera, width: int, height: int) -> dict[str, Any]:
+    """Return the members of a camera's record by name; width, height: of the film [pixels].
+
+    Raises SceneError for planes, a matrix or a glass that cannot be used, and beyond float32.
+    """
+    made = MEMBERS[type(camera)](camera, width, height)
+    for name, value in made.items():
+        if not fits_single(value):
+            raise SceneError("is beyond float32, 3.4e38", where=f"{camera.kind}.{name}")
+    return made
 
 
 def _matrix(camera: Camera, name: str) -> NDArray[np.float64]:
@@ -149,7 +161,8 @@ def _orthographic(camera: Orthographic, width: int, height: int) -> dict[str, An
 
 def _check_planes(camera: Any) -> None:
     if not camera.near < camera.far:
-        raise SceneError("near must be below far", where=camera.kind)
+        message = f"near must be below far, not {camera.near:g} and {camera.far:g}"
+        raise SceneError(message, where=camera.kind)
 
 
 def _spherical(camera: Spherical, width: int, height: int) -> dict[str, Any]:
@@ -172,8 +185,8 @@ def _unprojection(camera: Matrix, width: int, height: int) -> dict[str, Any]:
     parts = [b[:3] * column[3] - column[:3] * b[3] for column in (a, x, y)]
     length = max(np.linalg.norm(parts[0]), 1e-300)
     names = ("direction", "direction_x", "direction_y")
-    members = {name: part / length for name, part in zip(names, parts, strict=True)}
-    return {**members, "near": a - b, "near_x": x, "near_y": y}
+    found = {name: part / length for name, part in zip(names, parts, strict=True)}
+    return {**found, "near": a - b, "near_x": x, "near_y": y}
 
 
 MEMBERS: dict[type[Camera], Callable[..., dict[str, Any]]] = {

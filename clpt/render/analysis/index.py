@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from clpt.errors import SceneError
 from clpt.geometry import instancing, shapes
 from clpt.geometry.instancing import Placed, Prototype
 from clpt.geometry.motion import Motions
@@ -53,7 +52,7 @@ class SceneIndex:
     def of(cls, scene: Scene) -> SceneIndex:
         """Look through a scene that clpt.render.analysis.checks accepts.
 
-        Raises SceneError for an instance that cannot be placed, and for what is not a material.
+        Raises SceneError for an instance that cannot be placed, and for materials of one's own.
         """
         warnings: list[str] = []
         motions = Motions.of(scene)
@@ -249,11 +248,9 @@ def _leaf_kinds(shapes_: tuple[Shape, ...]) -> tuple[type[mt.Material], ...]:
     """The leaf kinds of a scene, in the order of their table; custom kinds follow."""
     found: dict[type[mt.Material], str] = {}
     for shape in shapes_:
-        where = shapes.where(shape)
-        if not isinstance(shape.material, mt.Material):
-            raise SceneError(f"{shape.material!r} is not a material", where=where)
         for leaf in leaves_of(shape.material):
-            found.setdefault(leaf, where)
+            if leaf not in found:
+                found[leaf] = shapes.where(shape)
     if any(shape.priority for shape in shapes_):
         found.setdefault(mt.Null, "")  # a surface within a body of higher priority
     return custom_materials.ordered(found) or (mt.Diffuse,)

@@ -43,7 +43,10 @@ def _placed(
         raise SceneError(
             f"the film would stand {-distance:.4g} mm inside of the lens", where="lens.film_shift"
         )
-    return made, distance, zones(made, distance, radius), axis_solid_angle(made, distance)
+    angle = axis_solid_angle(made, distance)
+    if not angle > 0.0:
+        raise SceneError("no light comes through to the middle of the film", where="lens")
+    return made, distance, zones(made, distance, radius), angle
 
 
 def focused(camera: Lens, aspect: float) -> tuple[Prescription, float, Floats, float, float]:

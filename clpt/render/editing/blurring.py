@@ -95,7 +95,8 @@ class _Way:
         normals = [one.normals for one in (old, new)]
         given = all(n is not None and not isinstance(n, str) for n in normals)
         turned = np.stack([np.asarray(on_host(n)) for n in normals]) if given else None
-        return replace(new, deformation=Deformation(self.times, [first, last], turned))
+        keys: dict[str, Any] = {"deformation": Deformation(self.times, [first, last], turned)}
+        return replace(new, **keys)
 
     def moved(self, old: Any, new: Any, name: str) -> Any:
         """A thing with keys of its transform, if it is elsewhere than before."""

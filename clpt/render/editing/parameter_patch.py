@@ -8,6 +8,7 @@ from typing import Any
 
 from clpt.geometry.instancing import distinct
 from clpt.render.analysis.cameras import dispersive_glasses
+from clpt.render.analysis.checks.materials import check_material
 from clpt.render.analysis.lights.aims import is_sharp
 from clpt.render.editing.rebuild import ranges
 from clpt.render.editing.scene_edit import Replacements
@@ -48,6 +49,7 @@ def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> Callable[[], N
             return "the camera's lens reflects, or no more"
     rows: list[tuple[int, Any]] = []
     for old, new in pairs:
+        check_material(new, scene.film)
         changed = lowered.encoder.replaced(old, new, "materials")
         if changed is None:
             return f"parameters of a {new.kind} come from elsewhere, such as a texture or a table"

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from clpt.arrays import Words
-from clpt.errors import SceneError
 from clpt.render.analysis.lights.look import Look
 from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.render.analysis.wavelengths import Density
@@ -26,7 +25,15 @@ from clpt.render.lowering.textures.bitmaps import Images
 from clpt.render.lowering.textures.textures import TextureTable
 from clpt.scene import roles
 from clpt.scene.materials import Material
-from clpt.scene.params import Kind, Texture, device_params, fields_of, interior_params, params
+from clpt.scene.params import (
+    Kind,
+    Texture,
+    device_params,
+    fields_of,
+    interior_params,
+    params,
+    place_of,
+)
 from clpt.scene.roles import Param, Role, Spectral
 from clpt.spectra import RGB, Constant, Sensor, Tabulated
 
@@ -126,7 +133,7 @@ class Encoder:
         values = fields_of(kind)
         for name, param in read.items():
             given = values[name]
-            self._check(given, param, _where(kind, name))
+            self._note_reach(given, place_of(kind, name))
             value, source = self.param_words(given, param, kind)
             if param.lobe and given in (0.0, *BLACK):
                 source = "none"
@@ -134,10 +141,8 @@ class Encoder:
             self._sources[kind.kind][name].add(source)
         return np.concatenate(made) if made else np.zeros(1, np.uint32)
 
-    def _check(self, value: object, param: Param, where: str) -> None:
-        """Raise SceneError for an index of 0; note a table that the film does not reach."""
-        if param.positive:
-            self.spectra.check_index(value, where)
+    def _note_reach(self, value: Any, where: str) -> None:
+        """Note a table that the film does not reach."""
         if isinstance(value, Tabulated) and not self.spectra.reaches(value):
             low, high = self.spectra.range
             self.warnings.add(
@@ -184,11 +189,9 @@ class Encoder:
         if self.spectra.spectral:
             rows = np.concatenate([self.kind_words(layer) for layer in material.layers])
         else:
-            self._refuse_textured_metal(material)
             for layer in material.layers:
-                values = fields_of(layer)
-                for name, param in params(type(layer)).items():
-                    self._check(values[name], param, _where(layer, name))
+                for name in params(type(layer)):
+                    self._note_reach(getattr(layer, name), place_of(layer, name))
             colours = thin_films.film_colours(material)
             table = self.store.append_floats("spectra", colours)
             profile, _ = self.named_words(
@@ -197,16 +200,6 @@ class Encoder:
             rows = np.array([table, colours.shape[1], *profile], np.uint32)
         first = self.store.append("materials", rows)
         return np.array([first, len(material.layers)], np.uint32), "layers"
-
-    @staticmethod
-    def _refuse_textured_metal(material: Material) -> None:
-        for name in ("eta", "k"):
-            if isinstance(fields_of(material).get(name), Texture):
-                raise SceneError(
-                    "below layers it cannot be a texture in RGB mode; give a spectrum, or render "
-                    'in the mode "spectral"',
-                    where=f"{material.kind}.{name}",
-                )
 
 
 def _spectrum(encoder: Encoder, value: Any, param: Param, owner: object) -> tuple[Words, str]:
@@ -243,12 +236,6 @@ ENCODINGS: dict[Role, Encoding] = {
     roles.MERL: lambda encoder, value, *_: encoder.spectra.merl_words(value),
     roles.RERADIATION: lambda encoder, value, *_: encoder.spectra.reradiation_words(value),
 }
-
-
-def _where(kind: Kind, name: str) -> str:
-    """Return the name of a parameter for messages, with the name of its material."""
-    named = fields_of(kind).get("name")
-    return f"{kind.kind}.{name}" + (f" of {named!r}" if named else "")
 
 
 def _no_sources() -> dict[str, dict[str, set[str]]]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import transforms
+from clpt import spectra, transforms
 from clpt.geometry import shape_records, shapes
 from clpt.geometry.instancing import Instances
 from clpt.geometry.refining import is_refined
@@ -49,7 +49,8 @@ from clpt.scene import materials as mt
 from clpt.scene.integrators import DEEPEST, Film, Integrator
 from clpt.scene.lights import Point
 from clpt.scene.media import Lattice
-from clpt.scene.shapes import Mesh
+from clpt.scene.params import params
+from clpt.scene.shapes import Mesh, Shape
 
 TREE_FROM = 16  # lights from which a tree chooses among them, see bench/lights.py
 
@@ -365,8 +366,6 @@ def _lower_camera(index: SceneIndex, encoder: Encoder) -> tuple[int, ...]:
     """Append the camera; return the rows in `spectra` of its glasses that disperse."""
     camera, film = index.scene.camera, index.scene.film
     glasses = cameras.dispersive_glasses(camera)
-    for glass in glasses:
-        encoder.spectra.check_index(glass, f"{camera.kind}.glass")
     rows = tuple(encoder.spectra.row(glass) for glass in glasses) if index.spectral else ()
     _, words = lower_camera(camera, film.width, film.height, rows)
     encoder.store.append_floats("camera", words)
@@ -387,6 +386,8 @@ def _warnings(index: SceneIndex) -> list[str]:
     warnings = list(index.warnings)
     if index.mode == "rgb" and cameras.dispersive_glasses(scene.camera):
         warnings.append(f"{scene.camera.kind}.glass: in RGB mode all wavelengths have one focus")
+    if index.mode == "rgb" and any(map(_disperses, index.shapes)):
+        warnings.append("in rgb mode glass does not disperse: ask for the spectral mode")
     if index.motions:
         warnings += _of_motion(index)
     if scene.integrator.light_paths:
@@ -406,6 +407,16 @@ def _warnings(index: SceneIndex) -> list[str]:
     if film.mode == "rgb" and any(medium.glows for medium in index.media):
         warnings.append("in rgb mode dyes in media only absorb: ask for the spectral mode")
     return warnings
+
+
+def _disperses(shape: Shape) -> bool:
+    """Whether a shape refracts wavelengths differently, in the spectral mode."""
+    return any(
+        param.role == "index" and not isinstance(spectra.index(vars(part)[name]), spectra.Constant)
+        for part in mt.parts(shape.material)
+        if part.refracts
+        for name, param in params(type(part)).items()
+    )
 
 
 def _of_motion(index: SceneIndex) -> list[str]:

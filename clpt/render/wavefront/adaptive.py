@@ -110,6 +110,18 @@ class Adaptive:
         return float(self._pixels[active].sum() / self._pixels.sum())
 
     @property
+    def level(self) -> float | None:
+        """The noise of the picture so far: the root of the mean square of the noise of its cells.
+
+        None before the first cells are measured. Cells that are not measured yet are left out.
+        """
+        known = np.isfinite(self._variance) & (self._pixels > 0) & (self.next > 0)
+        if not known.any():
+            return None
+        variance, pixels = self._variance[known] / self.next[known], self._pixels[known]
+        return math.sqrt(float((pixels * variance).sum() / pixels.sum()))
+
+    @property
     def _known_variance(self) -> Floats:
         """The variance of a sample where it is known, else 0."""
         return np.where(np.isfinite(self._variance), self._variance, 0.0)

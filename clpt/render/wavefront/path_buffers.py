@@ -14,13 +14,13 @@ from clpt import device
 from clpt.arrays import Integers
 from clpt.device.buffers import Buffers
 from clpt.errors import MemoryBudgetError
+from clpt.layout import SLAB_BLOCK, Record
 from clpt.records import COUNTER_NUMBERS, PATH, PATH_BITS, SLABS
 from clpt.render.lowering.scene import Lowered
 from clpt.render.wavefront import queues, work_list
 from clpt.render.wavefront.cells import CellGrid
 
 COUNTERS = COUNTER_NUMBERS.names
-PADDING = 80  # words between streams: powers of two collide in a cache
 GROUP = 64  # slots are a multiple of it, and it is the local size of one-lane kernels
 FRESH = PATH_BITS["fresh"]
 CPU_SLOTS = 1 << 14
@@ -29,8 +29,8 @@ MOST_SLOTS = 1 << 22  # beyond, more slots bring no speed
 # A core keeps its paths in its second cache, and waits the less for the longest of them the more
 # samples each slot has to take: few slots, measured on CPUs.
 LOOP_SLOTS = 1 << 10  # of a core
-WORDS = sum(record.words for record in SLABS) + 2  # of a slot, with those of queues
-LARGEST = max(record.words for record in SLABS)
+WORDS = sum(record.step for record in SLABS) + 2  # of a slot, with those of queues
+LARGEST = max(record.step for record in SLABS)
 
 
 @dataclass(frozen=True)
@@ -82,10 +82,12 @@ def divide_film(
     """
     words, largest = WORDS + footprint, max(LARGEST, footprint)
     room = min(memory // 2 // (4 * words), info.max_alloc // 4 // largest)
-    wanted = min(slots or default_slots(info, footprint), int(room) - PADDING)
+    wanted = min(slots or default_slots(info, footprint), int(room) - SLAB_BLOCK)
     if wanted < GROUP:
         advice = "close other programs or choose another device"
-        raise MemoryBudgetError("the least number of paths", 4 * words * GROUP, memory, advice)
+        raise MemoryBudgetError(
+            "the least number of paths", 8 * words * GROUP, 8 * words * max(int(room), 0), advice
+        )
     film = -(-padded_pixels // GROUP) * GROUP
     per_plane = min(wanted // GROUP * GROUP, film)
     planes = max(1, wanted // film) if per_plane == film else 1
@@ -103,8 +105,7 @@ class PathBuffers:
 
     settings: a copy of those of the lowered scene, with the numbers of slots and planes and the
     seed of the samples; pixels: how many have samples, with those around the picture; blocks: slots
-    beyond those of the paths, see kernels/path/queue.cl; stride: words from one stream of a slab to
-    the next.
+    beyond those of the paths, see kernels/path/queue.cl.
 
     Raises MemoryBudgetError.
     """
@@ -120,11 +121,11 @@ class PathBuffers:
     ):
         self.stream, self.buffers = stream, buffers
         self._slots, self.slots = slots, slots.total
-        self.stride = slots.total + blocks + PADDING
+        places = -(-(slots.total + blocks) // SLAB_BLOCK) * SLAB_BLOCK
         self.settings = self._with_slots(lowered.settings)
-        self._fixed: dict[str, Any] = {"stride": self.stride, "slots": self.slots}
+        self._fixed: dict[str, Any] = {"slots": self.slots}
         for record in SLABS:
-            name, size = f"{record.name.lower()}_words", 4 * record.words * self.stride
+            name, size = f"{record.name.lower()}_words", 4 * record.step * places
             buffer = buffers.allocate(name, size, "lower the number of slots")
             stream.fill(buffer, 0, 0, size)
             self._fixed[name] = buffer
@@ -174,8 +175,13 @@ class PathBuffers:
     def restart(self) -> None:
         """Enqueue that every slot begins its list of pixels again."""
         word = next(m.word for m in PATH.members if m.name == "state")
-        self.stream.fill(self._fixed["path_words"], FRESH, 4 * word * self.stride, 4 * self.slots)
+        self.stream.fill_rows(self._fixed["path_words"], FRESH, self.rows(PATH, word))
         self.stream.fill(self._fixed["counters"], 0, 0, 8)
+
+    def rows(self, record: Record, word: int) -> device.Rows:
+        """Where a slab has a word of all slots that hold paths."""
+        size = 4 * SLAB_BLOCK
+        return device.Rows(word * size, size, record.step * size, self.slots // SLAB_BLOCK)
 
     def clear_counters(self) -> None:
         """Enqueue that every counter is zero."""

@@ -282,6 +282,30 @@ def test_variants_and_units_by_choice(build, read):
 
 
 @pytest.mark.parametrize(
+    ("generator", "intensity", "strength"),
+    [
+        ("Khronos glTF Blender I/O v4.3.47", 54351.4, 54351.4 / 683.0),  # 1000 W / 4 pi
+        ("Khronos glTF Blender I/O v4.3.47", 79.6, 79.6),  # of the mode "Unitless"
+        ("Khronos glTF Blender I/O v3.3.27", 54351.4, 54351.4),  # without modes
+        ("Khronos Blender glTF 2.0 exporter", 1000.0, 1000.0),
+        (None, 54351.4, 54351.4),
+    ],
+)
+def test_lamps_of_blender(build, read, generator, intensity, strength):
+    """Its watts show as in Blender, whatever factor its exporter has put before them."""
+    name = "KHR_lights_punctual"
+    document = build()
+    document.mesh()
+    document.json["asset"] |= {} if generator is None else {"generator": generator}
+    document.json["extensions"] = {name: {"lights": [{"type": "point", "intensity": intensity}]}}
+    document.json["extensionsUsed"] = [name]
+    document.json["nodes"] += [{"extensions": {name: {"light": 0}}}]
+    document.json["scenes"] = [{"nodes": [0, 1]}]
+    assert read(document).lights[0].intensity.r == pytest.approx(strength)
+    assert read(document, lumens=1).lights[0].intensity.r == pytest.approx(intensity)
+
+
+@pytest.mark.parametrize(
     ("material", "place"),
     [
         ({"pbrMetallicRoughness": {"roughnessFactor": 2}}, "roughnessFactor"),

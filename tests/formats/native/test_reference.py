@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import get_args
 
+from clpt import scene
 from clpt.formats.native import forms, reference
 from clpt.scene import KINDS, integrators, materials
 from clpt.scene.params import params
@@ -39,3 +41,17 @@ def test_every_kind_and_parameter_is_in_the_reference():
         for cls in classes:
             section = page.split(f"### `{cls.kind}`\n")[1].split("\n## ")[0].split("\n### ")[0]
             assert all(f"| `{name}` |" in section for name in params(cls))
+
+
+def test_examples_say_the_same_in_json_and_python():
+    modules = {name: getattr(scene, name) for name in scene.__all__}
+    shown = 0
+    for classes in KINDS.values():
+        for cls in classes:
+            for text, code in reference.example(cls):
+                given = json.loads(text)
+                assert given.pop("type") == cls.kind
+                lists = {n: tuple(v) if isinstance(v, list) else v for n, v in given.items()}
+                assert repr(eval(code, modules)) == repr(cls(**lists))
+                shown += 1
+    assert shown > 60

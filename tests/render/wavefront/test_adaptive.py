@@ -94,6 +94,17 @@ def test_numbers_of_samples(renderer):
     assert renderer.active == 1.0
 
 
+def test_the_noise_so_far(renderer):
+    """It is told once it is measured, and falls as the root of the samples."""
+    again(renderer, 1)
+    seen = []
+    renderer.run(1024, lambda p: seen.append(p) or True, noise=1e-6)
+    assert seen[0].noise is None
+    levels = [(p.samples, p.noise) for p in seen if p.noise]
+    (few, first), (many, last) = levels[0], levels[-1]
+    assert many > 4 * few and 0.5 < first / last / np.sqrt(many / few) < 2.0
+
+
 def test_pieces_are_the_whole(renderer):
     """Several runs up to a number of samples, or one: the same picture."""
     pictures = []

@@ -13,6 +13,7 @@ import pytest
 import clpt
 from clpt import device
 from clpt.device import Source
+from clpt.layout import SLAB_BLOCK, Record
 from clpt.records import HIT, PATH, SHADOW, SLABS
 from clpt.render.codegen import programs
 from clpt.render.codegen.blocks import blocks_text, members, unused
@@ -71,13 +72,26 @@ kernel void probe(SLAB_ARGS, global const uint *queue, uint entry, uint end, uin
 }
 
 
-def slab_words(record: type, stride: int, **members: np.ndarray) -> np.ndarray:
-    """A slab with these members set, (words, stride) uint32."""
-    words = np.zeros((record.words, stride), np.uint32)
+def in_blocks(record: Record, words: np.ndarray) -> np.ndarray:
+    """Words (words, slots) as they lie in a slab: (blocks, step, SLAB_BLOCK)."""
+    blocks = -(-words.shape[1] // SLAB_BLOCK)
+    filled = np.zeros((record.step, blocks * SLAB_BLOCK), words.dtype)
+    filled[: record.words, : words.shape[1]] = words
+    return np.ascontiguousarray(filled.reshape(record.step, blocks, SLAB_BLOCK).swapaxes(0, 1))
+
+
+def from_blocks(record: Record, slab: np.ndarray) -> np.ndarray:
+    """The same back, (words, slots)."""
+    return slab.swapaxes(0, 1).reshape(record.step, -1)[: record.words]
+
+
+def slab_words(record: Record, slots: int, **members: np.ndarray) -> np.ndarray:
+    """A slab with these members set."""
+    words = np.zeros((record.words, slots), np.uint32)
     for member in record.members:
         if member.name in members:
             words[member.word, : len(members[member.name])] = members[member.name].astype(np.uint32)
-    return words
+    return in_blocks(record, words)
 
 
 def assembled(name: str, lanes: int = 1) -> Source:
@@ -119,8 +133,8 @@ def some(slots: int) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]:
 def slabs(slots: int, *members: np.ndarray) -> dict[str, np.ndarray]:
     state, prim, material = members
     return {
-        "path_words": slab_words(PATH, slots + 80, state=state),
-        "hit_words": slab_words(HIT, slots + 80, prim=prim, material=material),
+        "path_words": slab_words(PATH, slots, state=state),
+        "hit_words": slab_words(HIT, slots, prim=prim, material=material),
         "shadow_words": np.zeros(1, np.uint32),
     }
 
@@ -131,7 +145,7 @@ def test_sorting_against_numpy(slots: int, begin: int, end: int, lanes: int) -> 
     """Of its own slots alone, and nothing is written beyond its own entries."""
     host, waits, kind = some(slots)
     host |= {"queue": np.full(slots, 0xDEAD, np.uint32), "queue_starts": np.zeros(6, np.uint32)}
-    numbers = {"stride": slots + 80, "begin": begin, "end": end}
+    numbers = {"begin": begin, "end": end}
     made = on_device(assembled("sorting.cl", lanes), (("probe", 1, None),), host, **numbers)
     own = (waits >= begin) & (waits < end)
     waits, kind = waits[own], kind[own]
@@ -147,7 +161,7 @@ def test_appending_gathers_the_same(slots: int) -> None:
     """Every slot that waits is once in the queue of its kind; what is behind is left alone."""
     host, waits, kind = some(slots)
     host |= {n: np.full(k, 0xDEAD, np.uint32) for n, k in queues.sizes(slots, KINDS, True).items()}
-    numbers = {"stride": slots + 80, "slots": slots}
+    numbers = {"slots": slots}
     made = on_device(
         assembled("stage/append.cl"), tuple(queues.steps(slots, KINDS)), host, **numbers
     )
@@ -163,7 +177,7 @@ def test_nothing_waits() -> None:
     host = slabs(100, *np.zeros((3, 100)))
     host |= {n: np.full(k, 0xDEAD, np.uint32) for n, k in queues.sizes(100, KINDS, True).items()}
     steps = tuple(queues.steps(100, KINDS))
-    made = on_device(assembled("stage/append.cl"), steps, host, stride=180, slots=100)
+    made = on_device(assembled("stage/append.cl"), steps, host, slots=100)
     assert not made["queue_counts"].any()
 
 
@@ -175,7 +189,7 @@ def test_blocks_bring_paths_and_take_them_back(lanes: int) -> None:
     rng = np.random.default_rng(lanes)
     names = [f"{record.name.lower()}_words" for record in SLABS]
     host = {
-        name: rng.integers(1, 1 << 20, (record.words, slots + 80)).astype(np.uint32)
+        name: rng.integers(1, 1 << 20, (record.words, slots + SLAB_BLOCK)).astype(np.uint32)
         for name, record in zip(names, SLABS, strict=True)
     }
     word = {m.name: m.word for record in (SHADOW, HIT, PATH) for m in record.members}
@@ -184,9 +198,15 @@ def test_blocks_bring_paths_and_take_them_back(lanes: int) -> None:
     host["path_words"][word["pdf"]] = np.float32(0.25).view(np.uint32)
     before = {name: words[:, :slots].copy() for name, words in host.items()}
     queue = rng.permutation(slots).astype(np.uint32)
-    numbers = {"stride": slots + 80, "entry": entry, "end": end, "block": block}
+    numbers = {"entry": entry, "end": end, "block": block}
     source = assembled("blocks.cl", lanes)
-    made = on_device(source, (("probe", 1, None),), {**host, "queue": queue}, **numbers)
+    slabs = {
+        name: in_blocks(record, host[name]) for name, record in zip(names, SLABS, strict=True)
+    }
+    made = on_device(source, (("probe", 1, None),), {**slabs, "queue": queue}, **numbers)
+    made = {
+        name: from_blocks(record, made[name]) for name, record in zip(names, SLABS, strict=True)
+    }
     own, path = queue[entry:end], before["path_words"]
     path[word["state"], own] = path[word["sample"], own] + before["hit_words"][word["prim"], own]
     path[word["pdf"], own] = np.float32(0.5).view(np.uint32)

@@ -202,7 +202,7 @@ def _share_seen(index: SceneIndex, geometry: Geometry) -> float:
     return float(solid.sum() / (2.0 * np.pi * (1.0 - math.cos(view.angle))))
 
 
-def _first_with(all_: Iterable[Shape], wanted: Callable[[Shape], object]) -> Shape | None:
+def _first_with(all_: Iterable[Shape], wanted: Callable[[mt.Material], object]) -> Shape | None:
     """The first shape whose material is as wanted; a material is asked once."""
     asked: set[int] = set()
     for shape in all_:

@@ -8,7 +8,7 @@ in a cell by the bilinear function itself (kernels/core/grid.cl).
 from __future__ import annotations
 
 import dataclasses
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -172,8 +172,6 @@ def _loaded(image: Any, where: str, notes: list[str]) -> Floats32:
     """
     if spectral_exr.find(image, emissive=True, where=where) is not None:
         raise SceneError("spectral images can be an envmap only", where=where)
-    if image is None:
-        raise SceneError("an image is needed: a path, or an array (h, w, 3)", where=where)
     values: NDArray[Any]
     if isinstance(image, (str, Path)):
         stored = images.read_stored(image)
@@ -296,5 +294,13 @@ def _cube_weights(bright: Floats32) -> NDArray[np.float64]:
     wide[:, 1::2], wide[:, ::2] = bright[:, 1:-1], 0.5 * (bright[:, 1:] + bright[:, :-1])
     weights = np.empty((6, 2 * n + 1, 2 * n + 1))
     weights[..., 1::2], weights[..., ::2] = wide[..., 1:-1], 0.5 * (wide[..., 1:] + wide[..., :-1])
+    return weights * _cube_angles(n)
+
+
+@lru_cache(maxsize=2)
+def _cube_angles(n: int) -> NDArray[np.float64]:
+    """Solid angles (2n + 1, 2n + 1) of equal areas at the places of `_cube_weights`, on a scale."""
     at = np.linspace(-1.0, 1.0, 2 * n + 1)
-    return weights * (1.0 + at[None, :] ** 2 + at[:, None] ** 2) ** -1.5
+    angles = (1.0 + at[None, :] ** 2 + at[:, None] ** 2) ** -1.5
+    angles.flags.writeable = False
+    return np.asarray(angles, np.float64)

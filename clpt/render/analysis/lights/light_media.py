@@ -21,9 +21,10 @@ from clpt.render.analysis.bodies import matter_of
 from clpt.render.analysis.geometry import Emitter, Geometry
 from clpt.render.analysis.index import SceneIndex
 from clpt.render.analysis.lights import light_bounds
-from clpt.render.analysis.lights.sources import Sources
+from clpt.render.analysis.lights.sources import Sources, row_order
 from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.scene import Scene
+from clpt.scene.lights import Light
 from clpt.scene.media import Lattice, Medium
 from clpt.scene.motion import Deformation, Keys
 from clpt.scene.shapes import Shape
@@ -59,78 +60,98 @@ def light_media(
     sphere: tuple[NDArray[np.float64], float],
     cache: LoweringCache,
 ) -> LightMedia:
-    """Return the media around all lights of a scene that has media.
+    """Return the media around all lights of a scene that has media; the rest as of `around`."""
+    try:
+        found = around(index, geometry, sphere, cache)
+    except Unknown as reason:
+        return NOWHERE._replace(refusal=str(reason))
+    ends = (*sources.first, len(sources.power))[1:]
+    counts = [1] * len(sources.order)
+    counts += [end - first for first, end in zip(sources.first, ends, strict=True)]
+    rows = tuple(zip(found, counts, strict=True))
+    extinction = np.concatenate(
+        [np.zeros(0), *(np.full(count, _extinction(there)) for there, count in rows)]
+    )
+    return LightMedia(rows, "", extinction)
+
+
+class Unknown(Exception):
+    """Why no paths can start at some light; where: that light, "" where it is none's own."""
+
+    def __init__(self, reason: str, where: str = ""):
+        super().__init__(reason)
+        self.where = where
+
+
+def around(
+    index: SceneIndex,
+    geometry: Geometry,
+    sphere: tuple[NDArray[np.float64], float],
+    cache: LoweringCache,
+) -> list[Around]:
+    """Return the media around each lamp, in the order of rows, and each shape that shines.
 
     geometry: of the shapes that shine; sphere: centre and radius of one around the scene [m].
-    What moves is looked at again and again while the shutter is open: a light must stay in one
-    medium.
+    What moves is looked at again and again while the shutter is open. Raises Unknown for a light
+    that is not in one medium which is known, and for media that give out light.
     """
-    try:
-        if index.emitting:
-            name = index.emitting[0].name or index.emitting[0].kind
-            raise _NoLightPaths(f"no path starts in the medium {name!r}, which gives out light")
-        known = _Known(index.scene, index.nested, cache, index.motions)
-        hole = None if index.nested else known.open_medium()
-        afar = sphere[0] + AFAR * sphere[1] * np.ones(3)
-        rows = [(_around_lamp(index, i, known, hole, afar), 1) for i in sources.order]
-        ends = (*sources.first, len(sources.power))[1:]
-        for emitter, first, end in zip(geometry.emitters, sources.first, ends, strict=True):
-            number = int(geometry.rows[emitter.shape_row]["number"])
-            rows.append((_around_emitter(index, emitter, number, known, hole), end - first))
-    except _NoLightPaths as refusal:
-        return NOWHERE._replace(refusal=str(refusal))
-    extinction = np.concatenate(
-        [np.zeros(0), *(np.full(count, _extinction(around)) for around, count in rows)]
+    scene, motions = index.scene, index.motions
+    if index.emitting:
+        name = index.emitting[0].name or index.emitting[0].kind
+        raise Unknown(f"no path starts in the medium {name!r}, which gives out light")
+    known = _Known(scene, index.nested, cache, motions)
+    hole = None if index.nested else known.open_medium()
+    unknown = (
+        ""
+        if hole is None
+        else (
+            f"the boundary of the medium {hole.name or hole.kind!r} is not closed, so that nobody "
+            "knows whether {} is in it"
+        )
     )
-    return LightMedia(tuple(rows), "", extinction)
-
-
-class _NoLightPaths(Exception):
-    """The reason for which no path can start at the lights of a scene."""
+    afar = sphere[0] + AFAR * sphere[1] * np.ones(3)
+    lamps = [
+        _around_lamp(i, scene.lights[i], known, afar, unknown) for i in row_order(scene.lights)
+    ]
+    return lamps + [
+        _around_emitter(one, known, index, geometry, unknown) for one in geometry.emitters
+    ]
 
 
 def _around_lamp(
-    index: SceneIndex, number: int, known: _Known, hole: Medium | None, afar: NDArray[np.float64]
+    i: int, lamp: Light, known: _Known, afar: NDArray[np.float64], unknown: str
 ) -> Around:
-    """Return the media around a light of the scene's list; hole: a medium that is not closed.
-
-    afar: a point at which light from infinity begins. Raises _NoLightPaths.
-    """
-    lamp, name = index.scene.lights[number], f"lights[{number}]"
-    if hole is not None:
-        raise _unknown(hole, name)
+    """The media around a lamp; afar: a point (3,) that stands for infinity; unknown: where a
+    boundary is open, what to say of a light. Raises Unknown."""
+    name = f"lights[{i}]"
+    if unknown:
+        raise Unknown(unknown.format(name))
     if lamp.reach == "placed":
-        at = light_bounds.of_lamp(lamp).low[0]
-        inside = known.along(at, index.motions.lamps.get(number))
+        bounds = light_bounds.of_lamp(lamp)
+        inside = known.along(bounds.low[0], known.motions.lamps.get(i))
         if inside is None:
-            raise _NoLightPaths(CROSSES.format(name))
+            raise Unknown(CROSSES.format(name), name)
         return inside
     found = known.along(afar, None)
     if found or found is None:
         reason = f"the light of {name} comes from infinity, where a medium has no end"
-        raise _NoLightPaths(reason)
+        raise Unknown(reason, name)
     return found
 
 
 def _around_emitter(
-    index: SceneIndex, emitter: Emitter, number: int, known: _Known, hole: Medium | None
+    emitter: Emitter, known: _Known, index: SceneIndex, geometry: Geometry, unknown: str
 ) -> Around:
-    """Return the media that a shape shines into; number: of the shape. Raises _NoLightPaths."""
-    where = shapes.where(emitter.shape)
-    if hole is not None and not _says(emitter.shape):
-        raise _unknown(hole, where)
+    """The media that a shape shines into; unknown: as of `_around_lamp`. Raises Unknown."""
+    name = shapes.where(emitter.shape)
+    if unknown and not _says(emitter.shape):
+        raise Unknown(unknown.format(name))
+    number = int(geometry.rows[emitter.shape_row]["number"])
     into = _around_shape(emitter, known, index.motions, number)
     if into is None:
         moving = " while the shutter is open" if index.motions.moving else ""
-        raise _NoLightPaths(f"{where} shines into more than one medium{moving}")
+        raise Unknown(f"{name} shines into more than one medium{moving}", name)
     return into
-
-
-def _unknown(hole: Medium, where: str) -> _NoLightPaths:
-    return _NoLightPaths(
-        f"the boundary of the medium {hole.name or hole.kind!r} is not closed, so that nobody "
-        f"knows whether {where} is in it"
-    )
 
 
 def _extinction(around: Around) -> float:
@@ -151,7 +172,7 @@ class _Known:
 
     def __init__(self, scene: Scene, nested: bool, cache: LoweringCache, motions: Motions):
         self.scene = surroundings.boundaries(scene, matter_of if nested else None)
-        self.nested, self.cache = nested, cache
+        self.nested, self.cache, self.motions = nested, cache, motions
         self.looks = motions.looks()
         self.still = surroundings.stands_still(self.scene)
         # A camera's medium that no boundary holds is wherever there is no other.

@@ -16,6 +16,8 @@ from clpt.scene.pixels import pixels
 from clpt.scene.roles import EMISSION, REFLECTANCE
 from clpt.scene.textures import Bitmap, Checkerboard, Dots, MeshAttribute, Mix, Product, Solid
 
+SHEAR = 1e-5  # largest cosine between axes that are at right angles
+
 
 def power(lamp: Light, strength: float, scene_radius: float) -> float:
     """Estimate what a light off all shapes sends into the scene, mean of channels [W/nm].
@@ -83,6 +85,34 @@ def invertible(to_world: ArrayLike, where: str) -> NDArray[np.float64]:
     if matrix.shape != (4, 4) or transforms.is_singular(matrix) or not fits_single(matrix):
         raise SceneError("must be an invertible (4, 4) matrix", where=where)
     return matrix
+
+
+def placement(to_world: ArrayLike, where: str) -> dict[str, ArrayLike]:
+    """Return a light's position and unit axes. Raises SceneError as `invertible` and `unit` do."""
+    matrix = invertible(to_world, where)
+    axes = {axis: unit(matrix[:3, i], where) for i, axis in enumerate("xyz")}
+    return {"position": matrix[:3, 3], **axes}
+
+
+def unsheared(to_world: ArrayLike, where: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return a light's position (3,) and unit axes, the columns of (3, 3).
+
+    Raises SceneError for a matrix that shears, or without an inverse.
+    """
+    matrix = invertible(to_world, where)
+    axes = matrix[:3, :3] / np.linalg.norm(matrix[:3, :3], axis=0)
+    if np.abs(axes.T @ axes - np.eye(3)).max() > SHEAR:
+        raise SceneError("must not shear", where=where)
+    return matrix[:3, 3], axes
+
+
+def unit(value: ArrayLike, where: str) -> NDArray[np.float64]:
+    """Return a vector of length 1. Raises SceneError for one without a direction."""
+    vector = three(value, where)
+    length = transforms.length(vector)
+    if not length > 0.0:
+        raise SceneError("has no length", where=where)
+    return vector / length
 
 
 def three(value: ArrayLike, where: str) -> NDArray[np.float64]:

@@ -23,7 +23,7 @@ from clpt.render.analysis.lights.light_bounds import Bounds
 from clpt.render.analysis.lights.look import Look
 from clpt.render.analysis.lights.triangle_means import triangle_means
 from clpt.render.analysis.lowering_cache import LoweringCache
-from clpt.render.contract.light_records import INFINITE, RECORDS
+from clpt.render.contract.light_records import INFINITE
 from clpt.scene import lights
 from clpt.scene.lights import Area, DirectionalArea, Light
 from clpt.scene.media import Medium
@@ -144,7 +144,6 @@ def emissions_of(lamp: Light) -> dict[str, Any]:
 
 def _of_lamp(lamp: Light, scene_radius: float, look: Look) -> Source:
     """Return the source of a light that is not on a shape."""
-    _check_place(lamp)
     if isinstance(lamp, (lights.Envmap, lights.CubeMap)):
         strength = image_lights.mean_radiance(lamp, image_lights.content(lamp, look))
     elif isinstance(lamp, lights.Sky):
@@ -155,18 +154,6 @@ def _of_lamp(lamp: Light, scene_radius: float, look: Look) -> Source:
     power = light_power.power(lamp, strength, scene_radius)
     counts = light_power.importance(lamp, strength, power)
     return Source(np.array([power]), light_bounds.of_lamp(lamp), np.array([counts]))
-
-
-def _check_place(lamp: Light) -> None:
-    """Raise SceneError for a light that only shapes have, or that has no place."""
-    if lamp.kind not in RECORDS:
-        raise SceneError(f"a light of kind {lamp.kind!r} is a shape's `emission`", where="lights")
-    if isinstance(lamp, (lights.Envmap, lights.CubeMap, lights.Sky)):
-        image_lights.axes_of(lamp)
-    elif hasattr(lamp, "to_world"):
-        light_power.invertible(lamp.to_world, f"{lamp.kind}.to_world")
-    elif hasattr(lamp, "position"):
-        light_power.three(lamp.position, f"{lamp.kind}.position")
 
 
 def _of_bricks(glow: Glow) -> Bounds:

@@ -7,9 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.arrays import fits_single
-from clpt.errors import SceneError
-from clpt.render.analysis.cameras import MEMBERS, dispersive_glasses, rigid
+from clpt.render.analysis.cameras import dispersive_glasses, members, rigid
 from clpt.render.contract.camera_records import RECORDS
 from clpt.render.lowering.camera import lens
 from clpt.scene.cameras import Camera, Lens
@@ -29,9 +27,7 @@ def lower_camera(
         return camera.kind, lens.lens_words(camera, rigid(camera), width, height, rows)
     record = RECORDS[camera.kind]
     words = np.zeros((), record.dtype)
-    for name, value in MEMBERS[type(camera)](camera, width, height).items():
-        if not fits_single(value):
-            raise SceneError("is beyond float32, 3.4e38", where=f"{camera.kind}.{name}")
+    for name, value in members(camera, width, height).items():
         words[name] = value
     for row in rows.values():
         words["glass"] = row

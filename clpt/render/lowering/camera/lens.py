@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.arrays import Floats
-from clpt.errors import SceneError
 from clpt.lenses import COATINGS, Prescription
 from clpt.lenses.coatings import DESIGN, reflectance
 from clpt.lenses.glasses import LINE_D
@@ -43,8 +42,6 @@ def lens_words(
     unit = camera.unit
     extent = np.array([camera.film_width, camera.film_width * height / width])
     lens, back, ellipses, angle, radius = focused(camera, height / width)
-    if not angle > 0.0:
-        raise SceneError("no light comes through to the middle of the film", where="lens")
     lens = lens.with_coating(COATINGS[camera.coating])
     if camera.blades:
         turn = 2.0 * math.pi / camera.blades

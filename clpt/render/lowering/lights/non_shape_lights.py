@@ -8,10 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt import transforms
 from clpt.arrays import fits_single
 from clpt.errors import SceneError
-from clpt.render.analysis.lights.light_power import invertible, three
+from clpt.render.analysis.lights import light_power
 from clpt.render.analysis.lights.sources import emissions_of
 from clpt.render.contract import light_records
 from clpt.render.contract.light_records import RECORDS
@@ -92,9 +91,9 @@ MEMBERS: dict[Role, Callable[[str, Any, Param, str], dict[str, ArrayLike]]] = {
     roles.REAL: _number,
     roles.FLAG: _number,
     roles.CHOICE: lambda name, value, param, _: {name: param.choices.index(value)},
-    roles.host("vector"): lambda name, value, _, where: {name: three(value, where)},
-    roles.host("direction"): lambda name, value, _, where: {name: _unit(value, where)},
-    roles.host("matrix4"): lambda _, value, __, where: _placement(value, where),
+    roles.host("vector"): lambda name, value, _, where: {name: light_power.three(value, where)},
+    roles.host("direction"): lambda name, value, _, where: {name: light_power.unit(value, where)},
+    roles.host("matrix4"): lambda _, value, __, where: light_power.placement(value, where),
     roles.host("text"): lambda *_: {},
     roles.host("keys"): lambda *_: {},
 }
@@ -105,7 +104,7 @@ def _computed_members(kind: str, lamp: Light, encoder: Encoder) -> dict[str, Arr
     if kind in light_records.PROJECTED_RECORDS:
         return projected.members(lamp, encoder)
     assert isinstance(lamp, lights.Spot)
-    placement = _placement(lamp.to_world, "spot.to_world")
+    placement = light_power.placement(lamp.to_world, "spot.to_world")
     return {
         "position": placement["position"],
         "axis": placement["z"],
@@ -113,18 +112,3 @@ def _computed_members(kind: str, lamp: Light, encoder: Encoder) -> dict[str, Arr
         "beam_width": np.radians(min(lamp.beam_width, lamp.cutoff)),
         "smooth": lights.SPOT_EDGES.index(lamp.edge),
     }
-
-
-def _placement(to_world: ArrayLike, where: str) -> dict[str, ArrayLike]:
-    """A light's position and unit axes. Raises SceneError for a matrix without an inverse."""
-    matrix = invertible(to_world, where)
-    axes = {axis: _unit(matrix[:3, i], where) for i, axis in enumerate("xyz")}
-    return {"position": matrix[:3, 3], **axes}
-
-
-def _unit(value: ArrayLike, where: str) -> NDArray[np.float64]:
-    vector = three(value, where)
-    length = transforms.length(vector)
-    if not length > 0.0:
-        raise SceneError("has no length", where=where)
-    return vector / length

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt.errors import SceneError
-from clpt.render.analysis.lights.light_power import aspect, invertible
+from clpt.render.analysis.lights.light_power import aspect, unsheared
 from clpt.render.lowering.encoder import Encoder
 from clpt.scene.lights import SPOT_EDGES, Goniometric, Light, Projector, Spot
 from clpt.scene.pixels import pixels, spectral_image
@@ -62,9 +61,6 @@ def _place(
     to_world: ArrayLike, where: str, half_x: float = 1.0, half_y: float = 1.0
 ) -> dict[str, NDArray[np.float64]]:
     """Position and axes; x and y over half the image's size, along rows (1, 1) of unit length."""
-    matrix = invertible(to_world, where)
-    axes = matrix[:3, :3] / np.linalg.norm(matrix[:3, :3], axis=0)
-    if np.abs(axes.T @ axes - np.eye(3)).max() > 1e-5:
-        raise SceneError("must not shear", where=where)
+    position, axes = unsheared(to_world, where)
     x, y, z = axes.T
-    return {"position": matrix[:3, 3], "x": x / half_x, "y": y / half_y, "z": z}
+    return {"position": position, "x": x / half_x, "y": y / half_y, "z": z}

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from clpt.errors import SceneError
-from clpt.geometry import shapes
 from clpt.render.analysis.index import any_of
 from clpt.render.contract.parameter_words import MIXTURE
 from clpt.render.lowering.encoder import Encoder
@@ -66,11 +65,6 @@ class MaterialWords:
     def sides(self, shape: Shape) -> tuple[int, int, bool]:
         """Return the words of a shape's front and back, and whether it is two-sided."""
         two_sided = any_of(shape.material, mt.TwoSided)
-        if two_sided and any(part.transmits for part in mt.parts(shape.material)):
-            raise SceneError(
-                "a transmissive material cannot be mixed with a two-sided one",
-                where=shapes.where(shape),
-            )
         front = self._word(shape.material, _Side(front=True, two_sided=two_sided))
         back = self._word(shape.material, _Side(front=False, two_sided=two_sided))
         return front, back, two_sided

@@ -9,7 +9,6 @@ from typing import TypeAlias
 import numpy as np
 
 from clpt.arrays import Words
-from clpt.errors import SceneError
 from clpt.render.contract.parameter_words import NORMAL_MAP_WORDS
 from clpt.render.lowering.encoder import Encoder
 from clpt.scene import roles
@@ -30,11 +29,7 @@ class NormalPerturbation:
     inside: bool = False
 
     def within(self, outer: Map, inside: bool) -> NormalPerturbation:
-        """Return this with one more map. Raises SceneError for a second one of its kind."""
-        if (self.normal if isinstance(outer, NormalMap) else self.bump) is not None:
-            raise SceneError(f"a {outer.kind} inside of a {outer.kind} is not supported")
-        if (self.normal or self.bump) and self.inside != inside:
-            raise SceneError("of two maps, one cannot stand inside and one around a two_sided")
+        """Return this with one more map, of another kind than it has."""
         if isinstance(outer, NormalMap):
             return dataclasses.replace(self, normal=outer, inside=inside)
         return dataclasses.replace(self, bump=outer, inside=inside)

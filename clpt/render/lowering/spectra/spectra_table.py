@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from clpt import spectra
 from clpt.arrays import Words
-from clpt.errors import SceneError
 from clpt.measured import Measurement, MerlTable
 from clpt.render.analysis.wavelengths import Density
 from clpt.render.contract.parameter_words import (
@@ -33,7 +32,7 @@ from clpt.spectra import (
     Tabulated,
     observer,
 )
-from clpt.spectra.spectrum import d65, extremes, gridded, primaries
+from clpt.spectra.spectrum import d65, gridded, primaries
 
 STEP = 1.0  # [nm] at most, between the nodes of tabulated spectra
 FEWEST = 100  # cells between the nodes, however narrow the film's range is
@@ -126,17 +125,6 @@ class SpectraTable:
     def reaches(self, table: Tabulated) -> bool:
         """Whether the points of a table overlap with the film's range."""
         return table.lambdas[0] <= self.lambda_max and table.lambdas[-1] >= self.lambda_min
-
-    def check_index(self, value: Spectrum | str, where: str) -> None:
-        """Raise SceneError for an index that is not above 0 at every wavelength of the film."""
-        for found, at in extremes(spectra.index(value), *self.range):
-            if not 0.0 < found < np.inf:
-                raise SceneError(
-                    f"an index of {found:g} at {at:g} nm, but it must be above 0 within the film's"
-                    f" {self.lambda_min:g} to {self.lambda_max:g} nm; narrow that range, or give"
-                    " the index there",
-                    where=where,
-                )
 
     def words(self, value: Spectrum | str, role: Spectral) -> tuple[Words, str]:
         """Return the five words of a spectrum and its source: "constant" or "table".

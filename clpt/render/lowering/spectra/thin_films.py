@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from clpt import spectra
 from clpt.arrays import Array
-from clpt.errors import SceneError
 from clpt.render.contract.parameter_words import FILM_COSINES
 from clpt.scene.materials import Layer
 from clpt.scene.params import Kind, params
@@ -109,19 +108,9 @@ def _textured(layer: Layer) -> bool:
 
 
 def profile(material: Kind) -> Any:
-    """Return the texture by which the thickness of a material's layers varies, or 1.
-
-    Raises SceneError for layers whose thicknesses vary each in its own way.
-    """
+    """Return the one texture by which the thickness of a material's layers varies, or 1."""
     layers: tuple[Layer, ...] = material.layers  # type: ignore[attr-defined]
-    found = {id(layer.profile): layer.profile for layer in layers if _textured(layer)}
-    if len(found) > 1:
-        raise SceneError(
-            "in RGB mode one texture can vary the thickness of its layers, not several; give them "
-            'the same one, or render in the mode "spectral"',
-            where=f"{material.kind}.layers",
-        )
-    return next(iter(found.values()), 1.0)
+    return next((layer.profile for layer in layers if _textured(layer)), 1.0)
 
 
 def _complex(eta: Spectrum | str, k: Spectrum | str, lambdas: Array) -> Array:

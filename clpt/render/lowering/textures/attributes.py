@@ -13,7 +13,6 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from clpt import spectra
-from clpt.errors import SceneError
 from clpt.geometry import shape_records, shapes, triangles
 from clpt.geometry.triangles import per_face
 from clpt.render.analysis.geometry import Owner
@@ -22,7 +21,7 @@ from clpt.render.analysis.texels import texels
 from clpt.render.lowering.textures.textures import TextureTable
 from clpt.scene.roles import REAL, Role
 from clpt.scene.shapes import Shape
-from clpt.scene.textures import SECOND_UV, MeshAttribute, Placed, textures_in
+from clpt.scene.textures import attributes_in
 
 COLOUR_WORDS = 4
 
@@ -38,8 +37,6 @@ def lower_attributes(
 
     single_count: see clpt.records.SETTINGS; keys: rows of each vertex of a shape, by its first
     vertex, where that is not one.
-
-    Raises SceneError for a shape that lacks what its material or light asks for.
     """
     if not textures.attributes:
         return
@@ -47,7 +44,7 @@ def lower_attributes(
     if store.append("attributes", np.zeros(2 * count, np.uint32)) != 0:
         raise ValueError("`attributes` must be empty before those of the meshes are put in")
     for row, shape, first_vertex, first_face in owners:
-        names = _names(shape)
+        names = attributes_in(shape.material) | attributes_in(shape.emission)
         if not names:
             continue
         directory = np.zeros((count, 2), np.int32)
@@ -66,23 +63,6 @@ def lower_attributes(
                 at = store.append("attributes", made)
                 directory[number] = at - words * first, words
         row["attributes"] = store.append("attributes", directory.view(np.uint32))
-
-
-def _names(shape: Shape) -> set[str]:
-    """The attributes that a shape's material and emission read."""
-    kinds = (shape.material, shape.emission)
-    names: set[str] = set()
-    for texture in (t for kind in kinds for t in textures_in(kind)):
-        if isinstance(texture, MeshAttribute):
-            names.add(texture.name)
-        elif isinstance(texture, Placed) and texture.mapping == "uv1":
-            names |= set(SECOND_UV)
-    missing = sorted(names - set(shape.attributes))
-    if missing:
-        known = ", ".join(shape.attributes) or "none"
-        message = f"its material asks for the attribute {missing[0]!r}; it has {known}"
-        raise SceneError(message, where=shapes.where(shape))
-    return names
 
 
 def _words(shape: Shape, name: str, role: Role, channel: str, spectral: bool) -> np.ndarray:

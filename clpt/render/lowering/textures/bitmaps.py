@@ -446,12 +446,13 @@ class _Spectra:
     def packed(self, codes: Words, curved: bool) -> Words:
         """Two words for each colour of `_codes`, (2 n,)."""
         new = np.zeros(1 << 24, bool)
-        new[codes] = True
-        new &= ~self.known
-        made = np.flatnonzero(new)
+        new[codes[~self.known[codes]]] = True
+        eighths = np.flatnonzero(new.view(np.uint64))  # few of them, so most pages are not touched
+        made = (8 * eighths[:, None] + np.arange(8)).reshape(-1)
+        made = made[new[made]]
         channels = np.stack([made & 255, made >> 8 & 255, made >> 16], axis=1)
         self.words[made] = pack(spectra.uplift(_meaning(curved)[channels]))
-        self.known |= new
+        self.known[made] = True
         return self.words[codes].reshape(-1)
 
 

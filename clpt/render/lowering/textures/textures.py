@@ -142,8 +142,6 @@ def _identity(texture: Texture) -> Any:
 def _uv(texture: Placed, table: TextureTable, down: bool = False) -> dict[str, Any]:
     """The members of `_COMMON`; `down`: with v turned round, as an image's rows run."""
     matrix = np.asarray(texture.to_uv, np.float64)
-    if not np.allclose(matrix[2, :2], 0.0) or np.isclose(matrix[2, 2], 0.0):
-        raise SceneError("its last row must be 0 0 1", where=f"{texture.kind}.to_uv")
     u, v = matrix[:2] / matrix[2, 2]
     members = {"to_u": u, "to_v": [0.0, 0.0, 1.0] - v if down else v}
     if texture.mapping == "uv":
@@ -162,10 +160,8 @@ def _second_uv(table: TextureTable) -> int:
 
 
 def _transform(texture: Placed | Solid, table: TextureTable) -> int:
-    """Append the rows of `to_texture`. Raises SceneError for a projection."""
+    """Append the rows of `to_texture`."""
     matrix = np.asarray(texture.to_texture, np.float32)
-    if not np.allclose(matrix[3], [0.0, 0.0, 0.0, 1.0]):
-        raise SceneError("its last row must be 0 0 0 1", where=f"{texture.kind}.to_texture")
     return table.store.append("textures", np.ascontiguousarray(matrix[:3]).view(np.uint32))
 
 

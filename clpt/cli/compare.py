@@ -1,0 +1,39 @@
+"""`clpt compare`: figures of the difference between two images, and a picture of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from ..formats import locate
+
+
+@click.command()
+@click.argument("a", type=click.Path(path_type=Path))
+@click.argument("b", type=click.Path(path_type=Path))
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path),
+    help="Write the difference: a - b as .exr, .hdr, .pfm or .npy; its size in false colours as "
+    ".png, .jpg or .webp.",
+)  # fmt: skip
+@click.option(
+    "--most", type=click.FloatRange(0.0, min_open=True), metavar="VALUE",
+    help="The difference that is the brightest of the false colours.  "
+    "[default: that which a pixel of a hundred is beyond]",
+)  # fmt: skip
+@click.option("--json", "as_json", is_flag=True, help="Write JSON instead of a table.")
+def compare(a: Path, b: Path, output: Path | None, most: float | None, as_json: bool) -> None:
+    """Measure how the image or film A differs from B.
+
+    Spectral images of the same wavelengths are compared by their values, others by their colours,
+    linear; B is the reference. The relative square error is the mean of (a - b)^2 / (b^2 + 0.01).
+    """
+    locate(a)
+    locate(b)
+    from .files import comparisons
+
+    pair = comparisons.Pair.read(a, b)
+    click.echo(comparisons.as_json(pair) if as_json else comparisons.as_text(pair))
+    if output is not None:
+        click.echo(comparisons.write(pair, output, most), err=True)

@@ -1,0 +1,105 @@
+"""Two images side by side: figures of their difference, and pictures of it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ... import images, output_files
+from ...choices import FOR_SCREENS
+from ...colour.false_colours import false_colours
+from ...errors import SceneError
+from ...images import screen_files
+from ...images.differences import Differences, differences, size_of
+from .conversions import contents
+from .image_contents import size_text
+from .targets import checked
+
+MOST = 0.99  # of the pixels differ by less than the brightest of the false colours
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two images (h, w, n) of one shape with the same channels, and how they differ."""
+
+    paths: tuple[Path, Path]
+    a: np.ndarray
+    b: np.ndarray
+    labels: tuple[str, ...]
+    found: Differences
+
+    @classmethod
+    def read(cls, a: Path, b: Path) -> Pair:
+        """Read two files. Raises SceneError where they cannot be compared."""
+        first, second = contents(a), contents(b)
+        sizes = size_text(first.values), size_text(second.values)
+        if sizes[0] != sizes[1]:
+            raise SceneError(f"is {sizes[1]} pixels, and {a} is {sizes[0]}", file=b)
+        same = first.lambdas is not None and second.lambdas is not None
+        if same and np.array_equal(first.lambdas, second.lambdas):
+            values, labels = (first.values, second.values), first.labels
+        elif first.colours is not None and second.colours is not None:
+            values, labels = (first.colours, second.colours), ("R", "G", "B")
+        elif first.labels == second.labels:
+            values, labels = (first.values, second.values), first.labels
+        else:
+            channels = f"{', '.join(second.labels)}, and {a} has {', '.join(first.labels)}"
+            raise SceneError(f"has other channels: {channels}", file=b)
+        return cls((a, b), *values, labels, differences(*values))
+
+    @property
+    def place(self) -> str:
+        """Where the largest difference is."""
+        x, y, channel = self.found.where
+        return f"{x},{y} {self.labels[channel]}"
+
+
+def as_json(pair: Pair) -> str:
+    """Return the figures as JSON."""
+    figures = asdict(pair.found) | {"root_mean_square": pair.found.root_mean_square}
+    x, y, channel = pair.found.where
+    figures["where"] = {"at": [x, y], "channel": pair.labels[channel]}
+    return json.dumps({"files": [str(path) for path in pair.paths], **figures}, indent=2)
+
+
+def as_text(pair: Pair) -> str:
+    """Return the figures as lines."""
+    found = pair.found
+    share = f" ({found.bias / found.means[1]:+.3%} of B)" if found.means[1] else ""
+    rows = {
+        "mean of A": f"{found.means[0]:.6g}",
+        "mean of B": f"{found.means[1]:.6g}",
+        "mean difference": f"{found.bias:+.4g}{share}",
+        "mean absolute error": f"{found.absolute:.4g}",
+        "root mean square error": f"{found.root_mean_square:.4g}",
+        "relative square error": f"{found.relative_square:.4g}",
+        "largest difference": f"{found.largest:.4g} at {pair.place}",
+    }
+    if not found.largest and not found.lost:
+        rows = {"mean of both": rows["mean of A"], "difference": "none: all values are the same"}
+    if found.lost:
+        rows["not finite, left out"] = f"{found.lost:,} values"
+    return "\n".join(f"{name:<24} {value}" for name, value in rows.items())
+
+
+def write(pair: Pair, path: Path, most: float | None) -> str:
+    """Write the difference, and return what to say. Raises SceneError.
+
+    most: that is the brightest of the false colours.
+    """
+    (path,) = checked((path,))
+    if path.suffix.lower() not in FOR_SCREENS:
+        apart = pair.a - pair.b
+        images.write(path, apart if apart.shape[2] in (1, 3) else size_of(pair.a, pair.b))
+        return str(path)
+    size = size_of(pair.a, pair.b)
+    top = most or float(np.quantile(size, MOST)) or float(size.max()) or 1.0
+    data = screen_files.encode(path.suffix.lower(), false_colours(size / top))
+    try:
+        output_files.write(path, data)
+    except OSError as error:
+        raise SceneError(f"cannot be written: {error}", file=path) from error
+    return f"{path}  black: no difference, bright yellow: {top:.3g} and more"

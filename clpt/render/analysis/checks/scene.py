@@ -1,0 +1,95 @@
+"""Whether a scene is made of what it should be; values are checked where each is declared."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from clpt.errors import SceneError
+from clpt.geometry import shapes
+from clpt.geometry.instancing import distinct
+from clpt.geometry.motion import Motions, at_rest
+from clpt.geometry.motion import check as check_motion
+from clpt.render.analysis.bodies import check_bodies
+from clpt.render.analysis.checks.cameras import check_camera
+from clpt.render.analysis.checks.film import check_film
+from clpt.render.analysis.checks.light_paths import check_light_paths, check_lit_media
+from clpt.render.analysis.checks.lights import check_light
+from clpt.render.analysis.checks.materials import check_material
+from clpt.render.analysis.checks.shapes import check_instances, check_shapes
+from clpt.render.analysis.checks.textures import check_textures
+from clpt.render.analysis.lowering_cache import LoweringCache
+from clpt.scene import Scene
+from clpt.scene.cameras import Camera
+from clpt.scene.integrators import Film, Filter, Integrator, ParticleTracer, Sampler
+from clpt.scene.lights import ON_SHAPES, Light
+from clpt.scene.materials import Material
+from clpt.scene.shapes import Instance, Shape
+
+
+def check(scene: Scene) -> None:
+    """Raise SceneError for a scene that cannot be rendered, whatever the device.
+
+    What passes is refused later only for what files hold, and for sizes.
+    """
+    check_at_rest(at_rest(scene), LoweringCache())
+
+
+def check_at_rest(scene: Scene, cache: LoweringCache) -> None:
+    """Raise SceneError as `check` does, for a scene that is `at_rest`; cache: of its analysis."""
+    _check_entries(scene)
+    shapes_ = list(distinct(scene.shapes))
+    for shape in shapes_:
+        if not isinstance(shape.material, Material):
+            message = f"must be of a kind of material, not {shape.material!r}"
+            raise SceneError(message, where=f"{shapes.where(shape)}.material")
+        if not isinstance(shape.emission, (*ON_SHAPES, type(None))):
+            names = " or ".join(f"`{cls.kind}`" for cls in ON_SHAPES)
+            raise SceneError(f"its emission must be {names}", where=shapes.where(shape))
+    check_film(scene)
+    check_camera(scene.camera, scene.film)
+    for light in scene.lights:
+        check_light(light)
+    check_shapes(shapes_)
+    check_instances(scene.shapes)
+    _check_surfaces(shapes_, scene.film)
+    check_light_paths(scene, shapes_)
+    check_motion(scene, Motions.of(scene))
+    check_bodies([*shapes_, *(one for one in scene.shapes if isinstance(one, Instance))])
+    if isinstance(scene.integrator, ParticleTracer):
+        check_lit_media(scene, cache)
+
+
+def _check_entries(scene: Scene) -> None:
+    """Raise SceneError for an entry of a scene that is of the wrong kind."""
+    _check_kinds("camera", Camera, [scene.camera])
+    _check_kinds("integrator", Integrator, [scene.integrator])
+    _check_kinds("sampler", Sampler, [scene.sampler])
+    _check_kinds("film", Film, [scene.film])
+    _check_kinds("film.filter", Filter, [scene.film.filter])
+    if isinstance(scene.seed, bool) or not isinstance(scene.seed, int):
+        raise SceneError(f"must be a whole number, not {scene.seed!r}", where="seed")
+    _check_kinds("lights[{}]", Light, scene.lights)
+    _check_kinds("shapes[{}]", Shape, scene.shapes)
+
+
+def _check_surfaces(shapes_: list[Shape], film: Film) -> None:
+    """Raise SceneError for materials and lights of shapes; each is looked at once."""
+    seen: set[int] = set()
+    for shape in shapes_:
+        try:
+            if id(shape.material) not in seen:
+                check_material(shape.material, film)
+            if shape.emission is not None and id(shape.emission) not in seen:
+                check_textures(shape.emission)
+        except SceneError as error:
+            raise SceneError(str(error), where=shapes.where(shape)) from None
+        seen |= {id(shape.material), id(shape.emission)}
+
+
+def _check_kinds(where: str, base: type, values: Sequence[Any]) -> None:
+    """Raise SceneError for the first value that is of no kind of a base."""
+    for i, value in enumerate(values):
+        if not isinstance(value, base):
+            message = f"must be of a kind of {base.__name__.lower()}, not {value!r}"
+            raise SceneError(message, where=where.format(i))

@@ -1,0 +1,187 @@
+"""What bad devices do, played: each ends in the picture, or in one line that says what to do."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pyopencl as cl
+import pytest
+
+import clpt
+from clpt.device import program
+from clpt.render.wavefront.path_buffers import UNIT_SLOTS
+from clpt.scene import Film, Scene, cameras, integrators, lights, materials, shapes
+from clpt.transforms import look_at
+from tests.device.bad_device import CODE, BadDevice, Launch, driver_error, no_images
+
+MIB = 1 << 20
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    """Two kinds of materials, so that paths are queued."""
+    return Scene(
+        camera=cameras.Perspective(fov=40.0, to_world=look_at((0, 0, 4), (0, 0, 0), (0, 1, 0))),
+        film=Film(width=256, height=128, mode="rgb"),
+        integrator=integrators.Path(max_depth=3),
+        shapes=[
+            shapes.Sphere(material=materials.Diffuse()),
+            shapes.Sphere(center=(0.5, 0, 1), radius=0.3, material=materials.Conductor()),
+        ],
+        lights=[lights.Constant(radiance=1.0)],
+    )
+
+
+@pytest.fixture(scope="module")
+def picture(scene: Scene) -> np.ndarray:
+    """What a good device renders."""
+    return rendered(scene, BadDevice())
+
+
+def rendered(scene: Scene, bad: BadDevice, **options: Any) -> np.ndarray:
+    with clpt.Renderer(scene, bad.open(), **options) as renderer:
+        renderer.run(1)
+        return renderer.image()
+
+
+def refusing(limit: int, code: int) -> Callable[[int], None]:
+    """Refuses buffers above a size."""
+
+    def check(size: int) -> None:
+        if size > limit:
+            raise driver_error(code)
+
+    return check
+
+
+def groups_of(most: int) -> Callable[[Launch], None]:
+    def check(launch: Launch) -> None:
+        if launch.group > most:
+            raise driver_error(CODE.INVALID_WORK_GROUP_SIZE)
+
+    return check
+
+
+def local_memory_of(most: int) -> Callable[[Launch], None]:
+    def check(launch: Launch) -> None:
+        if launch.local_memory > most:
+            raise driver_error(CODE.OUT_OF_RESOURCES)
+
+    return check
+
+
+def refused_at(number: int, code: int) -> Callable[[Launch], None]:
+    """The driver refuses a launch."""
+
+    def check(launch: Launch) -> None:
+        if launch.number == number:
+            raise driver_error(code)
+
+    return check
+
+
+def killed_at(number: int, code: int) -> Callable[[Launch], int | None]:
+    """A launch fails while it runs."""
+    return lambda launch: code if launch.number == number else None
+
+
+def watchdog(items: int) -> Callable[[Launch], int | None]:
+    """Launches of more work-items take longer than a display's driver waits."""
+    return lambda launch: CODE.OUT_OF_RESOURCES if launch.items > items else None
+
+
+SMALL = {"global_mem": 64 * MIB, "max_alloc": 16 * MIB}
+
+
+@dataclass(frozen=True)
+class Hazard:
+    """A bad device. says: what the error tells, as a pattern; "": the picture is made all the same.
+
+    error: the class of it; options: of the renderer.
+    """
+
+    make: Callable[[], BadDevice]
+    says: str = ""
+    error: type[clpt.ClptError] = clpt.DeviceError
+    options: tuple[tuple[str, Any], ...] = ()
+
+
+HAZARDS = {
+    "a quarter of memory is the largest buffer": Hazard(
+        lambda: BadDevice(SMALL, buffer=refusing(16 * MIB, CODE.INVALID_BUFFER_SIZE))
+    ),
+    "hardly any memory": Hazard(
+        lambda: BadDevice({"global_mem": MIB, "max_alloc": 1 << 14}),
+        "the least number of paths needs .* KiB, the device has .* KiB: close other programs", clpt.MemoryBudgetError,
+    ),
+    "memory that fails late": Hazard(
+        lambda: BadDevice(launch=refused_at(3, CODE.MEM_OBJECT_ALLOCATION_FAILURE)),
+        "lower the size of the image", clpt.MemoryBudgetError,
+    ),
+    "less memory than was told": Hazard(
+        lambda: BadDevice(buffer=refusing(MIB, CODE.MEM_OBJECT_ALLOCATION_FAILURE)),
+        "lower the number of slots|lower the size", clpt.MemoryBudgetError,
+    ),
+    "groups of 256": Hazard(lambda: BadDevice(launch=groups_of(256))),
+    "16 KiB of local memory": Hazard(lambda: BadDevice(launch=local_memory_of(16 << 10))),
+    "a watchdog": Hazard(
+        lambda: BadDevice(launch=watchdog(UNIT_SLOTS), dead=CODE.OUT_OF_RESOURCES),
+        "stopped a kernel that took too long: take a smaller picture or fewer slots",
+    ),
+    "a watchdog, and fewer slots": Hazard(
+        lambda: BadDevice(launch=watchdog(1 << 15)), options=(("slots", 1 << 13),)
+    ),
+    "a device that is lost": Hazard(
+        lambda: BadDevice(launch=killed_at(4, CODE.DEVICE_NOT_AVAILABLE), dead=CODE.DEVICE_NOT_AVAILABLE),
+        "was reset or removed: open it again in a new process",
+    ),
+    "a context that is lost": Hazard(
+        lambda: BadDevice(launch=refused_at(2, CODE.INVALID_CONTEXT)), "open it again in a new process"
+    ),
+    "a kernel that leaves its buffers": Hazard(
+        lambda: BadDevice(launch=refused_at(2, -9999)), "beyond its buffers"
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", HAZARDS)
+def test_hazards(
+    name: str, scene: Scene, picture: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hazard = HAZARDS[name]
+    bad = hazard.make()
+    bad.play(monkeypatch)
+    if not hazard.says:
+        found = rendered(scene, bad, **dict(hazard.options))
+        assert np.array_equal(found, picture)
+        assert bad.launches
+        return
+    with pytest.raises(hazard.error) as raised:
+        rendered(scene, bad, **dict(hazard.options))
+    assert re.search(hazard.says, str(raised.value)), str(raised.value)
+    assert "\n" not in str(raised.value)
+    assert isinstance(raised.value.__cause__, cl.Error) or hazard.error is clpt.MemoryBudgetError
+
+
+@pytest.mark.parametrize("most", [64, 16, 1])
+def test_groups_that_the_device_cannot_run_are_smaller(
+    most: int, scene: Scene, picture: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Which a driver tells of each kernel: clpt asks for up to 256."""
+    bad = BadDevice(launch=groups_of(most))
+    bad.play(monkeypatch)
+    monkeypatch.setattr(program, "most_items", lambda *_: most)
+    assert np.array_equal(rendered(scene, bad), picture)
+
+
+def test_nothing_needs_images_or_finish(
+    scene: Scene, picture: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    no_images(monkeypatch)
+    monkeypatch.setattr(cl.CommandQueue, "finish", lambda _: 1 / 0)
+    assert np.array_equal(rendered(scene, BadDevice()), picture)
+
