@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 from clpt.errors import SceneError
 from clpt.measured import Measurement, MerlTable
@@ -80,15 +80,9 @@ class Material(Scatterer):
 
     name: str = host("", "for messages and for references in scene files")
 
-    @property
-    def absorption(self) -> SpectrumLike:
-        """The absorption of the inside [1/m]."""
-        return CLEAR
-
-    @property
-    def layers(self) -> tuple[Layer, ...]:
-        """The thin films on the surface, from the outside in."""
-        return ()
+    # of a kind without such parameters
+    absorption = cast(SpectrumLike, CLEAR)
+    layers = cast("tuple[Layer, ...]", ())
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -34,6 +34,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
+from operator import attrgetter
 from types import MappingProxyType
 from typing import Any, ClassVar, Literal
 
@@ -265,13 +266,15 @@ def defaults(cls: type) -> dict[str, Any]:
 
 def fields_of(kind: Kind) -> dict[str, Any]:
     """Return the values of an object's fields by name."""
-    cls: Any = type(kind)
-    return {name: getattr(kind, name) for name in _field_names(cls)}
+    names, read = _fields(type(kind))
+    return dict(zip(names, read(kind), strict=False))
 
 
 @cache
-def _field_names(cls: Any) -> tuple[str, ...]:
-    return tuple(field.name for field in dataclasses.fields(cls))
+def _fields(cls: Any) -> tuple[tuple[str, ...], Callable[[Any], tuple[Any, ...]]]:
+    """The names of a class's fields, and what reads them all at once, and more."""
+    names = tuple(field.name for field in dataclasses.fields(cls))
+    return names, attrgetter(*names, "__class__", "__class__")  # of two or more: a tuple
 
 
 def place_of(kind: Kind, name: str) -> str:

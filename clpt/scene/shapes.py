@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -29,22 +29,11 @@ class Shape(Kind):
     """Base of all shapes; placed by `to_world`."""
 
     is_tree = False  # it holds trees side by side
+    # of a kind without such parameters
     attributes = NO_ATTRIBUTES
-
-    @property
-    def normals(self) -> Any:
-        """The normals of its vertices, as of a mesh; None: there are none."""
-        return None
-
-    @property
-    def tangents(self) -> Any:
-        """The tangents of its vertices, as of a mesh; None: there are none."""
-        return None
-
-    @property
-    def deformation(self) -> Deformation | None:
-        """Where its points are at times; None: still."""
-        return None
+    normals = cast(Any, None)
+    tangents = cast(Any, None)
+    deformation = cast("Deformation | None", None)
 
     @property
     def members(self) -> tuple[Shape, ...]:

@@ -34,31 +34,6 @@ INDEX_FILE = {**STRING, "description": "columns, or a page of refractiveindex.in
 ANY_OF_SCALE = {"anyOf": [NUMBER, TRIPLE]}
 
 
-PROPERTIES: Schema = {
-    "$schema": STRING,
-    "name": STRING,
-    "camera": ref("camera"),
-    "integrator": ref("integrator"),
-    "sampler": ref("sampler"),
-    "materials": {"type": "object", "additionalProperties": ref("material")},
-    "media": {"type": "object", "additionalProperties": ref("medium")},
-    "groups": {
-        "type": "object",
-        "additionalProperties": {"type": "array", "items": ref("shape")},
-        "description": "shapes that instances place together",
-    },
-    "shapes": {"type": "array", "items": ref("shape")},
-    "lights": {"type": "array", "items": ref("light")},
-    "spp": {"type": "integer", "minimum": 1, "description": "samples of a pixel"},
-    "noise": {
-        "type": "number",
-        "exclusiveMinimum": 0,
-        "description": "below which a pixel gets no more samples",
-    },
-    "seed": {"type": "integer", "description": "of the random numbers"},
-}  # of a scene, but for its film
-
-
 def schema() -> Schema:
     """Return the JSON Schema (draft 2020-12) of a scene.json."""
     defs: Schema = {category: _category(category) for category in KINDS}
@@ -80,8 +55,36 @@ def schema() -> Schema:
         "type": "object",
         "additionalProperties": False,
         "required": ["camera"],
-        "properties": {**PROPERTIES, "film": _untyped(integrators.Film)},
+        "properties": _properties(),
         "$defs": defs,
+    }
+
+
+def _properties() -> Schema:
+    """The entries of a scene."""
+    return {
+        "$schema": STRING,
+        "name": STRING,
+        "camera": ref("camera"),
+        "film": _untyped(integrators.Film),
+        "integrator": ref("integrator"),
+        "sampler": ref("sampler"),
+        "materials": {"type": "object", "additionalProperties": ref("material")},
+        "media": {"type": "object", "additionalProperties": ref("medium")},
+        "groups": {
+            "type": "object",
+            "additionalProperties": {"type": "array", "items": ref("shape")},
+            "description": "shapes that instances place together",
+        },
+        "shapes": {"type": "array", "items": ref("shape")},
+        "lights": {"type": "array", "items": ref("light")},
+        "spp": {"type": "integer", "minimum": 1, "description": "samples of a pixel"},
+        "noise": {
+            "type": "number",
+            "exclusiveMinimum": 0,
+            "description": "below which a pixel gets no more samples",
+        },
+        "seed": {"type": "integer", "description": "of the random numbers"},
     }
 
 

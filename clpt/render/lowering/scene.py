@@ -50,6 +50,7 @@ from clpt.scene.integrators import DEEPEST, Film, Integrator
 from clpt.scene.lights import Point
 from clpt.scene.media import Lattice
 from clpt.scene.params import params
+from clpt.scene.roles import INDEX
 from clpt.scene.shapes import Mesh, Shape
 
 TREE_FROM = 16  # lights from which a tree chooses among them, see bench/lights.py
@@ -412,7 +413,7 @@ def _warnings(index: SceneIndex) -> list[str]:
 def _disperses(shape: Shape) -> bool:
     """Whether a shape refracts wavelengths differently, in the spectral mode."""
     return any(
-        param.role == "index" and not isinstance(spectra.index(vars(part)[name]), spectra.Constant)
+        param.role is INDEX and not isinstance(spectra.index(vars(part)[name]), spectra.Constant)
         for part in mt.parts(shape.material)
         if part.refracts
         for name, param in params(type(part)).items()
