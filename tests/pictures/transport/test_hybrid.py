@@ -17,7 +17,7 @@ import clpt
 from clpt import device as dev
 from clpt import transforms as tf
 from clpt.errors import SceneError
-from clpt.render.lowering import scene as lowering
+from clpt.render.analysis import analyse
 from clpt.render.lowering.scene import lower
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
@@ -104,7 +104,7 @@ def test_every_light(kind: str) -> None:
 
 def leave_aims_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let no light path aim."""
-    monkeypatch.setattr(lowering, "aims", lambda *_: np.zeros((0, 5), np.float32))
+    monkeypatch.setattr(analyse, "aims", lambda *_: np.zeros((0, 5), np.float32))
 
 
 def smooth(mode: str) -> Sphere:
