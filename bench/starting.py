@@ -21,7 +21,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -161,9 +161,9 @@ def theirs(scene: Path, size: int, out: Path, folder: Path) -> tuple[str, list[s
 
 def rows_of(
     scenes: dict[str, Path], folder: Path, size: int, rounds: int, checkout: Path
-) -> list[dict[str, Any]]:
+) -> Iterator[dict[str, Any]]:
     """A row for each scene and renderer."""
-    out, rows = folder / "out.exr", []
+    out = folder / "out.exr"
     find_llvm()
     bytecode = [sys.executable, "-m", "compileall", "-q", "clpt"]
     run(bytecode, folder / "bytecode", checkout)
@@ -171,12 +171,11 @@ def rows_of(
         which = {"scene": name, "size": size}
         command = ours(scene, size, out)
         row = which | {"renderer": "clpt"} | measure(command, folder, rounds, checkout)
-        rows.append(row | _figures("another", run(command, folder / "others", checkout)))
+        yield row | _figures("another", run(command, folder / "others", checkout))
         found = theirs(scene, size, out, folder) if scene.suffix == ".xml" else None
         if found is not None:
             beside = which | {"renderer": f"mitsuba {found[0]}"}
-            rows.append(beside | measure(found[1], folder, rounds))
-    return rows
+            yield beside | measure(found[1], folder, rounds)
 
 
 def _scenes(given: Sequence[Path], folder: Path) -> dict[str, Path]:
@@ -204,15 +203,14 @@ def main(
     table = Table("scene", "renderer", *names, "memory cold, warm", title="Whole processes")
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        rows = rows_of(_scenes(scenes, folder), folder, size, rounds, checkout.resolve())
-    machine.append(json_file, "starting", rows)
-    for row in rows:
-        cells = [
-            f"{row[name]:.2f} s ({row[f'{name}_clock']:.2f})" if name in row else ""
-            for name in names
-        ]
-        memory = ", ".join(f"{row[f'{name}_memory'] / 2**20:.0f}" for name in ("cold", "warm"))
-        table.add_row(row["scene"], row["renderer"], *cells, f"{memory} MiB")
+        for row in rows_of(_scenes(scenes, folder), folder, size, rounds, checkout.resolve()):
+            machine.append(json_file, "starting", [row])
+            cells = [
+                f"{row[name]:.2f} s ({row[f'{name}_clock']:.2f})" if name in row else ""
+                for name in names
+            ]
+            memory = ", ".join(f"{row[f'{name}_memory'] / 2**20:.0f}" for name in ("cold", "warm"))
+            table.add_row(row["scene"], row["renderer"], *cells, f"{memory} MiB")
     machine.console().print(table)
 
 

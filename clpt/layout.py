@@ -5,8 +5,8 @@ with the device. Four forms of text are made of a record:
 
 - `uniform_text`: a struct of scalars in memory, the same for all lanes (settings, cameras);
 - `row_text`: a lane struct and a loader that gathers one row per lane from a table of words;
-- `slab_text`: a load and a store per member for slabs, where each word of SLAB_BLOCK slots stands
-  side by side (kernels/core/slab.cl);
+- `slab_text`: a load and a store per member for slabs, where a word of all slots, or of a block of
+  them, stands side by side (kernels/core/slab.cl);
 - `select_text`: a lane struct that is never in memory, its value of nothing and the choice of two.
 """
 
@@ -18,7 +18,7 @@ from functools import cached_property
 
 import numpy as np
 
-SLAB_BLOCK = 32  # of kernels/core/slab.cl; a CPU's lanes divide it
+SLAB_BLOCK = 32  # slots of a block of kernels/core/slab.cl, on a GPU
 
 # type: (words, uniform form, lane form, components as the text names them)
 _XYZ = (".x", ".y", ".z")

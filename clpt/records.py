@@ -95,6 +95,12 @@ SHADOW = Record(
     ),
 )
 
+# layers of the first samples of a pixel, as kernels/path/layers.cl puts them
+LAYER_PLACES = (
+    "albedo", "shading_normal", "geometric_normal", "depth", "z", "position", "uv", "motion",
+    "shape_id", "primitive_id", "material_id", "denoising_albedo", "denoising_normal",
+)  # fmt: skip
+
 SETTINGS = Record(
     "Settings",
     "Numbers that hold for a whole render.",
@@ -162,6 +168,20 @@ SETTINGS = Record(
     to_third=("vec3", "the same of its third channel"),
     scene_radius=("real", "radius of a sphere around the scene [m]"),
     center=("vec3", "centre of that sphere [m]"),
+    **{
+        f"layer_{name}": ("integer", "first word of that layer of a pixel; 0: it has none")
+        for name in LAYER_PLACES
+    },
+    layer_denoising=("integer", "first word of the layers for denoisers, which come last"),
+    layer_words=("integer", "words of a pixel that layers of the first samples have"),
+    matte_object=("integer", "1 more than where the list of objects stands; 0: there is none"),
+    matte_material=("integer", "1 more than where that of materials stands; 0: there is none"),
+    mattes=("integer", "lists of names of a pixel"),
+    material_numbers=("integer", "where in `distributions` materials have numbers; 0: nowhere"),
+    layer_direct=("integer", "1 more than where that of direct light stands; 0: there is none"),
+    layer_indirect=("integer", "1 more than where that of indirect light stands; 0: there is none"),
+    layer_groups=("integer", "1 more than where those of groups of lights begin; 0: there is none"),
+    light_groups=("integer", "where in `distributions` lights have the numbers of their groups"),
 )
 
 SHAPE = Record(
@@ -311,7 +331,18 @@ BRICK_SIZES = Constants(
     unsigned=True,
     words=(365, "of its 9^3 points, two in each"),
 )
+LAYER_SIZES = Constants(
+    "LAYER_",
+    "Sizes of layers of the first samples of a pixel.",
+    most_words=(64, "of all layers together"),
+    matte_slots=(12, "names that a matte keeps"),
+)
 MOTION_SIZES = Constants("MOTION_", "Sizes of tables of motion.", step=(29, "floats of one"))
+RERADIATION_SIZES = Constants(
+    "RERADIATION_",
+    "Sizes of tables of re-radiation.",
+    step=(5, "between the nodes of a matrix [nm]"),
+)
 DENSITY_SIZES = Constants(
     "DENSITY_",
     "Sizes of tables of wavelengths.",
@@ -335,6 +366,8 @@ CONSTANTS = {
     "counter_numbers": COUNTER_NUMBERS,
     "photon_numbers": PHOTON_NUMBERS,
     "brick_sizes": BRICK_SIZES,
+    "layer_sizes": LAYER_SIZES,
+    "reradiation_sizes": RERADIATION_SIZES,
     "motion_sizes": MOTION_SIZES,
     "density_sizes": DENSITY_SIZES,
     "tree_bits": TREE_BITS,

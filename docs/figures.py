@@ -20,6 +20,7 @@ from bench.report import RESULTS, table
 ROOT = Path(__file__).resolve().parents[1]
 PLACE = re.compile(r"(<!-- figures: (\w+) -->\n).*?(<!-- end of figures -->)", re.S)
 AVX2, AVX512 = "AMD EPYC avx2", "AMD EPYC avx512f"
+KINDS = ("noisy", "`oidn`", "`statistical`")
 NAMES = {"cornell": "Cornell box", "glass": "glass with caustics"}
 
 Record = dict[str, Any]
@@ -42,7 +43,7 @@ def records() -> list[Record]:
     return sorted(map(json.loads, lines), key=lambda record: str(record["date"]))
 
 
-def newest(bench: str, **about: Any) -> Record:
+def newest(bench: str, **about: object) -> Record:
     """Return the newest record of a bench with these values; raises KeyError if there is none."""
     for record in reversed(records()):
         if record["bench"] == bench and about.items() <= record.items():
@@ -50,7 +51,7 @@ def newest(bench: str, **about: Any) -> Record:
     raise KeyError(f"bench/results has no {bench} with {about}")
 
 
-def names(bench: str, name: str, **about: Any) -> list[str]:
+def names(bench: str, name: str, **about: object) -> list[str]:
     """Return the values that a name has in the records of a bench, in the order of their coming."""
     found = [r[name] for r in records() if r["bench"] == bench and about.items() <= r.items()]
     return list(dict.fromkeys(found))
@@ -156,6 +157,40 @@ def denoisers() -> str:
     return table(heads, body)
 
 
+def bands() -> str:
+    """Return errors of bands and of their colours, noisy and denoised."""
+    body = []
+    for scene in names("denoising", "scene"):
+        cells = [f"`{scene}`"]
+        for spp in (16, 64):
+            both = [
+                newest("denoising", scene=scene, figure=f"{kind}, {spp} spp")
+                for kind in ("oidn", "statistical")
+            ]
+            pairs = [(both[0]["noisy_rms"], both[0]["noisy_delta_e"])]
+            pairs += [(record["rms"], record["delta_e"]) for record in both]
+            cells += [f"{rms:.3f}, {delta:.1f}" for rms, delta in pairs]
+        body.append(cells)
+    heads = ["rms of bands, then CIEDE2000 of their colours"]
+    heads += [
+        f"noisy, {spp}" if k == 0 else kind for spp in (16, 64) for k, kind in enumerate(KINDS)
+    ]
+    return table(heads, body)
+
+
+def queries() -> str:
+    """Return rates of ray queries beside the bare kernel's and embreex's."""
+    body = []
+    for rays in ("primary", "diffuse", "shadow"):
+        for query, shown in (("closest", "closest"), ("occluded", "any")):
+            found = newest("queries", rays=rays, query=query)
+            over = f"{found['overhead']:.2f}, {found['overhead_host']:.2f}"
+            rates = (f"{found[name]:.1f}" for name in ("mrays", "mrays_embreex"))
+            body.append([rays, shown, over, *rates])
+    heads = ["rays", "query", "time over the bare kernel's: on the device, from numpy"]
+    return table([*heads, "Mrays/s a core", "embreex"], body)
+
+
 def media() -> str:
     """Return clpt's efficiency in media over the better of Mitsuba's integrators."""
     about = {"renderer": "clpt"}
@@ -169,7 +204,18 @@ def media() -> str:
 
 TABLES: dict[str, Callable[[], str]] = {
     one.__name__: one
-    for one in (efficiency, samplers, modes, effects, layouts, sizes, denoisers, media)
+    for one in (
+        efficiency,
+        samplers,
+        modes,
+        effects,
+        layouts,
+        sizes,
+        denoisers,
+        bands,
+        queries,
+        media,
+    )
 }
 
 

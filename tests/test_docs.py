@@ -100,7 +100,7 @@ def test_commands_name_files_of_the_repository_that_are_there():
     assert [(name, pages.lost(line, ROOT)) for name, line in lines if pages.lost(line, ROOT)] == []
 
 
-TYPED = ("rendering.md", "recipes.md", "tutorial.md", "noise.md", "denoising.md")
+TYPED = ("rendering.md", "image_tools.md", "recipes.md", "tutorial.md", "noise.md", "denoising.md")
 
 
 @pytest.mark.slow

@@ -33,6 +33,7 @@ def run(on: device.Device, text: str, lanes: int, *arrays: np.ndarray) -> None:
         "generated/spectrum_read.cl": '#include "spectrum/spectral_read.cl"\n',
     }
     defines = {"LANES": lanes, "SPECTRA_SIZE": 471, "SPECTRA_STEP": "1.0f"}
+    defines["SLAB_BLOCK"] = SLAB_BLOCK if lanes == 1 else 0
     program = device.build(on, device.assemble("probe.cl", virtual, defines))
     flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
     buffers = [cl.Buffer(on.context, flags, hostbuf=a) for a in arrays]
@@ -91,7 +92,9 @@ def test_offsets_on_the_device(opened: device.Device, record: Record) -> None:
 def test_slab_members_go_in_and_out(opened: device.Device, lanes: int) -> None:
     """Every word of a slab, loaded and stored elsewhere member by member, lands where it should."""
     rng = np.random.default_rng(1)
-    source = rng.normal(size=(2, PATH.step, SLAB_BLOCK)).astype(np.float32)
+    shape = (2, PATH.step, SLAB_BLOCK) if lanes == 1 else (1, PATH.step, 2 * SLAB_BLOCK)
+    source = rng.normal(size=shape).astype(np.float32)
+    stride = PATH.step if lanes == 1 else 2 * SLAB_BLOCK
     target = np.zeros_like(source)
     slots = np.arange(48, 48 + lanes, dtype=np.uint32)
     lane_mask = (rng.random(lanes) < 0.6).astype(np.uint32)
@@ -103,13 +106,13 @@ def test_slab_members_go_in_and_out(opened: device.Device, lanes: int) -> None:
         '#include "core/base.cl"\n'
         "kernel void probe(global float *a, global float *b, global const uint *c, "
         "global const uint *d)\n{\n"
-        f"    Slab from = {{a, {PATH.step}}}, to = {{b, {PATH.step}}};\n"
+        f"    Slab from = {{a, {stride}}}, to = {{b, {stride}}};\n"
         f"    uint at = c[0];\n    mask m = {read} != 0;\n{moves}}}\n"
     )
     run(opened, kernel, lanes, source, target, slots, lane_mask)
     expected = np.zeros_like(source)
     kept = slots[lane_mask != 0]
-    block, within = kept // SLAB_BLOCK, kept % SLAB_BLOCK
+    block, within = kept // shape[2], kept % shape[2]
     expected[block, : PATH.words, within] = source[block, : PATH.words, within]
     assert np.array_equal(target, expected)
 

@@ -108,7 +108,10 @@ def run(folder: Path, tool: str, *args: str) -> str:
     return said
 
 
-# Instructions, by the beginnings of their names.
+# Instructions in an assembly text, and what they do, by their names.
+SASS_NAME = re.compile(r"^\s+/\*[0-9a-f]{4,}\*/\s+(?:@!?U?P\w+ )?\s*(\w+)", re.MULTILINE)
+AMD_NAME = re.compile(r"^\s+([vsfgbd]\w+)", re.MULTILINE)
+GEN_NAME = re.compile(r"^(?:\([^)]*\))?\s+([a-z]\w*)[\w.]* \(", re.MULTILINE)
 SASS = (
     re.compile(r"^(LD[GLS]?|ST[GLS]?|ATOM[GS]?|RED|TEX|TLD|TXQ|SU)$"),
     re.compile(r"^(MUFU)$"),
@@ -172,8 +175,7 @@ def nvidia(text: str, device: str, folder: Path) -> Figures:
     counts = (-1, -1, -1)
     if find("nvdisasm"):
         lines = run(folder, "nvdisasm", "-c", "k.cubin")
-        names = re.findall(r"^\s+/\*[0-9a-f]{4,}\*/\s+(?:@!?U?P\w+ )?\s*(\w+)", lines, re.MULTILINE)
-        counts = counted(names, SASS)
+        counts = counted(SASS_NAME.findall(lines), SASS)
     registers = most(r"Used (\d+) registers", said)
     return Figures(
         registers,
@@ -210,7 +212,7 @@ def amd(text: str, device: str, folder: Path) -> Figures:
     counts = (-1, -1, -1)
     if find("llvm-objdump"):
         lines = run(folder, "llvm-objdump", "-d", "--no-show-raw-insn", "k.o")
-        counts = counted(re.findall(r"^\s+([vsfgbd]\w+)", lines, re.MULTILINE), AMD)
+        counts = counted(AMD_NAME.findall(lines), AMD)
     return Figures(
         most(r"\bVGPRs: (\d+)", said),
         most(r"ScratchSize \[bytes/lane\]: (\d+)", said),
@@ -235,8 +237,7 @@ def intel(text: str, device: str, folder: Path) -> Figures:
     counts = (-1, -1, -1)
     if assembly := list((folder / "out").glob("*.asm")):
         lines = "".join(path.read_text(errors="replace") for path in assembly)
-        names = re.findall(r"^(?:\([^)]*\))?\s+([a-z]\w*)[\w.]* \(", lines, re.MULTILINE)
-        counts = counted(names, GEN)
+        counts = counted(GEN_NAME.findall(lines), GEN)
     return Figures(
         max(row[20] for row in environment),
         max((row[3] for row in private), default=0),

@@ -18,16 +18,15 @@ VARIABLE = "_CLPT_COMPLETE"  # by which a shell asks clpt
 @click.command()
 @click.argument("shell", type=click.Choice(SHELLS))
 @click.option("--print", "printed", is_flag=True, help="Print the script, and install nothing.")
-def completion(shell: str, printed: bool) -> None:
+@click.pass_context
+def completion(ctx: click.Context, shell: str, printed: bool) -> None:
     """Let the TAB key of a SHELL complete clpt's commands, options and values.
 
     The script is written to the user's folder for such scripts. It is in force in the next shell.
     """
-    from . import cli
-
     made = get_completion_class(shell)
     assert made is not None
-    script = made(cli, {}, "clpt", VARIABLE).source()
+    script = made(ctx.find_root().command, {}, "clpt", VARIABLE).source()
     if printed:
         click.echo(script)
         return

@@ -14,7 +14,7 @@ from functools import partial
 import pyopencl as cl
 from pyopencl.characterize import has_src_build_cache
 
-from clpt.device import declarations, disk_cache, native_programs
+from clpt.device import compile_limits, declarations, disk_cache, native_programs
 
 from ..errors import DeviceError, KernelBuildError
 from .compilers import Job
@@ -45,11 +45,13 @@ def build(device: Device, source: Source, options: Sequence[str] = ()) -> Progra
         return program
     device.builds.on_compile()
     start = time.perf_counter()
-    program = _from_source(device, source, flags)
-    if on_disk:  # a binary is compiled to the end, a program of the driver may not be
-        entry = _entry(device, source, flags)
-        disk_cache.store(entry, encode(program.signatures), _binary(program.cl_program))
-        program = _from_cache(device, source, flags, entry) or program
+    with compile_limits.watched(source):
+        program = _from_source(device, source, flags)
+        if on_disk:  # a binary is compiled to the end, a program of the driver may not be
+            entry = _entry(device, source, flags)
+            binary = native_programs.binary(program.cl_program)
+            disk_cache.store(entry, encode(program.signatures), binary)
+            program = _from_cache(device, source, flags, entry) or program
     return _built(device, source, flags, program, time.perf_counter() - start)
 
 
@@ -68,21 +70,37 @@ def link(
     program = _known(device, whole, flags, _has_binaries(device))
     if program is not None:
         return program
-    start = time.perf_counter()
+    entry = _entry(device, whole, flags)
+    with disk_cache.alone(entry):  # another process may have been at it
+        program = _known(device, whole, flags, _has_binaries(device))
+        if program is not None:
+            _drop_parts(device, sources, flags)
+            return program
+        start = time.perf_counter()
+        with compile_limits.watched(whole):
+            linked = _linked_of_any(device, sources, whole, flags)
+            program = Program(whole.name, linked, signatures)
+            if _has_binaries(device):
+                disk_cache.store(entry, encode(signatures), native_programs.binary(linked))
+                program = _from_cache(device, whole, flags, entry) or program
+        return _built(device, whole, flags, program, time.perf_counter() - start)
+
+
+def _linked_of_any(
+    device: Device, sources: Mapping[str, Source], whole: Source, flags: list[str]
+) -> cl.Program:
+    """Return a linked program, of parts from anywhere or, if they are refused, of new ones.
+
+    Raises KernelBuildError.
+    """
     try:
-        linked = _linked(device, sources, flags, _part)
+        return _linked(device, sources, flags, _part)
     except cl.Error as refusal:
         log.debug("%s is compiled again: %s", whole.name, refusal)
-        try:
-            linked = _linked(device, sources, flags, _compiled)
-        except cl.Error as error:
-            raise _build_error(whole, str(error)) from error
-    program = Program(whole.name, linked, signatures)
-    if _has_binaries(device):
-        entry = _entry(device, whole, flags)
-        disk_cache.store(entry, encode(signatures), _binary(linked))
-        program = _from_cache(device, whole, flags, entry) or program
-    return _built(device, whole, flags, program, time.perf_counter() - start)
+    try:
+        return _linked(device, sources, flags, _compiled)
+    except cl.Error as error:
+        raise _build_error(whole, str(error)) from error
 
 
 def compile_ahead(device: Device, sources: Mapping[str, Source], main: str) -> None:
@@ -93,13 +111,23 @@ def compile_ahead(device: Device, sources: Mapping[str, Source], main: str) -> N
     entry = _entry(device, _whole(sources, main), flags)
     if device.programs.find(_key(device, entry)) is not None or disk_cache.holds(entry):
         return
+    if disk_cache.is_being_made(entry):  # by another process
+        return
     for source in sources.values():
         part = _entry(device, source, [*flags, _PART])
         if not disk_cache.holds(part):
             text, options = next(declarations.forms(device, source.text, flags))
-            job = Job(device.info.platform, device.info.name, " ".join(options), text)
+            seconds = compile_limits.seconds_for(source)
+            told = source.name, seconds, device.info.platform, device.info.name
             device.builds.on_compile()
-            device.compilers.submit(part, job)
+            device.compilers.submit(part, Job(*told, " ".join(options), text))
+
+
+def _drop_parts(device: Device, sources: Mapping[str, Source], flags: list[str]) -> None:
+    """Let the device's `compilers` leave what they have not begun."""
+    if device.compilers is not None:
+        for source in sources.values():
+            device.compilers.drop(_entry(device, source, [*flags, _PART]))
 
 
 def _whole(sources: Mapping[str, Source], main: str) -> Source:
@@ -147,7 +175,8 @@ def _compiled(device: Device, source: Source, flags: list[str]) -> cl.Program:
     except cl.Error as error:
         raise _build_error(source, str(error)) from error
     if _has_binaries(device):
-        disk_cache.store(_entry(device, source, [*flags, _PART]), _PART, _binary(part))
+        entry = _entry(device, source, [*flags, _PART])
+        disk_cache.store(entry, _PART, native_programs.binary(part))
     return part
 
 
@@ -206,11 +235,6 @@ def _flags(device: Device, options: Sequence[str]) -> list[str]:
     # Oclgrind cannot interpret all that its compiler's optimiser makes.
     plain = ["-cl-opt-disable", "-DNOT_INLINED"] if _is_oclgrind(device) else []
     return [*OPTIONS, *options, *plain]
-
-
-def _binary(program: cl.Program) -> bytes:
-    """The binary, for the one device of the context that it was built for."""
-    return next(filter(None, program.get_info(cl.program_info.BINARIES)))
 
 
 def _is_oclgrind(device: Device) -> bool:

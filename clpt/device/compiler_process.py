@@ -6,26 +6,35 @@ standard input until that ends, as it does when whoever started it ends.
 
 from __future__ import annotations
 
+import math
 import os
 import pickle
 import queue
 import sys
 import threading
+import time
 from typing import Any
 
 import pyopencl as cl
 from pyopencl import _cl
 
+if sys.platform != "win32":
+    import resource
+
 
 def main() -> None:
-    """Answer each (platform, device, options, text) with a binary, or None if it has a fault."""
+    """Answer each (seconds, platform, device, options, text) with a binary, None for a fault.
+
+    The system ends the process if one takes more seconds of the processor than it may.
+    """
     replies = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what drivers print is no reply
     requests: queue.SimpleQueue[Any] = queue.SimpleQueue()
     threading.Thread(target=_read, args=(requests,), daemon=True).start()
     opened: dict[tuple[str, str], cl.Context] = {}
     while True:
-        platform, device, options, text = requests.get()
+        seconds, platform, device, options, text = requests.get()
+        _limit(seconds)
         try:
             if (platform, device) not in opened:
                 opened[platform, device] = cl.Context([_device(platform, device)])
@@ -34,6 +43,15 @@ def main() -> None:
             binary = None
         pickle.dump(binary, replies)
         replies.flush()
+
+
+def _limit(seconds: float) -> None:
+    """Let the system end the process after so many seconds more."""
+    if sys.platform != "win32":
+        _, most = resource.getrlimit(resource.RLIMIT_CPU)
+        end = math.ceil(time.process_time() + seconds) if math.isfinite(seconds) else most
+        own = end if most == resource.RLIM_INFINITY else min(end, most)
+        resource.setrlimit(resource.RLIMIT_CPU, (own, most))
 
 
 def _read(requests: queue.SimpleQueue[Any]) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import logging
 import os
 import pickle
+import signal
 import subprocess
 import threading
 import weakref
@@ -20,7 +21,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from clpt import child_processes
-from clpt.device import runtimes
+from clpt.device import compile_limits, runtimes
 
 log = logging.getLogger(__name__)
 
@@ -32,9 +33,12 @@ _MOST = 4  # processes: more than parts of a loop that take long
 class Job:
     """A text that a process compiles to a binary.
 
-    platform, device: their names; options: of the compiler.
+    name: of the program; seconds: of the processor that its compiler may take; platform, device:
+    their names; options: of the compiler.
     """
 
+    name: str
+    seconds: float
     platform: str
     device: str
     options: str
@@ -89,7 +93,8 @@ class Compilers:
     def take(self, key: Hashable) -> bytes | None:
         """Return a job's binary; None if it has not begun, and never will, or has failed.
 
-        It waits for a job that has begun.
+        It waits for a job that has begun. Raises KernelBuildError if its compiler was ended at its
+        limit.
         """
         with self._changed:
             task = self._tasks.pop(key, None)
@@ -99,6 +104,13 @@ class Compilers:
                 self._waiting.remove(task)
                 return None
         return task.result.result()
+
+    def drop(self, key: Hashable) -> None:
+        """Forget a job; it is not done if it has not begun."""
+        with self._changed:
+            task = self._tasks.pop(key, None)
+            if task in self._waiting:
+                self._waiting.remove(task)
 
     def close(self) -> None:
         """Let the processes do what was submitted, then end them, and wait for that."""
@@ -150,7 +162,12 @@ class Compilers:
                 try:
                     task.result.set_result(_answer(process, task.job))
                 except BaseException:
-                    task.result.set_result(None)
+                    if _was_ended_at_limit(process):
+                        task.result.set_exception(
+                            compile_limits.failure(task.job.name, task.job.seconds)
+                        )
+                    else:
+                        task.result.set_result(None)
                     raise
         except Exception as error:  # a process that died
             log.debug("nothing is compiled in another process: %s", error)
@@ -175,6 +192,14 @@ def _end(process: subprocess.Popen[bytes]) -> None:
     process.wait()
 
 
+def _was_ended_at_limit(process: subprocess.Popen[bytes]) -> bool:
+    """Whether the system has ended a process that no longer answers for its processor time."""
+    with suppress(subprocess.TimeoutExpired):
+        process.wait(1.0)
+    limit = getattr(signal, "SIGXCPU", None)
+    return limit is not None and process.returncode == -limit
+
+
 def spare_cores() -> int:
     """Return how many processes may compile beside this one: a core each."""
     if hasattr(os, "sched_getaffinity"):
@@ -190,7 +215,8 @@ def _command() -> list[str]:
 def _answer(process: subprocess.Popen[bytes], job: Job) -> bytes | None:
     assert process.stdin is not None
     assert process.stdout is not None
-    pickle.dump((job.platform, job.device, job.options, job.text), process.stdin)
+    request = job.seconds, job.platform, job.device, job.options, job.text
+    pickle.dump(request, process.stdin)
     process.stdin.flush()
     binary: bytes | None = pickle.load(process.stdout)  # from our own program
     return binary

@@ -13,9 +13,12 @@ import hashlib
 import logging
 import os
 import stat
+import sys
 import tempfile
 import threading
-from contextlib import suppress
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import platformdirs
@@ -25,10 +28,14 @@ from clpt.device import forking
 
 from .source import Source
 
+if sys.platform != "win32":
+    import fcntl
+
 log = logging.getLogger(__name__)
 
 LIMIT = 2**30  # bytes
 _PARTS = ("programs", "failed")  # the folders that are kept within LIMIT
+WAIT = 300.0  # [s] for what another process makes
 _STEP = LIMIT // 16  # bytes that a process writes before it looks at the folder's size again
 
 _lock = forking.renewed(threading.Lock())
@@ -117,7 +124,7 @@ def store(entry: str, header: str, binary: bytes, root: Path | None = None) -> N
     try:
         _keep((root or folder()) / "programs" / entry, check + b"\n" + content)
     except OSError as error:
-        log.debug("the cache cannot be written: %s", error)
+        _warn(f"the cache cannot be written, so programs are compiled again: {error}")
 
 
 def holds(entry: str) -> bool:
@@ -133,14 +140,78 @@ def load(entry: str) -> tuple[str, bytes] | None:
     path = folder() / "programs" / entry
     try:
         check, _, content = read(path).partition(b"\n")
-    except OSError:
+    except FileNotFoundError:
         return None
+    except OSError:
+        check, content = b"", b""
     with suppress(OSError):
         os.utime(path)  # it was used now; many systems do not note that
     if hashlib.sha256(content).hexdigest().encode() != check:
+        _warn(f"a file in {path.parent} is damaged or of another user: its program is built again")
         return None
     header, _, binary = content.partition(b"\n")
     return header.decode(), binary
+
+
+@contextmanager
+def alone(entry: str) -> Iterator[None]:
+    """Keep other processes from making an entry meanwhile; first wait for one that is at it.
+
+    Nobody waits for longer than WAIT, nor where files have no locks.
+    """
+    path = _lock_of(entry)
+    try:
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        handle = os.open(path, os.O_CREAT | os.O_RDWR | getattr(os, "O_NOFOLLOW", 0), 0o600)
+    except OSError:
+        yield
+        return
+    try:
+        end, waited = time.monotonic() + WAIT, False
+        while not _locks(handle) and time.monotonic() < end:
+            if not waited:
+                log.info("another process builds the same program: waiting for it")
+            waited = True
+            time.sleep(0.05)
+        yield
+    finally:
+        with suppress(OSError):
+            path.unlink()
+        os.close(handle)
+
+
+def is_being_made(entry: str) -> bool:
+    """Return whether another process is making an entry, see `alone`."""
+    try:
+        handle = os.open(_lock_of(entry), os.O_RDWR)
+    except OSError:
+        return False
+    try:
+        return not _locks(handle)
+    finally:
+        os.close(handle)
+
+
+def _lock_of(entry: str) -> Path:
+    return folder() / "locks" / entry
+
+
+def _locks(handle: int) -> bool:
+    """Lock a file; False if another process has done so. True where files have no locks."""
+    if sys.platform != "win32":
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return False
+        except OSError as error:
+            log.debug("no lock keeps processes from the same work: %s", error)
+    return True
+
+
+@functools.cache
+def _warn(text: str) -> None:
+    """Log a warning, once."""
+    log.warning("%s", text)
 
 
 def keep_failed(source: Source) -> str | None:

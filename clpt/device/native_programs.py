@@ -8,6 +8,7 @@ says.
 
 from __future__ import annotations
 
+import ctypes
 import logging
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -38,6 +39,21 @@ def compile_part(
     """Compile a text, to be linked. Raises pyopencl.Error with the driver's log."""
     program = _cl._Program(context, text)
     return _tried(program, device, lambda: program.compile(_joined(options), [device], []))
+
+
+def binary(program: cl.Program) -> bytes:
+    """Return a program's binary, for the one device of its context that it was built for.
+
+    Some drivers compile to the end only for that, and PyOpenCL holds Python's lock meanwhile: no
+    other thread could run, nor Ctrl-C end the process. So its size is asked for without that lock.
+    """
+    ask = getattr(ctypes.CDLL(_cl.__file__), "clGetProgramInfo", None)
+    if ask is not None:
+        sizes, handle = cl.program_info.BINARY_SIZES, ctypes.c_void_p(program.int_ptr)
+        count = len(program.get_info(cl.program_info.DEVICES))
+        room = (ctypes.c_size_t * count)()
+        ask(handle, sizes, ctypes.c_size_t(ctypes.sizeof(room)), room, None)
+    return next(filter(None, program.get_info(cl.program_info.BINARIES)))
 
 
 def _tried(program: Any, device: cl.Device, action: Callable[[], Any]) -> cl.Program:

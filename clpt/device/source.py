@@ -21,8 +21,8 @@ _LINE = re.compile(r'\s*#\s*line (\d+)(?: "([^"]+)")?')
 _PRIVATE = re.compile(  # at the beginning of a line: a constant, or a function with an argument
     r"^(?:static )?(?=[A-Za-z_])(?P<rest>"
     r"constant\b[^;=\[]*?(?P<constant>\w+)\s*(?=[=\[])"
-    r"|(?!static\b|kernel\b|typedef\b|return\b|else\b|void loop_)"
-    r"[A-Za-z_]\w*(?: \w+)* \*?(?P<function>\w+)\((?=[A-Za-z_]))",
+    r"|(?!static\b|kernel\b|typedef\b|return\b|else\b)"
+    r"[A-Za-z_]\w*(?: \w+)* \*?(?P<function>(?!loop_)\w+)\((?=[A-Za-z_]))",
     re.MULTILINE,
 )
 
@@ -75,7 +75,7 @@ class Source:
             return f"static {match['rest']}"
 
         text = _PRIVATE.sub(note, self.text)
-        head = [f"#define {name} {prefix}_{name}" for name in names]
+        head = [f"#define {name} in_{prefix}_{name}" for name in names]
         return Source(self.name, "\n".join([*head, text]), self.files)
 
 

@@ -203,7 +203,7 @@ def _own(
 
 
 def _analytic(
-    shape: Shape,
+    shape: Any,
     whole: Prototype,
     prototypes: list[Prototype],
     warnings: list[str],

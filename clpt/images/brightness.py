@@ -1,4 +1,4 @@
-"""How bright a picture is for a screen, and the exposure that suits it."""
+"""Brightness of pictures on a screen: what is white or black, and the exposure that suits."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from clpt.images.transfer import to_codes
 GREY = 0.18  # reflectance of the middle grey that photographers expose for
 DIM = 1e-4  # of the mean: a pixel below counts as if it were as bright
 WHITE, BLACK = 250, 2  # codes of 255: a colour from which or to which nothing can be told apart
-LOOKED_AT = 1 << 16  # pixels that are enough to judge a picture
+LOOKED_AT = 1 << 20  # pixels that are enough to judge a picture
 
 
 @dataclass(frozen=True)
 class Levels:
-    """How a picture comes out on a screen.
+    """Shares of a picture on a screen.
 
     lit: whether any light came; white: the share of the lit pixels that are white; black: that of
     all pixels which are black.
@@ -39,7 +39,7 @@ def auto_exposure(image: Floats32) -> float:
     The mean is that of the logarithm of the luminance of lit pixels (Reinhard et al. 2002,
     "Photographic Tone Reproduction", eq. 1). 0 for a picture without light.
     """
-    luminance = _luminance(image)
+    luminance = _luminance(_few(image))
     lit = luminance[luminance > 0.0]
     if lit.size == 0:
         return 0.0
@@ -58,14 +58,19 @@ def levels(
 ) -> Levels:
     """Return how linear Rec. 709 (h, w, c) comes out; the rest: see `clpt.images.to_codes`.
 
-    Of a large picture every second pixel is looked at, or fewer.
+    Of a picture of more than LOOKED_AT pixels every second row and column is looked at, or fewer.
     """
-    step = math.ceil(math.sqrt(max(image.shape[0] * image.shape[1] / LOOKED_AT, 1.0)))
-    image = image[::step, ::step]
-    codes = to_codes(np.ascontiguousarray(image), exposure, tone, view)[..., :3]
+    image = _few(image)
+    codes = to_codes(image, exposure, tone, view)[..., :3]
     lit = _luminance(image) > 0.0
     white = float((codes[lit].min(axis=-1) >= WHITE).mean()) if lit.any() else 0.0
     return Levels(bool(lit.any()), white, float((codes.max(axis=-1) <= BLACK).mean()))
+
+
+def _few(image: Floats32) -> Floats32:
+    """Every n-th row and column of an image, such that there are LOOKED_AT pixels at most."""
+    step = math.ceil(math.sqrt(max(image.shape[0] * image.shape[1] / LOOKED_AT, 1.0)))
+    return np.ascontiguousarray(image[::step, ::step])
 
 
 def _luminance(image: Floats32) -> NDArray[np.float32]:

@@ -1,4 +1,4 @@
-"""How an image differs from another one, in figures that renderers are compared by."""
+"""Differences of two images, in figures that renderers are compared by."""
 
 from __future__ import annotations
 

@@ -33,7 +33,6 @@ from clpt.render.wavefront.wavefront import Counts
 from clpt.scene import Scene
 from clpt.scene.fingerprint import Fingerprint, Plain, fingerprint
 from clpt.scene.integrators import PIXELWISE
-from clpt.scene.materials import LEAVES
 from clpt.version import VERSION
 
 log = logging.getLogger(__name__)
@@ -113,7 +112,7 @@ class Resumable(DevicePictures):
         }
         if type(self.scene.sampler) not in PIXELWISE:  # their points are for some number of samples
             settings["sampler.points"] = 1 << int(lowered.settings["sample_bits"])
-        outside = [cls for cls in features.materials.leaves if cls not in LEAVES]
+        outside = [cls for cls in features.materials.leaves if cls.source is not None]
         texts = [custom_materials.text(cls).text for cls in outside]
         digest = hashlib.sha256("\0".join([kernels_digest(), *texts]).encode()).hexdigest()
         return Origin(self._scene_read[1], settings, digest, VERSION)

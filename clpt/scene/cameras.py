@@ -22,10 +22,10 @@ class Camera(Kind):
     """Base of all cameras."""
 
     to_world: Matrix4 = host(np.eye(4), "camera to world, (4, 4)")
-    medium: Medium | None = host(None, "around the camera; None: none", form="medium")
-    motion: Keys | None = host(None, "moves it after `to_world`; None: still", form="keys")
+    medium: Medium | None = host(None, "around the camera, or None", form="medium")
+    motion: Keys | None = host(None, "moves it after `to_world`, or None", form="keys")
     shutter: Shutter | None = host(
-        None, "when light comes to the film; None: at 0 s alone", form="shutter"
+        None, "when the film gets light; None: at 0 s only", form="shutter"
     )
 
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from clpt.records import LAYER_SIZES
+
 Form = Literal["near", "long", "id", "light", "matte", "film"]
 
-MATTE_SLOTS = 12  # names that a pixel keeps
+MATTE_SLOTS = LAYER_SIZES["matte_slots"]  # names that a pixel keeps
 MOST_NAMED = (1 << 25) - 2  # what a matte can tell apart, kernels/film/layers.cl
 WORDS: dict[Form, int] = {"near": 1, "long": 3, "id": 1}  # of a channel, kernels/film/layers.cl
 

@@ -33,7 +33,7 @@ class Light(Kind):
     two_sided = False
 
     motion: Keys | None = host(
-        None, "moves it after its place; None: still; of an area light its shape moves", form="keys"
+        None, "moves it after its place, or None; an area light moves with its shape", form="keys"
     )
     group: str = host("", "lights of one name share a layer of `light_groups`")
 

@@ -648,7 +648,7 @@ class NormalMap(NormalMapped):
 
     map: Bitmap | None = host(
         None,
-        "bitmap, read raw; its colours are (x, y, z) / 2 + 1/2; None: none",
+        "bitmap, read raw; its colours are (x, y, z) / 2 + 1/2; or None",
         form="texture",
     )
     along_v: bool = flag(False, "y of the map goes along v even where uv are mirrored, as in glTF")

@@ -266,7 +266,8 @@ def defaults(cls: type) -> dict[str, Any]:
 
 def fields_of(kind: Kind) -> dict[str, Any]:
     """Return the values of an object's fields by name."""
-    names, read = _fields(type(kind))
+    cls: Any = type(kind)
+    names, read = _fields(cls)
     return dict(zip(names, read(kind), strict=False))
 
 

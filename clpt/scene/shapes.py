@@ -42,11 +42,11 @@ class Shape(Kind):
 
     material: Material = host(Diffuse(), "of the surface", form="material")
     emission: Light | None = host(None, "an `area` light, or None", form="area_light")
-    interior: Medium | None = host(None, "medium behind its front; None: none", form="medium")
-    exterior: Medium | None = host(None, "medium before its front; None: none", form="medium")
+    interior: Medium | None = host(None, "medium behind its front, or None", form="medium")
+    exterior: Medium | None = host(None, "medium before its front, or None", form="medium")
     priority: int = host(0, "where bodies overlap, that of the highest fills the place")
     to_world: Matrix4 | OnDevice = host(np.eye(4), "placement, (4, 4)")
-    motion: Keys | None = host(None, "moves it after `to_world`; None: still", form="keys")
+    motion: Keys | None = host(None, "moves it after `to_world`, or None", form="keys")
     flip_normals: bool = host(False, "turn the front to the other side")
     name: str = host("", "for messages")
 
@@ -59,7 +59,7 @@ class Mesh(Shape):
     faces: Any = host(None, "(m, 3) uint32", form="triangles")
     normals: Any = host(
         None,
-        "(n, 3) float32 per vertex; None: flat; 'smooth': from the triangles",
+        "(n, 3) float32 per vertex; None for flat; 'smooth': from the triangles",
         form="normals",
     )
     uvs: Any = host(None, "(n, 2) float32 per vertex, or None", form="rows2")
@@ -75,7 +75,7 @@ class Mesh(Shape):
         form="attributes",
     )
     deformation: Deformation | None = host(
-        None, "where the vertices are at times; None: still", form="deformation"
+        None, "where the vertices are at times, or None", form="deformation"
     )
     subdivision: int = host(0, "levels of Loop subdivision, to the smooth limit surface; 0: none")
     displacement: Bitmap | None = host(
@@ -143,7 +143,7 @@ class Spheres(Shape):
         {}, "name that begins with vertex_ -> (n, 1 or 3) float32, per sphere", form="attributes"
     )
     deformation: Deformation | None = host(
-        None, "where the spheres are at times, perhaps with radii; None: still", form="deformation"
+        None, "where the spheres are at times, perhaps with radii, or None", form="deformation"
     )
 
 
@@ -187,7 +187,7 @@ class Curves(Shape):
     )
     basis: str = choice("bspline", "what the points mean", BASES)
     deformation: Deformation | None = host(
-        None, "where the points are at times; None: still", form="deformation"
+        None, "where the points are at times, or None", form="deformation"
     )
 
 

@@ -47,6 +47,10 @@ ROLES = {
 class Sentences(griffe.Extension):
     """Adds markup to docstrings while griffe reads the sources."""
 
+    def on_module(self, *, mod: griffe.Module, **_: object) -> None:
+        """Mark the docstring of a module."""
+        _mark(mod, set())
+
     def on_function(self, *, func: griffe.Function, **_: Any) -> None:
         """Mark the names of parameters in a docstring."""
         _mark(func, {parameter.name for parameter in func.parameters})

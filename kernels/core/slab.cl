@@ -1,11 +1,17 @@
-/* Slabs: the state of paths, in blocks of SLAB_BLOCK slots. A block has a word of all its slots side by side, then the
- * next word: neighbours read neighbours, and all words of a slot lie at fixed distances from the first, which so is
- * the one address that a work-item keeps. A work-item serves LANES neighbours, from the slot `at` on. */
-#define SLAB_BLOCK 32 /* and clpt/layout.py */
-typedef struct { global float *words; uint step; } Slab; /* step: words of a slot */
+/* Slabs: the state of paths, a word of all slots side by side, then the next word; a work-item serves LANES neighbours,
+ * from the slot `at` on. So that neighbours read neighbours, a CPU has one such run of all slots. A GPU has one for each
+ * block of SLAB_BLOCK slots: all words of a slot then lie at fixed distances from the first, whose address is the one
+ * that a work-item keeps, in place of one a word. step: words of a slot in a block; else from a word to the next. */
+typedef struct { global float *words; uint step; } Slab;
 
+#if SLAB_BLOCK
+#define SLAB_STEP(words_of_slot, stride) words_of_slot
 #define slab_at(s, c, at) \
     ((s).words + ((size_t)((at) / SLAB_BLOCK * SLAB_BLOCK) * (s).step + (at) % SLAB_BLOCK) + (c) * SLAB_BLOCK)
+#else
+#define SLAB_STEP(words_of_slot, stride) stride
+#define slab_at(s, c, at) ((s).words + (size_t)(c) * (s).step + (at))
+#endif
 #define slab_read(s, c, at) block_load(slab_at(s, c, at))
 #define slab_write(s, c, at, m, v) slab_store(slab_at(s, c, at), m, v)
 inline void slab_store(global float *p, mask m, real v)
@@ -17,19 +23,23 @@ inline void slab_store(global float *p, mask m, real v)
 #endif
 }
 
-/* Where the first words of any slots are. */
+/* Where words of any slots are, from that of slot 0 on. */
 inline integer slab_places(Slab s, integer slots)
 {
-    integer within = slots & (int)(SLAB_BLOCK - 1);
+#if SLAB_BLOCK
+    integer within = slots & (SLAB_BLOCK - 1);
     return (slots - within) * (int)s.step + within;
+#else
+    return slots;
+#endif
 }
 
 /* Copies word c of any slots to neighbours from `at` on, and back where m. */
 inline void slab_gather(Slab s, uint c, integer slots, uint at)
 {
-    block_store(slab_at(s, c, at), gather(s.words + c * SLAB_BLOCK, slab_places(s, slots)));
+    block_store(slab_at(s, c, at), gather(slab_at(s, c, 0u), slab_places(s, slots)));
 }
 inline void slab_scatter(Slab s, uint c, uint at, integer slots, mask m)
 {
-    scatter_if(s.words + c * SLAB_BLOCK, slab_places(s, slots), m, block_load(slab_at(s, c, at)));
+    scatter_if(slab_at(s, c, 0u), slab_places(s, slots), m, block_load(slab_at(s, c, at)));
 }

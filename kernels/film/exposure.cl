@@ -46,13 +46,11 @@ inline void exposure_sum(Slab path, uint at, global uint *counters, mask m, vec3
     }
 }
 
-#if USES_ALPHA
 /* Adds the weight of a sample that met a surface. */
 inline void exposure_cover(Slab path, uint at, mask m, real weight)
 {
     store_path_covered(path, at, m, fixed_add(load_path_covered(path, at), fixed_of(sel(m, weight, (real)(0.0f)))));
 }
-#endif
 
 /* Adds finished samples. */
 inline void exposure_add(Scene scene, Slab path, uint at, BEGIN_ARGS, mask m, integer plane, integer pixel_index,

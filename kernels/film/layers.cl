@@ -1,11 +1,12 @@
 /* Layers beside the picture, in memory: sums over the first LAYER_SAMPLES samples of each pixel, so that they cost
  * little; whole numbers, which add in any order. What is summed is in path/layers.cl.
  *
- * `layers` has PIXEL_LAYER_WORDS words for each pixel, side by side, as its samples then touch one line of a cache:
+ * `layers` has Settings.layer_words words for each pixel, side by side, as its samples then touch one line of a cache:
  * how many samples; a word for each number that is near 1, in units of 2^-22; three for others, in units of 2^8, 2^-16
  * and 2^-40, the lower ones below 2^24; one for an id, 1 more than it, of the sample of number 0. No word leaves its
- * 32 bits, so words add without a carry. LAYER_<NAME> is the first word of a layer. */
+ * 32 bits, so words add without a carry. Settings.layer_<name> is the first word of a layer. */
 #include "film/sums.cl"
+#include "generated/layer_sizes.cl"
 #define LAYER_SAMPLES 64
 #define LAYER_UNITS 0x1p22f
 #define LAYER_LARGEST 7.9f /* times samples and units it is less than 2^31 */
@@ -33,7 +34,7 @@ inline void layers_add(Scene scene, global uint *layers, mask m, integer pixel_i
     }
     for (int j = 0; j < n; j++) {
         int i = lanes[j];
-        global uint *at = layers + (size_t)pixels[i] * PIXEL_LAYER_WORDS;
+        global uint *at = layers + (size_t)pixels[i] * scene.settings->layer_words;
         if (scene.settings->planes == 1)
             for (int k = 0; k < count; k++) at[k] += added[k * LANES + i];
         else
@@ -71,15 +72,14 @@ inline void layer_put_long(integer *words, mask m, real v)
 /* Puts an id. */
 inline void layer_put_id(integer *words, mask m, integer id) { words[0] = sel_i(m, id + 1, (integer)(0)); }
 
-#if MATTES
-/* Names that a pixel's samples have met, and how often: MATTE_SLOTS words a list, ascending. A word has 1 more than the
+/* Names that a pixel's samples have met, and how often: LAYER_MATTE_SLOTS words a list, ascending. A word has 1 more than the
  * name's number in its upper 25 bits and how often in its lower 7; 0 is none. Of more names the first ones of the scene
  * are kept: a slot keeps the least that comes to it, with all its counts, and hands the others to the next slot. So
  * what it ends with depends neither on the order of samples nor on who adds them, and lists of films add likewise. */
 inline void matte_add(global uint *list, uint number)
 {
     uint word = ((number + 1u) << 7) | 1u;
-    for (int i = 0; i < MATTE_SLOTS && word; i++) {
+    for (int i = 0; i < LAYER_MATTE_SLOTS && word; i++) {
         volatile global uint *slot = list + i;
         uint held = *slot;
         for (;;) {
@@ -97,11 +97,10 @@ inline void matte_add(global uint *list, uint number)
 }
 
 /* Adds the names with these numbers to the list `which` of the pixels. */
-inline void mattes_add(global uint *mattes, mask m, integer pixel_index, int which, integer number)
+inline void mattes_add(Scene scene, global uint *mattes, mask m, integer pixel_index, int which, integer number)
 {
     const int *adds = (const int *)&m, *pixels = (const int *)&pixel_index;
     const uint *numbers = (const uint *)&number;
     for (int i = 0; i < LANES; i++)
-        if (adds[i]) matte_add(mattes + ((size_t)pixels[i] * MATTES + which) * MATTE_SLOTS, numbers[i]);
+        if (adds[i]) matte_add(mattes + ((size_t)pixels[i] * scene.settings->mattes + which) * LAYER_MATTE_SLOTS, numbers[i]);
 }
-#endif

@@ -3,7 +3,7 @@
  * added when it is found. The sums of all groups, and direct with indirect light, are the picture. Where paths start at
  * lights too, as many pictures follow of what these bring, which are divided by the number of light paths. */
 #include "film/sums.cl"
-#include "path/seen_wavelengths.cl"
+#include "generated/seen_wavelengths.cl"
 #define LIGHT_PICTURE_WORDS 9
 #if LIGHT_LAYER_GROUPS /* the light that next-event estimation has chosen */
 #define light_layers_chosen(path, at, m, row) store_path_light(path, at, m, row)
@@ -36,19 +36,18 @@ inline void light_layers_sum(Scene scene, mask m, integer pixel_index, integer s
     if (!any(m)) return;
     v = sel3(m, v, v3(0.0f, 0.0f, 0.0f));
     mask direct = surfaces <= 1;
-#if LIGHT_LAYER_DIRECT
-    light_layer_sum(scene, m & direct, pixel_index, (integer)(first + LIGHT_LAYER_DIRECT - 1), v, light_layers);
-#endif
-#if LIGHT_LAYER_INDIRECT
-    light_layer_sum(scene, m & !direct, pixel_index, (integer)(first + LIGHT_LAYER_INDIRECT - 1), v, light_layers);
-#endif
-#if LIGHT_LAYER_GROUPS
-    integer group = to_integer(gather(scene.distributions, LIGHT_GROUPS + sel_i(m, row, (integer)(0))));
-    light_layer_sum(scene, m, pixel_index, first + LIGHT_LAYER_GROUPS - 1 + group, v, light_layers);
-#endif
+    int of_direct = scene.settings->layer_direct, of_indirect = scene.settings->layer_indirect;
+    int of_groups = scene.settings->layer_groups;
+    if (of_direct) light_layer_sum(scene, m & direct, pixel_index, (integer)(first + of_direct - 1), v, light_layers);
+    if (of_indirect)
+        light_layer_sum(scene, m & !direct, pixel_index, (integer)(first + of_indirect - 1), v, light_layers);
+    if (of_groups) {
+        integer number = scene.settings->light_groups + sel_i(m, row, (integer)(0));
+        integer group = to_integer(gather(scene.distributions, number));
+        light_layer_sum(scene, m, pixel_index, first + of_groups - 1 + group, v, light_layers);
+    }
 }
 
-#if !LIGHT_PATHS
 /* Adds light that arrives at the camera from the light in row `row` of `lights`, after as many surfaces. */
 inline void light_layers_add(Scene scene, Slab path, uint at, mask m, integer surfaces, integer row, Spectrum light,
                              global uint *light_layers)
@@ -57,4 +56,3 @@ inline void light_layers_add(Scene scene, Slab path, uint at, mask m, integer su
     vec3 v = scale3(film_value(scene, light, lambdas), load_path_weight(path, at) * scene.settings->film_scale);
     light_layers_sum(scene, m, load_path_pixel_index(path, at), surfaces, row, 0, v, light_layers);
 }
-#endif

@@ -1,3 +1,5 @@
+#include "generated/infinite_weight.cl"
+
 /* What one infinite light sends to a path that leaves the scene along d [W m^-2 sr^-1 nm^-1], and the share `w` of it
  * that counts. The direction was chosen with `pdf` [1/sr] (below 0: delta) at a point p of a surface that sends light
  * to `hemisphere`, see interface/light.cl; the power heuristic weighs that against its choice on the light (Veach
@@ -8,12 +10,7 @@ inline Spectrum infinite_met(Scene scene, int row, vec3 p, vec3 hemisphere, vec3
     Spectrum radiance;
     real other;
     infinite_light(scene, row, p, hemisphere, d, lambdas, &radiance, &other);
-#if WEIGHS_LIGHT_PATHS
-    real emission = light_path_pdf(scene, (integer)(row), p, d, (real)(FAR), neg3(d));
-    *w = mis_weight_of_three(pdf, other, rival * emission);
-#else
-    *w = sel(pdf < 0.0f, (real)(1.0f), mis_weight(pdf, other));
-#endif
+    *w = infinite_weight(scene, row, p, d, pdf, other, rival);
     return radiance;
 }
 

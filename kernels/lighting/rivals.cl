@@ -56,37 +56,15 @@
 #define RIVAL_MOST 1e18f /* so that its square is finite */
 #define SHARP_PDF 8.0f /* [1/sr]; an even hemisphere has 0.16 */
 
-/* The density of a direction, for any of the four wavelengths as the hero: the same number from either end. */
-inline real rival_pdf(Bsdf m, vec3 wo, vec3 wi)
-{
-#if BSDF_CHROMATIC && (USES_DISPERSION || BSDF_IS_PHASE)
-    return spectrum_mean(bsdf_pdfs(m, wo, wi));
-#else
-    return bsdf_pdf(m, wo, wi);
-#endif
-}
-
 inline real rival_limited(real rival) { return min_r(rival, (real)(RIVAL_MOST)); }
 
 /* Whether light paths end at a vertex: what happens there is not the same for light that comes the other way. */
 inline mask rival_ends(Scene scene, Vertex v)
 {
-#if BSDF_ENDS_LIGHT_PATHS
-    return mask_of(1);
-#else
-    return shading_frame_turns(scene, v.row);
-#endif
+    return BSDF_ENDS_LIGHT_PATHS ? mask_of(1) : shading_frame_turns(scene, v.row);
 }
 
 inline mask rival_sharp(mask delta, real p, real p_back) { return delta | (max_r(p, p_back) > SHARP_PDF); }
-
-#if MERGES && BSDF_MERGES
-/* `merging_area` in the unit of rivals. */
-inline real rival_merging_area(Scene scene, integer pass)
-{
-    return merging_area(scene, pass) / scene.settings->rival_area;
-}
-#endif
 
 /* What a vertex knows of the rival of its path. */
 typedef struct {
@@ -94,22 +72,11 @@ typedef struct {
     real found;   /* of a light path's first vertex, q */
     mask first;   /* it is the path's first vertex */
     mask met;     /* a ray from it might meet the light */
-#if MERGES
     real pending; /* what joins `arrives` where the vertex is sharp; of a light path, at the joint alone */
     real merges;  /* what merging here has over the path's density: 0 where there is none */
-#endif
 } Rival;
 
-/* The rival of a camera's path that arrives, if the vertex scatters with these densities. */
-inline real rival_arrives(Rival r, mask delta, real p, real p_back)
-{
-#if MERGES
-    real more = sel(rival_sharp(delta, p, p_back), r.pending, (real)(0.0f));
-    return sqrt(sqr(r.arrives) + sqr(more));
-#else
-    return r.arrives;
-#endif
-}
+#include "generated/rival_steps.cl"
 
 /* Of a camera's path. sampler: of its sample. */
 inline Rival rival_of_camera(Scene scene, Slab path, uint at, Vertex v, Sampler sampler)
@@ -119,25 +86,11 @@ inline Rival rival_of_camera(Scene scene, Slab path, uint at, Vertex v, Sampler 
     r.first = v.depth == 0;
     r.met = mask_of(1);
     r.found = 0.0f;
-    if (any(r.first)) {
-#if JOINS_CAMERA && !BSDF_DELTA
-        CameraPoint c = camera_connect(scene, v.s.p, mask_of(0), sampler_pair(sampler, (natural)(DIMENSION_LENS)));
-        real seen = sel(c.seen, rival / max_r(c.importance * scene.settings->rival_area, (real)(1e-30f)), (real)(0.0f));
-        rival = sel(r.first, seen, rival);
-#else
-        rival = sel(r.first, (real)(0.0f), rival);
-#endif
-    }
+    if (any(r.first)) rival = sel(r.first, rival_seen(scene, v, sampler, rival), rival);
     real goes_on = sel(rival_ends(scene, v), (real)(0.0f), 1.0f / max_r(VERTEX_COSINE(v.s.n, v.d), (real)(1e-7f)));
     r.arrives = rival * goes_on;
-#if MERGES
     r.pending = load_path_pending(path, at) * goes_on;
-    r.merges = 0.0f;
-#if BSDF_MERGES
-    real area = rival_merging_area(scene, load_path_sample(path, at));
-    r.merges = sel(merging_here(v.state, v.depth), area, (real)(0.0f));
-#endif
-#endif
+    r.merges = rival_merges_here(scene, path, at, v);
     return r;
 }
 
@@ -155,11 +108,8 @@ inline real rival_of_light_sample(Scene scene, Rival r, Surface s, LightSample l
     real emission = light_path_pdf(scene, ls.row, s.p, ls.wi, ls.t, ls.n) / max_r(chosen, (real)(1e-30f));
     real arrives = rival_arrives(r, mask_of(0), p, p_back) * VERTEX_COSINE(s.n, ls.wi) * emission;
     real third = rival_limited(arrives * p_back);
-#if BSDF_IS_PHASE
-    real joined = sel(rival_light_met(scene, ls.row), (real)(0.0f), rival_limited(arrives));
-#else
     real joined = 0.0f;
-#endif
+    if (BSDF_IS_PHASE) joined = sel(rival_light_met(scene, ls.row), (real)(0.0f), rival_limited(arrives));
     return sel(r.first, joined, third);
 }
 
@@ -170,15 +120,6 @@ inline real rival_to_light(Rival r, Surface s, vec3 d, mask delta, real p, real 
     real change = sel(delta, sel(r.first, (real)(0.0f), (real)(1.0f)), scatters);
     return rival_limited(rival_arrives(r, delta, p, p_back) * change * VERTEX_COSINE(s.n, d));
 }
-
-#if MERGES
-/* What joins that rival where something further is sharp. */
-inline real rival_pending(Rival r, Surface s, vec3 d, mask delta, real p, real p_back)
-{
-    real either = sqrt(sqr(r.pending * p_back) + sqr(r.merges)) / max_r(p, (real)(1e-30f));
-    return sel(rival_sharp(delta, p, p_back), (real)(0.0f), rival_limited(either * VERTEX_COSINE(s.n, d)));
-}
-#endif
 
 /* Of a light path. hemisphere: to which a camera's path would send next-event estimation here. */
 inline Rival rival_of_emission(Scene scene, Slab path, uint at, Vertex v, vec3 hemisphere)
@@ -192,19 +133,12 @@ inline Rival rival_of_emission(Scene scene, Slab path, uint at, Vertex v, vec3 h
         integer row = sel_i(r.first, load_path_light(path, at), (integer)(0));
         vec3 wi = neg3(v.d), n = load_path_sampled_hemisphere(path, at);
         real t = v.t + load_path_null_distance(path, at);
-        real emission = light_emit_pdf(scene, row, wi, t);
+        real emission = common_light_begins_pdf(scene, row, v.s.p, hemisphere, wi, t, n, &r.found);
         r.arrives = r.arrives / sel(r.first, max_r(emission, (real)(1e-30f)), (real)(1.0f));
-        r.found = light_found_pdf(scene, row, v.s.p, hemisphere, wi, t, n);
         r.met = !r.first | rival_light_met(scene, row);
     }
-#if MERGES
     r.pending = load_path_pending(path, at) / max_r(VERTEX_COSINE(v.s.n, v.d), (real)(1e-7f));
-    r.merges = 0.0f;
-#if BSDF_MERGES
-    real area = rival_merging_area(scene, merging_pass(scene, load_path_sample(path, at)));
-    r.merges = sel((v.state & PATH_SHARP) != 0, area / scene.settings->light_paths, (real)(0.0f));
-#endif
-#endif
+    r.merges = rival_left_here(scene, path, at, v);
     return r;
 }
 
@@ -217,29 +151,14 @@ inline real rival_to_camera(Rival r, Surface s, vec3 d, mask delta, real p, real
     return rival_limited(r.arrives * change * VERTEX_COSINE(s.n, d));
 }
 
-#if MERGES
-/* What is pending along it. */
-inline real rival_merged(Rival r, Surface s, vec3 d, mask delta, real p, real p_back)
-{
-    real begun = sel(rival_sharp(delta, p, p_back), r.pending * p_back, r.merges) / max_r(p, (real)(1e-30f));
-    return rival_limited(sel(delta, r.pending, begun) * VERTEX_COSINE(s.n, d));
-}
-#endif
-
-#if JOINS_CAMERA
 /* The square of the rival of a light path that is joined to the camera, where the material has densities p and p_back
  * of a camera's path. */
 inline real rival_of_joint(Scene scene, Rival r, Surface s, CameraPoint c, real p, real p_back)
 {
     real importance = c.importance * scene.settings->rival_area, chosen = 1.0f / max_r(importance, (real)(1e-30f));
     real square = sqr(rival_to_camera(r, s, c.d, mask_of(0), chosen, p));
-#if MERGES
-    real more = rival_limited(r.pending * p * importance * VERTEX_COSINE(s.n, c.d));
-    square += sel(rival_sharp(mask_of(0), p, p_back), sqr(more), (real)(0.0f));
-#endif
-    return square;
+    return square + rival_merged_square(r, s, c.d, importance, p, p_back);
 }
-#endif
 
 /* What a point of a light counts that next-event estimation has chosen; p: guide's and material's density of it. */
 #define event_weight(scene, rival, s, ls, m, wo, wi, p) rival_event_weight(scene, rival, s, ls, m, wo, wi)
@@ -256,10 +175,7 @@ inline real rival_goes_to_light(Slab path, uint at, mask scatters, Rival r, Scat
 {
     real p = rival_pdf(scatter.bsdf, scatter.wo, bs.wi), p_back = rival_pdf(scatter.bsdf, bs.wi, scatter.wo);
     store_path_rival(path, at, scatters, rival_to_light(r, v->s, onward, delta, p, p_back));
-#if MERGES
-    v->state -= sel_i(rival_sharp(delta, p, p_back), (integer)(0), v->state & PATH_SHARP);
-    store_path_pending(path, at, scatters, rival_pending(r, v->s, onward, delta, p, p_back));
-#endif
+    rival_pends_to_light(path, at, scatters, r, v, onward, delta, p, p_back);
     return p;
 }
 
@@ -271,14 +187,10 @@ inline mask rival_goes_to_camera(Scene scene, Slab path, uint at, mask next, mas
     mask delta = (bs.lobe & LOBE_DELTA) != 0;
     real p = rival_pdf(scatter.bsdf, scatter.wo, bs.wi), p_back = rival_pdf(scatter.bsdf, bs.wi, scatter.wo);
     store_path_rival(path, at, next & !null, rival_to_camera(r, v->s, onward, delta, p, p_back));
-#if MERGES
-    store_path_pending(path, at, next & !null, rival_merged(r, v->s, onward, delta, p, p_back));
-    v->state = v->state | sel_i(rival_sharp(delta, p, p_back) & !null, (integer)(PATH_SHARP), (integer)(0));
-#endif
+    rival_pends_to_camera(path, at, next & !null, null, r, v, onward, delta, p, p_back);
     return next;
 }
 
-#if JOINS_CAMERA
 /* What the joint of a light path to the camera counts; leaves in `shine` those that are not left to the camera. */
 inline real rival_joint(Scene scene, Rival r, Vertex v, Scattering scatter, vec3 to, CameraPoint c, mask *shine)
 {
@@ -288,4 +200,3 @@ inline real rival_joint(Scene scene, Rival r, Vertex v, Scattering scatter, vec3
     *shine = *shine & joined & !hidden & !rival_ends(scene, v);
     return 1.0f / (1.0f + rival_of_joint(scene, r, v.s, c, p, p_back));
 }
-#endif

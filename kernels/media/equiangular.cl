@@ -17,11 +17,9 @@ typedef struct {
 inline Equiangular equiangular(Scene scene, vec3 o, vec3 d, real end, real sigma, real u)
 {
     integer row = (integer)(0);
-#if MEDIUM_AIMS > 1
     for (int i = 0; i + 1 < MEDIUM_AIMS; i++) {
         row = row + sel_i(u >= as_float(scene.media[4 * i + 3]), (integer)(4), (integer)(0));
     }
-#endif
     vec4 aim = gather_w4(scene.media, row);
     vec3 to = sub3(v3(aim.x, aim.y, aim.z), o);
     real far2 = dot3(to, to);

@@ -17,9 +17,7 @@ typedef struct {
     vec3 o, d, inverse;
     real t, end; /* [m] */
     integer first, nx, ny, nz, x, y, z;
-#if USES_BYTES
     integer packed; /* base-2 logarithm of how many numbers a word holds */
-#endif
 } GridWalk;
 
 /* The brick of a walk: where its points begin, its highest density, where the ray leaves it and along which axis. */
@@ -36,9 +34,7 @@ inline natural grid_key(Scene scene, natural pixel_key, integer sample, integer 
     return hash_natural(pixel_key + hash_natural(key + as_natural(vertex)));
 }
 
-#if USES_BYTES
-#define grid_packed(name) sel_i(((name) & MEDIUM_BYTES) != 0, (integer)(2), (integer)(1))
-#endif
+#include "generated/grid_numbers.cl"
 
 /* Whether the ray from o along d, t metres long, is in the box; where it begins there. */
 inline mask grid_begin(Scene scene, integer name, vec3 o, vec3 d, real t, mask active, GridWalk *w)
@@ -48,9 +44,7 @@ inline mask grid_begin(Scene scene, integer name, vec3 o, vec3 d, real t, mask a
     w->nx = gather_i(scene.materials, at + 1);
     w->ny = gather_i(scene.materials, at + 2);
     w->nz = gather_i(scene.materials, at + 3);
-#if USES_BYTES
     w->packed = grid_packed(name);
-#endif
     real lo = 0.0f, hi = t;
 #define AXIS(a, n)                                                            \
     vec4 row_##a = gather_w4(scene.materials, at + 4 + 4 * n);                \
@@ -133,30 +127,12 @@ inline integer grid_corner(GridWalk w, natural bits)
 inline real brick_density(Scene scene, GridWalk w, GridBrick b, mask active, natural bits)
 {
     integer at = grid_corner(w, bits);
-#if USES_BYTES
-    mask small = w.packed == 2;
     integer word = gather_i(scene.images, sel_i(active, b.points + (at >> w.packed), (integer)(0)));
-    integer place = sel_i(small, (at & 3) << 3, (at & 1) << 4), most = sel_i(small, (integer)(0xff), (integer)(0xffff));
-    return to_real((word >> place) & most) / to_real(most);
-#else
-    integer word = gather_i(scene.images, sel_i(active, b.points + (at >> 1), (integer)(0)));
-    return to_real((word >> ((at & 1) << 4)) & 0xffff) * (1.0f / 65535.0f);
-#endif
+    return grid_number_at(w.packed, word, at);
 }
 
 inline real grid_length(natural bits) { return -log_r(1.0f - unit_interval(bits)); }
 
-#if GRIDS_TINTED || GRIDS_COLOURED
-#if GRIDS_EMIT
-#define GRID_ALBEDO (2 * MEDIUM_SCATTERING + 25) /* words from a medium's row: behind media/medium_grid_light.cl's */
-#else
-#define GRID_ALBEDO (2 * MEDIUM_SCATTERING + 19)
-#endif
-#if GRIDS_TINTED
-#define GRID_COLOUR (GRID_ALBEDO + 1)
-#else
-#define GRID_COLOUR GRID_ALBEDO
-#endif
 /* The colour at the point that `bits` choose, of those that word `at` of a medium's row tells; 1 where there are none.
  * In `images` each brick has a word, where its points begin from the first one on, and a point three: a colour, or the
  * coefficients of its curve. The word is below 0 where colours and density are trilinear each by itself: these bits
@@ -174,71 +150,17 @@ inline Spectrum grid_tint(Scene scene, integer name, int at, GridWalk w, mask ac
                     gather_w(scene.images, point + 2), (real)(1.0f));
     return spectrum_sel(active, spectrum_constant(words, lambdas), spectrum_of(1.0f));
 }
-#endif
 
-#if GRIDS_MIXED
-#if GRIDS_COLOURED
-#define GRID_MIXED (GRID_COLOUR + 1)
-#elif GRIDS_TINTED
-#define GRID_MIXED (GRID_ALBEDO + 1)
-#elif GRIDS_EMIT
-#define GRID_MIXED (2 * MEDIUM_SCATTERING + 25) /* as GRID_ALBEDO */
-#else
-#define GRID_MIXED (2 * MEDIUM_SCATTERING + 19)
-#endif
-/* Of a mixture word GRID_MIXED of its row is 1 + the first word of its shares in `images`, 0 of what is none. These are
- * for each brick where its points begin from there, and for each point the density of GRIDS_MIXED parts over that of
- * the bricks. Behind that word there stand for each part the word of its phase function and its coefficients. The
- * mixture's own coefficients, times the density of its bricks, are at all wavelengths at least those of all parts. */
-inline integer grid_shares(Scene scene, integer name, GridWalk w, mask active, natural bits)
-{
-    integer first = gather_i(scene.materials, sel_i(active, MEDIUM_ROW(name) + GRID_MIXED, (integer)(0))) - 1;
-    active = active & (first >= 0);
-    integer brick = (w.z * w.ny + w.y) * w.nx + w.x;
-    integer points = first + gather_i(scene.images, sel_i(active, first + brick, (integer)(0)));
-    return sel_i(active, points + GRIDS_MIXED * grid_corner(w, bits), (integer)(0));
-}
-
-/* A part of a mixture at the point whose shares stand at word `shares` of `images`, where the density of the bricks is
- * 1. Lanes without shares have any medium. */
-inline Medium grid_part(Scene scene, integer name, int part, integer shares, Wavelengths lambdas)
-{
-    integer row = MEDIUM_ROW(name) + GRID_MIXED + 2 + part * (1 + 2 * MEDIUM_SCATTERING);
-    Medium m = medium_load(scene, sel_i(shares != 0, row + 1, (integer)(0)), lambdas);
-    real share = gather_w(scene.images, sel_i(shares != 0, shares + part, (integer)(0)));
-    m.sigma_s = spectrum_scale(m.sigma_s, share);
-    m.sigma_t = spectrum_scale(m.sigma_t, share);
-    return m;
-}
-#endif
+#include "generated/grid_steps.cl"
 
 /* The medium at the point that `bits` choose, where its density is 1: albedo and extinction may have colours there.
  * These are at most 1, so that the highest density of a brick bounds the extinction at all wavelengths. */
-#define GRIDS_VARY (GRIDS_COLOURED || GRIDS_MIXED) /* their extinction has other colours from point to point */
 inline Medium grid_medium(Scene scene, integer name, Medium m, GridWalk w, mask active, natural bits,
                           Wavelengths lambdas)
 {
-#if GRIDS_COLOURED
-    Spectrum colour = grid_tint(scene, name, GRID_COLOUR, w, active, bits, lambdas);
-    m.sigma_s = spectrum_mul(m.sigma_s, colour);
-    m.sigma_t = spectrum_mul(m.sigma_t, colour);
-#endif
-#if GRIDS_TINTED
-    m.sigma_s = spectrum_mul(m.sigma_s, grid_tint(scene, name, GRID_ALBEDO, w, active, bits, lambdas));
-#endif
-#if GRIDS_MIXED
-    integer shares = grid_shares(scene, name, w, active, bits);
-    if (any(shares != 0)) {
-        Medium whole = grid_part(scene, name, 0, shares, lambdas);
-        for (int i = 1; i < GRIDS_MIXED; i++) {
-            Medium part = grid_part(scene, name, i, shares, lambdas);
-            whole.sigma_s = spectrum_add(whole.sigma_s, part.sigma_s);
-            whole.sigma_t = spectrum_add(whole.sigma_t, part.sigma_t);
-        }
-        m.sigma_s = spectrum_sel(shares != 0, whole.sigma_s, m.sigma_s);
-        m.sigma_t = spectrum_sel(shares != 0, whole.sigma_t, m.sigma_t);
-    }
-#endif
+    grid_coloured(scene, name, w, active, bits, lambdas, &m);
+    grid_tinted(scene, name, w, active, bits, lambdas, &m);
+    grid_mixed(scene, name, w, active, bits, lambdas, &m);
     return m;
 }
 
@@ -250,9 +172,7 @@ inline Spectrum grid_transmittance(Scene scene, integer name, Medium m, vec3 o, 
     active = grid_begin(scene, name, o, d, t, active, &w);
     real most = max_r(spectrum_max(m.sigma_t), (real)(1e-30f)), inverse = 1.0f / most;
     Spectrum passes = spectrum_of(1.0f);
-#if !GRIDS_VARY
     Spectrum share = spectrum_scale(m.sigma_t, inverse);
-#endif
     natural count = 1u, bits = hash_natural(key);
     real left = grid_length(bits) * inverse;
     while (any(active)) {
@@ -265,10 +185,8 @@ inline Spectrum grid_transmittance(Scene scene, integer name, Medium m, vec3 o, 
             bits = hash_natural(key + count * 0x9e3779b9u);
             natural more = hash_natural(bits ^ 0x68bc21ebu);
             real density = brick_density(scene, w, b, meets, more);
-#if GRIDS_VARY
-            Spectrum share = grid_medium(scene, name, m, w, meets, more, lambdas).sigma_t;
-            share = spectrum_scale(share, inverse);
-#endif
+            if (GRIDS_VARY)
+                share = spectrum_scale(grid_medium(scene, name, m, w, meets, more, lambdas).sigma_t, inverse);
             Spectrum kept = spectrum_sub(spectrum_of(1.0f), spectrum_scale(share, density));
             passes = spectrum_sel(meets, spectrum_mul(passes, kept), passes);
             mask staked = meets & (spectrum_max(passes) < GRID_ROULETTE);

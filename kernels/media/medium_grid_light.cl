@@ -45,41 +45,7 @@ inline real grid_number(Scene scene, GridWalk w, integer first, mask active)
     return sel(active, sum * most * (1.0f / 65535.0f), (real)(0.0f));
 }
 
-#if GRIDS_GLOW
-/* Planck's law [W m^-2 sr^-1 nm^-1], times `factor`; normalised: 1 at its highest. at: of the grid's words. */
-inline Spectrum grid_black_body(Scene scene, integer at, real kelvin, mask normalised, mask active, Wavelengths lambdas)
-{
-    real factor = gather_w(scene.materials, at + 3);
-    mask hot = active & (kelvin > 1.0f);
-    kelvin = sel(hot, kelvin, (real)(1.0f));
-#if SPECTRUM_SIZE == 4
-    real t2 = kelvin * kelvin, top = 4.0956747e-15f * t2 * t2 * kelvin;
-    factor *= sel(normalised, 1.0f / top, (real)(1.0f));
-    Spectrum r;
-#define C(c)                                                                                        \
-    real nm_##c = lambdas.c, m2_##c = nm_##c * nm_##c;                                              \
-    real less_##c = exp_r(-min_r(1.438776877e7f / (nm_##c * kelvin), (real)(80.0f)));               \
-    r.c = sel(hot, factor * 1.191042972e20f / (m2_##c * m2_##c * nm_##c) * less_##c / (1.0f - less_##c), (real)(0.0f));
-    SPECTRUM_EACH(C)
-#undef C
-    return r;
-#else
-    real place = kelvin * gather_w(scene.materials, at + 5);
-    integer cell = clamp_i(to_integer(place), (integer)(1022));
-    real share = clamp_r(place - to_real(cell), (real)(0.0f), (real)(1.0f));
-    integer first = sel_i(hot, gather_i(scene.materials, at + 4) + 3 * cell, (integer)(0));
-    Spectrum r;
-#define C(c, i)                                                             \
-    real low_##c = gather(scene.distributions, first + i);                  \
-    r.c = sel(hot, low_##c + share * (gather(scene.distributions, first + 3 + i) - low_##c), (real)(0.0f));
-    C(x, 0)
-    C(y, 1)
-    C(z, 2)
-#undef C
-    return r;
-#endif
-}
-#endif
+#include "generated/grid_glow.cl"
 
 /* What a metre emits at the walk's point [W m^-3 sr^-1 nm^-1]: an estimate, by the density of one point around. */
 inline Spectrum grid_emission(Scene scene, integer name, Medium m, GridWalk w, GridBrick b, mask active, natural bits,
@@ -90,13 +56,7 @@ inline Spectrum grid_emission(Scene scene, integer name, Medium m, GridWalk w, G
     integer source = sel_i(active, gather_i(scene.materials, at + 2), (integer)(0));
     real number = sel(source != 0, grid_number(scene, w, source, active & (source != 0)), (real)(1.0f));
     Spectrum light = spectrum_scale(medium_light(scene, row - MEDIUM_LIGHT, texture_point_nowhere(), lambdas), number);
-#if GRIDS_GLOW
-    integer kind = gather_i(scene.materials, at + 1);
-    mask glows = active & (kind != 0);
-    if (any(glows)) {
-        light = spectrum_sel(glows, grid_black_body(scene, at, number, kind == 2, glows, lambdas), light);
-    }
-#endif
+    light = grid_glow(scene, at, number, active, lambdas, light);
     m = grid_medium(scene, name, m, w, active, bits, lambdas);
     Spectrum absorbs = spectrum_sub(m.sigma_t, m.sigma_s);
 #define C(c) light.c *= max_r(absorbs.c, (real)(0.0f)) * density;
@@ -114,9 +74,7 @@ inline GridWalk grid_point(Scene scene, integer name, integer number, vec3 p, ma
     w.nx = max_i(gather_i(scene.materials, at + 1), (integer)(1));
     w.ny = max_i(gather_i(scene.materials, at + 2), (integer)(1));
     w.nz = gather_i(scene.materials, at + 3);
-#if USES_BYTES
     w.packed = grid_packed(name);
-#endif
 #define AXIS(a, n)                                                            \
     vec4 row_##a = gather_w4(scene.materials, at + 4 + 4 * n);                \
     w.o.a = row_##a.x * p.x + row_##a.y * p.y + row_##a.z * p.z + row_##a.w;  \

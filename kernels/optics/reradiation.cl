@@ -3,6 +3,7 @@
  * (clpt/render/lowering/spectra/reradiation.py): at each node how much light to expect, then the integral of each
  * row times that, then of each row its values [1/nm] and the normalised running integral of the product. */
 #include "core/grid.cl"
+#include "generated/reradiation_sizes.cl"
 #define SHIFT_CELLS ((int)((SPECTRA_SIZE - 1) * SPECTRA_STEP + (RERADIATION_STEP - 1e-3f)) / RERADIATION_STEP)
 #define SHIFT_ROW (2 * SHIFT_CELLS + 1)
 

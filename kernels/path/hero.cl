@@ -6,40 +6,16 @@
  * direction that holds for the hero alone leaves (4, 0, 0, 0), and the path goes on with one wavelength.
  */
 
-#define HERO_CHROMATIC (USES_RATIO && BSDF_CHROMATIC && SPECTRUM_SIZE == 4)
-
-/* pdf of the directions that are not delta [1/sr]. */
-inline real hero_pdf(Bsdf m, vec3 wo, vec3 wi, Spectrum ratio)
-{
-#if HERO_CHROMATIC
-    return spectrum_mean(spectrum_mul(ratio, bsdf_pdfs(m, wo, wi)));
-#else
-    return bsdf_pdf(m, wo, wi);
-#endif
-}
 
 /* bsdf_sample, its pdf and weight those of the four together. A direction that is not finite has a pdf of 0, so that
  * the path ends: it would leave the scene, and no sky knows where. */
+#include "generated/hero_steps.cl"
+
 inline BsdfSample hero_sample(Bsdf m, vec3 wo, vec3 u, Spectrum *ratio)
 {
     BsdfSample s = bsdf_sample(m, wo, u);
     s.pdf = sel(dot3(s.wi, s.wi) < 4.0f, s.pdf, (real)(0.0f)); /* NaN fails the comparison */
-#if HERO_CHROMATIC
-    Spectrum pdfs = spectrum_mul(*ratio, bsdf_pdfs(m, wo, s.wi));
-    real pdf = spectrum_mean(pdfs);
-    mask usable = (s.pdf > 0.0f) & (pdf > 0.0f);
-    real inv = 1.0f / sel(usable, pdf, (real)(1.0f));
-    *ratio = spectrum_sel(usable, spectrum_scale(pdfs, inv), *ratio);
-    s.weight = spectrum_scale(s.weight, sel(usable, s.pdf * inv, (real)(1.0f)));
-    s.pdf = sel(usable, pdf, (real)(0.0f));
-#endif
-#if USES_DISPERSION
-    mask alone = (s.lobe & LOBE_DISPERSE) != 0;
-    if (any(alone)) {
-        Spectrum hero = {(real)(4.0f), (real)(0.0f), (real)(0.0f), (real)(0.0f)};
-        s.weight = spectrum_sel(alone, spectrum_scale(spectrum_mul(s.weight, hero), 1.0f / ratio->x), s.weight);
-        *ratio = spectrum_sel(alone, hero, *ratio);
-    }
-#endif
+    hero_weighs(m, wo, &s, ratio);
+    hero_goes_alone(&s, ratio);
     return s;
 }

@@ -3,7 +3,7 @@
 #include "film/layers.cl"
 
 #include "generated/mattes.cl"
-#define DENOISERS_SEE (LAYER_DENOISING && !BSDF_DELTA) /* past mirrors and smooth glass */
+#define DENOISERS_SEE (settings->layer_denoising && !BSDF_DELTA) /* past mirrors and smooth glass */
 
 /* What a surface reflects, as the film's sensor tells it; `before`: of what is before it. */
 inline vec3 layer_albedo(Scene scene, Scattering scatter, Wavelengths lambdas, Spectrum before, real weight)
@@ -34,36 +34,38 @@ inline void layer_put_long3(integer *words, mask m, vec3 v, real weight)
     layer_put_long(words + 6, m, v.z * weight);
 }
 
-/* Puts what the camera sees `first`; LAYER_<NAME> is 0 where there is no such layer. */
+/* Puts what the camera sees `first`; Settings.layer_<name> is 0 where there is no such layer. */
 inline void layers_put_first(Scene scene, Slab path, uint at, integer *words, mask first, Vertex v, Scattering scatter,
                              real weight)
 {
+    global const Settings *settings = scene.settings;
     words[0] = sel_i(first, (integer)(1), (integer)(0));
-    if (LAYER_ALBEDO) {
+    if (settings->layer_albedo) {
         vec3 albedo = layer_albedo(scene, scatter, v.lambdas, spectrum_of(1.0f), weight);
-        layer_put(words + LAYER_ALBEDO, first, albedo);
+        layer_put(words + settings->layer_albedo, first, albedo);
     }
-    if (LAYER_SHADING_NORMAL) layer_put(words + LAYER_SHADING_NORMAL, first, scale3(layer_normal(scatter), weight));
-    if (LAYER_GEOMETRIC_NORMAL) layer_put(words + LAYER_GEOMETRIC_NORMAL, first, scale3(v.s.n, weight));
-    if (LAYER_DEPTH)
-        layer_put_long(words + LAYER_DEPTH, first, (v.t + load_path_null_distance(path, at)) * weight);
-    if (LAYER_Z) layer_put_long(words + LAYER_Z, first, layer_z(scene, v.s.p) * weight);
-    if (LAYER_POSITION) layer_put_long3(words + LAYER_POSITION, first, v.s.p, weight);
-    if (LAYER_UV) {
-        layer_put_long(words + LAYER_UV, first, v.s.uv.x * weight);
-        layer_put_long(words + LAYER_UV + 3, first, v.s.uv.y * weight);
+    if (settings->layer_shading_normal) layer_put(words + settings->layer_shading_normal, first, scale3(layer_normal(scatter), weight));
+    if (settings->layer_geometric_normal) layer_put(words + settings->layer_geometric_normal, first, scale3(v.s.n, weight));
+    if (settings->layer_depth)
+        layer_put_long(words + settings->layer_depth, first, (v.t + load_path_null_distance(path, at)) * weight);
+    if (settings->layer_z) layer_put_long(words + settings->layer_z, first, layer_z(scene, v.s.p) * weight);
+    if (settings->layer_position) layer_put_long3(words + settings->layer_position, first, v.s.p, weight);
+    if (settings->layer_uv) {
+        layer_put_long(words + settings->layer_uv, first, v.s.uv.x * weight);
+        layer_put_long(words + settings->layer_uv + 3, first, v.s.uv.y * weight);
     }
-    if (LAYER_MOTION) screen_motion_record(scene, words + LAYER_MOTION, first, v, weight);
+    if (settings->layer_motion) screen_motion_record(scene, words + settings->layer_motion, first, v, weight);
     mask zeroth = first & (load_path_sample(path, at) == 0);
-    if (LAYER_SHAPE_ID) layer_put_id(words + LAYER_SHAPE_ID, zeroth, v.object);
-    if (LAYER_PRIMITIVE_ID) layer_put_id(words + LAYER_PRIMITIVE_ID, zeroth, v.primitive);
-    if (LAYER_MATERIAL_ID) layer_put_id(words + LAYER_MATERIAL_ID, zeroth, v.material);
+    if (settings->layer_shape_id) layer_put_id(words + settings->layer_shape_id, zeroth, v.object);
+    if (settings->layer_primitive_id) layer_put_id(words + settings->layer_primitive_id, zeroth, v.primitive);
+    if (settings->layer_material_id) layer_put_id(words + settings->layer_material_id, zeroth, v.material);
 }
 
 /* Adds what the `met` paths see here. Returns the paths' state, which says whether denoisers have got theirs. */
 inline integer layers_record(Scene scene, Slab path, uint at, LAYER_ARGS, mask met, Vertex v, Scattering scatter,
                              integer state)
 {
+    global const Settings *settings = scene.settings;
     mask wanted = layers_want(path, at, met), first = wanted & (v.depth == 0), adds = first;
     if (DENOISERS_SEE) { /* those that are here first are among them */
         adds = wanted & ((state & PATH_SEEN) == 0);
@@ -71,17 +73,17 @@ inline integer layers_record(Scene scene, Slab path, uint at, LAYER_ARGS, mask m
     }
     if (!any(adds)) return state;
     real weight = layer_weight(path, at);
-    integer words[PIXEL_LAYER_WORDS];
+    integer words[LAYER_MOST_WORDS];
     layers_put_first(scene, path, at, words, first, v, scatter, weight);
-    if (DENOISERS_SEE * LAYER_DENOISING_ALBEDO) {
+    if (DENOISERS_SEE && settings->layer_denoising_albedo) {
         vec3 albedo = layer_albedo(scene, scatter, v.lambdas, v.beta, weight);
-        layer_put(words + LAYER_DENOISING_ALBEDO, adds, albedo);
+        layer_put(words + settings->layer_denoising_albedo, adds, albedo);
     }
-    if (DENOISERS_SEE * LAYER_DENOISING_NORMAL)
-        layer_put(words + LAYER_DENOISING_NORMAL, adds, scale3(layer_normal(scatter), weight));
-    int count = LAYER_DENOISING && BSDF_DELTA ? LAYER_DENOISING : PIXEL_LAYER_WORDS; /* theirs come last */
+    if (DENOISERS_SEE && settings->layer_denoising_normal)
+        layer_put(words + settings->layer_denoising_normal, adds, scale3(layer_normal(scatter), weight));
+    int count = settings->layer_denoising && BSDF_DELTA ? settings->layer_denoising : settings->layer_words; /* theirs come last */
     integer pixel_index = load_path_pixel_index(path, at);
     layers_add(scene, layers, adds, pixel_index, words, count);
-    mattes_record(mattes, first, pixel_index, v);
+    mattes_record(scene, mattes, first, pixel_index, v);
     return state;
 }

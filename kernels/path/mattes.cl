@@ -1,7 +1,8 @@
 /* Adds the names of the objects and materials that the camera sees to mattes; points of media have none. */
-inline void mattes_record(global uint *mattes, mask first, integer pixel_index, Vertex v)
+inline void mattes_record(Scene scene, global uint *mattes, mask first, integer pixel_index, Vertex v)
 {
     if (BSDF_IS_PHASE) return;
-    if (MATTE_OBJECT) mattes_add(mattes, first, pixel_index, MATTE_OBJECT - 1, v.object);
-    if (MATTE_MATERIAL) mattes_add(mattes, first, pixel_index, MATTE_MATERIAL - 1, v.material);
+    int object = scene.settings->matte_object, material = scene.settings->matte_material;
+    if (object) mattes_add(scene, mattes, first, pixel_index, object - 1, v.object);
+    if (material) mattes_add(scene, mattes, first, pixel_index, material - 1, v.material);
 }

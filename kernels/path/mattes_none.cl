@@ -1,2 +1,2 @@
 /* Stands for path/mattes.cl where there are none. */
-#define mattes_record(mattes, first, pixel_index, v)
+#define mattes_record(scene, mattes, first, pixel_index, v)

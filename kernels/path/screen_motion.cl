@@ -69,5 +69,5 @@ inline void layers_of_sky(Scene scene, Slab path, uint at, global uint *layers, 
     vec3 d = sel3(m, load_path_d(path, at), v3(0.0f, 0.0f, 1.0f));
     ScreenMotion s = screen_motion(scene, (integer)(-1), d, d, d, mask_of(1));
     screen_motion_put(words, m, s, layer_weight(path, at));
-    layers_add(scene, layers + LAYER_MOTION, m, load_path_pixel_index(path, at), words, 12);
+    layers_add(scene, layers + scene.settings->layer_motion, m, load_path_pixel_index(path, at), words, 12);
 }

@@ -9,14 +9,7 @@ inline Spectrum shadow_ray_transmittance(TRACE_ARGS, Scene scene, Slab path, Sla
     vec3 o = load_shadow_o(shadow, at), d = load_shadow_d(shadow, at);
     store_shadow_t(shadow, at, active, (real)(-1.0f));
     integer medium = sel_i(active, load_shadow_through(shadow, at), (integer)(0));
-    natural key = 0u;
-    integer into = 0;
-#if USES_GRIDS
-    integer vertex = (load_path_state(path, at) & PATH_DEPTH) + load_path_nulls(path, at);
-    key = ~grid_key(scene, load_path_pixel_key(path, at), load_path_sample(path, at), vertex);
-#endif
-#if BRICK_LIGHTS
-    into = sel_i(active, load_shadow_into(shadow, at), (integer)(0));
-#endif
+    natural key = grid_way_key(scene, path, at);
+    integer into = sel_i(active, load_shadow_into(shadow, at), (integer)(0));
     return trace_transmittance(TRACE_PASSED, scene, o, d, t, medium, load_path_lambdas(path, at), active, key, into);
 }

@@ -56,7 +56,7 @@ inline Vertex vertex_load(Scene scene, Slab path, Slab hit, uint at, mask active
     v.s = surface_of_point(madd3(v.d, v.t, v.o));
     v.front = mask_of(1);
 #else
-    v.s = surface_load(scene, hit, at, active, v.o, v.d, &v.front);
+    v.s = common_surface_load(scene, hit, at, active, v.o, v.d, &v.front);
 #endif
     v.cone = cone_after(load_path_cone(path, at), v.t);
     v.s.footprint = cone_footprint(v.cone, v.d, v.s.n, v.s.dpdu, v.s.dpdv);

@@ -5,9 +5,8 @@ inline void vertex_names(Scene scene, Slab hit, uint at, mask active, Vertex *v)
     if (BSDF_IS_PHASE) return;
     integer row = sel_i(active, load_hit_shape(hit, at), (integer)(0));
     ShapeRow shape = shape_row_row(scene.shapes, row * SHAPE_ROW_WORDS);
-#if MATERIAL_NUMBERS
-    v->material = to_integer(gather(scene.distributions, MATERIAL_NUMBERS + row));
-#endif
+    int numbers = scene.settings->material_numbers;
+    if (numbers) v->material = to_integer(gather(scene.distributions, numbers + row));
     v->object = shape.number;
 #if USES_INSTANCES
     integer instance = sel_i(active, load_hit_instance(hit, at), (integer)(0));

@@ -25,6 +25,7 @@
 #include "generated/merging.cl"
 #include "generated/motion.cl"
 #include "generated/join_light.cl"
+#include "generated/emit_steps.cl"
 
 /* The ray with which a light path begins, and the wavelengths that it has; sets the scene's time. */
 inline LightRay first_light_ray(Scene *scene, Sampler sampler, integer sample, Wavelengths *lambdas)
@@ -41,11 +42,7 @@ inline LightRay first_light_ray(Scene *scene, Sampler sampler, integer sample, W
 /* The rival of a light path that begins, see lighting/rivals.cl. */
 inline real first_rival(Scene scene, LightRay r)
 {
-    real rival = 1.0f / scene.settings->light_paths;
-#if AIMS_LIGHT_PATHS
-    rival /= r.gain;
-#endif
-    return rival;
+    return aimed_rival((real)(1.0f / scene.settings->light_paths), r);
 }
 
 /* Puts a ray from a light into the slots that `go` on, and, where the camera sees lights, one from it to the camera
@@ -82,10 +79,7 @@ inline integer begin_light_path(Scene scene, Slab path, Slab shadow, uint at, ma
     store_path_ratio(path, at, go, spectrum_of(1.0f));
     store_path_pending(path, at, go, (real)(0.0f));
     store_path_rival(path, at, go, first_rival(scene, r));
-#if WEIGHS_LIGHT_PATHS
-    store_path_light(path, at, go, r.row);
-    store_path_sampled_hemisphere(path, at, go, r.n);
-#endif
+    light_kept(path, at, go, r);
     integer state = sel_i(alive, (integer)(PATH_ALIVE), (integer)(0));
     return state + light_joined(scene, shadow, at, ended, go, sampler, s, r, lambdas);
 }

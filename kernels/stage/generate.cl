@@ -16,7 +16,7 @@
 #include "generated/medium.cl"
 #include "generated/merging.cl"
 #include "path/path_end.cl"
-#include "path/seen_wavelengths.cl"
+#include "generated/seen_wavelengths.cl"
 #include "generated/ghosts.cl"
 #include "generated/sky.cl"
 #include "generated/first_ray.cl"

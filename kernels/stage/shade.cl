@@ -13,6 +13,8 @@
 #include "surface/surface.cl"
 #include "generated/shading_frame.cl"
 #include "lighting/next_event.cl"
+#include "lighting/light_begins.cl"
+#include "generated/common.cl"
 #include "optics/fresnel.cl"
 #include "optics/microfacet.cl"
 #include "interface/bsdf.cl"

@@ -15,7 +15,6 @@ typedef struct {
     real footprint; /* how wide what is looked at is, in units of uv; 0: a point */
 } TexturePoint;
 
-#if USES_ATTRIBUTES
 /* `face` for row `sphere` of `spheres`, whose attributes are the same all over it. */
 inline integer texture_face_of_sphere(integer sphere) { return -1 - sphere; }
 
@@ -26,7 +25,6 @@ inline integer texture_corner(Scene scene, TexturePoint point, int corner)
     integer vertex = gather_i(scene.faces, sel_i(ball, (integer)(0), 3 * point.face + corner));
     return sel_i(ball, -1 - point.face, vertex);
 }
-#endif
 
 inline TexturePoint texture_point(vec2 uv, vec3 p)
 {

@@ -1,5 +1,4 @@
 /* The tree over analytic shapes, for traversals that go one ray a work-item. */
-#if USES_ANALYTIC
 typedef Scene ShapeTable;
 inline int shape_intersect(Scene scene, uint prim, float3 from, float3 along, float tmin, float *t)
 {
@@ -9,4 +8,3 @@ inline int shape_intersect(Scene scene, uint prim, float3 from, float3 along, fl
     *t = hit.t;
     return 1;
 }
-#endif

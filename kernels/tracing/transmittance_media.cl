@@ -10,20 +10,14 @@
 #include "tracing/passage.cl"
 #include "generated/null_transmittance.cl"
 
+#include "generated/way_steps.cl"
+
 /* What is left of light after `way` metres along d in a medium. */
 inline Spectrum way_transmittance(Scene scene, integer medium, vec3 o, vec3 d, real way, natural key, mask active,
                                   Wavelengths lambdas)
 {
     Spectrum dims = medium_transmittance(scene, sel_i(active, medium, (integer)(0)), way, lambdas);
-#if USES_GRIDS
-    mask gridded = active & ((medium & MEDIUM_GRID) != 0);
-    if (any(gridded)) {
-        Medium m = medium_load(scene, sel_i(gridded, medium, (integer)(0)), lambdas);
-        Spectrum passed = grid_transmittance(scene, medium, m, o, d, way, key, gridded, lambdas);
-        dims = spectrum_sel(gridded, passed, dims);
-    }
-#endif
-    return dims;
+    return grid_way(scene, medium, o, d, way, key, active, lambdas, dims);
 }
 
 inline Spectrum trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real t, integer medium,
@@ -31,13 +25,9 @@ inline Spectrum trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, rea
 {
     Spectrum passes = spectrum_sel(active, spectrum_of(1.0f), spectrum_of(0.0f));
     int surfaces = 0;
-#if USES_BODIES
     integer bodies = medium;
-    medium = body_medium(scene, bodies_top(sel_i(active, bodies, (integer)(0))));
-#endif
-#if BRICK_LIGHTS
+    medium = way_medium(scene, bodies, active, medium);
     integer last = medium;
-#endif
     while (any(active)) {
         TraceHit h = trace_closest(TRACE_PASSED, scene, o, d, t, active);
         mask met = active & (h.prim >= 0) & (t > 0.0f);
@@ -53,22 +43,11 @@ inline Spectrum trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, rea
             integer word = sel_i(active, sel_i(front, shape.front, shape.back), (integer)(0));
             Passage own = null_transmittance(scene, word, surface_texture_point(s), lambdas, fabs(dot3(s.ns, d)));
             own = passage_scale(own, (real)(surfaces < MOST_NULL_SURFACES ? 1.0f : 0.0f));
-#if USES_BODIES
-            BodyBoundary boundary = body_boundary(scene, row, bodies, front);
-            own = passage_sel(boundary.hidden & mask_of(surfaces < MOST_NULL_SURFACES), passage_of(1.0f), own);
-            bodies = bodies_beyond(boundary, front);
-#endif
+            own = way_passage(scene, row, &bodies, front, surfaces, own);
             passes = spectrum_sel(active, passage_dims(passes, own), passes);
             active = active & (passage_most(own) > 0.0f);
-#if USES_BODIES
-            medium = body_medium(scene, bodies_top(sel_i(active, bodies, (integer)(0))));
-#else
-            ShapeMedia sides = shape_media(scene, row);
-            medium = sel_i(active, medium_beyond(medium, sides.inside, sides.outside, front, front), medium);
-#endif
-#if BRICK_LIGHTS
+            medium = way_onward(scene, row, bodies, active, front, medium);
             last = sel_i(active, medium, last);
-#endif
             /* On along d: beside it, the ray would miss its end, and a round light would shade itself. */
             real on = h.t * (1.0f + SURFACE_ROUNDING) + surface_lead(s, d);
             o = sel3(active, madd3(d, on, o), o);
@@ -76,8 +55,5 @@ inline Spectrum trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, rea
             surfaces++;
         }
     }
-#if BRICK_LIGHTS
-    passes = spectrum_sel((into == 0) | (into == last), passes, spectrum_of(0.0f));
-#endif
-    return passes;
+    return spectrum_sel((into == 0) | (into == last), passes, spectrum_of(0.0f));
 }

@@ -14,7 +14,16 @@ from clpt.cli.options.applied import changed
 from clpt.cli.options.changes import SceneChanges
 from clpt.cli.options.composition import CameraType, CropType
 from clpt.cli.options.loading_options import Bytes
-from clpt.cli.options.values import LightPaths, Names, SensorName, Size, White
+from clpt.cli.options.values import (
+    Count,
+    LightPaths,
+    Names,
+    Noise,
+    SensorName,
+    Size,
+    Stops,
+    White,
+)
 from clpt.cli.options.workers import Where
 from clpt.cli.render.frame_values import Frames
 from clpt.cli.render.settings import Address, Duration, Period, SampleRange
@@ -25,6 +34,7 @@ from clpt.scene.cameras import Perspective
 KINDS = (
     CameraType(), CropType(), Frames(), PixelType(), Where(), Duration(), Period(), SampleRange(),
     Bytes(), LightPaths(), Names(["depth", "albedo"]), SensorName(), Size(), White(), Address(),
+    Count(), Noise(), Stops(),
 )  # fmt: skip
 ALPHABET = "0123456789.,:-+%x/hmsKMGTB einfat"
 TEXTS = st.text(ALPHABET, max_size=12) | st.text(max_size=12) | st.text("09", max_size=500)

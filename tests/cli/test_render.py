@@ -102,7 +102,7 @@ def test_a_signal_writes_what_is_there(tmp_path, number):
     ) as process:
         assert process.stderr is not None
         lines = iter(process.stderr.readline, "")
-        assert any("Msamples/s" in line for line in lines)
+        assert any("Mrays/s" in line for line in lines)
         process.send_signal(number)
         rest = process.stderr.read()
         assert process.wait(20) == 128 + number

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import logging
+import math
 import subprocess
 import sys
+import threading
 
 import numpy as np
 import pyopencl as cl
 import pytest
 
 from clpt import device as dev
-from clpt.device import compilers, disk_cache, native_programs
+from clpt.device import compile_limits, compilers, disk_cache, native_programs
 from clpt.device.compilers import Compilers, Job
 from clpt.device.program import Argument
+from clpt.errors import DeviceError, KernelBuildError
 
 PARTS = {
     "main": "uint seven(void);\n"
@@ -29,6 +32,11 @@ def opened(monkeypatch: pytest.MonkeyPatch, tmp_path) -> dev.Device:
     info = dev.choose().info
     monkeypatch.setattr(disk_cache, "folder", lambda: tmp_path)
     return dev.Device.open(info)
+
+
+def job(info: dev.DeviceInfo, text: str) -> Job:
+    """A text for a process, which may take a minute."""
+    return Job("part", 60.0, info.platform, info.name, "-w", text)
 
 
 def answer(on: dev.Device, mark: str) -> list[int]:
@@ -53,8 +61,8 @@ def test_parts_of_another_process_are_linked_and_kept(opened: dev.Device, tmp_pa
 def test_a_process_gives_a_binary(opened: dev.Device) -> None:
     info = opened.info
     with Compilers(1) as pool:
-        pool.submit("a", Job(info.platform, info.name, "-w", PARTS["part"]))
-        pool.submit("b", Job(info.platform, info.name, "-w", "this is wrong"))
+        pool.submit("a", job(info, PARTS["part"]))
+        pool.submit("b", job(info, "this is wrong"))
         while pool._waiting:
             pass
         assert pool.take("a")
@@ -79,6 +87,9 @@ class Given:
         self.binary = binary
 
     def submit(self, key: str, job: Job) -> None:
+        pass
+
+    def drop(self, key: str) -> None:
         pass
 
     def take(self, key: str) -> bytes:
@@ -114,7 +125,74 @@ def test_processes_end_with_who_started_them() -> None:
 def test_killed_processes_are_waited_for(opened: dev.Device) -> None:
     pool = Compilers(1)
     info = opened.info
-    pool.submit("a", Job(info.platform, info.name, "-w", PARTS["part"]))
+    pool.submit("a", job(info, PARTS["part"]))
     pool.kill()
     assert not any(thread.is_alive() for thread in pool._threads)
     assert all(process.poll() is not None for process in pool._processes)
+
+
+HANGS = """
+import runpy, sys
+process = runpy.run_path(sys.argv[1])
+def compile_(*of):
+    while True:
+        pass
+process["main"].__globals__.update(_compile=compile_, _device=lambda *of: None)
+process["cl"].Context = lambda devices: None
+process["main"]()
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of the processor are POSIX's")
+def test_a_compiler_that_hangs_is_ended_and_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    command = [sys.executable, "-c", HANGS, str(compilers._PROGRAM)]
+    monkeypatch.setattr(compilers, "_command", lambda: command)
+    with Compilers(1) as pool:
+        pool.submit("a", Job("shade", 0.2, "platform", "device", "", ""))
+        while pool._waiting:
+            pass
+        with pytest.raises(KernelBuildError, match=r"'shade'.* hang.*CLPT_COMPILE_SECONDS"):
+            pool.take("a")
+
+
+def test_a_compiler_of_this_process_that_hangs_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    said: list[str] = []
+    monkeypatch.setattr(compile_limits, "at_limit", said.append)
+    monkeypatch.setenv(compile_limits.VARIABLE, "0.05")
+    source = dev.Source("stage/shade.cl", "", ())
+    with compile_limits.watched(source):
+        while not said:
+            pass
+    assert "'stage/shade.cl'" in said[0]
+    monkeypatch.setenv(compile_limits.VARIABLE, "0")
+    assert compile_limits.seconds_for(source) == math.inf
+    monkeypatch.setenv(compile_limits.VARIABLE, "long")
+    with pytest.raises(DeviceError, match="CLPT_COMPILE_SECONDS is a number of seconds"):
+        compile_limits.seconds_for(source)
+
+
+def test_python_goes_on_while_a_binary_is_made(opened: dev.Device) -> None:
+    """Another thread runs while a driver compiles, so Ctrl-C can end the process."""
+    program = native_programs.build(opened.context, opened.info.cl_device, PARTS["part"])
+    assert native_programs.binary(program) == next(
+        filter(None, program.get_info(cl.program_info.BINARIES))
+    )
+
+
+def test_what_another_process_makes_is_waited_for(opened: dev.Device, tmp_path) -> None:
+    """The second process compiles nothing: it finds what the first has made."""
+    made = []
+    with disk_cache.alone("entry"):
+        assert disk_cache.is_being_made("entry")
+
+        def second() -> None:
+            with disk_cache.alone("entry"):
+                made.append(disk_cache.load("entry"))
+
+        thread = threading.Thread(target=second)
+        thread.start()
+        disk_cache.store("entry", "{}", b"binary")
+        assert not made
+    thread.join(60)
+    assert made == [("{}", b"binary")]
+    assert not disk_cache.is_being_made("entry") and not [*(tmp_path / "locks").iterdir()]

@@ -38,8 +38,7 @@ class Pair:
         sizes = size_text(first.values), size_text(second.values)
         if sizes[0] != sizes[1]:
             raise SceneError(f"is {sizes[1]} pixels, and {a} is {sizes[0]}", file=b)
-        same = first.lambdas is not None and second.lambdas is not None
-        if same and np.array_equal(first.lambdas, second.lambdas):
+        if _same_wavelengths(first.lambdas, second.lambdas):
             values, labels = (first.values, second.values), first.labels
         elif first.colours is not None and second.colours is not None:
             values, labels = (first.colours, second.colours), ("R", "G", "B")
@@ -55,6 +54,11 @@ class Pair:
         """Where the largest difference is."""
         x, y, channel = self.found.where
         return f"{x},{y} {self.labels[channel]}"
+
+
+def _same_wavelengths(a: np.ndarray | None, b: np.ndarray | None) -> bool:
+    """Whether two images are spectral, and of the same wavelengths."""
+    return a is not None and b is not None and np.array_equal(a, b)
 
 
 def as_json(pair: Pair) -> str:

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from ... import device as dev
+from ...device import compile_limits
 from ..options.scene_options import Machine
+from ..process import failures
 
 
 def choose_devices(machine: Machine) -> list[dev.Device]:
@@ -12,3 +18,19 @@ def choose_devices(machine: Machine) -> list[dev.Device]:
     if which is not None and dev.names_several(which):
         return dev.choose_all(which, profiling=profiling, threads=threads)
     return [dev.choose(which, profiling=profiling, threads=threads)]
+
+
+@contextmanager
+def ending_at_limit() -> Iterator[None]:
+    """End the process with an error if a driver's compiler hangs in it: nothing else would."""
+
+    def end(said: str) -> None:
+        dev.kill_compilers()
+        failures.complain(said)
+        os._exit(failures.BAD_INPUT)
+
+    before, compile_limits.at_limit = compile_limits.at_limit, end
+    try:
+        yield
+    finally:
+        compile_limits.at_limit = before

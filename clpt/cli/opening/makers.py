@@ -17,6 +17,7 @@ from ..options.workers import Workers
 from ..printing.display import Display
 from ..printing.names import device_names
 from ..process.stopping import prompt
+from .devices import ending_at_limit
 
 if TYPE_CHECKING:  # one device has no use for what several need
     from distributed import Client
@@ -74,7 +75,7 @@ class DeviceMaker(Maker):
     def make(self, scene: Scene, shown: Display, first_sample: int = 0) -> AnyRenderer:
         """Return a new renderer of a scene; note its warnings."""
         text = f"building kernels for {device_names([on.info for on in self.devices])}"
-        with prompt(dev.kill_compilers), shown.compiling(text) as compiles:
+        with prompt(dev.kill_compilers), ending_at_limit(), shown.compiling(text) as compiles:
             for on in self.devices:
                 on.builds.on_compile = compiles
             renderer = new_renderer(scene, self.devices, first_sample=first_sample, **self._made)

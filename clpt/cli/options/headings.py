@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import click
 
@@ -37,12 +36,10 @@ HEADINGS: dict[str, tuple[str, ...]] = {
 class Grouped(click.Command):
     """A command whose help shows options under HEADINGS.
 
-    examples: command lines, and what each does.
+    `examples` of a heir: command lines, and what each does.
     """
 
-    def __init__(self, *given: Any, examples: Sequence[tuple[str, str]] = (), **more: Any):
-        super().__init__(*given, **more)
-        self.examples = examples
+    examples: Sequence[tuple[str, str]] = ()
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the options, heading by heading, then the examples."""
@@ -64,3 +61,8 @@ class Grouped(click.Command):
                 for line, meaning in self.examples:
                     formatter.write(f"{'':{formatter.current_indent}}{line}\n")
                     formatter.write(f"{'':{formatter.current_indent}}    {meaning}\n")
+
+
+def grouped(examples: Sequence[tuple[str, str]] = ()) -> type[Grouped]:
+    """Return a class of commands whose help ends with examples."""
+    return type("Grouped", (Grouped,), {"examples": examples})

@@ -38,7 +38,9 @@ class Noise(click.ParamType):
 
     name = "SHARE"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> float:
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
         found = re.fullmatch(r"(\d{1,9}(?:\.\d*)?|\.\d+)(?:e-?\d{1,2})?( ?%)?", str(value).strip())
         if not found:
             self.fail(f"{value!r} does not look like 0.02 or 2%", param, ctx)
@@ -54,7 +56,9 @@ class Count(click.ParamType):
 
     name = "N"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> int:
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> int:
         found = re.fullmatch(r"(\d{1,10})(?:\.(\d{1,6}))?([kM]?)", str(value).strip())
         number = 0.0
         if found:
@@ -73,7 +77,9 @@ class Stops(click.ParamType):
 
     name = "STOPS-OR-AUTO"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> float | str:
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float | str:
         limits = click.FloatRange(-MOST_STOPS, MOST_STOPS)
         return AUTO if value == AUTO else limits(value, param, ctx)
 

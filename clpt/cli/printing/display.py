@@ -108,13 +108,14 @@ class Lines(Display):
     def compiling(self, text: str) -> Iterator[Callable[[], None]]:
         timer = threading.Timer(PATIENCE, self._compiles, [text])
         timer.daemon = True
-        lock, begun = threading.Lock(), []
+        lock, begun = threading.Lock(), False
 
         def begin() -> None:
+            nonlocal begun
             with lock:
                 if not begun:
-                    begun.append(True)
                     timer.start()
+                begun = True
 
         try:
             yield begin

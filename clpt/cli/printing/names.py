@@ -18,7 +18,7 @@ _TARGET = re.compile(r"^(?:pthread|cpu)-(?:[a-z0-9_.-]*-)?(?=[A-Z])")  # PoCL's 
 
 
 class Info(Protocol):
-    """What a device is called."""
+    """A device: the names that OpenCL gives it."""
 
     @property
     def platform(self) -> str: ...

@@ -10,7 +10,7 @@ import click
 from ...formats import locate
 from ..files import targets
 from ..options.grading import grading_options, names_option
-from ..options.headings import Grouped
+from ..options.headings import grouped
 from ..options.records import with_records
 from ..options.scene_options import denoise_option, scene_options
 from ..options.verbosity import verbose_option
@@ -26,7 +26,7 @@ EXAMPLES = (
 )
 
 
-@click.command(cls=Grouped, examples=EXAMPLES)
+@click.command(cls=grouped(EXAMPLES))
 @click.argument(
     "scenes", metavar="SCENE...", nargs=-1, required=True, type=click.Path(path_type=Path)
 )

@@ -8,7 +8,7 @@ import click
 
 from ...formats import locate
 from ..options.grading import grading_options
-from ..options.headings import Grouped
+from ..options.headings import grouped
 from ..options.records import with_records
 from ..options.scene_options import scene_options
 from ..options.values import Count, Noise
@@ -23,7 +23,7 @@ EXAMPLES = (
 )
 
 
-@click.command(cls=Grouped, examples=EXAMPLES)
+@click.command(cls=grouped(EXAMPLES))
 @click.argument("scene", type=click.Path(path_type=Path))
 @click.option("--port", type=click.IntRange(0, 65535), default=0, help="0: any that is free.")
 @click.option(

@@ -167,7 +167,7 @@ def _roughness(props: Properties) -> Parameters:
     }
 
 
-def _alpha(props: Properties, name: str, default: object) -> Any:
+def _alpha(props: Properties, name: str, default: Any) -> Any:
     value = real(props, name, default)
     return max(value, SMOOTHEST) if isinstance(value, float) else value
 

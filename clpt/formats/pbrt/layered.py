@@ -60,7 +60,12 @@ def coat(params: Parameters, state: State) -> float:
 
 
 def plastic(base: Textured, eta: IndexLike, alpha: TexturedNumber) -> Material:
-    given = {"diffuse_reflectance": base, "int_ior": eta, "ext_ior": 1.0, "nonlinear": True}
+    given: dict[str, Any] = {
+        "diffuse_reflectance": base,
+        "int_ior": eta,
+        "ext_ior": 1.0,
+        "nonlinear": True,
+    }
     if smooth(alpha):
         return both(materials.Plastic(**given))
     return both(materials.RoughPlastic(alpha=rough(alpha), **given))

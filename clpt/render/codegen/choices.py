@@ -68,13 +68,8 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         *either(f.film.layers.lights, "film/light_layers.cl"),
     ),
     "generated/met_weight.cl": lambda f, _: either(f.transport.balanced, "steps/met_weight.cl"),
-    "generated/flight_layers.cl": lambda f, _: (
-        ("film/light_layers.cl",)
-        * (bool(f.film.layers.lights) and f.media.emissive and not f.transport.light_paths)
-    ),
     "generated/medium.cl": lambda f, _: (
         ("generated/medium_coefficients.cl", "media/medium.cl") * (f.media.absorbing)
-        + ("media/dye_flight.cl",) * f.media.dyed
         + ("media/medium_grid.cl",) * f.media.grids.present
         + ("media/medium_grid_light.cl",) * f.media.grids.emissive
         + ("generated/body_index.cl",) * f.media.bodies
@@ -83,6 +78,54 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/grid_flight.cl": lambda f, _: (
         ("generated/lights.cl", "path/met_light.cl") * f.media.grids.emissive
         + ("media/grid_flight.cl",) * f.media.grids.present
+    ),
+    "generated/kept_hemisphere.cl": lambda f, _: either(f.hemispheres, "path/kept_hemisphere.cl"),
+    "generated/seen_wavelengths.cl": lambda f, _: either(
+        f.fluorescence, "path/seen_wavelengths.cl"
+    ),
+    "generated/infinite_weight.cl": lambda f, _: either(
+        f.transport.balanced, "lighting/infinite_weight.cl"
+    ),
+    "generated/emit_steps.cl": lambda f, _: (
+        *either(f.transport.aimed, "lighting/aimed_rival.cl"),
+        *either(f.transport.balanced, "lighting/light_kept.cl"),
+    ),
+    "generated/medium_steps.cl": lambda f, _: either(f.media.present, "media/medium_flies.cl"),
+    "generated/medium_dims.cl": lambda f, _: either(not f.shadow_media, "media/medium_dims.cl"),
+    "generated/light_media.cl": lambda f, _: either(f.light_media, "media/light_media.cl"),
+    "generated/grid_numbers.cl": lambda f, _: either(f.media.grids.bytes, "media/grid_bytes.cl"),
+    "generated/grid_steps.cl": lambda f, _: (
+        "generated/grid_words.cl",
+        *either(f.media.grids.coloured, "media/grid_coloured.cl"),
+        *either(f.media.grids.tinted, "media/grid_tinted.cl"),
+        *either(f.media.grids.mixed, "media/grid_mixed.cl"),
+    ),
+    "generated/grid_glow.cl": lambda f, _: (
+        *when(f.media.grids.hot, f"media/black_body_{f.spectra.mode}.cl"),
+        *either(f.media.grids.hot, "media/grid_glow.cl"),
+    ),
+    "generated/flight_steps_of_grids.cl": lambda f, _: (
+        *either(f.ratios, "media/grid_weigh.cl"),
+        *either(f.media.grids.emissive, "media/grid_gather.cl"),
+        f"media/grid_meet{'_mixed' * bool(f.media.grids.mixed)}.cl",
+    ),
+    "generated/brick_weight.cl": lambda f, _: either(f.lights.bricks, "media/brick_weight.cl"),
+    "generated/grid_origin.cl": lambda f, _: either(f.media.grids.emissive, "media/grid_origin.cl"),
+    "generated/flight_steps.cl": lambda f, _: (
+        f"media/flight_medium{'_bodies' * f.media.bodies}.cl",
+        *either(f.media.grids.present, "media/near_grids.cl"),
+        *either(f.media.aims and not f.transport.light_paths, "media/flight_near.cl"),
+        *either(f.media.dyed, "media/flight_dye.cl"),
+        *either(f.ratios, "media/flight_weight.cl"),
+        *either(f.media.emissive, "media/flight_emission.cl"),
+        *either(f.media.grids.present, "media/flight_grids.cl"),
+    ),
+    "generated/light_of_flight.cl": lambda f, _: either(
+        bool(f.film.layers.lights) and not f.transport.light_paths, "media/flight_light_layers.cl"
+    ),
+    "generated/way_steps.cl": lambda f, _: (
+        *either(f.media.grids.present, "media/grid_way.cl"),
+        f"media/way_{'bodies' if f.media.bodies else 'shapes'}.cl",
     ),
     "generated/light_medium.cl": lambda f, _: (
         ("generated/textures.cl", "generated/medium.cl")
@@ -167,6 +210,20 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
     "generated/rivals.cl": lambda f, cls: (
         when(f.transport.balanced and not flags.is_null(f, cls), *_RIVALS)
         or ("lighting/rivals_none.cl",)
+    ),
+    "generated/rival_steps.cl": lambda f, cls: (
+        *either(f.transport.merged, "lighting/rivals_merging.cl"),
+        *either(f.transport.joined and not cls.delta, "lighting/rivals_camera.cl"),
+        *either(
+            flags.is_chromatic(f, cls) and (f.told_dispersion or cls.is_phase),
+            "lighting/rival_pdf.cl",
+        ),
+    ),
+    "generated/hero_steps.cl": lambda f, cls: (
+        *either(
+            f.ratios and flags.is_chromatic(f, cls) and f.spectra.spectral, "path/hero_weighs.cl"
+        ),
+        *either(f.told_dispersion, "path/hero_alone.cl"),
     ),
     "generated/guide.cl": lambda f, cls: (
         ("guiding/guided_vertex.cl",)

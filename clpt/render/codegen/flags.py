@@ -12,7 +12,6 @@ from collections.abc import Callable
 from clpt.render.contract.features import Features
 from clpt.render.contract.features.macros import said
 from clpt.render.contract.texture_records import IMAGES
-from clpt.scene.layers import LAYERS, WORDS
 from clpt.scene.params import device_params
 from clpt.scene.scatterer import Scatterer
 
@@ -50,7 +49,7 @@ def has_lobe(features: Features, cls: type[Scatterer], name: str) -> bool:
     return name in declared and sources.get(name, none) != none
 
 
-def _chromatic(features: Features, cls: type[Scatterer]) -> bool:
+def is_chromatic(features: Features, cls: type[Scatterer]) -> bool:
     """Whether densities of a material's directions differ between wavelengths."""
     return features.materials.phase_varies(cls) if cls.is_phase else cls.chromatic
 
@@ -79,7 +78,7 @@ MATERIAL: dict[str, Callable[[Features, type[Scatterer]], int]] = {
     "BSDF_TRANSMITS": lambda f, cls: int(cls.kind in f.materials.transmitting),  # calculated with
     "BSDF_SHINES": lambda f, cls: cls.kind in f.materials.shining,
     "BSDF_ABSORBS": lambda f, cls: cls.absorbs,
-    "BSDF_CHROMATIC": _chromatic,
+    "BSDF_CHROMATIC": is_chromatic,
     "BSDF_FLUORESCES": fluoresces,
     "BSDF_ENDS_LIGHT_PATHS": lambda f, cls: f.transport.balanced and ends_light_paths(f, cls),
     "BSDF_MERGES": lambda f, cls: f.transport.merged and gathers_photons(f, cls),
@@ -91,17 +90,12 @@ MATERIAL: dict[str, Callable[[Features, type[Scatterer]], int]] = {
     "USES_CHOICE": lambda f, cls: cls.uses_lobe_sample or cls.fluoresces or not f.lights.few,
 }
 
-# the layers whose words in a pixel begin at a place of their own, by the macros that tell it
-_LAYERS = {f"LAYER_{name.upper()}": name for name in LAYERS if LAYERS[name].form in WORDS}
-
-SCENE = frozenset({*dict(said(Features())), *_LAYERS})  # the names of flags of a scene
+SCENE = frozenset(dict(said(Features())))  # the names of flags of a scene
 
 
 def of_scene(features: Features) -> Defines:
     """Return the macros that features say."""
-    places = features.film.layers.places
-    layers = {macro: places.get(name, 0) for macro, name in _LAYERS.items()}
-    return layers | {name: value for name, value in said(features) if value is not None}
+    return {name: value for name, value in said(features) if value is not None}
 
 
 def of_material(features: Features, cls: type[Scatterer]) -> Defines:

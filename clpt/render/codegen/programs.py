@@ -9,10 +9,12 @@ from __future__ import annotations
 import functools
 
 from clpt import bvh, device
+from clpt.layout import SLAB_BLOCK
 from clpt.render.codegen import (
     blocks,
     bounce,
     choices,
+    common,
     emission,
     flags,
     lights,
@@ -55,7 +57,7 @@ def _stages(
     features: Features, layout: str, lanes: int, interleaved: bool, part: bool = False
 ) -> dict[str, device.Source]:
     """The texts of a bounce but for queues and shading, see `sources`; part: of a loop."""
-    files, defines = _shared(features, layout), flags.of_scene(features)
+    files, defines = _shared(features, layout), _defines(features, lanes)
     make = functools.partial(_source, part=part)
     begin, join = bounce.begin_and_join(features)
     trace_lanes = bounce.trace_lanes(layout, lanes)
@@ -94,7 +96,7 @@ def _shading(
     features: Features, layout: str, lanes: int, *, queued: bool = False, part: bool = False
 ) -> dict[str, device.Source]:
     """The texts that shade, see `sources`; part: of a loop, for all kinds of paths of the scene."""
-    files, defines = _shared(features, layout), flags.of_scene(features)
+    files, defines = _shared(features, layout), _defines(features, lanes)
     texts = {}
     for cls in features.materials.leaves:
         own = {
@@ -102,6 +104,8 @@ def _shading(
             **choices.material_files(features, cls),
             "generated/bsdf.cl": stages.bsdf_text(features, cls),
         }
+        if part:
+            own["generated/common.cl"] = common.calls_text(features)
         if cls.is_phase:
             own["generated/shading_frame.cl"] = ("path/phase_frame.cl",)
         if cls.source is not None:
@@ -142,25 +146,42 @@ def loop_sources(
         made |= _stages(own, layout, lanes, interleaved, part=True)
         stages_ = bounce.order(own, layout, lanes, interleaved)
         used |= dict.fromkeys(stage.program for stage in stages_)
+    if common.shared(features):
+        made["common"] = _common(features, layout, lanes)
+        used["common"] = None
     files = {
         **_shared(features, layout),
         **signatures.loop_files(features, layout),
         "generated/block.cl": blocks.blocks_text(features.passes),
         "generated/bounce_stages.cl": bounce.stages_text(features, layout, lanes, interleaved),
     }
-    loop = _source("loop", files, flags.of_scene(features), lanes)
+    loop = _source("loop", files, _defines(features, lanes), lanes)
     parts = {name: made[name].with_private(name) for name in used}
     return {**parts, "loop": loop.with_private("loop")}
 
 
+def _common(features: Features, layout: str, lanes: int) -> device.Source:
+    """The part of a loop that several kinds of materials call."""
+    files = {
+        **_shared(features, layout),
+        "generated/common_part.cl": common.part_text(features),
+    }
+    return _source("common", files, flags.of_scene(features), lanes)
+
+
 def _alone(features: Features, layout: str, *names: str) -> dict[str, device.Source]:
     """The texts of programs whose work-items serve a pixel each."""
-    files, defines = _shared(features, layout), flags.of_scene(features)
+    files, defines = _shared(features, layout), _defines(features, 1)
     return {name: _source(name, files, defines, 1) for name in names}
 
 
 def _static(texts: dict[str, device.Source]) -> dict[str, device.Source]:
     return {name: text.with_static() for name, text in texts.items()}
+
+
+def _defines(features: Features, lanes: int) -> flags.Defines:
+    """What is the same for all programs of a scene; lanes: paths that a work-item shades."""
+    return {**flags.of_scene(features), "SLAB_BLOCK": SLAB_BLOCK if lanes == 1 else 0}
 
 
 def _source(
@@ -187,8 +208,10 @@ def _shared(features: Features, layout: str) -> Files:
         **signatures.virtual_files(features, layout),
         **parameters.virtual_files(features),
         **choices.virtual_files(features, layout),
+        "generated/common.cl": common.calls_text(),
         "generated/camera.cl": stages.camera_text(features.camera, moves=features.motion.camera),
         "generated/connect.cl": stages.connect_text(features),
+        "generated/grid_words.cl": stages.grid_words_text(features.media.grids),
         "generated/screen.cl": stages.screen_text(features),
         "generated/photon.cl": stages.photon_text(features) if features.transport.merged else "",
         "generated/emission.cl": emission.dispatch_text(features),

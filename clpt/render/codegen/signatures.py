@@ -14,6 +14,7 @@ from clpt.render.codegen import blocks
 from clpt.render.contract.features import Features
 
 SLAB_ARGS = {f"{record.name.lower()}_words": "global float *restrict " for record in SLABS}
+SLAB_ARGS["stride"] = "uint "
 SCENE_ARGS = {n: f"global const {element} *restrict " for n, (element, _) in TABLES.items()}
 SCENE_ARGS["settings"] = "global const Settings *restrict "
 
@@ -66,7 +67,7 @@ def scene_text(unused: Container[str] = ()) -> str:
         for name, (element, doc) in TABLES.items()
     ]
     slab_sets = [
-        f"{record.name.lower()} = {{{name}, {record.snake_name.upper()}_STEP}}"
+        f"{record.name.lower()} = {{{name}, SLAB_STEP({record.snake_name.upper()}_STEP, stride)}}"
         for record, name in zip(SLABS, SLAB_ARGS, strict=False)
     ]
     return "\n".join(

@@ -9,7 +9,12 @@ from clpt.records import PHOTON
 from clpt.render.codegen import emission, flags, lights, parameters, thin_films
 from clpt.render.codegen.dispatch import Case, Function, active, function
 from clpt.render.contract import camera_records
-from clpt.render.contract.features import CameraFeatures, Features, MaterialFeatures
+from clpt.render.contract.features import (
+    CameraFeatures,
+    Features,
+    GridFeatures,
+    MaterialFeatures,
+)
 from clpt.render.contract.parameter_words import MIXTURE, row_words, words
 from clpt.scene.params import device_params, interior_params
 from clpt.scene.roles import Role
@@ -100,6 +105,18 @@ def photon_text(features: Features) -> str:
     return f"""{PHOTON.row_text()}{PHOTON.keep_text()}#define PHOTON_WORDS {PHOTON.words}
 #define photon_met(kind) ({met})
 """
+
+
+def grid_words_text(grids: GridFeatures) -> str:
+    """Return where behind a medium's coefficients the words of its grid's colours and parts lie."""
+    albedo = (
+        19 + 6 * grids.emissive
+    )  # behind the words of its light, kernels/media/medium_grid_light.cl
+    colour = albedo + grids.tinted
+    words = {"ALBEDO": albedo, "COLOUR": colour, "MIXED": colour + grids.coloured}
+    rows = [f"#define GRID_{name} (2 * MEDIUM_SCATTERING + {n})" for name, n in words.items()]
+    # whether extinction has other colours from point to point
+    return "\n".join([*rows, f"#define GRIDS_VARY {int(grids.coloured or grids.mixed > 0)}", ""])
 
 
 def lights_text(features: Features) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from clpt.records import MATERIAL_KINDS
+from clpt.records import MATERIAL_KINDS, RERADIATION_SIZES
 from clpt.scene import roles
 from clpt.scene.params import Kind, device_params, interior_params
 from clpt.scene.roles import ORDERS, Param, Role
@@ -12,7 +12,7 @@ from clpt.scene.roles import ORDERS, Param, Role
 NORMAL_MAP_WORDS = 11  # before a material's row, see kernels/path/shading_frame_mapped.cl
 MIXTURE = MATERIAL_KINDS["mixture"]
 FILM_COSINES = 128  # of the table of a film's colours, from 0 to 1
-RERADIATION_STEP = 5  # [nm] between the nodes of a matrix
+RERADIATION_STEP = RERADIATION_SIZES["step"]  # [nm] between the nodes of a matrix
 
 # How many words a parameter takes in a row of `materials`, `textures` or `light_params`.
 SPECTRUM_WORDS = 5  # x y z w and where the value comes from: 0 here, > 0 texture, < 0 table

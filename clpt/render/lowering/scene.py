@@ -42,7 +42,7 @@ from clpt.render.lowering.media.body_words import BodyWords
 from clpt.render.lowering.media.light_media import light_media_words
 from clpt.render.lowering.media.medium_words import MediumWords, medium_aims
 from clpt.render.lowering.motion import lower_motion
-from clpt.render.lowering.settings import Found, settings_of
+from clpt.render.lowering.settings import Found, set_layers, settings_of
 from clpt.render.lowering.textures.attributes import lower_attributes
 from clpt.scene import Scene
 from clpt.scene import materials as mt
@@ -160,6 +160,7 @@ def encode(found: Analysis, cache: LoweringCache, texture_budget: int | None = N
     aims = rows.aims, len(found.aims)
     own = Found(rows.density, rows.ambient, aims, surfaces.around, features.dispersion)
     settings = settings_of(index, geometry, lights, wavelengths, found.sphere, own)
+    set_layers(settings, layers)
     cache.settle()
     tables = encoder.store.arrays()
     encoder.textures.images.joined(tables["images"])

@@ -14,6 +14,7 @@ from clpt.render.analysis.colour import film_scale, output_matrix
 from clpt.render.analysis.geometry import Geometry
 from clpt.render.analysis.index import SceneIndex
 from clpt.render.analysis.wavelengths import Density
+from clpt.render.contract.features import LayerFeatures
 from clpt.render.lowering import guides
 from clpt.render.lowering.lights.light_level import light_level
 from clpt.render.lowering.lights.lights import LightRows
@@ -108,6 +109,18 @@ def _set_paths(settings: NDArray[np.void], index: SceneIndex) -> None:
     settings["rr_depth"] = min(integrator.rr_depth, DEEPEST)
     settings["hide_lights"] = integrator.hide_lights
     settings["light_paths"] = index.weighed
+
+
+def set_layers(settings: NDArray[np.void], layers: LayerFeatures) -> None:
+    """Set where the layers beside the picture stand."""
+    for name, place in layers.places.items():
+        settings[f"layer_{name}"] = place
+    settings["layer_denoising"], settings["layer_words"] = layers.first_for_denoisers, layers.words
+    settings["mattes"], settings["material_numbers"] = len(layers.mattes), layers.material_numbers
+    settings["matte_object"] = layers.matte_of_objects
+    settings["matte_material"] = layers.matte_of_materials
+    settings["layer_direct"], settings["layer_indirect"] = layers.direct, layers.indirect
+    settings["layer_groups"], settings["light_groups"] = layers.groups, layers.light_group_row or 0
 
 
 def rival_area(scene_radius: float) -> float:

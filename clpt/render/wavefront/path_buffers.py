@@ -21,6 +21,7 @@ from clpt.render.wavefront import queues, work_list
 from clpt.render.wavefront.cells import CellGrid
 
 COUNTERS = COUNTER_NUMBERS.names
+PADDING = 80  # words between runs of all slots: powers of two collide in a cache
 GROUP = 64  # slots are a multiple of it, and it is the local size of one-lane kernels
 FRESH = PATH_BITS["fresh"]
 CPU_SLOTS = 1 << 14
@@ -82,7 +83,7 @@ def divide_film(
     """
     words, largest = WORDS + footprint, max(LARGEST, footprint)
     room = min(memory // 2 // (4 * words), info.max_alloc // 4 // largest)
-    wanted = min(slots or default_slots(info, footprint), int(room) - SLAB_BLOCK)
+    wanted = min(slots or default_slots(info, footprint), int(room) - PADDING)
     if wanted < GROUP:
         advice = "close other programs or choose another device"
         raise MemoryBudgetError(
@@ -105,7 +106,8 @@ class PathBuffers:
 
     settings: a copy of those of the lowered scene, with the numbers of slots and planes and the
     seed of the samples; pixels: how many have samples, with those around the picture; blocks: slots
-    beyond those of the paths, see kernels/path/queue.cl.
+    beyond those of the paths, see kernels/path/queue.cl; in_blocks: whether slabs are, see
+    kernels/core/slab.cl.
 
     Raises MemoryBudgetError.
     """
@@ -118,14 +120,17 @@ class PathBuffers:
         slots: Slots,
         blocks: int,
         queued: bool,
+        in_blocks: bool,
     ):
-        self.stream, self.buffers = stream, buffers
+        self.stream, self.buffers, self._in_blocks = stream, buffers, in_blocks
         self._slots, self.slots = slots, slots.total
-        places = -(-(slots.total + blocks) // SLAB_BLOCK) * SLAB_BLOCK
+        self._stride = -(-(slots.total + blocks) // SLAB_BLOCK) * SLAB_BLOCK
+        if not in_blocks:
+            self._stride += PADDING
         self.settings = self._with_slots(lowered.settings)
-        self._fixed: dict[str, Any] = {"slots": self.slots}
+        self._fixed: dict[str, Any] = {"stride": self._stride, "slots": self.slots}
         for record in SLABS:
-            name, size = f"{record.name.lower()}_words", 4 * record.step * places
+            name, size = f"{record.name.lower()}_words", 4 * record.step * self._stride
             buffer = buffers.allocate(name, size, "lower the number of slots")
             stream.fill(buffer, 0, 0, size)
             self._fixed[name] = buffer
@@ -180,6 +185,9 @@ class PathBuffers:
 
     def rows(self, record: Record, word: int) -> device.Rows:
         """Where a slab has a word of all slots that hold paths."""
+        if not self._in_blocks:
+            stride = 4 * self._stride
+            return device.Rows(word * stride, 4 * self.slots, stride, 1)
         size = 4 * SLAB_BLOCK
         return device.Rows(word * size, size, record.step * size, self.slots // SLAB_BLOCK)
 

@@ -141,7 +141,9 @@ class Wavefront:
         scene = DeviceScene(stream, buffers, lowered, chosen, tree_quality)
         share = strategy.loop_share(on)
         blocks = -(-divided.total // share) * on.lanes if share > on.lanes else 0  # one each
-        in_flight = PathBuffers(stream, buffers, lowered, divided, blocks, chosen.queued)
+        in_flight = PathBuffers(
+            stream, buffers, lowered, divided, blocks, chosen.queued, in_blocks=on.lanes == 1
+        )
         return cls(scene, in_flight, looped, tuning)
 
     @property

@@ -24,9 +24,11 @@ from clpt.scene.integrators import (
     Zsobol,
 )
 from clpt.scene.integrators import Path as PathTracing
-from clpt.scene.materials import Dielectric
+from clpt.scene.materials import Dielectric, Null
+from clpt.scene.media import Blend, HenyeyGreenstein, Homogeneous, Isotropic
 from tests.pictures.support import with_film
 
+SKY = lights.Constant()
 SIZE = {"width": 26, "height": 18}
 FIRST, SECOND = 5, 8
 # Film, what else the scene has, options of the renderer, and the limit of noise.
@@ -162,6 +164,17 @@ def test_another_scene_is_refused_by_what_differs(tmp_path: Path, changes, told)
             renderer.load_state(path)
         assert renderer.samples == 1
         np.testing.assert_array_equal(renderer.image(), before)
+
+
+@pytest.mark.parametrize("phase", [Isotropic(), HenyeyGreenstein(), Blend()], ids=lambda p: p.kind)
+def test_a_film_of_a_medium_is_saved(phase, scenes: Path, tmp_path: Path):
+    """A phase function is a part of the kernels, as materials are."""
+    fog = shapes.Sphere(material=Null(), interior=Homogeneous(sigma_t=1.0, phase=phase))
+    scene = dataclasses.replace(box(scenes, {}, {}, None), shapes=[fog], lights=[SKY])
+    with clpt.Renderer(scene) as renderer:
+        renderer.save_state(tmp_path / "a.film")
+        kernels = renderer.origin().kernels
+    assert film_file.read(tmp_path / "a.film").origin.kernels == kernels
 
 
 def test_other_settings_and_kernels_are_refused(tmp_path: Path):

@@ -15,7 +15,7 @@ import pytest
 
 import clpt
 from clpt.device import Source
-from clpt.render.codegen import programs
+from clpt.render.codegen import common, flags, programs
 from clpt.render.contract.features import Features
 from clpt.render.lowering.scene import lower
 from clpt.scene.cameras import Perspective
@@ -81,15 +81,18 @@ def test_only_stages_are_seen_outside(name: str) -> None:
             assert len(found) > 10, "definitions are found at all"
             for head, own in found:
                 if head.startswith("static "):
-                    assert private[own] == f"{program}_{own}", head
+                    assert private[own] == f"in_{program}_{own}", head
                 elif head.startswith("STAGE("):
                     outside.append(private["PART"])
+                elif shared := re.match(r"COMMON\(\w+, (\w+)\)", head):
+                    outside.append(f"loop_{shared[1]}")
                 else:
                     assert head.startswith("kernel "), f"{program}: {head} is not private"
                     outside.append(own)
-        assert sorted(outside) == sorted(
-            {"loop", *(f"loop_{name}" for name in made.keys() - {"loop"})}
-        )
+        stages = made.keys() - {"loop", "common"}
+        wanted = {"loop", *(f"loop_{name}" for name in stages)}
+        wanted |= {f"loop_{one.name}" for one in common.shared(features)}
+        assert sorted(outside) == sorted(wanted)
 
 
 def test_definitions_are_found_by_their_braces() -> None:
@@ -115,13 +118,32 @@ def test_kinds_of_paths_share_what_is_the_same() -> None:
     name = "scenes/bulb/scene.json"
     alone = features_of(name, PathTracer(light_paths=0))
     shading = {f"shade_{kind}" for kind in alone.materials.kinds}
-    camera = {"generate", "intersect", "shadow", "loop", *shading}
+    camera = {"generate", "intersect", "shadow", "loop", "common", *shading}
     beside = {"emit", "splat"}
     assert programs.loop_sources(alone, "wide8", 8).keys() == camera
     with_light_paths = features_of(name, PathTracer(light_paths=1))
     assert programs.loop_sources(with_light_paths, "wide8", 8).keys() == camera | beside
     with_photons = features_of(name, Vcm())
     assert programs.loop_sources(with_photons, "wide8", 8).keys() == camera | beside | {"deposit"}
+
+
+def test_kinds_of_materials_share_what_is_long() -> None:
+    """A part of its own, which none of their flags reach; with one kind there is none."""
+    for name, names in {
+        "scenes/cornell_box/scene.json": [],
+        "scenes/three_spheres/scene.json": ["surface_load", "light_sample", "light_begins_pdf"],
+        "scenes/bulb/scene.json": ["surface_load"],
+    }.items():
+        features = features_of(name)
+        made = programs.loop_sources(features, "wide8", 8)
+        assert [one.name for one in common.shared(features)] == names
+        assert ("common" in made) == bool(names)
+        for one in names:
+            inline = [f"in_{program}_{one}" for program in made if program.startswith("shade_")]
+            assert not any(own in source.text for own in inline for source in made.values())
+        if names:
+            asked = set(re.findall(r"\b[A-Z]\w*", made["common"].text))
+            assert not asked & flags.MATERIAL.keys()
 
 
 @pytest.mark.parametrize("integrator", [PathTracer(light_paths=1), Vcm()])

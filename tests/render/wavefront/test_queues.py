@@ -72,30 +72,39 @@ kernel void probe(SLAB_ARGS, global const uint *queue, uint entry, uint end, uin
 }
 
 
-def in_blocks(record: Record, words: np.ndarray) -> np.ndarray:
-    """Words (words, slots) as they lie in a slab: (blocks, step, SLAB_BLOCK)."""
-    blocks = -(-words.shape[1] // SLAB_BLOCK)
-    filled = np.zeros((record.step, blocks * SLAB_BLOCK), words.dtype)
-    filled[: record.words, : words.shape[1]] = words
-    return np.ascontiguousarray(filled.reshape(record.step, blocks, SLAB_BLOCK).swapaxes(0, 1))
+def laid(record: Record, words: np.ndarray, lanes: int) -> np.ndarray:
+    """Words (words, slots) as they lie in a slab: in blocks (blocks, step, SLAB_BLOCK), or as is."""
+    if lanes > 1:
+        return words
+    filled = np.zeros((record.step, words.shape[1]), words.dtype)
+    filled[: record.words] = words
+    return np.ascontiguousarray(filled.reshape(record.step, -1, SLAB_BLOCK).swapaxes(0, 1))
 
 
-def from_blocks(record: Record, slab: np.ndarray) -> np.ndarray:
+def taken(record: Record, slab: np.ndarray, lanes: int) -> np.ndarray:
     """The same back, (words, slots)."""
+    if lanes > 1:
+        return slab
     return slab.swapaxes(0, 1).reshape(record.step, -1)[: record.words]
 
 
-def slab_words(record: Record, slots: int, **members: np.ndarray) -> np.ndarray:
+def stride_of(slots: int) -> int:
+    """Slots that a slab has room for."""
+    return (slots // SLAB_BLOCK + 1) * SLAB_BLOCK
+
+
+def slab_words(record: Record, slots: int, lanes: int, **members: np.ndarray) -> np.ndarray:
     """A slab with these members set."""
-    words = np.zeros((record.words, slots), np.uint32)
+    words = np.zeros((record.words, stride_of(slots)), np.uint32)
     for member in record.members:
         if member.name in members:
             words[member.word, : len(members[member.name])] = members[member.name].astype(np.uint32)
-    return in_blocks(record, words)
+    return laid(record, words, lanes)
 
 
 def assembled(name: str, lanes: int = 1) -> Source:
-    defines = {"LANES": lanes, "QUEUED": 0, "BSDF_COUNT": KINDS}
+    block = SLAB_BLOCK if lanes == 1 else 0
+    defines = {"LANES": lanes, "QUEUED": 0, "BSDF_COUNT": KINDS, "SLAB_BLOCK": block}
     return device.assemble(name, VIRTUAL, defines)
 
 
@@ -117,7 +126,7 @@ def on_device(
     return host
 
 
-def some(slots: int) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]:
+def some(slots: int, lanes: int = 1) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]:
     """Slabs, the slots that wait, and the kind of each."""
     rng = np.random.default_rng(slots)
     kind = rng.integers(0, KINDS, slots)
@@ -127,14 +136,14 @@ def some(slots: int) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]:
     prim = np.where(hit, 5, -1)
     material = kind << 24 | rng.integers(0, 1 << 24, slots)
     waits = np.flatnonzero(alive & hit)
-    return slabs(slots, state, prim, material), waits, kind[waits]
+    return slabs(slots, lanes, state, prim, material), waits, kind[waits]
 
 
-def slabs(slots: int, *members: np.ndarray) -> dict[str, np.ndarray]:
+def slabs(slots: int, lanes: int, *members: np.ndarray) -> dict[str, np.ndarray]:
     state, prim, material = members
     return {
-        "path_words": slab_words(PATH, slots, state=state),
-        "hit_words": slab_words(HIT, slots, prim=prim, material=material),
+        "path_words": slab_words(PATH, slots, lanes, state=state),
+        "hit_words": slab_words(HIT, slots, lanes, prim=prim, material=material),
         "shadow_words": np.zeros(1, np.uint32),
     }
 
@@ -143,9 +152,9 @@ def slabs(slots: int, *members: np.ndarray) -> dict[str, np.ndarray]:
 @pytest.mark.parametrize(("slots", "begin", "end"), [(64, 0, 64), (1024, 64, 784), (4096, 0, 4096)])
 def test_sorting_against_numpy(slots: int, begin: int, end: int, lanes: int) -> None:
     """Of its own slots alone, and nothing is written beyond its own entries."""
-    host, waits, kind = some(slots)
+    host, waits, kind = some(slots, lanes)
     host |= {"queue": np.full(slots, 0xDEAD, np.uint32), "queue_starts": np.zeros(6, np.uint32)}
-    numbers = {"begin": begin, "end": end}
+    numbers = {"stride": stride_of(slots), "begin": begin, "end": end}
     made = on_device(assembled("sorting.cl", lanes), (("probe", 1, None),), host, **numbers)
     own = (waits >= begin) & (waits < end)
     waits, kind = waits[own], kind[own]
@@ -161,7 +170,7 @@ def test_appending_gathers_the_same(slots: int) -> None:
     """Every slot that waits is once in the queue of its kind; what is behind is left alone."""
     host, waits, kind = some(slots)
     host |= {n: np.full(k, 0xDEAD, np.uint32) for n, k in queues.sizes(slots, KINDS, True).items()}
-    numbers = {"slots": slots}
+    numbers = {"stride": stride_of(slots), "slots": slots}
     made = on_device(
         assembled("stage/append.cl"), tuple(queues.steps(slots, KINDS)), host, **numbers
     )
@@ -174,10 +183,10 @@ def test_appending_gathers_the_same(slots: int) -> None:
 
 
 def test_nothing_waits() -> None:
-    host = slabs(100, *np.zeros((3, 100)))
+    host = slabs(100, 1, *np.zeros((3, 100)))
     host |= {n: np.full(k, 0xDEAD, np.uint32) for n, k in queues.sizes(100, KINDS, True).items()}
     steps = tuple(queues.steps(100, KINDS))
-    made = on_device(assembled("stage/append.cl"), steps, host, slots=100)
+    made = on_device(assembled("stage/append.cl"), steps, host, stride=128, slots=100)
     assert not made["queue_counts"].any()
 
 
@@ -189,7 +198,7 @@ def test_blocks_bring_paths_and_take_them_back(lanes: int) -> None:
     rng = np.random.default_rng(lanes)
     names = [f"{record.name.lower()}_words" for record in SLABS]
     host = {
-        name: rng.integers(1, 1 << 20, (record.words, slots + SLAB_BLOCK)).astype(np.uint32)
+        name: rng.integers(1, 1 << 20, (record.words, stride_of(slots))).astype(np.uint32)
         for name, record in zip(names, SLABS, strict=True)
     }
     word = {m.name: m.word for record in (SHADOW, HIT, PATH) for m in record.members}
@@ -198,14 +207,14 @@ def test_blocks_bring_paths_and_take_them_back(lanes: int) -> None:
     host["path_words"][word["pdf"]] = np.float32(0.25).view(np.uint32)
     before = {name: words[:, :slots].copy() for name, words in host.items()}
     queue = rng.permutation(slots).astype(np.uint32)
-    numbers = {"entry": entry, "end": end, "block": block}
+    numbers = {"stride": stride_of(slots), "entry": entry, "end": end, "block": block}
     source = assembled("blocks.cl", lanes)
     slabs = {
-        name: in_blocks(record, host[name]) for name, record in zip(names, SLABS, strict=True)
+        name: laid(record, host[name], lanes) for name, record in zip(names, SLABS, strict=True)
     }
     made = on_device(source, (("probe", 1, None),), {**slabs, "queue": queue}, **numbers)
     made = {
-        name: from_blocks(record, made[name]) for name, record in zip(names, SLABS, strict=True)
+        name: taken(record, made[name], lanes) for name, record in zip(names, SLABS, strict=True)
     }
     own, path = queue[entry:end], before["path_words"]
     path[word["state"], own] = path[word["sample"], own] + before["hit_words"][word["prim"], own]

@@ -101,13 +101,11 @@ class Features:
         return self.media.chromatic or of_paths
 
     @property
-    @macro("USES_FLUORESCENCE")
     def fluorescence(self) -> bool:
         """Whether light may leave some material at another wavelength than it came."""
         return self.spectra.spectral and any(cls.fluoresces for cls in self.materials.leaves)
 
     @property
-    @macro("USES_HEMISPHERE")
     def hemispheres(self) -> bool:
         """Whether paths keep the side of a surface from which their direction was chosen."""
         weighed_there = self.transport.balanced and self.transport.light_paths
@@ -127,7 +125,6 @@ class Features:
         return self.media.present and several
 
     @property
-    @macro("LIGHT_MEDIA")
     def light_media(self) -> bool:
         """Whether media are known around lights, as paths start there."""
         own = self.transport

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from clpt.render.contract.features.macros import flag, macro, number
-from clpt.scene.layers import LAYERS, MATTE_SLOTS, WORDS, Form
+from clpt.scene.layers import LAYERS, WORDS, Form
 
 
 def layer_places(names: Iterable[str]) -> dict[str, int]:
@@ -43,9 +43,9 @@ class LayerFeatures:
     """The layers beside the picture, by their names in the order of LAYERS."""
 
     names: tuple[str, ...] = ()
-    material_numbers: int = flag("MATERIAL_NUMBERS", 0)  # where they stand in `distributions`
+    material_numbers: int = 0  # where they stand in `distributions`
     light_groups: int = 0  # of lights, where there is a layer for each
-    light_group_row: int | None = number("LIGHT_GROUPS", None)  # where in `distributions` they are
+    light_group_row: int | None = None  # where in `distributions` they are
 
     @property
     def places(self) -> dict[str, int]:
@@ -53,14 +53,12 @@ class LayerFeatures:
         return layer_places(self.names)
 
     @property
-    @macro("LAYER_DENOISING", of_number=True)
     def first_for_denoisers(self) -> int:
         """The first word of the layers for denoisers, which come last; 0 where there is none."""
         places = self.places
         return min((places[name] for name in places if LAYERS[name].denoising), default=0)
 
     @property
-    @macro("PIXEL_LAYER_WORDS")
     def words(self) -> int:
         """Words of a pixel that these have, with the number of samples, which mattes need too."""
         if not self.places and not self.mattes:
@@ -79,25 +77,16 @@ class LayerFeatures:
         return self._of("matte")
 
     @property
-    @macro("MATTES")
     def matte_count(self) -> int:
         """Number of layers that are lists of names."""
         return len(self.mattes)
 
     @property
-    @macro("MATTE_SLOTS")
-    def matte_slots(self) -> int:
-        """Number of names that a list holds."""
-        return MATTE_SLOTS if self.mattes else 0
-
-    @property
-    @macro("MATTE_OBJECT", of_number=True)
     def matte_of_objects(self) -> int:
         """1 more than where the list of objects stands."""
         return _number("crypto_object", self.mattes)
 
     @property
-    @macro("MATTE_MATERIAL", of_number=True)
     def matte_of_materials(self) -> int:
         """1 more than where the list of materials stands."""
         return _number("crypto_material", self.mattes)
@@ -115,19 +104,17 @@ class LayerFeatures:
         return len(self.lights) - 1 + groups if self.lights else 0
 
     @property
-    @macro("LIGHT_LAYER_DIRECT", of_number=True)
     def direct(self) -> int:
         """1 more than where the layer of direct light stands."""
         return _number("direct", self.lights)
 
     @property
-    @macro("LIGHT_LAYER_INDIRECT", of_number=True)
     def indirect(self) -> int:
         """1 more than where the layer of indirect light stands."""
         return _number("indirect", self.lights)
 
     @property
-    @macro("LIGHT_LAYER_GROUPS", of_number=True)
+    @macro("LIGHT_LAYER_GROUPS")
     def groups(self) -> int:
         """1 more than where the layers of the groups of lights begin."""
         return _number("light_groups", self.lights)

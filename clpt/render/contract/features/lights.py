@@ -26,7 +26,6 @@ class LightFeatures:
         return bool(self.kinds)
 
     @property
-    @macro("BRICK_LIGHTS")
     def bricks(self) -> bool:
         """Whether bricks of media are lights."""
         return VOLUME in self.kinds

@@ -11,13 +11,13 @@ from clpt.render.contract.features.macros import flag, macro, number
 class GridFeatures:
     """Media whose density is on a grid."""
 
-    present: bool = flag("USES_GRIDS")
-    emissive: bool = flag("GRIDS_EMIT")  # some give out light
-    hot: bool = flag("GRIDS_GLOW")  # some have a temperature
-    tinted: bool = flag("GRIDS_TINTED")  # some have an albedo on a grid
-    coloured: bool = flag("GRIDS_COLOURED")  # some have colours of their extinction on a grid
+    present: bool = False
+    emissive: bool = False  # some give out light
+    hot: bool = False  # some have a temperature
+    tinted: bool = False  # some have an albedo on a grid
+    coloured: bool = False  # some have colours of their extinction on a grid
     mixed: int = flag("GRIDS_MIXED", 0)  # parts of the one that is made of most
-    bytes: bool = flag("USES_BYTES")  # some have 8 bits for each number
+    bytes: bool = False  # some have 8 bits for each number
 
 
 @dataclass(frozen=True)
@@ -27,10 +27,10 @@ class MediaFeatures:
     absorption: bool = False  # inside of a dielectric
     present: bool = flag("USES_MEDIA")
     chromatic: bool = False  # some extinction depends on the wavelength
-    emissive: bool = flag("MEDIA_EMIT")  # some give out light
-    dyed: bool = flag("USES_DYES")  # some have a dye that gives out light
+    emissive: bool = False  # some give out light
+    dyed: bool = False  # some have a dye that gives out light
     sealed: bool = flag("SEALED_MEDIA")  # no ray to a light can leave some
-    bodies: bool = flag("USES_BODIES")  # they may overlap, of different priorities
+    bodies: bool = False  # they may overlap, of different priorities
     aims: int = number("MEDIUM_AIMS")  # places of lamps near which flights through media end
     grids: GridFeatures = GridFeatures()
 

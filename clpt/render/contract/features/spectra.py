@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from clpt.render.contract.features.macros import macro, number
-from clpt.render.contract.parameter_words import RERADIATION_STEP
 
 
 @dataclass(frozen=True)
@@ -27,9 +26,3 @@ class SpectraFeatures:
     def step_text(self) -> str:
         """The step in the text of kernels."""
         return f"{self.step}f"
-
-    @property
-    @macro("RERADIATION_STEP")
-    def reradiation_step(self) -> int:
-        """The step of tables of re-radiation [nm]."""
-        return RERADIATION_STEP

@@ -1,0 +1,2 @@
+/* The density of a direction, for any of the four wavelengths as the hero: the same number from either end. */
+inline real rival_pdf(Bsdf m, vec3 wo, vec3 wi) { return spectrum_mean(bsdf_pdfs(m, wo, wi)); }

@@ -1,0 +1,13 @@
+/* What light of a brick counts that a flight gathers at t, against its choice by next-event estimation; row: 1 + that
+ * of `lights`. */
+inline real brick_weight(Scene scene, integer row, mask active, GridOrigin origin, real t)
+{
+    mask sought = active & (row > 0) & (origin.pdf >= 0.0f);
+    real w_met = 1.0f;
+    if (any(sought)) {
+        integer one = sel_i(sought, row - 1, (integer)(0));
+        real pdf = brick_light_pdf(scene, one, origin.from, origin.hemisphere, origin.before + t);
+        w_met = sel(sought, mis_weight(origin.pdf, pdf), w_met);
+    }
+    return w_met;
+}

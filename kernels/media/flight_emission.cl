@@ -1,0 +1,15 @@
+/* Light that a flight gathers from media that emit. */
+#include "generated/light_of_flight.cl"
+
+inline Spectrum flight_emission(Scene scene, mask flies, integer name, Medium m, real end, Wavelengths lambdas)
+{
+    return medium_emission(scene, sel_i(flies, name, (integer)(0)), m, end, lambdas);
+}
+
+/* Adds it to what the path has brought. */
+inline void flight_light(Scene scene, Slab path, uint at, mask flies, integer state, Spectrum light FLIGHT_ARGS)
+{
+    light = spectrum_mul(load_path_beta(path, at), light);
+    store_path_radiance(path, at, flies, spectrum_add(load_path_radiance(path, at), light));
+    flight_light_layers(scene, path, at, flies, state, light);
+}

@@ -1,0 +1,20 @@
+/* Flights through media on grids, which take the place of those through media that are the same everywhere. */
+#include "generated/grid_origin.cl"
+
+inline void flight_grids(Scene scene, Slab path, uint at, mask flies, integer name, FlightRay r, Spectrum ratio,
+                         Wavelengths lambdas, Spectrum *light, Spectrum *weight, mask *collides, real *t, Medium *m)
+{
+    mask gridded = flies & ((name & MEDIUM_GRID) != 0);
+    if (any(gridded)) {
+        natural key = grid_key(scene, load_path_pixel_key(path, at), load_path_sample(path, at), r.vertex);
+        GridOrigin origin = {(real)(0.0f), (real)(0.0f), r.o, r.d};
+        grid_origin_load(path, at, r, &origin);
+        GridFlight own = grid_flight(scene, name, *m, r.o, r.d, r.end, ratio, r.u, key, gridded, lambdas, origin);
+        *light = spectrum_sel(gridded, own.light, *light);
+        *weight = spectrum_sel(gridded, own.weight, *weight);
+        *collides = sel_i(gridded, own.collides, *collides);
+        *t = sel(gridded, own.t, *t);
+        store_path_ratio(path, at, gridded, own.ratio);
+        m->phase = sel_i(gridded, own.phase, m->phase);
+    }
+}

@@ -1,0 +1,8 @@
+/* What a flight weighs over all wavelengths of its path; f: of light that comes so far, pdf: of the distance. */
+inline Spectrum flight_weight(Slab path, uint at, mask flies, Spectrum ratio, Spectrum f, Spectrum pdf)
+{
+    Spectrum pdfs = spectrum_mul(ratio, pdf);
+    real mean = spectrum_mean(pdfs), inverse = sel(mean > 1e-30f, 1.0f / mean, (real)(0.0f));
+    store_path_ratio(path, at, flies, spectrum_scale(pdfs, inverse));
+    return spectrum_scale(f, inverse);
+}

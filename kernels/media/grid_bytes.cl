@@ -1,0 +1,10 @@
+/* Numbers of grids, some of which have 8 bits for each and some 16. */
+#define grid_packed(name) sel_i(((name) & MEDIUM_BYTES) != 0, (integer)(2), (integer)(1))
+
+/* The number `at` of a brick, over the highest; word: where it is. */
+inline real grid_number_at(integer packed, integer word, integer at)
+{
+    mask small = packed == 2;
+    integer place = sel_i(small, (at & 3) << 3, (at & 1) << 4), most = sel_i(small, (integer)(0xff), (integer)(0xffff));
+    return to_real((word >> place) & most) / to_real(most);
+}

@@ -1,0 +1,10 @@
+/* Light of grids that have a temperature: of black bodies, in the place of `light`. at: of the grid's words. */
+inline Spectrum grid_glow(Scene scene, integer at, real number, mask active, Wavelengths lambdas, Spectrum light)
+{
+    integer kind = gather_i(scene.materials, at + 1);
+    mask glows = active & (kind != 0);
+    if (any(glows)) {
+        light = spectrum_sel(glows, grid_black_body(scene, at, number, kind == 2, glows, lambdas), light);
+    }
+    return light;
+}

@@ -1,0 +1,8 @@
+/* How the direction of a flight was chosen, where light of grids is weighed by it. */
+inline void grid_origin_load(Slab path, uint at, FlightRay r, GridOrigin *origin)
+{
+    origin->pdf = load_path_pdf(path, at);
+    origin->before = load_path_null_distance(path, at) - r.lead;
+    origin->from = madd3(r.d, -origin->before, r.o);
+    origin->hemisphere = path_hemisphere(path, at);
+}

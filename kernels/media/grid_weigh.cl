@@ -1,0 +1,26 @@
+/* Weights of flights through grids over all wavelengths of a path. */
+
+/* After so much of the highest density, times metres, since the last collision the path is as likely as `pdf` at each
+ * wavelength, and `value` of light is left; both lack what passes at the least extinction. */
+inline void grid_weigh(Medium m, real thickness, Spectrum value, Spectrum pdf, mask active, GridFlight *f)
+{
+    real least = m.sigma_t.x;
+#define C(c) least = min_r(least, m.sigma_t.c);
+    SPECTRUM_EACH(C)
+#undef C
+    Spectrum passes = spectrum_exp(spectrum_scale(spectrum_sub(m.sigma_t, spectrum_of(least)), -thickness));
+    Spectrum pdfs = spectrum_mul(f->ratio, spectrum_mul(pdf, passes));
+    real mean = spectrum_mean(pdfs), inverse = sel(mean > 1e-30f, 1.0f / mean, (real)(0.0f));
+    Spectrum weight = spectrum_scale(spectrum_mul(value, passes), inverse);
+    f->ratio = spectrum_sel(active, spectrum_scale(pdfs, inverse), f->ratio);
+    f->weight = spectrum_sel(active, spectrum_mul(f->weight, weight), f->weight);
+}
+
+/* The number that chooses the wavelength of a way. */
+inline real grid_hero(natural bits) { return unit_interval(hash_natural(bits ^ 0x51ed270bu)); }
+
+/* Weighs the last way, of flights that have come to their end. */
+inline void grid_weigh_end(Medium m, real thickness, mask active, GridFlight *f)
+{
+    grid_weigh(m, thickness, spectrum_of(1.0f), spectrum_of(1.0f), active, f);
+}

@@ -1,0 +1,57 @@
+/* Media that rays fly through: what shapes have inside and outside, and what is around the camera. */
+#include "generated/light_media.cl"
+
+/* Absorption `a` with what such a medium scatters. */
+inline Spectrum medium_extinction(Scene scene, integer medium, integer row, Spectrum a, Wavelengths lambdas)
+{
+    mask flies = (medium & MEDIUM_FLIES) != 0;
+    row = sel_i(flies, row + MEDIUM_SCATTERING, (integer)(0));
+    Spectrum s = medium_scattering(scene, row, texture_point_nowhere(), lambdas);
+    return spectrum_sel(flies, spectrum_add(a, s), a);
+}
+
+typedef struct {
+    Spectrum sigma_t, sigma_s; /* [1/m] */
+    integer phase;             /* material word of its phase function */
+} Medium;
+
+/* A medium that flies, in the lanes that have one. */
+inline Medium medium_load(Scene scene, integer name, Wavelengths lambdas)
+{
+    integer row = max_i(MEDIUM_ROW(name), (integer)(1));
+    Medium m;
+    m.sigma_s = medium_scattering(scene, row + MEDIUM_SCATTERING, texture_point_nowhere(), lambdas);
+    m.sigma_t = spectrum_add(m.sigma_s, medium_absorption(scene, row, texture_point_nowhere(), lambdas));
+    m.phase = gather_i(scene.materials, row - 1);
+    return m;
+}
+
+/* What t metres of a medium that is the same everywhere emit, and let through: by Kirchhoff's law a metre emits as much
+ * of `light`, the radiance of a thick body, as it absorbs of any. */
+inline Spectrum medium_emission(Scene scene, integer name, Medium m, real t, Wavelengths lambdas)
+{
+    integer row = max_i(MEDIUM_ROW(name), (integer)(MEDIUM_LIGHT)) - MEDIUM_LIGHT;
+    Spectrum light = medium_light(scene, row, texture_point_nowhere(), lambdas);
+    Spectrum r = spectrum_sub(m.sigma_t, m.sigma_s); /* absorbs, and so emits */
+#define C(c)                                                                             \
+    real depth_##c = m.sigma_t.c * t;                                                    \
+    real some_##c = (1.0f - exp_r(-depth_##c)) / max_r(m.sigma_t.c, (real)(1e-30f));     \
+    r.c = max_r(r.c, (real)(0.0f)) * light.c *                                           \
+          sel(depth_##c > 1e-2f, some_##c, t * (1.0f - depth_##c * (0.5f - depth_##c * (1.0f / 6.0f))));
+    SPECTRUM_EACH(C)
+#undef C
+    return r;
+}
+
+/* The names of the media behind the front of a shape and before it. */
+typedef struct { integer inside, outside; } ShapeMedia;
+
+inline ShapeMedia shape_media(Scene scene, integer shape)
+{
+    integer row = MEDIA_OF_SHAPES + 2 * shape;
+    ShapeMedia m = {gather_i(scene.media, row), gather_i(scene.media, row + 1)};
+    return m;
+}
+
+/* The medium that a surface has still to dim a ray by: none that it has flown through. */
+#define MEDIUM_LEFT(medium) sel_i(((medium) & MEDIUM_FLIES) != 0, (integer)(0), medium)

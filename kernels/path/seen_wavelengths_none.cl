@@ -1,0 +1,2 @@
+/* Stands for path/seen_wavelengths.cl where nothing fluoresces. */
+#define seen_wavelengths(scene, path, at, lambdas) (lambdas)
