@@ -64,7 +64,7 @@ def look_up(made, role, uv, mode="rgb", lanes=8, rows=None, u=()):
     u: (n, 2), which choose texels for the role "texel", see `_body`.
     """
     encoder, given = Encoder(mode), NAMED["reflectance" if role == "texel" else role]
-    words = np.array([encoder.param_words(t, given)[0][-1] - 1 for t in made])
+    words = np.array([encoder.param_words(t, Param(given))[0][-1] - 1 for t in made])
     encoder.textures.finish()
     which = words[np.zeros(len(uv), int) if rows is None else rows]
     body, components = _body(role, mode)
