@@ -109,7 +109,7 @@ class Compilers:
         """Forget a job; it is not done if it has not begun."""
         with self._changed:
             task = self._tasks.pop(key, None)
-            if task in self._waiting:
+            if task is not None and task in self._waiting:
                 self._waiting.remove(task)
 
     def close(self) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt import transforms
-from clpt.arrays import Points, Words, fits_single, single
+from clpt.arrays import Points, Words, fits_single, on_host, single
 from clpt.errors import SceneError
 from clpt.geometry.shape_records import ANALYTIC, ONE_OF, RECORDS, ROWS
 from clpt.geometry.shapes import placement, where
@@ -26,7 +26,7 @@ def check(shape: shapes.Sphere | shapes.Spheres | shapes.Cylinder) -> None:
     """Raise SceneError for a sphere, many or a cylinder that its transform makes none."""
     if isinstance(shape, shapes.Cylinder):
         row(shape)
-    elif not np.array_equal(shape.to_world, transforms.IDENTITY):
+    elif not np.array_equal(on_host(shape.to_world), transforms.IDENTITY):
         _even_axes(placement(shape)[:3, :3], shape)
 
 

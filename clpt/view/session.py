@@ -366,8 +366,8 @@ class Session(CameraWork):
         if state is None:
             raise CommandError(f"there is nothing to {verb}")
         now = self.scene
-        kept: dict[str, Any] = {"camera": now.camera, "spp": now.spp, "noise": now.noise}
-        self._show(dataclasses.replace(state.scene, **kept), Change(whole=True), state.look)
+        scene = dataclasses.replace(state.scene, camera=now.camera, spp=now.spp, noise=now.noise)
+        self._show(scene, Change(whole=True), state.look)
         self._tell_state()
 
     def _do_size(self, reply: Reply, width: int, height: int) -> None:

@@ -16,9 +16,9 @@ from clpt.scene.scatterer import Scatterer
 
 @dataclass(frozen=True)
 class Common:
-    """A function: type, name, parameters as a pair of type and name, and which kinds call it."""
+    """A function: what it returns, name, parameters as a pair of type and name, and which kinds call it."""
 
-    type: str
+    returned: str
     name: str
     parameters: tuple[tuple[str, str], ...]
     calls: Callable[[Features, type[Scatterer]], object]
@@ -74,7 +74,7 @@ def calls_text(features: Features | None = None) -> str:
     for one in FUNCTIONS:
         if one in elsewhere:
             declared = ", ".join(f"{type_}{name}" for type_, name in one.parameters)
-            rows.append(f"{one.type} loop_{one.name}({declared});")
+            rows.append(f"{one.returned} loop_{one.name}({declared});")
         called = f"loop_{one.name}" if one in elsewhere else one.name
         rows.append(f"#define common_{one.name} {called}")
     return "\n".join([*rows, ""])
@@ -86,6 +86,6 @@ def part_text(features: Features) -> str:
     for one in shared(features):
         declared = ", ".join(f"{type_}{name}" for type_, name in one.parameters)
         passed = ", ".join(name for _, name in one.parameters)
-        rows.append(f"COMMON({one.type}, {one.name})({declared})")
+        rows.append(f"COMMON({one.returned}, {one.name})({declared})")
         rows.append(f"{{\n    return {one.name}({passed});\n}}")
     return "\n".join([*rows, ""])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from functools import cache
+from typing import Any
 
 from clpt import spectra
 from clpt.errors import SceneError
@@ -17,7 +18,7 @@ from clpt.spectra.spectrum import extremes
 def check_indices(kinds: Iterable[Kind], film: Film) -> None:
     """Raise SceneError for an index of some kind that is 0 at a wavelength of the film."""
     for kind in kinds:
-        cls: type = type(kind)
+        cls: Any = type(kind)
         given = fields_of(kind)
         for name in _indices(cls):
             value = given[name]

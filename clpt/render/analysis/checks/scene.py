@@ -39,10 +39,10 @@ def check_at_rest(scene: Scene, cache: LoweringCache) -> None:
     """Raise SceneError as `check` does, for a scene that is `at_rest`; cache: of its analysis."""
     _check_entries(scene)
     shapes_ = list(distinct(scene.shapes))
+    for shape in [one for one in shapes_ if not isinstance(one.material, Material)]:
+        message = f"must be of a kind of material, not {shape.material!r}"
+        raise SceneError(message, where=f"{shapes.where(shape)}.material")
     for shape in shapes_:
-        if not isinstance(shape.material, Material):
-            message = f"must be of a kind of material, not {shape.material!r}"
-            raise SceneError(message, where=f"{shapes.where(shape)}.material")
         if not isinstance(shape.emission, (*ON_SHAPES, type(None))):
             names = " or ".join(f"`{cls.kind}`" for cls in ON_SHAPES)
             raise SceneError(f"its emission must be {names}", where=shapes.where(shape))
