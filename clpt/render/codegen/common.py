@@ -16,7 +16,7 @@ from clpt.scene.scatterer import Scatterer
 
 @dataclass(frozen=True)
 class Common:
-    """A function: what it returns, name, parameters as a pair of type and name, and which kinds call it."""
+    """A function: what it returns, its name, pairs of type and name, and which kinds call it."""
 
     returned: str
     name: str
