@@ -29,7 +29,7 @@ path, mode, spp = sys.argv[1], sys.argv[2], int(sys.argv[3])
 scene = clpt.load(path)
 scene = dataclasses.replace(scene, spp=spp, film=dataclasses.replace(scene.film, mode=mode))
 renderer = clpt.Renderer(scene, profiling=True, looped=False)
-timings = renderer.wavefront.timings
+timings = renderer._wavefront.timings
 while True:
     renderer.run(spp)
     print(json.dumps({name: t.seconds for name, t in timings.collect().items()}), flush=True)

@@ -44,14 +44,14 @@ def parts(renderer: clpt.Renderer, path: Path, times: int) -> dict[str, float]:
     """Medians of what a copy on the device, one to the host, and a file take [s], after a pass."""
 
     def hold() -> None:
-        renderer.hold()
-        renderer.wavefront.stream.wait()
+        renderer._hold()
+        renderer._wavefront.stream.wait()
 
     hold()
-    saved = renderer.saved_film(held=True)
+    saved = renderer._saved_film(held=True)
     works = {
         "copy": hold,
-        "to_host": lambda: renderer.saved_film(held=True),
+        "to_host": lambda: renderer._saved_film(held=True),
         "file": lambda: film_file.write(path, saved),
     }
     times_of: dict[str, list[float]] = {name: [] for name in works}

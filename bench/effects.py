@@ -151,7 +151,7 @@ def compare(name: str, spp: int, rounds: int) -> dict[str, object]:
     seconds: list[list[float]] = [[], []]
     for number in range(rounds + 1):
         for renderer, taken, spent in zip(renderers, images, seconds, strict=True):
-            renderer.wavefront.clear()
+            renderer._wavefront.clear()
             start = time.perf_counter()
             renderer.run(spp)
             image = renderer.image()

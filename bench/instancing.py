@@ -105,10 +105,10 @@ def measure(name: str, things: list[Shape], side: float = 50.0) -> dict[str, obj
     """Render twice; rays are counted the second time."""
     renderer = clpt.Renderer(scene(things, side))
     renderer.run(SPP)
-    before = renderer.wavefront.counts.rays
+    before = renderer._wavefront.counts.rays
     start = time.process_time()
     renderer.run(SPP)
-    rays = (renderer.wavefront.counts.rays - before) / (time.process_time() - start)
+    rays = (renderer._wavefront.counts.rays - before) / (time.process_time() - start)
     stats = renderer.stats
     return {
         "scene": name,

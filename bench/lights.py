@@ -95,7 +95,7 @@ def compare(count: int, spp: int, rounds: int) -> dict[str, object]:
     seconds: list[list[float]] = [[], []]
     for number in range(rounds + 1):
         for one, taken, spent in zip(both, images, seconds, strict=True):
-            one.wavefront.clear()
+            one._wavefront.clear()
             start = time.perf_counter()
             one.run(spp)
             image = one.image()

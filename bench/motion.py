@@ -73,9 +73,9 @@ def rates(scenes: list[Scene]) -> list[float]:
     found: list[list[float]] = [[] for _ in scenes]
     for round_ in range(ROUNDS + 1):
         for renderer, own in zip(renderers, found, strict=True):
-            before, began = renderer.wavefront.counts.rays, time.process_time()
+            before, began = renderer._wavefront.counts.rays, time.process_time()
             renderer.run(SPP)
-            rate = (renderer.wavefront.counts.rays - before) / (time.process_time() - began)
+            rate = (renderer._wavefront.counts.rays - before) / (time.process_time() - began)
             if round_:
                 own.append(rate)
     return [statistics.median(own) for own in found]

@@ -65,7 +65,7 @@ def compare(name: str, size: int, most: int, limit: float, seeds: int) -> dict[s
             image = renderer.image()
             spent = time.process_time() - start
             if way == 0:
-                spp = max(1, round(renderer.wavefront.counts.samples / size**2))
+                spp = max(1, round(renderer._wavefront.counts.samples / size**2))
             if seed > 0:  # the first one warms up
                 pictures[way].append(image)
                 seconds[way].append(spent)

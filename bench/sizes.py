@@ -99,7 +99,7 @@ def measure(path: Path, layout: str | None) -> dict[str, Any]:
     )
     renderer = watch("prepare", lambda: clpt.Renderer(scene, layout=layout))
     watch("first", lambda: renderer.run(SPP))
-    front = renderer.wavefront
+    front = renderer._wavefront
     rays, start = front.counts.rays, time.process_time()
     renderer.run(SPP)
     cpu, rays = time.process_time() - start, front.counts.rays - rays

@@ -146,7 +146,7 @@ class Soak:
             "rounds": self.rounds,
             "unequal": self.unequal,
             "rss_mib": resident(),
-            "used_mib": self.renderer.wavefront.buffers.used / MIB,
+            "used_mib": self.renderer._wavefront.buffers.used / MIB,
             "programs": len(self.device.programs),
             "builds": self.device.builds.programs,
         }

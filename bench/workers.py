@@ -90,7 +90,7 @@ class Clpt:
 
         renderer = clpt.Renderer(self.scene, profiling=True, looped=False)
         renderer.run(spp)
-        wavefront = renderer.wavefront
+        wavefront = renderer._wavefront
         timings = wavefront.timings.collect()
         return {
             "milliseconds": {name: round(t.seconds * 1e3, 2) for name, t in timings.items()},

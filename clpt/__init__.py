@@ -1,8 +1,7 @@
 """clpt: a spectral path tracer in OpenCL.
 
 >>> import clpt
->>> scene = clpt.load("scenes/cornell_box")
->>> image = clpt.render(scene, spp=64)
+>>> image = clpt.render("scenes/cornell_box", spp=64)
 >>> clpt.write_image("out.exr", image)
 """
 
@@ -35,15 +34,16 @@ if TYPE_CHECKING:
     from clpt.formats import load, save
     from clpt.images import read as read_image
     from clpt.images import write as write_image
+    from clpt.one_call import render
     from clpt.rays import Accel, AllHits, Hits, InstancedAccel
     from clpt.render.codegen.library import kernel_source
     from clpt.render.film.denoised_picture import DenoisedPicture
     from clpt.render.film.layer_channels import write_layers
     from clpt.render.options import RenderOptions
     from clpt.render.progress import Progress
-    from clpt.render.renderer import Renderer, render
+    from clpt.render.renderer import Renderer
     from clpt.render.wavefront.film_state import FilmState
-    from clpt.scene import Scene
+    from clpt.scene import Film, Scene
     from clpt.spectral_exr import SpectralImage
     from clpt.spectral_exr import read as read_spectral
     from clpt.spectral_exr import write as write_spectral
@@ -67,6 +67,7 @@ _HOMES = {  # the module of each name, and what it is called there
     "save": ("formats", "save"),
     "read_image": ("images", "read"),
     "write_image": ("images", "write"),
+    "render": ("one_call", "render"),
     "Accel": ("rays", "Accel"),
     "AllHits": ("rays", "AllHits"),
     "Hits": ("rays", "Hits"),
@@ -77,8 +78,8 @@ _HOMES = {  # the module of each name, and what it is called there
     "RenderOptions": ("render.options", "RenderOptions"),
     "Progress": ("render.progress", "Progress"),
     "Renderer": ("render.renderer", "Renderer"),
-    "render": ("render.renderer", "render"),
     "FilmState": ("render.wavefront.film_state", "FilmState"),
+    "Film": ("scene", "Film"),
     "Scene": ("scene", "Scene"),
     "SpectralImage": ("spectral_exr", "SpectralImage"),
     "read_spectral": ("spectral_exr", "read"),
@@ -86,6 +87,7 @@ _HOMES = {  # the module of each name, and what it is called there
     "__version__": ("version", "VERSION"),
 }
 _SHOWN = ("MultiRenderer", "Renderer")  # renderers, whose pictures a notebook shows
+_MAKE_SCENES = ("Scene", "load")
 
 
 class _Front(ModuleType):
@@ -97,6 +99,8 @@ class _Front(ModuleType):
             value = vars(importlib.import_module(f"clpt.{module}"))[inside]
             if name in _SHOWN:
                 _give_widgets()
+            if name in _MAKE_SCENES:
+                _give_pictures()
         else:
             value = _submodule(name)
         self.__dict__[name] = value
@@ -116,7 +120,19 @@ def _give_widgets() -> None:
     from clpt.render.pictures import DevicePictures
     from clpt.view.notebook import widget
 
-    DevicePictures.make_widget = widget
+    DevicePictures._make_widget = widget
+
+
+def _give_pictures() -> None:
+    """Let scenes show themselves in notebooks: they know no renderer."""
+    from clpt.scene import Scene as Shown
+
+    def picture(scene: Shown) -> bytes:
+        from clpt.one_call import small_picture
+
+        return small_picture(scene)
+
+    Shown._picture = staticmethod(picture)
 
 
 def _submodule(name: str) -> ModuleType:
@@ -140,6 +156,7 @@ __all__ = [
     "ClusterError",
     "DenoisedPicture",
     "DeviceError",
+    "Film",
     "FilmState",
     "Hits",
     "InstancedAccel",

@@ -60,14 +60,18 @@ class SceneError(ClptError, ValueError):
         line: int | None = None,
         where: str | None = None,
     ):
-        message = one_line(message)
-        where = None if where is None else one_line(where, LONGEST_PLACE)
-        self.message, self.file, self.line, self.where = message, file, line, where
-        place = one_line(str(file), LONGEST_PLACE) if file is not None else ""
-        if line is not None:
-            place += f":{line}"
+        self.message, self.file, self.line = one_line(message), file, line
+        super().__init__()
+        self.place_at(where)
+
+    def place_at(self, where: str | None) -> None:
+        """Say where it is, in place of what was said: the element or the parameter."""
+        self.where = where = None if where is None else one_line(where, LONGEST_PLACE)
+        place = one_line(str(self.file), LONGEST_PLACE) if self.file is not None else ""
+        if self.line is not None:
+            place += f":{self.line}"
         before = "".join(f"{part}: " for part in (place, where) if part)
-        super().__init__(before + one_line(message, max(LONGEST - len(before), 40)))
+        self.args = (before + one_line(self.message, max(LONGEST - len(before), 40)),)
 
 
 LONGEST_NAME = 80  # characters that are compared

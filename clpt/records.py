@@ -184,6 +184,9 @@ SETTINGS = Record(
     light_groups=("integer", "where in `distributions` lights have the numbers of their groups"),
 )
 
+# the last of them, which only layers need
+LAYER_SETTINGS = tuple(m.name for m in SETTINGS.members)[-len(LAYER_PLACES) - 10 :]
+
 SHAPE = Record(
     "ShapeRow",
     "One shape.",

@@ -121,8 +121,9 @@ def is_spectral(path: str | Path) -> bool:
 
 
 def read(path: str | Path, *, emissive: bool | None = None) -> SpectralImage:
-    """Read a spectral EXR file. emissive: which part of one that holds both; None: light if any.
+    """Read a spectral EXR file.
 
+    path: of the file. emissive: which part of one that holds both; None: light if any.
     Polarisation (S1 to S3) is left out with a warning. Raises SceneError for what is no such file,
     lacks the part, holds a wavelength twice, or fluorescence.
     """
@@ -162,9 +163,10 @@ def write(
 ) -> None:
     """Write a spectral EXR file; what `read` gives back is the same to the bit unless `half`.
 
-    preview: linear Rec. 709 (h, w, 3) for its R, G, B; the image's own colour, with its exposure,
-    by default; layers: further channels, name -> (h, w), in float. Raises SceneError if the suffix
-    is not .exr or the file cannot be made.
+    path: of the file. preview: linear Rec. 709 (h, w, 3) for its R, G, B; the image's own colour,
+    with its exposure, by default. metadata: further attributes of the file. layers: further
+    channels, name -> (h, w), in float. Raises SceneError if the suffix is not .exr or the file
+    cannot be made.
     """
     path = Path(path)
     if path.suffix.lower() != ".exr":

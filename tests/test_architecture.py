@@ -43,6 +43,7 @@ MAY_IMPORT = {
     "render": BASE | {"lenses", "scene", "geometry", "sky", "device", "bvh", "denoise"},
     "formats": BASE | {"lenses", "geometry", "scene"},
     "mie": BASE | {"scene"},
+    "one_call": BASE | {"scene", "device", "render", "formats"},
     "testing": BASE | {"scene", "device", "render"},
     "view": RENDERS,
     "cluster": RENDERS,

@@ -21,11 +21,16 @@ class Mesh:
     vertices, faces = np.zeros((3, 3)), np.zeros((1, 3))
 
 
+def test_a_renderer_reads_no_file() -> None:
+    message = r"must be a clpt\.Scene, not 'scenes/x'; clpt\.load\('scenes/x'\) reads one"
+    with pytest.raises(TypeError, match=message):
+        clpt.Renderer("scenes/x")  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize("function", [clpt.render, clpt.Renderer])
 @pytest.mark.parametrize(
     ("scene", "message"),
     [
-        ("scenes/x", r"must be a clpt\.Scene, not 'scenes/x'; clpt\.load\('scenes/x'\) reads one"),
         (3, r"must be a clpt\.Scene, not int; clpt\.load"),
         (Scene, r"must be a clpt\.Scene, not type"),
     ],
@@ -39,7 +44,6 @@ def test_what_is_no_scene(function: Any, scene: Any, message: str) -> None:
 @pytest.mark.parametrize(
     ("options", "error", "message"),
     [
-        ({"size": (4, 4)}, TypeError, r"no option 'size'; it is the film's: scene\.film = "),
         ({"width": 4}, TypeError, r"film's: .*dataclasses\.replace\(scene\.film, width=\.\.\)"),
         ({"seed": 1}, TypeError, r"no option 'seed'; it is the scene's: scene\.seed = \.\."),
         ({"max_depth": 4}, TypeError, r"replace\(scene\.integrator, max_depth=\.\.\)"),
@@ -57,6 +61,37 @@ def test_what_is_no_scene(function: Any, scene: Any, message: str) -> None:
 def test_options(function: Any, options: dict[str, Any], error: type, message: str) -> None:
     with pytest.raises(error, match=message):
         function(SCENE, **options)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"size": 4}, r"^film\.size: must be \(width, height\), not 4$"),
+        ({"size": (0, 4)}, r"^film\.width: must be 1 to 65536, not 0$"),
+        ({"mode": "rbg"}, r"^film\.mode: 'rbg' is none of spectral, rgb"),
+        ({"camera": "front"}, r"^camera: must be a camera or \(azimuth, elevation\).* not 'front'"),
+        ({"camera": (1, 2, 3, 4)}, r"^camera: must be a camera or \(azimuth, elevation\)"),
+        ({"env": "no.hdr"}, r"no\.hdr: no such image"),
+        ({"spp": 0}, "whole number above zero, not 0"),
+        ({"noise": -1}, r"^noise: must be a number above zero"),
+    ],
+)
+def test_changes_of_a_scene_by_render(given: dict[str, Any], message: str) -> None:
+    with pytest.raises(SceneError, match=message):
+        clpt.render(SCENE, **given)
+
+
+def test_a_renderer_has_no_size() -> None:
+    with pytest.raises(TypeError, match=r"no option 'size'; it is the film's: scene\.film = "):
+        clpt.Renderer(SCENE, size=(4, 4))  # type: ignore[call-arg]
+
+
+def test_render_reads_a_file_and_changes_what_is_asked(tmp_path: Any, one_context: None) -> None:
+    clpt.save(SCENE, tmp_path / "white.json")
+    picture = clpt.render(tmp_path / "white.json", 1, size=(6, 3), camera=(30.0, 20.0))
+    assert picture.shape == (3, 6, 3)
+    clpt.save(Scene(camera=SCENE.camera, film=SCENE.film), tmp_path / "scene.json")
+    assert clpt.render(str(tmp_path), 1).shape == (4, 4, 3)
 
 
 def test_all_options_are_described() -> None:

@@ -43,9 +43,9 @@ class _Listed(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         name = args[0]
-        known = self.list_commands(ctx)
-        if name not in known and not name.startswith("-") and not ctx.resilient_parsing:
-            ctx.fail(f"there is no command {name!r}{nearest(name, known)}")
+        missing = not name.startswith("-") and self.get_command(ctx, name) is None
+        if missing and not ctx.resilient_parsing:
+            ctx.fail(f"there is no command {name!r}{nearest(name, self.list_commands(ctx))}")
         return super().resolve_command(ctx, args)
 
 

@@ -157,7 +157,7 @@ class ClusterFilm(DevicePictures):
             raise SceneError(message, where="noise")
         local = self.shown()
         tracer = FarmTracer(local, self._take_selection)
-        begun = local.adaptively(tracer, self.denoise)
+        begun = local._adaptively(tracer, self.denoise)
         if arrays:
             begun.restore(arrays)
         else:
@@ -192,17 +192,17 @@ class ClusterFilm(DevicePictures):
         return () if self._local is None else self._local.devices
 
     @property
-    def wavefront(self) -> Wavefront:
+    def _wavefront(self) -> Wavefront:
         """The wavefront on this machine that holds the picture so far, for screens."""
-        return self.shown().wavefront
+        return self.shown()._wavefront
 
     # ---- saved films
 
-    def origin(self) -> Origin:
+    def _origin(self) -> Origin:
         """Return what the samples are of. Raises SceneError for a scene that cannot be read."""
-        return self._here.origin()
+        return self._here._origin()
 
-    def hold(self) -> None:
+    def _hold(self) -> None:
         """Keep the film of all whole blocks so far, for `saved_film`.
 
         Blocks that a stop cut are in the picture, but not in what is held; with noise, what a run
@@ -210,13 +210,13 @@ class ClusterFilm(DevicePictures):
         """
         self._held = self._whole, {} if self._noise is None else self._noise.arrays()
 
-    def saved_film(self, *, held: bool = False) -> SavedFilm:
-        """Return the film with all that it takes to go on with it; see `Renderer.saved_film`.
+    def _saved_film(self, *, held: bool = False) -> SavedFilm:
+        """Return the film with all that it takes to go on with it; see `Renderer`.
 
         It may lack samples before its last one, which `ClusterRenderer` takes when it goes on.
         """
         if held and self._held is None:
-            raise SceneError("no film is held; call hold() first")
+            raise SceneError("no film is held")
         adaptive = {} if self._noise is None or held else self._noise.arrays()
         films, arrays = self._held if held and self._held else (self._sum, adaptive)
         state = self._empty() if films.film is None else films.film
@@ -227,7 +227,7 @@ class ClusterFilm(DevicePictures):
             for device, took in zip(self._classes.values(), seconds, strict=False)
         ]
         sessions = [*self._sessions, *sessions]
-        return SavedFilm(state, self.origin(), self.form, counts, tuple(sessions), arrays)
+        return SavedFilm(state, self._origin(), self._form, counts, tuple(sessions), arrays)
 
     def _empty(self) -> FilmState:
         """A film without samples."""
@@ -235,12 +235,12 @@ class ClusterFilm(DevicePictures):
         arrays = {name: np.zeros_like(array) for name, array in state.arrays.items()}
         return FilmState(taken=(), scale=state.scale, **arrays)
 
-    def restore(self, saved: SavedFilm) -> None:
+    def _restore(self, saved: SavedFilm) -> None:
         """Go on from a saved film, as `load_state` does. Raises SceneError.
 
         `warnings` tells, once a worker is there, where another class of device took the samples.
         """
-        saved.origin.check_same(self.origin())
+        saved.origin.check_same(self._origin())
         own, film, former = self._empty().arrays, saved.film, (self._sum, self._whole)
         if any(own[name].shape != array.shape for name, array in film.arrays.items()):
             raise SceneError("the film has another form than this scene's")
@@ -271,11 +271,11 @@ class ClusterFilm(DevicePictures):
     # ---- pictures
 
     @property
-    def form(self) -> PictureForm:  # type: ignore[override]
-        """The choices by which pictures are made of the film; see `Renderer.form`."""
-        form = self._here.form
+    def _form(self) -> PictureForm:  # type: ignore[override]
+        """The choices by which pictures are made of the film; see `Pictures`."""
+        form = self._here._form
         return dataclasses.replace(form, adaptive=form.adaptive or self._noise is not None)
 
-    def developed(self, *words: str) -> Developed:
+    def _developed(self, *words: str) -> Developed:
         """Return the pictures of the film as it is now, which then stay; see `Pictures`."""
-        return Developed(self._sum.film or self._empty(), self.form)
+        return Developed(self._sum.film or self._empty(), self._form)

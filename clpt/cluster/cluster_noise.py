@@ -19,7 +19,7 @@ class FarmTracer(Tracer):
     """
 
     def __init__(self, local: Renderer, take: Take):
-        super().__init__(local.wavefront)
+        super().__init__(local._wavefront)
         self._local, self._take = local, take
         self._added: FilmState | None = None  # since `gather`
 
@@ -30,7 +30,7 @@ class FarmTracer(Tracer):
     def gather(self) -> None:
         """Let the film hold all that was added so far."""
         if self._added is not None:
-            self._local.set_words(self._local.film_state().plus(self._added))
+            self._local._set_words(self._local.film_state().plus(self._added))
             self._added = None
 
     def discard(self) -> None:

@@ -103,10 +103,10 @@ class ClusterRenderer(ClusterFilm):
         return dict(self.farm.known.records)
 
     @property
-    def device_text(self) -> str:
+    def _device_text(self) -> str:
         """The classes of the workers' devices, for people."""
         kinds = {record.kind for record in self.workers.values()}
-        return "; ".join(sorted(kinds)) or super().device_text
+        return "; ".join(sorted(kinds)) or super()._device_text
 
     @property
     def refused(self) -> dict[str, str]:
@@ -120,11 +120,11 @@ class ClusterRenderer(ClusterFilm):
 
     @property
     def _features(self) -> Features:
-        return self._here.wavefront.features
+        return self._here._wavefront.features
 
     @property
     def _pixels(self) -> int:
-        return self._here.wavefront.paths.pixels
+        return self._here._wavefront.paths.pixels
 
     def _add_samples(self, first: int, end: int, noise: float | None, watch: Watch) -> bool:
         """Add samples to all pixels, or to those with noise; return whether all were added.
@@ -182,7 +182,7 @@ class ClusterRenderer(ClusterFilm):
         try:
             if noise is not None:
                 return self._noise.run(end, noise, lambda _: tick())
-            every = Selection("all", self._here.wavefront.paths.pixels)
+            every = Selection("all", self._here._wavefront.paths.pixels)
             finished = self._tracer.add(every, first, end, lambda _: tick())
             if finished:
                 self._noise.skip(end)
@@ -202,7 +202,7 @@ class ClusterRenderer(ClusterFilm):
             self._sum = self._sum.counting(film.counts)
             add(film.state)
 
-        pixels = self._here.wavefront.paths.pixels
+        pixels = self._here._wavefront.paths.pixels
         return self._ask(selection, pixels, (first, end), (), note, lambda: on_batch(None))
 
     def _ask(

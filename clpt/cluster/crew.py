@@ -86,7 +86,7 @@ class Crew:
     @property
     def whole(self) -> Selection:
         """Samples of all pixels."""
-        return Selection("all", self.first.renderer.wavefront.paths.pixels)
+        return Selection("all", self.first.renderer._wavefront.paths.pixels)
 
     def run(self, selection: Selection, ranges: Ranges, tick: Callable[[], bool]) -> bool:
         """Add ranges of a selection's samples; return whether it was not stopped.
@@ -135,7 +135,7 @@ class Crew:
         """Let later renders sample every pixel, after selections of some."""
         for worker in list(self.workers):
             try:
-                use_all_pixels(worker.renderer.wavefront)
+                use_all_pixels(worker.renderer._wavefront)
             except Exception as error:
                 self.drop(worker, error)
 

@@ -107,7 +107,7 @@ class DeviceWorker:
 
     def do(self, selection: Selection, first: int, end: int, on_batch: OnBatch) -> bool:
         """Add samples first to end - 1 to the film; return whether it was not stopped."""
-        wavefront = self.renderer.wavefront
+        wavefront = self.renderer._wavefront
         if selection is not self._selection:
             selection.prepare(wavefront)
         self._selection = selection
@@ -121,21 +121,21 @@ class DeviceWorker:
 
     def hold(self) -> None:
         """Keep a copy of the film on the device, for `held`. Raises MemoryBudgetError."""
-        self.renderer.wavefront.film.hold()
+        self.renderer._wavefront.film.hold()
 
     def held(self) -> FilmState:
         """Return what the film was at the last `hold`."""
-        return self.renderer.words((), held=True)
+        return self.renderer._words((), held=True)
 
     def clear(self) -> None:
         """Empty the film."""
         self.past = self.counts
-        self.renderer.wavefront.clear()
+        self.renderer._wavefront.clear()
         self.unsaved, self.unsaved_seconds, self.shows = [], 0.0, False
 
     def show(self, state: FilmState) -> None:
         """Let the film hold a whole picture."""
-        self.renderer.set_words(state)
+        self.renderer._set_words(state)
         self.shows = True
 
 

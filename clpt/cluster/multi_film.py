@@ -70,7 +70,7 @@ class MultiFilm(DevicePictures):
 
         When all devices have failed it is what was saved of them.
         """
-        taken = self.contents.taken
+        taken = self._settled.taken
         if self._noise is not None and not self._crew.workers:
             return self._noise.base
         if self._noise is not None:
@@ -92,30 +92,30 @@ class MultiFilm(DevicePictures):
             self._crew.saved, self._crew.saved_ranges = merged, merged.taken
             return Contents(merged.taken)
 
-        with self.change("merge", put):
+        with self._change("merge", put):
             self._contents = put()
 
     @property
     @synchronized
-    def wavefront(self) -> Wavefront:
+    def _wavefront(self) -> Wavefront:
         """The wavefront of the first device, whose film then holds the picture of all."""
-        return self._on_first(lambda first: first.renderer.wavefront)
+        return self._on_first(lambda first: first.renderer._wavefront)
 
     # ---- saved films
 
     @property
-    def form(self) -> PictureForm:  # type: ignore[override]
-        """The choices by which pictures are made of the film; see `Renderer.form`."""
-        form = self._crew.first.renderer.form
+    def _form(self) -> PictureForm:  # type: ignore[override]
+        """The choices by which pictures are made of the film; see `Pictures`."""
+        form = self._crew.first.renderer._form
         return dataclasses.replace(form, adaptive=form.adaptive or self._noise is not None)
 
-    def origin(self) -> Origin:
+    def _origin(self) -> Origin:
         """Return what the samples are of. Raises SceneError for a scene that cannot be read."""
-        return self._crew.first.renderer.origin()
+        return self._crew.first.renderer._origin()
 
     @synchronized
-    def hold(self) -> None:
-        """Keep a copy of the film as it is now, for `saved_film`; see `Renderer.hold`.
+    def _hold(self) -> None:
+        """Keep a copy of the film as it is now, for `_saved_film`; see `Renderer`.
 
         Each device keeps what only it has, in its own memory.
         """
@@ -134,32 +134,32 @@ class MultiFilm(DevicePictures):
             raise
         except Exception as error:
             log.debug("a film cannot be held on devices: %s", error)
-            self._held = self.saved_film()
+            self._held = self._saved_film()
 
     @synchronized
-    def saved_film(self, *, held: bool = False) -> SavedFilm:
-        """Return the film with all that it takes to go on with it; see `Renderer.saved_film`.
+    def _saved_film(self, *, held: bool = False) -> SavedFilm:
+        """Return the film with all that it takes to go on with it; see `Renderer`.
 
         held: raises SceneError also where a device has failed since that had a part of it.
         """
         if held:
             if self._held is None:
-                raise SceneError("no film is held; call hold() first")
+                raise SceneError("no film is held")
             if isinstance(self._held, _Held):
                 self._held = self._read(self._held)
             return self._held
         state, so_far = self._on_first(
             lambda first: (first.renderer.film_state(), self._so_far_on(first))
         )
-        return self._film_with(dataclasses.replace(state, taken=self.contents.taken), so_far)
+        return self._film_with(dataclasses.replace(state, taken=self._settled.taken), so_far)
 
     def _so_far_on(self, first: DeviceWorker) -> dict[str, Any]:
         """Return a saved film's parts beside its words and origin; first: the device it is of."""
-        return self._progress_so_far(first.renderer.device_class())
+        return self._progress_so_far(first.renderer._device_class())
 
     def _film_with(self, state: FilmState, so_far: Mapping[str, Any]) -> SavedFilm:
         others = {name: value for name, value in so_far.items() if name != "taken"}
-        return SavedFilm(state, self.origin(), self.form, **others)
+        return SavedFilm(state, self._origin(), self._form, **others)
 
     def _read(self, held: _Held) -> SavedFilm:
         """Bring what is held to the host."""
@@ -169,17 +169,17 @@ class MultiFilm(DevicePictures):
             if held.so_far["taken"] != self._known.taken:
                 message = f"a device has failed that had a part of the film: {error}"
                 raise SceneError(message) from error
-        return self.saved_film()  # nothing was added since: others do its part
+        return self._saved_film()  # nothing was added since: others do its part
 
     @synchronized
-    def restore(self, saved: SavedFilm) -> None:
+    def _restore(self, saved: SavedFilm) -> None:
         """Go on from a saved film, as `load_state` does. Raises SceneError."""
 
         def load(first: DeviceWorker) -> FilmState:
-            first.renderer.restore(saved)
+            first.renderer._restore(saved)
             return first.renderer.film_state()
 
-        with self.change("load_state") as change:
+        with self._change("load_state") as change:
             with change.beginning_unless(Exception):
                 state = self._on_first(load)
             self._go_on(state, saved)
@@ -241,14 +241,14 @@ class MultiFilm(DevicePictures):
         moves = self._noise is not None or any(worker.unsaved for worker in crew.workers)
         if not moves and crew.workers and (crew.first.shows or crew.saved is None):
             return crew.first
-        now = self.contents
+        now = self._settled
 
         def finish(error: BaseException) -> Contents:
             if isinstance(error, Exception):
                 return now  # the last device has failed
             raise error  # samples may be in two films, or in none
 
-        with self.change("gathering of films", finish):
+        with self._change("gathering of films", finish):
             first = self._gathered()
             self._contents = now
         return first

@@ -88,8 +88,8 @@ class AdaptiveCrew:
             try:
                 first.show(self.base)
                 renderer = first.renderer
-                tracer = _AdaptiveTracer(renderer.wavefront, self)
-                begun = renderer.adaptively(tracer, renderer.denoise)
+                tracer = _AdaptiveTracer(renderer._wavefront, self)
+                begun = renderer._adaptively(tracer, renderer.denoise)
                 if self._arrays:
                     begun.restore(self._arrays)
                 break

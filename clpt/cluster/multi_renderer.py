@@ -120,10 +120,10 @@ class MultiRenderer(MultiFilm):
         """The devices that have not failed."""
         return tuple(worker.renderer.device for worker in self._crew.workers)
 
-    def device_class(self) -> dict[str, Plain]:
+    def _device_class(self) -> dict[str, Plain]:
         """Return what decides the last bits of samples, of all devices; see `Renderer`."""
-        first = self._crew.first.renderer.device_class()
-        each = [worker.renderer.device_class() for worker in self._crew.workers]
+        first = self._crew.first.renderer._device_class()
+        each = [worker.renderer._device_class() for worker in self._crew.workers]
         for name in first:
             values = list(dict.fromkeys(str(one[name]) for one in each))
             if len(values) > 1:
@@ -169,7 +169,7 @@ class MultiRenderer(MultiFilm):
 
     @property
     def _features(self) -> Features:
-        return self._crew.first.renderer.wavefront.features
+        return self._crew.first.renderer._wavefront.features
 
     @property
     def _pixels(self) -> int:
@@ -184,7 +184,7 @@ class MultiRenderer(MultiFilm):
         base: FilmState | None = None  # that adaptive sampling begins over
         if noise is not None and self._noise is None:
             base = self.film_state()
-        now = self.contents
+        now = self._settled
         plain = noise is None and self._noise is None
         more = dataclasses.replace(now, taken=join_ranges(now.taken, ((first, end),)))
 
@@ -196,7 +196,7 @@ class MultiRenderer(MultiFilm):
                 return now if self._noise is None else more
             raise error  # cells of some devices may be in no film
 
-        with self.change("run", finish):
+        with self._change("run", finish):
             if plain:
                 finished = self._crew.run(self._crew.whole, ((first, end),), watch)
                 self._contents = dataclasses.replace(now, taken=self._crew.ranges)
@@ -208,9 +208,9 @@ class MultiRenderer(MultiFilm):
                 self._contents = more
         return finished
 
-    def tracer(self) -> Tracer:
+    def _tracer(self) -> Tracer:
         """Return what adds selections of samples to the films of all devices."""
-        return CrewTracer(self._crew.first.renderer.wavefront, self._crew)
+        return CrewTracer(self._crew.first.renderer._wavefront, self._crew)
 
     @healing
     def reset(self, *, seed: int | None = None, first_sample: int | None = None) -> None:
@@ -226,7 +226,7 @@ class MultiRenderer(MultiFilm):
                 self._first_sample = first_sample
             return Contents()
 
-        with self.healing("reset", put):
+        with self._healing("reset", put):
             self._contents = put()
 
     @synchronized
@@ -253,7 +253,7 @@ class MultiRenderer(MultiFilm):
                 scene=scene, motion=motion,
             ).wait()  # fmt: skip
 
-        with self.change("update", heals=False) as change:
+        with self._change("update", heals=False) as change:
             with change.beginning_unless(Exception):
                 self._on_each(edit)
             self._forget()

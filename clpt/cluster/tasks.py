@@ -54,7 +54,7 @@ class _Job:
             if len(devices) > 1
             else Renderer(scene, devices[0], **options)
         )
-        self.options, self._tracer = options, self.renderer.tracer()
+        self.options, self._tracer = options, self.renderer._tracer()
         self._packed: Reply | None = None  # the selection that was taken last
         self._selection: Selection | None = None
 
@@ -171,7 +171,7 @@ def _open_job(job: str, files: dict[str, bytes]) -> Reply:
     renderer = _open[digest].renderer
     return {
         "kind": _open[digest].kind,
-        "class": renderer.device_class(),
+        "class": renderer._device_class(),
         "device": " and ".join(on.info.label for on in renderer.devices),
         "seconds": time.perf_counter() - began,
     }
@@ -311,7 +311,7 @@ def device_class(renderer: Renderer | MultiRenderer) -> str:
     Device, driver, lanes and trees; and what was chosen to suit the device, such as how many texels
     its memory lets images have.
     """
-    found = {**renderer.device_class(), **renderer.origin().settings}
+    found = {**renderer._device_class(), **renderer._origin().settings}
     return ", ".join(f"{name} {value}" for name, value in found.items())
 
 

@@ -11,6 +11,7 @@ import os
 import pickle
 import signal
 import subprocess
+import sys
 import threading
 import weakref
 from collections import deque
@@ -196,8 +197,7 @@ def _was_ended_at_limit(process: subprocess.Popen[bytes]) -> bool:
     """Whether the system has ended a process that no longer answers for its processor time."""
     with suppress(subprocess.TimeoutExpired):
         process.wait(1.0)
-    limit = getattr(signal, "SIGXCPU", None)
-    return limit is not None and process.returncode == -limit
+    return sys.platform != "win32" and process.returncode == -signal.SIGXCPU
 
 
 def spare_cores() -> int:

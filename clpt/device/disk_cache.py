@@ -162,7 +162,7 @@ def alone(entry: str) -> Iterator[None]:
     path = _lock_of(entry)
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        handle = os.open(path, os.O_CREAT | os.O_RDWR | getattr(os, "O_NOFOLLOW", 0), 0o600)
+        handle = os.open(path, os.O_CREAT | os.O_RDWR, 0o600)
     except OSError:
         yield
         return

@@ -11,6 +11,7 @@ from __future__ import annotations
 import ctypes
 import logging
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Any
 
 import pyopencl as cl
@@ -47,12 +48,11 @@ def binary(program: cl.Program) -> bytes:
     Some drivers compile to the end only for that, and PyOpenCL holds Python's lock meanwhile: no
     other thread could run, nor Ctrl-C end the process. So its size is asked for without that lock.
     """
-    ask = getattr(ctypes.CDLL(_cl.__file__), "clGetProgramInfo", None)
-    if ask is not None:
-        sizes, handle = cl.program_info.BINARY_SIZES, ctypes.c_void_p(program.int_ptr)
-        count = len(program.get_info(cl.program_info.DEVICES))
-        room = (ctypes.c_size_t * count)()
-        ask(handle, sizes, ctypes.c_size_t(ctypes.sizeof(room)), room, None)
+    room = (ctypes.c_size_t * len(program.get_info(cl.program_info.DEVICES)))()
+    size, handle = ctypes.c_size_t(ctypes.sizeof(room)), ctypes.c_void_p(program.int_ptr)
+    with suppress(AttributeError):  # the loader's functions are not seen through PyOpenCL's module
+        ask = ctypes.CDLL(_cl.__file__).clGetProgramInfo
+        ask(handle, cl.program_info.BINARY_SIZES, size, room, None)
     return next(filter(None, program.get_info(cl.program_info.BINARIES)))
 
 

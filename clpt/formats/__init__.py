@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, get_args
 from clpt import budget as budgets
 from clpt.budget import Budget
 from clpt.choices import Missing
-from clpt.errors import SceneError
+from clpt.errors import SceneError, nearest
 
 if TYPE_CHECKING:  # a name of a file is looked up without the kinds of scenes
     from clpt.scene import Scene
@@ -40,6 +40,7 @@ IN_FOLDERS = ("scene.json", "scene.xml", "scene.pbrt", "scene-v4.pbrt")
 SCENES = (".xml", ".pbrt", ".pbrt.gz", ".glb", ".gltf")
 MOST_COMPARED, CLOSE = 4096, 0.7  # names of a folder, and how near one is that is meant
 MOST_NAMED = 8  # scenes of a folder that a message names
+ARGUMENTS = ("kinds", "progress", "missing_textures", "budget")  # of `load`, beside variables
 
 __all__ = ["FORMATS", "load", "locate", "save"]
 
@@ -56,10 +57,10 @@ def load(
 ) -> Scene:
     """Read a scene, a bare mesh or a bare density; a folder means the scene in it (see IN_FOLDERS).
 
-    `kinds` are materials that are not clpt's own, of which a scene.json may speak. `variables` set
-    the `$names` of Mitsuba's XML; of glTF they choose scene, animation and time; of both `camera`
-    is the number or name of one of several. `progress` is
-    called with the share that is read, from 0 to 1, and a text, for files of many shapes.
+    `path` is that of the file. `kinds` are materials that are not clpt's own, of which a scene.json
+    may speak. `variables` set the `$names` of Mitsuba's XML; of glTF they choose scene, animation
+    and time; of both `camera` is the number or name of one of several. `progress` is called with
+    the share that is read, from 0 to 1, and a text, for files of many shapes.
     `missing_textures`: "grey" puts grey in the place of images that are not there, with a warning.
     `budget`: what the load may take of memory and time; a file that asks for more is refused.
     Raises SceneError with the file and, where it is known, the line.
@@ -91,9 +92,10 @@ def _load(
         message += "--camera AZIMUTH,ELEVATION such as 45,20 looks at all of a scene"
         raise SceneError(message, file=path)
     if variables and kind not in WITH_VARIABLES:
-        raise SceneError(
-            f"only .xml and glTF have variables, so {min(variables)!r} means nothing", file=path
-        )
+        name = min(variables)
+        message = f"only .xml and glTF have variables, so {name!r} means nothing"
+        near = difflib.get_close_matches(name, ARGUMENTS)
+        raise SceneError(message + (nearest(name, ARGUMENTS) if near else ""), file=path)
     if kinds and kind != "native":
         raise SceneError("only a scene.json can have kinds that are not clpt's own", file=path)
     loader = importlib.import_module(f"clpt.formats.{kind}").load

@@ -305,12 +305,7 @@ def _mesh(shape: shapes.Mesh) -> tuple[Points, Faces, Points | None, Points | No
     if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu":
         found = f"{faces.shape} {faces.dtype}"
         raise SceneError(f"faces must be (m, 3) whole numbers, found {found}", where=where(shape))
-    lowest, highest = int(faces.min()), int(faces.max())
-    if lowest < 0 or highest >= len(vertices):
-        wrong = lowest if lowest < 0 else highest
-        raise SceneError(
-            f"a face names vertex {wrong}, there are {len(vertices)}", where=where(shape)
-        )
+    shapes.check_faces(faces, len(vertices), where(shape))
     normals = _normals(shape, vertices, faces)
     uvs = None if shape.uvs is None else _array(shape, "uvs", 2, len(vertices))
     parts = vertices, faces.astype(np.uint32, copy=False), normals, uvs

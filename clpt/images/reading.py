@@ -31,11 +31,11 @@ def read(path: str | Path, *, linear: bool = True) -> Floats32:
 
     Other counts are possible for EXR files without colours, and .npy.
 
-    linear: colours, as linear Rec. 709. False: data, such as roughness or normals: the numbers as
-    they are stored, those of 8 and 16 bits in [0, 1]. Alpha is never decoded; colours of .exr are
-    multiplied by it, those of other files are not, and they stay so.
-
+    path: of the file. linear: colours, as linear Rec. 709. False: data, such as roughness or
+    normals: the numbers as they are stored, those of 8 and 16 bits in [0, 1]. Alpha is never
+    decoded; colours of .exr are multiplied by it, those of other files are not, and they stay so.
     What the file says and is left out is a warning in the log. docs/images.md has the table.
+
     Raises SceneError if there is no such file, its suffix is unknown, it is not an image, or too
     large.
     """

@@ -35,8 +35,9 @@ def write(
     view: View | None = None,
     prefix: str = "",
 ) -> None:
-    """Write a linear (h, w), (h, w, 1), (h, w, 3) or (h, w, 4) image in the format of the suffix.
+    """Write a linear (h, w), (h, w, 1), (h, w, 3) or (h, w, 4) image; the suffix says how.
 
+    path: of the file, with the suffix of its format.
     .exr: half, or float where `half` is False or half numbers do not reach the brightest pixel,
     with attributes from `metadata` and further `layers` in float, name -> (h, w) as the channel of
     that name, or (h, w, 3) as its .R, .G, .B; prefix: before R, G and B of the image, such as

@@ -26,7 +26,8 @@ class InstancedAccel(Queries):
     accels: the meshes, in one context and of one layout; their trees are copied, so a mesh that
     moves no more may be closed. prototypes: (k,) which mesh each instance is; transforms: (k, 4, 4)
     float32 from the mesh to the world, numpy or a PyOpenCL array. The `primitive` of a hit counts
-    in its mesh, and `instance` is the instance; t is in units of the world's direction.
+    in its mesh, and `instance` is the instance; t is in units of the world's direction. wait_for:
+    events of the caller that come first.
 
     Raises SceneError for meshes that do not fit together, and for a transform that is singular or
     moves a mesh beyond 1e12.

@@ -125,7 +125,7 @@ class FilmOwner(DeviceOwner):
         self._contents: Contents | Change = Contents()
 
     @property
-    def contents(self) -> Contents:
+    def _settled(self) -> Contents:
         """The contents of the film. Raises DeviceError while they change."""
         if isinstance(self._contents, Change):
             raise self._contents.unfinished()
@@ -141,7 +141,7 @@ class FilmOwner(DeviceOwner):
             raise now.failure()
         return now.former
 
-    def change(
+    def _change(
         self,
         what: str,
         finish: Callable[[BaseException], Contents] | None = None,
@@ -154,9 +154,9 @@ class FilmOwner(DeviceOwner):
         and returns what it then holds; without it the film is as it was until `Change.begin`.
         heals: whether `reset` makes it whole where that fails. Raises DeviceError within another.
         """
-        return Change(self, what, self.contents, finish, heals)
+        return Change(self, what, self._settled, finish, heals)
 
-    def healing(self, what: str, finish: Callable[[BaseException], Contents]) -> Change:
+    def _healing(self, what: str, finish: Callable[[BaseException], Contents]) -> Change:
         """Return a change as `change` does, also of what is broken."""
         now = self._contents
         former = now.former if isinstance(now, Change) else now

@@ -14,14 +14,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from clpt import images
 from clpt.arrays import Image
-from clpt.choices import MOST_SAMPLES
+from clpt.choices import MOST_SAMPLES, Exposure
+from clpt.colour.view import View
 from clpt.errors import SceneError
 from clpt.render.contents import FilmOwner
 from clpt.render.contract.features import Features
 from clpt.render.film import film_file
 from clpt.render.film.denoised_picture import DenoisedPicture
 from clpt.render.film.developed import Developed
+from clpt.render.film.layer_channels import write_layers
 from clpt.render.film.pictures import Pictures
 from clpt.render.film.saved_film import Origin, SavedFilm, Session
 from clpt.render.locking import Stop, synchronized
@@ -51,7 +54,7 @@ class FilmRenderer(FilmOwner, Pictures):
 
     scene: Scene
     warnings: list[str]
-    shows_meanwhile = False
+    _shows_meanwhile = False
 
     def __init__(self) -> None:
         super().__init__()
@@ -65,7 +68,7 @@ class FilmRenderer(FilmOwner, Pictures):
     # ---- what there is
 
     @property
-    def device_text(self) -> str:
+    def _device_text(self) -> str:
         """Names of the devices that take the samples, for people."""
         return " and ".join(on.info.label for on in self.devices)
 
@@ -93,7 +96,7 @@ class FilmRenderer(FilmOwner, Pictures):
         return 1.0 if chosen is None else chosen.active
 
     @property
-    def former_seconds(self) -> float:
+    def _former_seconds(self) -> float:
         """Seconds for which others rendered the film, before this renderer went on with it."""
         return sum(session.seconds for session in self._known.sessions)
 
@@ -104,7 +107,7 @@ class FilmRenderer(FilmOwner, Pictures):
 
     def _progress_so_far(self, device: Mapping[str, Plain]) -> dict[str, Any]:
         """Return what a saved film has beside its words and origin; device: the class it is of."""
-        now, chosen = self.contents, self._adaptive
+        now, chosen = self._settled, self._adaptive
         session = Session(now.began, self._seconds_rendered, VERSION, device)
         return {
             "taken": now.taken,
@@ -114,7 +117,7 @@ class FilmRenderer(FilmOwner, Pictures):
         }
 
     @abstractmethod
-    def origin(self) -> Origin:
+    def _origin(self) -> Origin:
         """Return what the samples are of. Raises SceneError for a scene that cannot be read."""
 
     # ---- samples
@@ -201,9 +204,9 @@ class FilmRenderer(FilmOwner, Pictures):
     # ---- the film, its pictures, and its files
 
     @synchronized
-    def developed(self, *words: str) -> Developed:
+    def _developed(self, *words: str) -> Developed:
         """Return the pictures of the film as it is now, which then stay; see `Pictures`."""
-        return Developed(self.film_state(), self.form)
+        return Developed(self.film_state(), self._form)
 
     @abstractmethod
     def film_state(self) -> FilmState:
@@ -214,15 +217,15 @@ class FilmRenderer(FilmOwner, Pictures):
         """Add the samples of another film of the same scene to this one, and wait."""
 
     @abstractmethod
-    def hold(self) -> None:
+    def _hold(self) -> None:
         """Keep the film as it is now, for `saved_film`."""
 
     @abstractmethod
-    def saved_film(self, *, held: bool = False) -> SavedFilm:
+    def _saved_film(self, *, held: bool = False) -> SavedFilm:
         """Return the film with all that it takes to go on with it; held: as it was when held."""
 
     @abstractmethod
-    def restore(self, saved: SavedFilm) -> None:
+    def _restore(self, saved: SavedFilm) -> None:
         """Go on from a saved film, as `load_state` does. Raises SceneError."""
 
     def denoised(self, method: str | None = None) -> Image:
@@ -234,12 +237,38 @@ class FilmRenderer(FilmOwner, Pictures):
         """
         return DenoisedPicture(self, method).image()
 
+    def save(
+        self,
+        path: str | Path,
+        *,
+        exposure: Exposure = 0.0,
+        tone: str = "none",
+        view: View | None = None,
+    ) -> None:
+        """Write the picture so far to a file, in the format of the path's suffix; wait for it.
+
+        An .exr has the film's layers. A renderer with `denoise` writes what is denoised.
+        exposure [stops], tone, view: of files for screens, see `clpt.write_image`.
+
+        Raises SceneError for an unknown suffix, and for a file that cannot be written.
+        """
+        path, film = Path(path), self.scene.film
+        if film.layers and path.suffix.lower() == ".exr" and self.denoise is None:
+            write_layers(path, self)
+            return
+        plain = self.image() if film.bands == 0 else self.colours()
+        picture = plain if self.denoise is None else self.denoised()
+        space = film.output_space
+        images.write(path, picture, exposure=exposure, space=space, tone=tone, view=view)
+
     def save_state(self, path: str | Path) -> None:
         """Write the film to a file, from which `load_state` goes on, in another process too.
 
+        path: of the file; the former one is replaced.
+
         Raises SceneError for a file that cannot be written: the former one is then as it was.
         """
-        saved = self.saved_film()
+        saved = self._saved_film()
         try:
             film_file.write(path, saved)
         except OSError as error:
@@ -247,6 +276,8 @@ class FilmRenderer(FilmOwner, Pictures):
 
     def load_state(self, path: str | Path) -> None:
         """Go on from a file of `save_state`, of any renderer: what the film held before is gone.
+
+        path: of the file.
 
         All that follows is to the bit as if nothing had been interrupted, where the device is of
         the class that took the samples; `warnings` tells where it is not.
@@ -256,7 +287,7 @@ class FilmRenderer(FilmOwner, Pictures):
         """
         saved = film_file.read(path)
         try:
-            self.restore(saved)
+            self._restore(saved)
         except SceneError as error:
             raise SceneError(error.message, file=path) from None
 

@@ -26,14 +26,14 @@ class DevicePictures(FilmRenderer):
     make_widget: given by who shows pictures in notebooks, see `clpt/__init__`.
     """
 
-    make_widget: ClassVar[Callable[..., Any]]
+    _make_widget: ClassVar[Callable[..., Any]]
 
     device: dev.Device
     _resolve: Resolve | None = None  # built when a picture is first resolved
 
     @property
     @abstractmethod
-    def wavefront(self) -> Wavefront:
+    def _wavefront(self) -> Wavefront:
         """The wavefront whose film holds the picture."""
 
     @property
@@ -51,7 +51,7 @@ class DevicePictures(FilmRenderer):
         renderer's queue; steps wait for those of its `events` that readers add, as its `get_async`
         does.
         """
-        return self.wavefront.film.picture
+        return self._wavefront.film.picture
 
     @synchronized
     def resolve(
@@ -73,13 +73,14 @@ class DevicePictures(FilmRenderer):
         exposure [stops]; tone: none, reinhard, aces, agx or neutral, see clpt.colour.tones; srgb:
         whether the sRGB transfer is applied, by default to uint8 only; colours become Rec. 709.
         view: of OpenColorIO, in the place of tone and transfer: a table of it, right to 1/512 for
-        98 of 100 colours. flip: the first row is the lowest.
+        98 of 100 colours. flip: the first row is the lowest. wait_for: events of the caller that
+        come first.
 
         Returns the Array, whose `events` hold the event of the picture; for an Image the event.
         Raises DeviceError if the picture does not fit, UnknownKindError for names.
         """
         if self._resolve is None:
-            self._resolve = Resolve(self.device, self.wavefront.stream)
+            self._resolve = Resolve(self.device, self._wavefront.stream)
         return self._resolve(
             self.film, into, dtype=dtype, exposure=exposure,
             tone=tone, srgb=srgb, flip=flip, view=view, wait_for=wait_for,
@@ -92,7 +93,7 @@ class DevicePictures(FilmRenderer):
         It is rendered by another renderer, with these options, in a thread of its own; see
         clpt.view.widget.Widget. Raises ClptError where clpt[notebook] is not installed.
         """
-        return type(self).make_widget(self.scene, self.device, **options)
+        return type(self)._make_widget(self.scene, self.device, **options)
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         """`image()`, for numpy.asarray(renderer): a copy, which waits."""

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import pyopencl as cl
 
 from clpt import device as dev
-from clpt.arrays import Image
 from clpt.denoise import needs
 from clpt.errors import DeviceError, MemoryBudgetError, SceneError
 from clpt.geometry import shapes
@@ -32,7 +31,7 @@ from clpt.render.editing.scene_edit import (
     match_replacements,
     resolve_device_arrays,
 )
-from clpt.render.film_renderer import Watch, checked_number, checked_samples, next_range
+from clpt.render.film_renderer import Watch, checked_number, next_range
 from clpt.render.locking import healing, synchronized
 from clpt.render.lowering.scene import Lowered, lower
 from clpt.render.options import RenderOptions, check_changes, check_options, check_scene
@@ -75,7 +74,7 @@ class Renderer(Resumable):
     makes no sense; DeviceError, MemoryBudgetError, KernelBuildError.
     """
 
-    shows_meanwhile = True
+    _shows_meanwhile = True
 
     def __init__(
         self,
@@ -100,8 +99,8 @@ class Renderer(Resumable):
         self._texture_budget, self._successors = texture_budget, Successors()
         lowered = self._lower(scene)
         self._seconds["lower"] = time.perf_counter() - self._start
-        self._wavefront: Wavefront | None = None
-        self._wavefront = first = Wavefront.create(
+        self._opened: Wavefront | None = None
+        self._opened = first = Wavefront.create(
             device,
             lowered,
             Tuning(options.get("layout"), options.get("queued"), options.get("cancel_seconds")),
@@ -133,15 +132,15 @@ class Renderer(Resumable):
         Many drivers compile a kernel to its end when it runs for the first time. The film and the
         number of the next sample stay.
         """
-        now = self.contents
+        now = self._settled
         with self._adding("prepare", now):
-            self.wavefront.render_samples(self.samples, self.samples)
+            self._wavefront.render_samples(self.samples, self.samples)
             self._contents = now
 
     @property
-    def wavefront(self) -> Wavefront:
+    def _wavefront(self) -> Wavefront:
         """The wavefront that renders on the device. Raises DeviceError after `close`."""
-        wavefront = self._wavefront
+        wavefront = self._opened
         if wavefront is None:
             raise self._closed_error()
         return wavefront
@@ -157,11 +156,11 @@ class Renderer(Resumable):
         Raises SceneError for a number that is none, DeviceError if the driver refuses.
         """
         first, end = next_range(self.samples, samples)
-        stream = self.wavefront.stream
+        stream = self._wavefront.stream
         stream.after(wait_for)
         more = self._with(first, end)
         with self._adding("step", more, plain=True):
-            self.wavefront.enqueue(first, end)
+            self._wavefront.enqueue(first, end)
             stream.flush()
             if more.adaptive is not None:
                 more.adaptive.skip(end)
@@ -177,7 +176,7 @@ class Renderer(Resumable):
         What the caller then raises is logged: in a thread of the driver nobody could catch it.
         """
         samples, start = self.samples, self._start
-        pixels = self.wavefront.paths.pixels
+        pixels = self._wavefront.paths.pixels
 
         def report(_: int) -> None:
             seconds = time.perf_counter() - start
@@ -190,11 +189,11 @@ class Renderer(Resumable):
 
     @property
     def _features(self) -> Features:
-        return self.wavefront.features
+        return self._wavefront.features
 
     @property
     def _pixels(self) -> int:
-        return self.wavefront.paths.pixels
+        return self._wavefront.paths.pixels
 
     def _add_samples(self, first: int, end: int, noise: float | None, watch: Watch) -> bool:
         """Add samples to all pixels, or to those with noise; return whether all were added."""
@@ -204,12 +203,12 @@ class Renderer(Resumable):
                 raise _Discarded
             return watch()
 
-        if noise is not None and self.contents.adaptive is None:
-            begun = self.adaptively(None, self.denoise)
+        if noise is not None and self._settled.adaptive is None:
+            begun = self._adaptively(None, self.denoise)
             begun.skip(first)
-            self._contents = dataclasses.replace(self.contents, adaptive=begun)
+            self._contents = dataclasses.replace(self._settled, adaptive=begun)
         more = self._with(first, end)
-        self.wavefront.leave.lower()  # that a `cancel` raised which came too late for another run
+        self._wavefront.leave.lower()  # that a `cancel` raised which came too late for another run
         with self._adding("run", more, plain=noise is None):
             try:
                 finished = self._render_samples(more.adaptive, first, end, noise, on_batch)
@@ -230,14 +229,14 @@ class Renderer(Resumable):
         """Add samples to all pixels, or to those with noise; return whether all were added."""
         if noise is not None and chosen is not None:
             return chosen.run(end, noise, on_batch)
-        finished = self.wavefront.render_samples(first, end, on_batch)
+        finished = self._wavefront.render_samples(first, end, on_batch)
         if chosen is not None:
             chosen.skip(end)  # after a stop too: numbers are not used again
         return finished
 
     def _with(self, first: int, end: int) -> Contents:
         """Return the contents of the film with the samples from `first` to `end` added."""
-        now = self.contents
+        now = self._settled
         return dataclasses.replace(now, taken=join_ranges(now.taken, ((first, end),)))
 
     def _adding(self, what: str, more: Contents, *, plain: bool = False) -> Change:
@@ -247,7 +246,7 @@ class Renderer(Resumable):
         it holds that too, though some pixels may lack some of these samples; or what it held, if
         none has begun. An error of the device makes nothing whole.
         """
-        now, wavefront = self.contents, self.wavefront
+        now, wavefront = self._settled, self._wavefront
         wavefront.begun = False
 
         def finish(error: BaseException) -> Contents:
@@ -264,11 +263,11 @@ class Renderer(Resumable):
             wavefront.refresh()
             return more if begun else now
 
-        return self.change(what, finish)
+        return self._change(what, finish)
 
-    def tracer(self) -> Tracer:
+    def _tracer(self) -> Tracer:
         """Return what adds selections of samples to the film."""
-        return Tracer(self.wavefront)
+        return Tracer(self._wavefront)
 
     @property
     def devices(self) -> tuple[dev.Device, ...]:
@@ -278,15 +277,15 @@ class Renderer(Resumable):
     @property
     def counts(self) -> Counts:
         """Counts of samples and rays so far, and of those that the film refused."""
-        return self.wavefront.counts
+        return self._wavefront.counts
 
     def cancel(self, *, discard: bool = False) -> None:
         """Let the `run` of another thread, or else the next one, stop soon and return False.
 
         discard: see `FilmRenderer.cancel`.
         """
-        if discard and self._wavefront is not None:  # who sees the flag finds the reason soon
-            self._wavefront.leave.raise_()
+        if discard and self._opened is not None:  # who sees the flag finds the reason soon
+            self._opened.leave.raise_()
             self._discards = True
         super().cancel()
 
@@ -304,7 +303,8 @@ class Renderer(Resumable):
     ) -> cl.Event:
         """Enqueue that the film is emptied; the next sample is the first one again.
 
-        first_sample: its number from now on, by default as before. seed: of the samples from now
+        wait_for: events of the caller that come first. first_sample: its number from now on, by
+        default as before. seed: of the samples from now
         on, which `self.scene` then has; by default as before. Raises SceneError for a seed that is
         no whole number, and for a number that is too large.
 
@@ -315,8 +315,8 @@ class Renderer(Resumable):
         if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int)):
             raise SceneError(f"must be a whole number, not {seed!r}", where="seed")
         broken = isinstance(self._contents, Change)
-        self.wavefront.stream.after(wait_for)
-        with self.healing("reset", lambda _: self._emptied(recover=True)):
+        self._wavefront.stream.after(wait_for)
+        with self._healing("reset", lambda _: self._emptied(recover=True)):
             if seed is not None:
                 self.scene = dataclasses.replace(self.scene, seed=seed)
             if first_sample is not None:
@@ -326,14 +326,14 @@ class Renderer(Resumable):
 
     @property
     def _last(self) -> cl.Event:
-        event = self.wavefront.stream.last
+        event = self._wavefront.stream.last
         assert event is not None, "something was enqueued"
         return event
 
     def _emptied(self, *, recover: bool = False) -> Contents:
         """Enqueue that the film is empty; return what it then holds; recover: from an error at any
         line."""
-        wavefront = self.wavefront
+        wavefront = self._wavefront
         if recover:
             wavefront.stream.rejoin()
             use_all_pixels(wavefront)
@@ -353,13 +353,13 @@ class Renderer(Resumable):
         Raises SceneError if the film has another form, or a sample is in both: nothing has changed.
         """
         merged = self.film_state().merged(state)
-        after = dataclasses.replace(self.contents, taken=merged.taken, adaptive=None)
+        after = dataclasses.replace(self._settled, taken=merged.taken, adaptive=None)
         self._hold_words("merge", merged, after)
 
     @synchronized
-    def set_words(self, state: FilmState) -> None:
+    def _set_words(self, state: FilmState) -> None:
         """Let the film hold the words of another one of its form; `samples` stays."""
-        self._hold_words("set_words", state, self.contents)
+        self._hold_words("set_words", state, self._settled)
 
     def _hold_words(self, what: str, state: FilmState, after: Contents) -> None:
         """Let the film hold these words; after: what it then holds."""
@@ -368,7 +368,7 @@ class Renderer(Resumable):
             self._put(state)
             return after
 
-        with self.change(what, put):
+        with self._change(what, put):
             self._contents = put()
 
     def close(self) -> None:
@@ -379,7 +379,7 @@ class Renderer(Resumable):
         """
         with self._lock:
             self._closed = True
-            self._wavefront = None
+            self._opened = None
             self._contents = Contents()
             self._moving = self._resolve = None
 
@@ -405,7 +405,8 @@ class Renderer(Resumable):
         film, for any other change; arrays and images that it shares with the present one are taken
         to be unchanged. motion: what changes place, of shapes, lights and the camera, moves from
         where it was to where it is, and so do vertices, while the shutter of the camera is open;
-        the next update goes on from there. The scene is lowered again then, and once more after.
+        the next update goes on from there. wait_for: events of the caller that come first. The
+        scene is lowered again then, and once more after.
 
         The first of three ways that is possible is taken:
 
@@ -427,7 +428,7 @@ class Renderer(Resumable):
             scene = needs.prepared(scene, self.denoise)
         check_changes(camera, materials=materials, transforms=transforms, vertices=vertices)
         events = list(wait_for or ())
-        self.wavefront.stream.after(events)
+        self._wavefront.stream.after(events)
         quick = scene is None and not (motion or self._blurred)
         moves = quick and bool(transforms or vertices)
         if moves and self._move(transforms or {}, vertices or {}):
@@ -475,7 +476,7 @@ class Renderer(Resumable):
             self._successors.note(replaced)
             return self._emptied()
 
-        with self.change("update", put, heals=False):
+        with self._change("update", put, heals=False):
             self._contents = put()
 
     def _lower(self, scene: Scene, former: Lowered | None = None) -> Lowered:
@@ -496,11 +497,11 @@ class Renderer(Resumable):
     def _move(self, transforms: Mapping[ShapeKey, Any], vertices: Mapping[ShapeKey, Any]) -> bool:
         """Move shapes on the device, and begin at sample 0; return whether they could."""
         if self._moving is None:
-            self._moving = Moving(self.wavefront.scene, self.scene)
+            self._moving = Moving(self._wavefront.scene, self.scene)
         moved, replaced = self._edit(self.scene, None, transforms, vertices)
         if self._enters_a_medium(moved):
             return False
-        with self.change("update", heals=False) as change:
+        with self._change("update", heals=False) as change:
             refusal = self._moving.move(self.scene, replaced, change.begin)
             if refusal is not None:
                 log.debug("shapes cannot move on the device: %s", refusal)
@@ -514,7 +515,7 @@ class Renderer(Resumable):
         """Return what writes the words of parameters that differ, None if more does."""
         if self._enters_a_medium(scene):
             return None
-        found = parameter_patch.patch(self.wavefront.scene, self.scene, scene)
+        found = parameter_patch.patch(self._wavefront.scene, self.scene, scene)
         if isinstance(found, str):
             log.debug("words alone do not change the scene: %s", found)
             return None
@@ -522,7 +523,7 @@ class Renderer(Resumable):
 
     def _enters_a_medium(self, scene: Scene) -> bool:
         """Whether the camera or a light of a changed scene may be in other media than before."""
-        lowered = self.wavefront.scene.lowered
+        lowered = self._wavefront.scene.lowered
         if not lowered.features.media.present:
             return False
         if lowered.features.light_media and _lights_moved(self.scene, scene):
@@ -543,7 +544,7 @@ class Renderer(Resumable):
         for event in events:
             dev.wait(event)
         shown, remarks = between(self.scene, scene) if motion else (scene, [])
-        first = self.wavefront
+        first = self._wavefront
         lowered = self._lower(shown, first.scene.lowered)
         take = rebuild.prepare(first, lowered, refit)
 
@@ -557,7 +558,7 @@ class Renderer(Resumable):
     @synchronized
     def stats(self) -> RenderStats:
         """Figures of the render so far: numbers of things, bytes by table and tree, seconds."""
-        return collect(self.wavefront, *self._built, dict(self._seconds))
+        return collect(self._wavefront, *self._built, dict(self._seconds))
 
 
 def _opened(device: dev.Device | str | int | None, options: RenderOptions) -> dev.Device:
@@ -595,26 +596,3 @@ def _placement(light: Light) -> tuple[Any, ...]:
 def texture_budget_of(device: dev.Device) -> int:
     """Return what bitmaps may take on a device [bytes]: half of what is free, in one buffer."""
     return min(int(TEXTURE_SHARE * device.free_memory()), device.info.max_alloc)
-
-
-def render(
-    scene: Scene,
-    spp: int | None = None,
-    *,
-    device: dev.Device | str | int | None = None,
-    progress: Callable[[Progress], bool | None] | None = None,
-    noise: float | None = None,
-    **options: Unpack[RenderOptions],
-) -> Image:
-    """Render a scene: (h, w, 3) float32 linear Rec. 709; else see `Renderer.image`.
-
-    spp: samples per pixel, noise and progress: see `Renderer.run`; spp and noise are the scene's
-    own by default. device: see `Renderer`; options: see `RenderOptions`; with `denoise` the picture
-    is denoised. Raises as `Renderer` does.
-    """
-    check_scene(scene)
-    spp = checked_samples(scene.spp if spp is None else spp)
-    noise = scene.noise if noise is None else noise
-    renderer = Renderer(dataclasses.replace(scene, spp=spp, noise=noise), device, **options)
-    renderer.run(spp, progress, noise=noise)
-    return renderer.image() if renderer.denoise is None else renderer.denoised()

@@ -51,57 +51,57 @@ class Resumable(DevicePictures):
     @synchronized
     def film_state(self) -> FilmState:
         """Return what the film holds, as whole numbers on the host; wait for it."""
-        return self.words(self.contents.taken, held=False)
+        return self._words(self._settled.taken, held=False)
 
     @synchronized
-    def developed(self, *words: str) -> Developed:
+    def _developed(self, *words: str) -> Developed:
         """Return the pictures of the film as it is now, which then stay; see `Pictures`."""
-        return Developed(self.words((), held=False, names=words), self.form)
+        return Developed(self._words((), held=False, names=words), self._form)
 
-    def words(self, taken: Ranges, *, held: bool, names: tuple[str, ...] = ()) -> FilmState:
+    def _words(self, taken: Ranges, *, held: bool, names: tuple[str, ...] = ()) -> FilmState:
         """Return what the film holds, or held, as `film_state` does, of samples that are taken.
 
         names: of the arrays that are wanted, all by default.
         """
-        first = self.wavefront
+        first = self._wavefront
         scale = float(first.paths.settings["film_scale"])
         arrays = first.film.words(*(names or DIMENSIONS), held=held)
         return FilmState(taken=taken, scale=scale, **arrays)
 
     @synchronized
-    def hold(self) -> None:
-        """Keep a copy of the film on the device, as it is now, for `saved_film`.
+    def _hold(self) -> None:
+        """Keep a copy of the film on the device, as it is now, for `_saved_film`.
 
         So a render that is stopped in the middle of a `run` can be saved as it was before: without
         samples that some pixels have and others have not. Raises MemoryBudgetError.
         """
-        so_far, self._held = self._progress_so_far(self.device_class()), None
-        self.wavefront.film.hold()
+        so_far, self._held = self._progress_so_far(self._device_class()), None
+        self._wavefront.film.hold()
         self._held = so_far
 
     @synchronized
-    def saved_film(self, *, held: bool = False) -> SavedFilm:
+    def _saved_film(self, *, held: bool = False) -> SavedFilm:
         """Return the film with all that it takes to go on with it; wait for the device.
 
-        held: as it was at the last `hold`. Raises SceneError for a scene that cannot be read, and
-        without a `hold`.
+        held: as it was at the last `_hold`. Raises SceneError for a scene that cannot be read, and
+        without a `_hold`.
         """
         if held and self._held is None:
-            raise SceneError("no film is held; call hold() first")
+            raise SceneError("no film is held")
         if held and self._held is not None:
             so_far = dict(self._held)
         else:
-            so_far = self._progress_so_far(self.device_class())
-        state = self.words(so_far.pop("taken"), held=held)
-        return SavedFilm(state, self.origin(), self.form, **so_far)
+            so_far = self._progress_so_far(self._device_class())
+        state = self._words(so_far.pop("taken"), held=held)
+        return SavedFilm(state, self._origin(), self._form, **so_far)
 
     @synchronized
-    def origin(self) -> Origin:
+    def _origin(self) -> Origin:
         """Return what the samples are of. Raises SceneError for a scene that cannot be read."""
         if self._scene_read is None or self._scene_read[0] is not self.scene:
-            readable = resolve_device_arrays(self.scene, self.wavefront.stream.queue)
+            readable = resolve_device_arrays(self.scene, self._wavefront.stream.queue)
             self._scene_read = self.scene, fingerprint(readable)
-        first = self.wavefront
+        first = self._wavefront
         lowered, features = first.scene.lowered, first.features
         settings: dict[str, Plain] = {
             "chosen.integrator": lowered.integrator.kind,
@@ -118,9 +118,9 @@ class Resumable(DevicePictures):
         return Origin(self._scene_read[1], settings, digest, VERSION)
 
     @synchronized
-    def device_class(self) -> dict[str, Plain]:
+    def _device_class(self) -> dict[str, Plain]:
         """Return what decides the last bits of samples: equal classes give equal films."""
-        first, info = self.wavefront, self.device.info
+        first, info = self._wavefront, self.device.info
         return {
             "device": info.label,
             "driver": f"{info.version} {info.driver}",
@@ -129,13 +129,13 @@ class Resumable(DevicePictures):
             "tree_quality": first.scene.tree_quality,
         }
 
-    def adaptively(self, tracer: Tracer | None, denoise: str | None) -> Adaptive:
+    def _adaptively(self, tracer: Tracer | None, denoise: str | None) -> Adaptive:
         """Return adaptive sampling of this film, which begins.
 
         tracer: adds the samples; denoise: a denoiser: noise is then what it leaves. Light paths
         have their noise before. Raises SceneError where halves are wanted and not kept.
         """
-        first = self.wavefront
+        first = self._wavefront
         if denoise is None or first.features.transport.weighed:
             return Adaptive(first, tracer)
         if first.film.halves != 2:
@@ -144,15 +144,15 @@ class Resumable(DevicePictures):
         return Adaptive(first, tracer, DenoisedNoise(self, self.device, denoise).measure)
 
     @synchronized
-    def restore(self, saved: SavedFilm) -> None:
+    def _restore(self, saved: SavedFilm) -> None:
         """Go on from a saved film, as `load_state` does. Raises SceneError."""
-        saved.origin.check_same(self.origin())
+        saved.origin.check_same(self._origin())
         own, given = self.film_state().arrays, saved.film.arrays
         if any(own[name].shape != given[name].shape for name in own):
             raise SceneError("the film has another form than this scene's")
         adaptive = None
         if saved.adaptive:
-            adaptive = self.adaptively(None, self.denoise)
+            adaptive = self._adaptively(None, self.denoise)
             try:
                 adaptive.restore(saved.adaptive)
             except (KeyError, ValueError) as error:
@@ -162,26 +162,26 @@ class Resumable(DevicePictures):
 
         def put(_: BaseException | None = None) -> Contents:
             self._held, self._seconds_rendered = None, 0.0
-            self.wavefront.counts = Counts(**saved.counts)
+            self._wavefront.counts = Counts(**saved.counts)
             self._put(saved.film)
             return restored
 
-        with self.change("load_state", put):
+        with self._change("load_state", put):
             self._contents = put()
-        others = other_devices(saved.sessions, self.device_class())
+        others = other_devices(saved.sessions, self._device_class())
         if others:
             self.warnings.append(classes_text(others))
             log.warning("%s", self.warnings[-1])
 
     def _put(self, state: FilmState) -> None:
         """Enqueue that the film holds the words of another one of its form."""
-        self.wavefront.set_words(state.arrays)
+        self._wavefront.set_words(state.arrays)
 
     @property
     @synchronized
-    def form(self) -> PictureForm:  # type: ignore[override]
+    def _form(self) -> PictureForm:  # type: ignore[override]
         """The way from the film's words to a picture."""
-        first, film = self.wavefront, self.scene.film
+        first, film = self._wavefront, self.scene.film
         settings, features = first.paths.settings, first.features
         return PictureForm(
             tuple(tuple(float(v) for v in np.ravel(settings[name])[:3]) for name in TO_OUTPUT),

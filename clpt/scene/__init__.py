@@ -4,13 +4,31 @@ from __future__ import annotations
 
 import math
 import numbers
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import FunctionType, ModuleType
+from typing import Any, ClassVar
+
+import numpy as np
 
 from clpt.errors import SceneError
-from clpt.scene import cameras, integrators, lights, materials, media, shapes, textures
+from clpt.scene import (
+    cameras,
+    integrators,
+    lights,
+    materials,
+    media,
+    paths,
+    shapes,
+    studio,
+    textures,
+    trimeshes,
+)
 from clpt.scene.integrators import Auto, Film, Sobol
+from clpt.scene.lights import Light
 from clpt.scene.params import Kind
+from clpt.scene.shapes import Shape
+from clpt.scene.studio import Up
 
 __all__ = [
     "KINDS",
@@ -40,6 +58,26 @@ KINDS: dict[str, tuple[type[Kind], ...]] = {
 }
 
 
+def __dir__() -> list[str]:
+    return __all__
+
+
+def _show_own(module: ModuleType) -> None:
+    """Let TAB after a module's name show what it defines, not what it imports."""
+    defined = (type, FunctionType)
+    own = [
+        name
+        for name, value in vars(module).items()
+        if not name.startswith("_")
+        and (name.isupper() or (isinstance(value, defined) and value.__module__ == module.__name__))
+    ]
+    vars(module)["__dir__"] = lambda: own
+
+
+for _module in (cameras, integrators, lights, materials, media, shapes, textures):
+    _show_own(_module)
+
+
 def kinds(category: str) -> dict[str, type[Kind]]:
     """Return the kinds of a category by their names in scene files."""
     return {cls.kind: cls for cls in KINDS[category]}
@@ -49,10 +87,11 @@ def kinds(category: str) -> dict[str, type[Kind]]:
 class Scene:
     """A whole scene.
 
-    shapes, lights: what there is; lights that are surfaces are a shape's `emission`. integrator:
-    how light is followed; sampler: where its random numbers come from; film: size, mode, filter and
-    colours of the picture. spp: samples of a pixel, for `clpt.render`; noise: below which it gets
-    no more, None for all, see clpt.render.wavefront.adaptive; seed: of the random numbers.
+    camera: from which it is seen. shapes, lights: what there is; lights that are surfaces are a
+    shape's `emission`. integrator: how light is followed; sampler: where its random numbers come
+    from; film: size, mode, filter and colours of the picture. spp: samples of a pixel, for
+    `clpt.render`; noise: below which it gets no more, None for all, see
+    clpt.render.wavefront.adaptive; seed: of the random numbers. name: for messages and files.
     warnings: what a loader had to pass over; extra: what else it found, for people.
 
     Raises SceneError for `spp` that is no whole number above zero, and `noise` likewise.
@@ -71,11 +110,140 @@ class Scene:
     warnings: list[str] = field(default_factory=list)
     extra: dict[str, Any] = field(default_factory=dict)
 
+    # Makes the picture that a notebook shows: given by clpt/__init__, as scenes know no renderer.
+    _picture: ClassVar[Callable[[Scene], bytes] | None] = None
+
+    def _repr_png_(self) -> bytes | None:
+        """Return a small picture of the scene as PNG, which a notebook shows of it."""
+        return None if Scene._picture is None else Scene._picture(self)
+
+    @classmethod
+    def studio(
+        cls,
+        things: object,
+        *,
+        camera: cameras.Camera | None = None,
+        lights: Sequence[Light] = (),
+        up: Up = "y",
+        name: str = "",
+    ) -> Scene:
+        """Return a scene of shapes in a photographer's studio, as `clpt render mesh.ply` makes it.
+
+        things: a shape, a `trimesh.Trimesh`, or a list of them. camera: by default one that frames
+        them all, from the front and above. lights: by default a warm key light and a cool fill,
+        over a ground that curves up to a backdrop. up: "y", or "z" as in CAD; the front is +z, or
+        -y then. name: of the scene.
+
+        Raises SceneError for shapes too large to be framed.
+        """
+        listed = [things] if trimeshes.is_mesh(things) else _listed(things, "shapes")
+        shapes_ = [
+            shapes.Mesh.from_trimesh(thing) if trimeshes.is_mesh(thing) else thing
+            for thing in listed
+        ]
+        made = studio.parts(shapes_, camera=camera, own_lights=lights, up=up)
+        return cls(**made, name=name)
+
+    @classmethod
+    def from_trimesh(cls, scene: Any, *, up: Up = "y", name: str = "") -> Scene:
+        """Return a `trimesh.Scene` in the studio: its meshes where they are, with their materials.
+
+        It is seen by its own camera if it has been given one. up, name: see `studio`. What is no
+        mesh, such as a path, is left out, with a warning.
+
+        Raises SceneError for an object that is not a scene of trimesh.
+        """
+        if not trimeshes.is_scene(scene):
+            message = f"must be a trimesh.Scene, not {type(scene).__name__}; "
+            raise SceneError(message + "Scene.studio takes a mesh", where="scene")
+        meshes: dict[str, shapes.Mesh] = {}
+        placed: list[Shape] = []
+        left_out: list[str] = []
+        for node in scene.graph.nodes_geometry:
+            to_world, key = scene.graph[node]
+            geometry = scene.geometry[key]
+            if not trimeshes.is_mesh(geometry):
+                left_out.append(f"{key}: a {type(geometry).__name__} is no mesh, left out")
+                continue
+            if key not in meshes:
+                meshes[key] = shapes.Mesh.from_trimesh(geometry, name=str(key))
+            placed.append(replace(meshes[key], to_world=np.array(to_world), name=str(node)))
+        camera = None
+        if scene.has_camera:
+            camera = trimeshes.camera_of(scene.camera, scene.camera_transform)
+        made = cls.studio(placed, camera=camera, up=up, name=name)
+        made.warnings = list(dict.fromkeys(left_out))
+        return made
+
+    def parameters(self) -> dict[str, Any]:
+        """Return all parameters by their paths, as "ball.material.reflectance", in their order.
+
+        A path begins with camera, film, integrator, sampler, spp, noise or seed; with the name of
+        a shape or of a material; or with shapes[0] or lights[0]. See also `changed`.
+        """
+        return paths.parameters(self)
+
+    def __getitem__(self, path: str) -> Any:
+        """Return the parameter or the object at a path, see `parameters`.
+
+        Raises SceneError, with the nearest names, for a path that leads to nothing.
+        """
+        return paths.get(self, path)
+
+    def changed(self, values: Mapping[str, Any]) -> Scene:
+        """Return a scene with other values, by their paths; this one stays as it is.
+
+        `renderer.update(scene=scene.changed({"ball.material.reflectance": 0.2}))` renders it. What
+        several shapes share, such as a material, changes at all of them.
+
+        Raises SceneError for a path that leads to nothing, and a value that makes no sense there.
+        """
+        scene = self
+        for path, value in values.items():
+            parts: dict[str, Any] = paths.changes(scene, path, value)
+            scene = replace(scene, **parts)
+        return scene
+
     def __post_init__(self) -> None:
+        self.shapes, self.lights = _listed(self.shapes, "shapes"), _listed(self.lights, "lights")
+        check_parts(self)
         if isinstance(self.spp, bool) or not isinstance(self.spp, int) or self.spp < 1:
             raise SceneError(f"must be a whole number above zero, not {self.spp!r}", where="spp")
         if self.noise is not None:
             check_noise(self.noise)
+
+
+def check_parts(scene: Scene) -> None:
+    """Raise SceneError for a part of a scene that is of another category."""
+    _check_kind(scene.camera, cameras.Camera, "camera")
+    _check_kind(scene.integrator, integrators.Integrator, "integrator")
+    _check_kind(scene.sampler, integrators.Sampler, "sampler")
+    _check_kind(scene.film, Film, "film")
+    held: tuple[tuple[str, Sequence[object], type[Kind]], ...] = (
+        ("shapes", scene.shapes, Shape),
+        ("lights", scene.lights, Light),
+    )
+    for name, things, base in held:
+        for i, thing in enumerate(things):
+            if not isinstance(thing, base):  # there may be a million
+                _check_kind(thing, base, f"{name}[{i}]")
+
+
+def _listed(held: object, name: str) -> list[Any]:
+    """Return a list as it is, one thing or other items in a new one. Raises SceneError."""
+    if isinstance(held, (list, Kind)):
+        return held if isinstance(held, list) else [held]
+    try:
+        return list(held)  # type: ignore[call-overload]
+    except TypeError:
+        raise SceneError(f"must be a list of {name}, not {held!r}", where=name) from None
+
+
+def _check_kind(value: object, base: type[Kind], where: str) -> None:
+    """Raise SceneError for a value that is of no kind of a category."""
+    if not isinstance(value, base):
+        message = f"must be of a kind of {base.__name__.lower()}, not {value!r}"
+        raise SceneError(message, where=where)
 
 
 def check_noise(noise: Any) -> None:

@@ -2,24 +2,53 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import InitVar, dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from clpt import lenses
+from clpt import lenses, transforms
 from clpt.errors import SceneError
 from clpt.lenses import Prescription
+from clpt.scene import roles
 from clpt.scene.media import Medium
 from clpt.scene.motion import Keys, Shutter
-from clpt.scene.params import Kind, choice, flag, host, index, real
-from clpt.scene.values import IndexLike, Matrix4
+from clpt.scene.params import Kind, Shorthand, choice, flag, host, index, real
+from clpt.scene.roles import Param
+from clpt.scene.values import IndexLike, Matrix4, Vector3
 
 MOST_BLADES = 24
+
+
+def _looking(
+    origin: Vector3 | None = None, target: Vector3 | None = None, up: Vector3 = (0.0, 1.0, 0.0)
+) -> dict[str, Any]:
+    """Return the placement of a camera at `origin` that looks at `target`."""
+    if origin is None or target is None:
+        raise SceneError("give origin and target, both", where="target" if origin else "origin")
+    return {"to_world": transforms.look_at(origin, target, up)}
+
+
+LOOK_AT = Shorthand(
+    {
+        "origin": Param(roles.host("vector"), "where the camera is", "m"),
+        "target": Param(roles.host("vector"), "what it looks at", "m"),
+        "up": Param(roles.host("vector"), "what is up in the picture; (0, 1, 0) if left out"),
+    },
+    ("to_world",),
+    _looking,
+)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Camera(Kind):
     """Base of all cameras."""
+
+    shorthands: ClassVar[tuple[Shorthand, ...]] = (LOOK_AT,)
+    if TYPE_CHECKING:  # arguments only: they stand for `to_world`
+        origin: InitVar[Vector3 | None] = None
+        target: InitVar[Vector3 | None] = None
+        up: InitVar[Vector3 | None] = None
 
     to_world: Matrix4 = host(np.eye(4), "camera to world, (4, 4)")
     medium: Medium | None = host(None, "around the camera, or None", form="medium")
@@ -129,6 +158,8 @@ class Matrix(Camera):
     Rays come from the inverse of projection @ view; clip space z from -1 (near) to 1 (far).
     `to_world` is not used.
     """
+
+    shorthands = ()
 
     view: Matrix4 = host(np.eye(4), "world to eye, (4, 4), eye space looks along -z")
     projection: Matrix4 = host(np.eye(4), "eye to clip, (4, 4)")

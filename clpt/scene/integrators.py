@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from clpt.choices import AUTO, MOST_LIGHT_PATHS
 from clpt.errors import SceneError, UnknownKindError
+from clpt.scene import roles
 from clpt.scene.layers import LAYERS
-from clpt.scene.params import Kind, choice, emission, fields_of, flag, host, real
+from clpt.scene.params import Kind, Shorthand, choice, emission, fields_of, flag, host, real
+from clpt.scene.roles import Param
 from clpt.scene.values import SpectrumLike
 from clpt.spectra import Sensor, illuminants, spaces
 from clpt.spectra.sensors import OBSERVERS
@@ -279,6 +281,12 @@ class BlackmanHarris(Filter):
     radius: float = real(1.5, "half width", "pixels", 0.01, 16.0)
 
 
+def _width_and_height(size: tuple[int, int]) -> dict[str, int]:
+    if not isinstance(size, (tuple, list, np.ndarray)) or len(size) != 2:
+        raise SceneError(f"must be (width, height), not {size!r}", where="size")
+    return {"width": size[0], "height": size[1]}
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Film(Kind):
     """The picture that is recorded: size, mode, wavelengths, filter, and how light becomes colour.
@@ -288,6 +296,14 @@ class Film(Kind):
     (Bradford); without it colours are as the sensor tells them. A `sensor` other than cie1931 and
     `bands` need the spectral mode.
     """
+
+    shorthands = (
+        Shorthand(
+            {"size": Param(roles.host("size"), "(width, height)", "pixels")},
+            ("width", "height"),
+            _width_and_height,
+        ),
+    )
 
     width: int = host(768, "pixels")
     height: int = host(576, "pixels")
@@ -330,10 +346,14 @@ class Film(Kind):
         (), f"beside the picture: any of {', '.join(LAYERS)}", form="names"
     )
 
-    @property
-    def size(self) -> tuple[int, int]:
-        """Width and height of the picture [pixels]."""
-        return (self.width, self.height) if self.crop is None else self.crop[2:]
+    if TYPE_CHECKING:  # an argument, and what is read is the property
+        size: tuple[int, int] = (0, 0)
+    else:
+
+        @property
+        def size(self) -> tuple[int, int]:
+            """Width and height of the picture [pixels]."""
+            return (self.width, self.height) if self.crop is None else self.crop[2:]
 
     @property
     def band_centres(self) -> np.ndarray:
@@ -347,6 +367,10 @@ class Film(Kind):
                 raise SceneError(f"must be 1 to 65536, not {size!r}", where=f"film.{name}")
         if self.crop is not None:
             object.__setattr__(self, "crop", self._checked_crop())
+        given_filter: object = self.filter
+        if not isinstance(given_filter, Filter):
+            message = f"must be of a kind of filter, not {given_filter!r}"
+            raise SceneError(message, where="film.filter")
         if self.lambda_min >= self.lambda_max:
             raise SceneError("must be below lambda_max", where="film.lambda_min")
         if self.lambda_max - self.lambda_min < NARROWEST:

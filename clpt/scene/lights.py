@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal
@@ -10,12 +12,25 @@ import numpy as np
 
 from clpt.errors import SceneError
 from clpt.scene.motion import Keys
-from clpt.scene.params import Kind, choice, emission, flag, host, real, reflectance
+from clpt.scene.params import (
+    Kind,
+    choice,
+    emission,
+    fields_of,
+    flag,
+    host,
+    params,
+    real,
+    reflectance,
+)
+from clpt.scene.roles import EMISSION
 from clpt.scene.textures import Texture
 from clpt.scene.values import ImageLike, Matrix4, SpectrumLike, Textured, Vector3
+from clpt.spectra import Blackbody, RGBIlluminant, Spectrum, lumens, scaled, watts
 
 RADIANCE = "W m^-2 sr^-1 nm^-1"
 SPOT_EDGES = ("linear", "smooth")
+CONE_RINGS = 4096  # of equal width, over which a spot's intensity is summed
 Reach = Literal["surface", "placed", "distant", "infinite"]
 
 
@@ -39,7 +54,104 @@ class Light(Kind):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Area(Light):
+class Lamp(Light):
+    """Base of the lights whose emission is one spectrum."""
+
+    temperature: float | None = host(
+        None, "colour of a black body; the emission is then its luminance", "K",
+        form="optional_number", positive=True,
+    )  # fmt: skip
+
+    @property
+    def emission_name(self) -> str:
+        """The name of the parameter that is emitted."""
+        return next(name for name, p in params(type(self)).items() if p.role is EMISSION)
+
+    def check(self) -> None:
+        """Raise SceneError for a temperature beside another colour."""
+        name = self.emission_name
+        if self.temperature is not None:
+            Blackbody(self.temperature, normalised=True)
+            if _grey(fields_of(self)[name]) is None:
+                message = f"gives a colour, as {name} does: leave one out, or make {name} a number"
+                raise SceneError(message, where=f"{self.kind}.temperature")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PoweredLamp(Lamp):
+    """Base of the lights that send out a finite power, which may be given.
+
+    With `power` or `lumens` the emission says the colour alone, or is left out.
+    """
+
+    power: float | None = host(
+        None, "of all its light from 360 to 830 nm", "W", form="optional_number", positive=True
+    )
+    lumens: float | None = host(
+        None, "of all its light to the eye", "lm", form="optional_number", positive=True
+    )
+
+    def extent(self, area: float) -> float:
+        """Return what it sends out in all for an emission of 1, [m^2 sr], [m^2] or [sr].
+
+        area: of its surface [m^2].
+        """
+        return 4.0 * math.pi
+
+    def check(self) -> None:
+        """Raise SceneError for a strength that is given twice."""
+        super().check()
+        strengths = {"power": self.power, "lumens": self.lumens}
+        given = [name for name, value in strengths.items() if value is not None]
+        if not given:
+            return
+        where, name = f"{self.kind}.{given[0]}", self.emission_name
+        emitted = fields_of(self)[name]
+        if len(given) > 1:
+            raise SceneError("says what lumens say: give either", where=where)
+        if not isinstance(emitted, Spectrum):
+            raise SceneError(f"needs {name} to be without a texture", where=where)
+        if _grey(emitted) not in (None, 1.0):
+            message = f"says how strong it is, as a number of {name} does: give either"
+            raise SceneError(message, where=where)
+
+
+def _grey(emitted: object) -> float | None:
+    """Return the number that an emission was given as, None for a colour or a texture."""
+    alike = isinstance(emitted, RGBIlluminant) and emitted.r == emitted.g == emitted.b
+    return emitted.r if isinstance(emitted, RGBIlluminant) and alike else None
+
+
+def with_emission(light: Light, area: float = 0.0) -> Light:
+    """Return a light whose emission says all that temperature, power and lumens say.
+
+    area: of the shape that it is on [m^2]. Raises SceneError for a light that is dark.
+    """
+    if not isinstance(light, Lamp):
+        return light
+    given = fields_of(light)
+    asked = {name: None for name in STRENGTHS if given.get(name) is not None}
+    if not asked:
+        return light
+    name = light.emission_name
+    emitted = given[name]
+    if light.temperature is not None:
+        emitted = Blackbody(light.temperature, scale=_grey(emitted) or 0.0, normalised=True)
+    if isinstance(light, PoweredLamp) and (light.power or light.lumens):
+        wanted = light.power or light.lumens or 0.0
+        measure = watts if light.power else lumens
+        sent = light.extent(area) * measure(emitted)
+        if not sent > 0.0:
+            raise SceneError("its light is 0 whatever its strength", where=light.kind)
+        emitted = scaled(emitted, wanted / sent)
+    return dataclasses.replace(light, **{**asked, name: emitted})
+
+
+STRENGTHS = ("temperature", "power", "lumens")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Area(PoweredLamp):
     """A surface that emits from its front side, or from both, evenly in all directions."""
 
     reach = "surface"
@@ -47,9 +159,13 @@ class Area(Light):
     radiance: Textured = emission(1.0, "emitted radiance", RADIANCE, textured=True)
     two_sided: bool = flag(False, "True: its back emits too")
 
+    def extent(self, area: float) -> float:
+        """Return pi times the area that emits [m^2 sr]."""
+        return math.pi * area * (2.0 if self.two_sided else 1.0)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class DirectionalArea(Light):
+class DirectionalArea(PoweredLamp):
     """A surface that emits from its front side along its normal only: a flat one sends out a beam.
 
     Only the `particle_tracer` finds it. The camera does not see it shine.
@@ -61,9 +177,13 @@ class DirectionalArea(Light):
         1.0, "through a surface across the beam", "W m^-2 nm^-1", textured=True
     )
 
+    def extent(self, area: float) -> float:
+        """Return the area of a flat surface, from which its light goes straight ahead [m^2]."""
+        return area
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Point(Light):
+class Point(PoweredLamp):
     """A point that emits evenly."""
 
     position: Vector3 = host((0.0, 0.0, 0.0), "where it is", "m")
@@ -72,7 +192,7 @@ class Point(Light):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Spot(Light):
+class Spot(PoweredLamp):
     """A point that emits into a cone about +z of `to_world`, smoothly cut off at its edge."""
 
     to_world: Matrix4 = host(np.eye(4), "placement, (4, 4); shines along its +z")
@@ -86,13 +206,27 @@ class Spot(Light):
         1.0, "what its light passes through; a texture fills the square around a cone below 90"
     )
 
+    def extent(self, area: float) -> float:
+        """Return the solid angle of its cone, each direction counted as strong as it is [sr]."""
+        cutoff = math.radians(self.cutoff)
+        theta = cutoff * (np.arange(CONE_RINGS) + 0.5) / CONE_RINGS
+        beam = math.radians(min(self.beam_width, self.cutoff))
+        if self.edge == "linear":
+            across = np.clip((cutoff - theta) / max(cutoff - beam, 1e-7), 0.0, 1.0)
+        else:
+            end, full = math.cos(cutoff), math.cos(beam)
+            x = np.clip((np.cos(theta) - end) / max(full - end, 1e-7), 0.0, 1.0)
+            across = x * x * (3.0 - 2.0 * x)
+        return 2.0 * math.pi * float(across @ np.sin(theta)) * cutoff / CONE_RINGS
+
     def check(self) -> None:
+        super().check()
         if isinstance(self.image, Texture) and self.cutoff >= 90.0:
             raise SceneError("an image needs a cutoff below 90 degrees", where="spot.cutoff")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Projector(Light):
+class Projector(Lamp):
     """A point that throws an image along +z of `to_world`: a pinhole camera in reverse."""
 
     image: Textured = reflectance(1.0, "what it shows, upright along +y; a bitmap may go beyond 1")
@@ -105,7 +239,7 @@ class Projector(Light):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Goniometric(Light):
+class Goniometric(PoweredLamp):
     """A point whose intensity depends on the direction, as an image in latitude and longitude says.
 
     Directions lie in the image as in that of an envmap.
@@ -119,7 +253,7 @@ class Goniometric(Light):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Directional(Light):
+class Directional(Lamp):
     """Parallel light from infinitely far away."""
 
     reach = "distant"
@@ -129,7 +263,7 @@ class Directional(Light):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Constant(Light):
+class Constant(Lamp):
     """A light that surrounds the scene with the same radiance from every direction."""
 
     reach = "infinite"

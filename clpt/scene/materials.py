@@ -7,14 +7,16 @@ none: lowering turns it into rules by which a hit chooses its leaf.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any, cast
+from dataclasses import InitVar, dataclass
+from typing import TYPE_CHECKING, Any, cast
 
 from clpt.errors import SceneError
 from clpt.measured import Measurement, MerlTable
+from clpt.scene import roles
 from clpt.scene.energy import check_reradiation
 from clpt.scene.params import (
     Kind,
+    Shorthand,
     Texture,
     choice,
     coefficient,
@@ -31,14 +33,16 @@ from clpt.scene.params import (
     reflectance,
     reradiation,
 )
-from clpt.scene.roles import ORDERS
+from clpt.scene.roles import ORDERS, Param
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.textures import Bitmap
 from clpt.scene.values import IndexLike, SpectrumLike, Textured, TexturedNumber
 from clpt.spectra import Constant, Reradiation, Spectrum
+from clpt.spectra import metal as named_metal
 
 DISTRIBUTIONS = ("ggx", "beckmann")
 CLEAR = Constant(0.0)  # absorption of what absorbs nothing
+LEAST_ALPHA = 1e-4
 FILMS = "thin films on the surface, from the outside in"
 
 
@@ -49,6 +53,44 @@ def pigment(eumelanin: float, pheomelanin: float) -> tuple[float, ...]:
     """
     dark, red = (0.419, 0.697, 1.37), (0.187, 0.4, 1.05)
     return tuple(eumelanin * a + pheomelanin * b for a, b in zip(dark, red, strict=True))
+
+
+def _metal(metal: str | tuple[Spectrum, Spectrum]) -> dict[str, Any]:
+    eta, k = named_metal(metal) if isinstance(metal, str) else metal
+    return {"eta": eta, "k": k}
+
+
+def _roughness(names: tuple[str, ...]) -> tuple[Shorthand, ...]:
+    """Return the shorthands for the parameters of roughness; one of a name needs no `alpha`."""
+    alpha = Param(
+        roles.REAL, "roughness along both directions", low=LEAST_ALPHA, high=1.0, textured=True
+    )
+    square = Param(roles.REAL, "its root, as `principled` and glTF have it", low=0.0, high=1.0)
+
+    def squared(roughness: float) -> dict[str, Any]:
+        return dict.fromkeys(
+            names, max(roles.REAL.check(roughness, square, None) ** 2, LEAST_ALPHA)
+        )
+
+    rough = Shorthand({"roughness": square}, names, squared)
+    even = Shorthand({"alpha": alpha}, names, lambda alpha: dict.fromkeys(names, alpha))
+    return (rough,) if len(names) == 1 else (even, rough)
+
+
+def _renamed(argument: str, name: str, doc: str) -> Shorthand:
+    """Return the shorthand of another word for a parameter."""
+    param = Param(roles.REAL, doc, low=0.0, high=1.0, textured=True)
+    return Shorthand({argument: param}, (name,), lambda **given: {name: given[argument]})
+
+
+METAL = Shorthand(
+    {"metal": Param(roles.host("metal"), "such as gold or Au, or its (eta, k)")},
+    ("eta", "k"),
+    _metal,
+)
+ROUGH, ROUGH_EVENLY = _roughness(("alpha_u", "alpha_v")), _roughness(("alpha",))
+ANISOTROPY = _renamed("anisotropy", "anisotropic", "another word for `anisotropic`, as in glTF")
+TRANSMISSION = _renamed("transmission", "spec_trans", "another word for `spec_trans`, as in glTF")
 
 
 def _share(default: float, doc: str, *, lobe: bool = False) -> Any:
@@ -161,6 +203,11 @@ class ThinDielectric(Material):
 class RoughDielectric(Material):
     """A rough boundary of two dielectrics (Walter et al. 2007); both sides."""
 
+    shorthands = ROUGH
+    if TYPE_CHECKING:  # arguments only: they stand for others
+        alpha: InitVar[TexturedNumber | None] = None
+        roughness: InitVar[float | None] = None
+
     uses_lobe_sample = True
     refracts = True
     chromatic = True
@@ -190,6 +237,10 @@ class RoughDielectric(Material):
 class Conductor(Material):
     """A smooth metal; front side. The default is a perfect mirror."""
 
+    shorthands = (METAL,)
+    if TYPE_CHECKING:  # arguments only: they stand for others
+        metal: InitVar[str | tuple[Spectrum, Spectrum] | None] = None
+
     delta = True
 
     eta: IndexLike | Texture = index(0.0, "index of refraction", zero=True, textured=True)
@@ -203,6 +254,12 @@ class Conductor(Material):
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RoughConductor(Material):
     """A rough metal of microfacets (Cook and Torrance; Heitz 2018 visible normals); front side."""
+
+    shorthands = (METAL, *ROUGH)
+    if TYPE_CHECKING:  # arguments only: they stand for others
+        metal: InitVar[str | tuple[Spectrum, Spectrum] | None] = None
+        alpha: InitVar[TexturedNumber | None] = None
+        roughness: InitVar[float | None] = None
 
     eta: IndexLike | Texture = index(0.0, "index of refraction", zero=True, textured=True)
     k: IndexLike | Texture = index(1.0, "extinction coefficient", zero=True, textured=True)
@@ -236,6 +293,10 @@ class Plastic(Material):
 class RoughPlastic(Material):
     """A diffuse base under a rough dielectric coat; front side."""
 
+    shorthands = ROUGH_EVENLY
+    if TYPE_CHECKING:  # arguments only: they stand for others
+        roughness: InitVar[float | None] = None
+
     uses_lobe_sample = True
 
     diffuse_reflectance: Textured = reflectance(0.5, "albedo of the base")
@@ -255,6 +316,12 @@ class CoatedConductor(Material):
 
     Closed form: see docs/materials.md for how far it is from a random walk between the two.
     """
+
+    shorthands = (METAL, *ROUGH)
+    if TYPE_CHECKING:  # arguments only: they stand for others
+        metal: InitVar[str | tuple[Spectrum, Spectrum] | None] = None
+        alpha: InitVar[TexturedNumber | None] = None
+        roughness: InitVar[float | None] = None
 
     uses_lobe_sample = True
 
@@ -290,6 +357,11 @@ class Principled(Material):
 
     Both sides where `spec_trans` is above zero. The microfacets have the square of `roughness`.
     """
+
+    shorthands = (ANISOTROPY, TRANSMISSION)
+    if TYPE_CHECKING:  # arguments only: they stand for others
+        anisotropy: InitVar[TexturedNumber | None] = None
+        transmission: InitVar[TexturedNumber | None] = None
 
     uses_lobe_sample = True
     refracts = True
@@ -329,6 +401,11 @@ class Principled(Material):
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PrincipledThin(Material):
     """The principled model of a thin sheet (Burley 2015), as Mitsuba 3 defines it; both sides."""
+
+    shorthands = (ANISOTROPY, TRANSMISSION)
+    if TYPE_CHECKING:  # arguments only: they stand for others
+        anisotropy: InitVar[TexturedNumber | None] = None
+        transmission: InitVar[TexturedNumber | None] = None
 
     uses_lobe_sample = True
     tints = (("spec_tint",), ("sheen", "sheen_tint"))
@@ -467,6 +544,10 @@ class Grating(Material):
     Its grooves follow each other along the tangent (u of the surface; a disk's radius; a mesh needs
     uvs), turned by `angle`. Reflective: a metal's front. Transmissive: a thin plate, both sides.
     """
+
+    shorthands = (METAL,)
+    if TYPE_CHECKING:  # arguments only: they stand for others
+        metal: InitVar[str | tuple[Spectrum, Spectrum] | None] = None
 
     delta = True
     uses_lobe_sample = True

@@ -36,11 +36,11 @@ from dataclasses import dataclass, field
 from functools import cache
 from operator import attrgetter
 from types import MappingProxyType
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, cast
 
 import numpy as np
 
-from clpt.errors import SceneError
+from clpt.errors import SceneError, UnusedParameterError
 from clpt.scene import roles
 from clpt.scene.roles import HostForm, Param
 
@@ -160,12 +160,20 @@ def layers(doc: str) -> Any:
     return _field((), Param(roles.LAYERS, doc))
 
 
-def host(default: object, doc: str, unit: str = "", *, form: HostForm | None = None) -> Any:
+def host(
+    default: object,
+    doc: str,
+    unit: str = "",
+    *,
+    form: HostForm | None = None,
+    positive: bool = False,
+) -> Any:
     """Declare what only the host needs: geometry, matrices, nested kinds.
 
-    form: what it holds; None for what the type of the default implies.
+    form: what it holds; None for what the type of the default implies. positive: of a number.
     """
-    return _field(default, Param(roles.host(form or _form_of(default)), doc, unit))
+    role, low = roles.host(form or _form_of(default)), 0.0 if positive else -math.inf
+    return _field(default, Param(role, doc, unit, low, positive=positive))
 
 
 def _form_of(default: object) -> HostForm | Literal["host"]:
@@ -182,6 +190,19 @@ def _form_of(default: object) -> HostForm | Literal["host"]:
 _FORMS: dict[type, HostForm] = {bool: "boolean", int: "integer", float: "number", str: "text"}
 
 
+@dataclass(frozen=True)
+class Shorthand:
+    """Arguments of a kind that stand for some of its parameters.
+
+    arguments: what each is, by its name. stands_for: the parameters. spell: called with those of
+    the arguments that are given, returns values of the parameters by name.
+    """
+
+    arguments: Mapping[str, Param]
+    stands_for: tuple[str, ...]
+    spell: Callable[..., dict[str, Any]]
+
+
 class classproperty:
     """A read-only property of a class."""
 
@@ -192,10 +213,55 @@ class classproperty:
         return self.function(owner)
 
 
+class KindType(type):
+    """The type of kinds: what all of them do with the arguments that they are called with.
+
+    A name that the kind does not have raises UnusedParameterError with the nearest ones. Shorthands
+    become the parameters that they stand for. What is wrong with an object tells its name.
+    """
+
+    def __call__(cls, /, *values: object, **given: object) -> Any:
+        kind = cast("type[Kind]", cls)
+        if values:
+            example = next(iter((*device_params(kind), *_field_names(kind))), "")
+            message = f"{cls.__name__} takes its parameters by name: {cls.__name__}({example}=...)"
+            raise TypeError(message)
+        try:
+            return super().__call__(**_spelled_out(kind, given))
+        except SceneError as error:
+            name, where = given.get("name"), error.where or kind.kind
+            if name and isinstance(name, str) and where.startswith(kind.kind):
+                error.place_at(f"{kind.kind} {name!r}{where.removeprefix(kind.kind)}")
+            raise
+
+
+def _spelled_out(kind: type[Kind], given: dict[str, object]) -> dict[str, object]:
+    """Return arguments of a kind without shorthands. Raises SceneError, UnusedParameterError."""
+    known, short = _field_names(kind), shorthands(kind)
+    for name in given:
+        if name not in known and name not in short:
+            raise UnusedParameterError(kind.kind, name, (*known, *short))
+    plain = {name: value for name, value in given.items() if name not in short}
+    for shorthand in kind.shorthands:
+        asked = {name: given[name] for name in shorthand.arguments if given.get(name) is not None}
+        for name in shorthand.stands_for if asked else ():
+            if name in plain:
+                first = next(iter(asked))
+                message = f"{first!r} stands for {name!r} too; give either"
+                raise SceneError(message, where=f"{kind.kind}.{first}")
+        try:
+            plain |= shorthand.spell(**asked) if asked else {}
+        except SceneError as error:
+            error.place_at(f"{kind.kind}.{error.where or next(iter(asked))}")
+            raise
+    return plain
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Kind:
+class Kind(metaclass=KindType):
     """Base of all kinds; the class name gives the name in files and kernels."""
 
+    shorthands: ClassVar[tuple[Shorthand, ...]] = ()
     needs_wavelengths: ClassVar[bool] = False  # its struct in the kernels has `lambdas`
     # Where all numbers of one of these are above 0, its struct has the `luminance` of `base_color`,
     # and its kernel file includes core/luminance.cl.
@@ -255,6 +321,13 @@ def params(cls: type) -> Mapping[str, Param]:
     return _declared(cls)
 
 
+@cache
+def shorthands(cls: type[Kind]) -> Mapping[str, Param]:
+    """Return the arguments of a kind that stand for parameters, by name; see `Shorthand`."""
+    merged = {name: param for one in cls.shorthands for name, param in one.arguments.items()}
+    return MappingProxyType(merged)
+
+
 def defaults(cls: type) -> dict[str, Any]:
     """Return the defaults of a kind's declared parameters, by name."""
     fields = {f.name: f for f in dataclasses.fields(cls) if "param" in f.metadata}
@@ -276,6 +349,10 @@ def _fields(cls: Any) -> tuple[tuple[str, ...], Callable[[Any], tuple[Any, ...]]
     """The names of a class's fields, and what reads them all at once, and more."""
     names = tuple(field.name for field in dataclasses.fields(cls))
     return names, attrgetter(*names, "__class__", "__class__")  # of two or more: a tuple
+
+
+def _field_names(cls: Any) -> tuple[str, ...]:
+    return _fields(cls)[0]
 
 
 def place_of(kind: Kind, name: str) -> str:

@@ -11,9 +11,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol, runtime_checkable
+from typing import Any, Literal, Protocol, cast, runtime_checkable
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from clpt import spectra
 from clpt.errors import SceneError
@@ -50,7 +51,7 @@ class Role:
     def __str__(self) -> str:
         return self.name
 
-    def check(self, value: object, param: Param, where: str) -> Any:
+    def check(self, value: object, param: Param, where: str | None) -> Any:
         """Return what is meant by a value that is no texture. Raises SceneError."""
         return value
 
@@ -75,26 +76,26 @@ class Param:
 class Real(Role):
     """A number within its limits."""
 
-    def check(self, value: object, param: Param, where: str) -> float:
+    def check(self, value: object, param: Param, where: str | None) -> float:
         if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
             raise SceneError(f"must be a number, not {value!r}", where=where)
         if not math.isfinite(value):
             raise SceneError(f"must be finite, not {value}", where=where)
         if abs(value) > LARGEST:
             raise SceneError(f"{value:g} is beyond {LARGEST:g}, where float32 ends", where=where)
+        if param.positive and value <= 0.0:
+            raise SceneError(f"must be above 0, not {value}", where=where)
         if not param.low <= value <= param.high:
             advice = f"; {param.role.advice}" if param.role.advice and value > param.high else ""
             message = f"{value} is outside [{param.low:g}, {param.high:g}]{advice}"
             raise SceneError(message, where=where)
-        if param.positive and value == 0.0:
-            raise SceneError("must be above 0", where=where)
         return float(value)
 
 
 class Flag(Role):
     """True or false."""
 
-    def check(self, value: object, param: Param, where: str) -> bool:
+    def check(self, value: object, param: Param, where: str | None) -> bool:
         if not isinstance(value, (bool, np.bool_)):
             raise SceneError(f"must be true or false, not {value!r}", where=where)
         return bool(value)
@@ -103,7 +104,7 @@ class Flag(Role):
 class Choice(Role):
     """One of the names that the parameter lists."""
 
-    def check(self, value: object, param: Param, where: str) -> Any:
+    def check(self, value: object, param: Param, where: str | None) -> Any:
         if value not in param.choices and not (param.optional and value is None):
             raise SceneError(f"{value!r} is none of {', '.join(param.choices)}", where=where)
         return value
@@ -112,7 +113,7 @@ class Choice(Role):
 class Orders(Role):
     """A number for each order of diffraction from -n to n."""
 
-    def check(self, value: object, param: Param, where: str) -> tuple[float, ...]:
+    def check(self, value: object, param: Param, where: str | None) -> tuple[float, ...]:
         if not isinstance(value, (list, tuple, np.ndarray)):
             raise SceneError(f"must be a list of numbers, not {value!r}", where=where)
         if len(value) % 2 == 0 or len(value) > 2 * ORDERS + 1:
@@ -133,7 +134,7 @@ class _Part(Protocol):
 class Layers(Role):
     """Thin films, from the outside in."""
 
-    def check(self, value: object, param: Param, where: str) -> tuple[Any, ...]:
+    def check(self, value: object, param: Param, where: str | None) -> tuple[Any, ...]:
         if not isinstance(value, (list, tuple)):
             raise SceneError(f"must be a list of layers, not {value!r}", where=where)
         for i, entry in enumerate(value):
@@ -149,7 +150,7 @@ class Data(Role):
     cls: type[Any] = object
     words: str = ""
 
-    def check(self, value: object, param: Param, where: str) -> Any:
+    def check(self, value: object, param: Param, where: str | None) -> Any:
         if not isinstance(value, (self.cls, type(None))):
             raise SceneError(f"must be {self.words}, not {value!r}", where=where)
         return value
@@ -171,7 +172,7 @@ class Spectral(Role):
     measured: bool = False
     grey: bool = False
 
-    def check(self, value: object, param: Param, where: str) -> Any:
+    def check(self, value: object, param: Param, where: str | None) -> Any:
         if isinstance(value, str) and self.names is not None:
             return self._named(value, where)
         if isinstance(value, Spectrum):
@@ -187,20 +188,20 @@ class Spectral(Role):
             where=where,
         )
 
-    def _named(self, name: str, where: str) -> Spectrum | str:
+    def _named(self, name: str, where: str | None) -> Spectrum | str:
         assert self.names is not None
         try:
             return self.names(name)
         except SceneError as error:
             raise SceneError(error.message, where=where) from None
 
-    def _colour(self, rgb: list[float], param: Param, where: str) -> Spectrum:
+    def _colour(self, rgb: list[float], param: Param, where: str | None) -> Spectrum:
         return RGB(*rgb) if max(rgb) <= 1.0 else RGBUnbounded(*rgb)
 
     def _constant(self, number: float) -> Spectrum:
         return Constant(number)
 
-    def _check_limits(self, value: Spectrum, param: Param, where: str) -> None:
+    def _check_limits(self, value: Spectrum, param: Param, where: str | None) -> None:
         """Raise SceneError for a spectrum beyond its limits, or a table that no film can reach."""
         if isinstance(value, Tabulated):
             try:
@@ -228,7 +229,7 @@ class Spectral(Role):
 class Index(Spectral):
     """A refractive index or extinction coefficient; the name of a glass stays a name."""
 
-    def _named(self, name: str, where: str) -> str:
+    def _named(self, name: str, where: str | None) -> str:
         super()._named(name, where)
         return name
 
@@ -236,7 +237,7 @@ class Index(Spectral):
 class Emission(Spectral):
     """An emitted spectrum; a number and a colour are multiples of D65."""
 
-    def _colour(self, rgb: list[float], param: Param, where: str) -> Spectrum:
+    def _colour(self, rgb: list[float], param: Param, where: str | None) -> Spectrum:
         return RGB(*rgb)
 
     def _constant(self, number: float) -> Spectrum:
@@ -246,14 +247,14 @@ class Emission(Spectral):
 class Factor(Spectral):
     """A factor without limits."""
 
-    def _colour(self, rgb: list[float], param: Param, where: str) -> Spectrum:
+    def _colour(self, rgb: list[float], param: Param, where: str | None) -> Spectrum:
         return RGBUnbounded(*rgb)
 
 
 class Quantity(Factor):
     """A number that may depend on the wavelength and is no colour."""
 
-    def _colour(self, rgb: list[float], param: Param, where: str) -> Spectrum:
+    def _colour(self, rgb: list[float], param: Param, where: str | None) -> Spectrum:
         colour = super()._colour(rgb, param, where)
         self._check_limits(colour, param, where)
         return colour
@@ -286,6 +287,53 @@ DEVICE = (
 NAMED = {role.name: role for role in DEVICE}
 
 
+@dataclass(frozen=True)
+class OptionalReal(Real):
+    """A number within its limits, or None."""
+
+    def check(self, value: object, param: Param, where: str | None) -> Any:
+        return None if value is None else super().check(value, param, where)
+
+
+@dataclass(frozen=True)
+class Vector(Role):
+    """Three numbers; those of a direction cannot all be 0."""
+
+    def check(self, value: object, param: Param, where: str | None) -> Any:
+        try:
+            numbers = np.asarray(cast("ArrayLike", value), np.float64)
+        except (TypeError, ValueError):
+            numbers = np.empty(0)
+        if numbers.shape != (3,) or not np.isfinite(numbers).all():
+            raise SceneError(f"must be three finite numbers, not {value!r}", where=where)
+        if np.abs(numbers).max() > LARGEST:
+            raise SceneError(f"is beyond {LARGEST:g}, where float32 ends", where=where)
+        if self.name == "direction" and not numbers.any():
+            raise SceneError("has no length", where=where)
+        return value
+
+
+@dataclass(frozen=True)
+class Matrix(Role):
+    """A square matrix, or one on a device, whose form is not looked at."""
+
+    def check(self, value: object, param: Param, where: str | None) -> Any:
+        wanted = (3, 3) if self.name == "matrix3" else (4, 4)
+        if hasattr(value, "context"):
+            return value
+        try:
+            shape = np.asarray(cast("ArrayLike", value), np.float64).shape
+        except (TypeError, ValueError) as error:
+            raise SceneError(f"is not a matrix: {error}", where=where) from None
+        if shape != wanted:
+            raise SceneError(f"must be {wanted}, found {shape}", where=where)
+        return value
+
+
+_HOSTS: dict[str, type[Role]] = {
+    "number": Real, "optional_number": OptionalReal, "vector": Vector, "direction": Vector,
+    "matrix3": Matrix, "matrix4": Matrix,
+}  # fmt: skip
 # What a host parameter holds. clpt/formats/native/forms.py reads, writes and describes each form.
 HostForm = Literal[
     "boolean", "integer", "number", "text", "names", "numbers",
@@ -294,10 +342,10 @@ HostForm = Literal[
     "rows2", "rows3", "rows4", "grid", "normals", "triangles", "attributes",
     "number_or_list", "lengths",
     "image", "volume", "colour_volume", "cube_images", "crop", "sensor", "white_balance",
-    "number_or_auto", "lens", "keys", "deformation", "shutter",
+    "number_or_auto", "lens", "keys", "deformation", "shutter", "optional_number", "metal", "size",
 ]  # fmt: skip
 
 
 def host(form: HostForm | Literal["host"]) -> Role:
     """Return the role of what only the host needs; "host" where a scene file cannot hold it."""
-    return Role(form, "host")
+    return _HOSTS.get(form, Role)(form, "host")

@@ -8,15 +8,16 @@ from types import MappingProxyType
 from typing import Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
-from clpt import images
 from clpt.errors import SceneError
-from clpt.scene.lights import Light
-from clpt.scene.materials import Diffuse, Material, TwoSided
+from clpt.scene import trimeshes
+from clpt.scene.lights import ON_SHAPES, Light
+from clpt.scene.materials import Diffuse, Material
 from clpt.scene.media import Medium
 from clpt.scene.motion import Deformation, Keys
 from clpt.scene.params import Kind, choice, host
-from clpt.scene.textures import Bitmap, MeshAttribute
+from clpt.scene.textures import Bitmap
 from clpt.scene.values import Matrix4, OnDevice, Vector3
 
 SMOOTH = "smooth"  # normals of a mesh: the means of the triangles around a vertex, by their areas
@@ -49,6 +50,26 @@ class Shape(Kind):
     motion: Keys | None = host(None, "moves it after `to_world`, or None", form="keys")
     flip_normals: bool = host(False, "turn the front to the other side")
     name: str = host("", "for messages")
+
+    def check(self) -> None:
+        """Raise SceneError for a material or a light that is none."""
+        material: object = self.material
+        if not isinstance(material, Material):
+            advice = "such as clpt.scene.materials.Diffuse()"
+            message = f"must be a material, {advice}, not {material!r}"
+            raise SceneError(message, where=f"{self.kind}.material")
+        if not isinstance(self.emission, (*ON_SHAPES, type(None))):
+            names = " or ".join(cls.__name__ for cls in ON_SHAPES)
+            message = f"must be a light of a surface, {names}, not {self.emission!r}"
+            raise SceneError(message, where=f"{self.kind}.emission")
+
+
+def check_faces(faces: NDArray[Any], vertices: int, where: str) -> None:
+    """Raise SceneError for faces (m, 3) of integers that name a vertex beyond so many."""
+    lowest, highest = int(faces.min()), int(faces.max())
+    if lowest < 0 or highest >= vertices:
+        wrong = lowest if lowest < 0 else highest
+        raise SceneError(f"a face names vertex {wrong}, there are {vertices}", where=where)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -84,33 +105,43 @@ class Mesh(Shape):
     displacement_scale: float = host(1.0, "factor on them", "m")
     displacement_edge: float = host(0.05, "longest edge of what is displaced, in the world", "m")
 
+    def check(self) -> None:
+        """Raise SceneError for faces of vertices that are not there, as far as the host knows."""
+        super().check()
+        if not all(isinstance(a, (np.ndarray, list, tuple)) for a in (self.vertices, self.faces)):
+            return
+        vertices, faces = self.vertices, np.asarray(self.faces)
+        if (
+            faces.size and len(vertices) and faces.dtype.kind in "iu"
+        ):  # else `triangulate` says what they lack
+            check_faces(faces, len(vertices), "mesh.faces")
+
     @classmethod
     def from_trimesh(cls, geometry: Any, **parameters: Any) -> Mesh:
-        """Return a `trimesh.Trimesh` as a mesh: its vertices, faces, uvs and colours.
+        """Return a `trimesh.Trimesh` as a mesh: its vertices, faces, uvs, colours and material.
 
         geometry: its arrays are shared where they have clpt's types already. Colours of vertices
         or faces, 8-bit sRGB, become the linear attribute `vertex_color` or `face_color`, which the
-        material shows if none is given. Its material is not read.
+        material shows; a material with its images becomes one of clpt's, and a light if it glows.
         parameters: further ones of the mesh, such as material, to_world, name, or normals="smooth";
-        without normals the triangles are flat.
+        without normals the triangles are flat. A `material` takes the place of trimesh's.
 
-        Raises SceneError for an object that is not a Trimesh.
+        Raises SceneError for an object that is not a Trimesh; `Scene.from_trimesh` takes scenes.
         """
-        if not (hasattr(geometry, "faces") and hasattr(geometry, "vertices")):
-            message = f"must be a trimesh.Trimesh, not {type(geometry).__name__}; "
-            raise SceneError(message + "a trimesh.Scene gives one by its to_mesh()", where="mesh")
-        visual, given = getattr(geometry, "visual", None), dict(parameters)
-        uvs = getattr(visual, "uv", None)
+        if not trimeshes.is_mesh(geometry):
+            advice = "; Scene.from_trimesh takes a scene" if trimeshes.is_scene(geometry) else ""
+            message = f"must be a trimesh.Trimesh, not {type(geometry).__name__}{advice}"
+            raise SceneError(message, where="mesh")
+        visual, given = geometry.visual, dict(parameters)
+        uvs, colours = getattr(visual, "uv", None), trimeshes.colours_of(visual)
         if uvs is not None:
             given.setdefault("uvs", np.ascontiguousarray(uvs, np.float32))
-        kind = getattr(visual, "kind", None)
-        if kind in ("vertex", "face"):
-            levels = np.asarray(getattr(visual, f"{kind}_colors"))[:, :3]
-            colours = images.srgb_to_linear(levels.astype(np.float32) / np.float32(255.0))
-            name = f"{kind}_color"
-            given["attributes"] = {name: colours, **given.get("attributes", {})}
-            shown = Diffuse(reflectance=MeshAttribute(name=name), name=name)
-            given.setdefault("material", TwoSided(front=shown))
+        if colours:
+            given["attributes"] = {**colours, **given.get("attributes", {})}
+            given.setdefault("material", trimeshes.coloured(next(iter(colours))))
+        if "material" not in given and (found := trimeshes.material_of(visual)):
+            given["material"], emission = found
+            given.setdefault("emission", emission)
         return cls(
             vertices=np.ascontiguousarray(geometry.vertices, np.float32),
             faces=np.ascontiguousarray(geometry.faces, np.uint32),
@@ -123,7 +154,7 @@ class Sphere(Shape):
     """A sphere; uv from the azimuth and polar angle about z."""
 
     center: Vector3 = host((0.0, 0.0, 0.0), "before `to_world`", "m")
-    radius: float = host(1.0, "before `to_world`, which may scale it evenly", "m")
+    radius: float = host(1.0, "before `to_world`, which may scale it evenly", "m", positive=True)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -168,7 +199,7 @@ class Cylinder(Shape):
 
     p0: Vector3 = host((0.0, 0.0, 0.0), "start of the axis", "m")
     p1: Vector3 = host((0.0, 0.0, 1.0), "end of the axis", "m")
-    radius: float = host(1.0, "before `to_world`, which may scale it evenly", "m")
+    radius: float = host(1.0, "before `to_world`, which may scale it evenly", "m", positive=True)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -251,6 +282,7 @@ class Instance(Shape):
         return self.group.shapes
 
     def check(self) -> None:
+        """Raise SceneError for what is no group."""
         if not isinstance(self.group, Group):
             raise SceneError(f"must be a group, not {self.group!r}", where="instance.group")
 

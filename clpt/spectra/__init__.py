@@ -17,7 +17,17 @@ from clpt.spectra.cie import (
     wavelength_pdf,
     xyz_to_rgb,
 )
-from clpt.spectra.emission import LED, Blackbody, Illuminant, Lines, illuminant, illuminants
+from clpt.spectra.emission import (
+    LED,
+    Blackbody,
+    Illuminant,
+    Lines,
+    illuminant,
+    illuminants,
+    lumens,
+    scaled,
+    watts,
+)
 from clpt.spectra.files import read_absorption, read_index, read_refractive_index, read_table
 from clpt.spectra.named import glass, glasses, index, metal, metals
 from clpt.spectra.reradiation import Donaldson, Fluorophore, Reradiation
@@ -65,6 +75,7 @@ __all__ = [
     "illuminant",
     "illuminants",
     "index",
+    "lumens",
     "luminance",
     "metal",
     "metals",
@@ -79,8 +90,10 @@ __all__ = [
     "read_table",
     "rgb_to_xyz",
     "sample_wavelengths",
+    "scaled",
     "unbounded",
     "uplift",
+    "watts",
     "wavelength_pdf",
     "xyz_to_rgb",
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -14,10 +14,19 @@ from numpy.typing import ArrayLike
 from clpt.arrays import Floats
 from clpt.errors import SceneError, UnknownKindError
 from clpt.spectra import cie, data
-from clpt.spectra.spectrum import Constant, Spectrum, with_luminance_one
+from clpt.spectra.spectrum import (
+    RGB,
+    Constant,
+    RGBIlluminant,
+    RGBUnbounded,
+    Spectrum,
+    Tabulated,
+    with_luminance_one,
+)
 
 # CODATA 2018, exact: Planck [J s], light [m/s], Boltzmann [J/K].
 PLANCK, LIGHT, BOLTZMANN = 6.62607015e-34, 299792458.0, 1.380649e-23
+LUMENS = 683.0  # of a watt of 555 nm, by which the candela is defined
 
 
 @dataclass(frozen=True)
@@ -167,6 +176,42 @@ def _of_luminance_one(name: str) -> Spectrum:
 @cache
 def _discharges() -> dict[str, Any]:
     return json.loads((data.ROOT / "discharges.json").read_text("utf-8"))
+
+
+def scaled(spectrum: Spectrum, factor: float) -> Spectrum:
+    """Return an emitted spectrum times a number; a colour is D65 times it, as everywhere."""
+    if factor == 1.0:
+        return spectrum
+    if isinstance(spectrum, (RGB, RGBUnbounded)):
+        return RGBIlluminant(*(factor * float(c) for c in spectrum.to_rgb("emission")))
+    if isinstance(spectrum, Constant):
+        return Constant(factor * spectrum.value)
+    if isinstance(spectrum, (Blackbody, Illuminant, LED)):
+        return replace(spectrum, scale=factor * spectrum.scale)
+    if isinstance(spectrum, Lines):
+        powers, width = spectrum.powers, spectrum.width
+        return Lines(spectrum.wavelengths, powers, width, factor * spectrum.scale)
+    if isinstance(spectrum, Tabulated):
+        values = factor * np.array(spectrum.values)
+        return Tabulated(spectrum.lambdas, values, spectrum.outside)
+    return Tabulated(cie.GRID, factor * spectrum.sample(cie.GRID))
+
+
+def watts(spectrum: Spectrum) -> float:
+    """Return the integral of an emitted spectrum over 360 to 830 nm [nm times its unit]."""
+    return float(_emitted(spectrum).sum())
+
+
+def lumens(spectrum: Spectrum) -> float:
+    """Return the light of an emitted spectrum to the eye: 683 lm/W times its integral with V."""
+    return LUMENS * float(_emitted(spectrum) @ cie.cie_xyz(cie.GRID)[:, 1])
+
+
+def _emitted(spectrum: Spectrum) -> Floats:
+    """An emitted spectrum at each whole nanometre from 360 to 830."""
+    if isinstance(spectrum, RGB):
+        spectrum = RGBIlluminant(spectrum.r, spectrum.g, spectrum.b)
+    return spectrum.sample(cie.GRID)
 
 
 def _check_scale(scale: float) -> None:

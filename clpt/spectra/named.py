@@ -11,10 +11,18 @@ from clpt.errors import UnknownKindError
 from clpt.spectra import data
 from clpt.spectra.spectrum import RGB, Constant, RGBUnbounded, Sellmeier, Spectrum, Tabulated
 
+NAMES = {  # of the elements, and of brass
+    "aluminium": "Al", "aluminum": "Al", "beryllium": "Be", "brass": "CuZn", "chromium": "Cr",
+    "cobalt": "Co", "copper": "Cu", "gold": "Au", "iridium": "Ir", "iron": "Fe", "lithium": "Li",
+    "mercury": "Hg", "molybdenum": "Mo", "nickel": "Ni", "niobium": "Nb", "palladium": "Pd",
+    "platinum": "Pt", "potassium": "K", "rhodium": "Rh", "silicon": "Si", "silver": "Ag",
+    "sodium": "Na", "titanium": "Ti", "tungsten": "W", "vanadium": "V",
+}  # fmt: skip
+
 
 def metals() -> tuple[str, ...]:
-    """Names that `metal` knows."""
-    return (*data.names("metals"), "none")
+    """Names that `metal` knows: symbols, the names of elements, and none."""
+    return (*data.names("metals"), *NAMES, "none")
 
 
 def glasses() -> tuple[str, ...]:
@@ -24,15 +32,15 @@ def glasses() -> tuple[str, ...]:
 
 @cache
 def metal(name: str) -> tuple[Spectrum, Spectrum]:
-    """Complex index (eta, k) of a metal by its symbol; "none" reflects everything.
+    """Complex index (eta, k) of a metal, "gold" or "Au"; "none" reflects everything.
 
     A suffix `_palik`, which tells two tables of one metal apart in Mitsuba, is ignored.
     Raises UnknownKindError.
     """
     if name == "none":
         return Constant(0.0), Constant(1.0)
-    symbol = name.removesuffix("_palik")
-    if symbol not in metals():
+    symbol = NAMES.get(name.lower(), name.removesuffix("_palik"))
+    if symbol not in data.names("metals"):
         raise UnknownKindError("metal", name, metals())
     lambdas, eta, k = data.table(f"metals/{symbol}.csv").T
     return Tabulated(lambdas, eta, "hold"), Tabulated(lambdas, k, "hold")

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from clpt.arrays import Floats
-from clpt.scene import Scene
+from clpt.scene import Scene, viewpoint
 from clpt.scene.cameras import Camera, Perspective, ThinLens
 from clpt.scene.params import fields_of
 from clpt.view import navigation, views
@@ -84,7 +84,7 @@ class CameraWork:
         self._tell_state()
 
     def _do_look_at(self, reply: Reply) -> None:
-        at = navigation.pose(self.scene.camera)
+        at = viewpoint.pose(self.scene.camera)
         target = at.origin + self._distance() * at.forward
         points = {"origin": at.origin, "target": target, "up": at.up}
         rounded = {name: navigation.rounded(point) for name, point in points.items()}
@@ -125,7 +125,7 @@ class CameraWork:
         if hit["shape"] is None:
             reply({"type": "note", "text": "there is nothing to focus on"})
             return
-        at = navigation.pose(self.scene.camera)
+        at = viewpoint.pose(self.scene.camera)
         distance = float(np.dot(np.array(hit["position"]) - at.origin, at.forward))
         self.post(Request("focus_at", {"distance": max(distance, 1e-6)}), reply)
 
@@ -151,7 +151,7 @@ class CameraWork:
         if not navigation.is_within_reach(camera):
             raise CommandError("the camera would be too far away, or see too much or too little")
         if takes_pivot:
-            old, new = navigation.pose(self.scene.camera), navigation.pose(camera)
+            old, new = viewpoint.pose(self.scene.camera), viewpoint.pose(camera)
             away = self._pivot - old.origin
             parts = [float(np.dot(away, axis)) for axis in (old.left, old.up, old.forward)]
             axes = (new.left, new.up, new.forward)
@@ -165,13 +165,13 @@ class CameraWork:
     def _set_pivot(self) -> None:
         """Let the pivot be where the camera focuses, or as far away as the world's origin."""
         camera = self.scene.camera
-        at = navigation.pose(camera)
+        at = viewpoint.pose(camera)
         distance = float(fields_of(camera).get("focus_distance", np.linalg.norm(at.origin))) or 1.0
-        self._pivot, self._up = at.origin + distance * at.forward, navigation.upright(camera)
+        self._pivot, self._up = at.origin + distance * at.forward, viewpoint.upright(camera)
         self._aimed = False
 
     def _distance(self) -> float:
-        away = self._pivot - navigation.pose(self.scene.camera).origin
+        away = self._pivot - viewpoint.pose(self.scene.camera).origin
         return float(np.linalg.norm(away)) or 1.0
 
     def _aspect(self) -> float:

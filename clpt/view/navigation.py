@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,30 +11,10 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.arrays import Floats
 from clpt.scene.cameras import Camera, Matrix, Orthographic, Perspective
+from clpt.scene.viewpoint import Pose, pose
 
 FARTHEST = 1e12  # [m] from the origin, as of vertices
 POLE = math.radians(2.0)  # nearest to the pole that a turn ends
-_EYE_TO_CAMERA = np.diag([-1.0, 1.0, -1.0, 1.0])  # OpenGL's eye space looks along -z, +x right
-
-
-@dataclass(frozen=True)
-class Pose:
-    """Where a camera is: a point, and unit vectors (3,) to its left, up and forward."""
-
-    origin: Floats
-    left: Floats
-    up: Floats
-    forward: Floats
-
-
-def pose(camera: Camera) -> Pose:
-    """Return where a camera is and looks."""
-    if isinstance(camera, Matrix):
-        matrix = np.linalg.inv(np.asarray(camera.view, float)) @ _EYE_TO_CAMERA
-    else:
-        matrix = np.asarray(camera.to_world, float)
-    left, up, forward = (_unit(matrix[:3, i]) for i in range(3))
-    return Pose(matrix[:3, 3].copy(), left, up, forward)
 
 
 def rounded(point: Floats) -> list[float]:
@@ -60,13 +39,6 @@ def moved(camera: Camera, motion: NDArray[np.float64]) -> Camera:
         view = np.asarray(camera.view, float) @ np.linalg.inv(motion)
         return dataclasses.replace(camera, view=view)
     return dataclasses.replace(camera, to_world=motion @ np.asarray(camera.to_world, float))
-
-
-def upright(camera: Camera) -> Floats:
-    """Return the axis of the world that is nearest to the camera's own up, (3,)."""
-    up = pose(camera).up
-    axis = int(np.argmax(np.abs(up)))
-    return np.eye(3)[axis] * math.copysign(1.0, up[axis])
 
 
 def half_height(camera: Camera, aspect: float) -> float:

@@ -65,7 +65,7 @@ def denoised(source: Pictures, display: Display) -> NDArray[np.uint8]:
 
     Raises SceneError where the denoiser is not installed.
     """
-    colours = images.to_rec709(DenoisedPicture(source, METHOD).colours(), source.form.output_space)
+    colours = images.to_rec709(DenoisedPicture(source, METHOD).colours(), source._form.output_space)
     if display.tone == OF_VIEW:
         return images.to_codes(colours, display.exposure, view=display.view)
     return images.to_codes(colours, display.exposure, display.tone)

@@ -138,7 +138,7 @@ def test_a_host_without_room_for_a_film(folder, monkeypatch, capsys):
     def full(self, **_):
         raise MemoryError
 
-    monkeypatch.setattr(Renderer, "saved_film", full)
+    monkeypatch.setattr(Renderer, "_saved_film", full)
     command = ["render", killing.SCENE, "-o", "a.npy", *COMMON[:-1], "--spp", "30"]
     assert run([*command, "--checkpoint", "0.001s"]) == 0
     error = capsys.readouterr().err
@@ -150,7 +150,7 @@ def test_a_device_without_room_for_a_copy(folder, monkeypatch, capsys):
     def full(self):
         raise MemoryBudgetError("a copy of the film", 100, 10, "save no films")
 
-    monkeypatch.setattr(Renderer, "hold", full)
+    monkeypatch.setattr(Renderer, "_hold", full)
     command = ["render", killing.SCENE, "-o", "a.npy", *COMMON[:-1], "--spp", "3"]
     assert run([*command, "--checkpoint", "1h"]) == 0
     assert "warning: no checkpoints: a copy of the film needs" in capsys.readouterr().err
@@ -234,7 +234,7 @@ def test_a_range_says_how_many(capsys):
 
 def test_a_film_without_a_pass(tmp_path):
     with Renderer(killing_scene()) as renderer:
-        renderer.hold()
+        renderer._hold()
         with pytest.raises(SceneError, match="no pass has come to its end"):
             outputs.write(tmp_path / "a.film", renderer, {}, None)
 

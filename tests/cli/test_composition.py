@@ -14,14 +14,13 @@ from hypothesis import strategies as st
 
 from clpt import images, transforms
 from clpt.__main__ import run
-from clpt.cli.options.applied import changed, composed, up_of
+from clpt.cli.options.applied import changed, composed
 from clpt.cli.options.changes import SceneChanges
 from clpt.cli.options.composition import CameraType, Composition, CropType, Orbit
 from clpt.errors import SceneError
 from clpt.formats import load
-from clpt.formats.meshes import framing
-from clpt.scene import Film, Scene, cameras, lights, shapes
-from clpt.view.navigation import pose
+from clpt.scene import Film, Scene, cameras, framing, lights, shapes
+from clpt.scene.viewpoint import pose, up_of
 
 CORNELL = str(Path(__file__).resolve().parents[2] / "scenes" / "cornell_box")
 
@@ -194,7 +193,8 @@ def test_a_camera_that_flattens_space_has_no_up():
 
 
 def test_nothing_can_be_framed_of_what_is_endless():
-    far = shapes.Sphere(radius=1e200)
-    scene = Scene(camera=cameras.Perspective(), shapes=[far, shapes.Sphere(center=(1e308, 0, 0))])
+    corners = np.array([[-1.5e308, 0, 0], [1.5e308, 0, 0], [0, 1, 0]])
+    far = shapes.Mesh(vertices=corners, faces=np.array([[0, 1, 2]]))
+    scene = Scene(camera=cameras.Perspective(), shapes=[far])
     with pytest.raises(SceneError, match="too large to be framed"):
         seen_from(scene, 0.0, 0.0)

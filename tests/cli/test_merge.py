@@ -105,7 +105,7 @@ def test_films_that_do_not_add(tmp_path, capsys):
         ("seed", "seed: 0 -> 3"),
         ("spectral", "film.mode: rgb -> spectral"),
         ("torn", "not written to its end"),
-        ("none", "No such file"),
+        ("none", "no such file"),
     ):
         other = str(paths.get(name, tmp_path / "none.film"))
         assert run(["merge", str(paths["a"]), other, "-o", str(tmp_path / "c.png")]) == 2

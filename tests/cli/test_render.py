@@ -405,7 +405,7 @@ def test_changes_of_a_scene():
         (["--integrator", "path", "--radius", "0.1"], "no photons"),
         (["--integrator", "vcm", "--radius", "-1"], "--radius"),
         (["--device", "no such device"], "is not there"),
-        (["-o", "picture.jpeg"], ".exr"),
+        (["-o", "picture.gif"], ".exr"),
         (["-o", "no/such/folder/a.png"], "folder"),
         (["--integrator", "aov"], '"layers"'),
         (["-D", "spp=3"], "only .xml"),

@@ -76,16 +76,16 @@ def test_all_pictures_are_those_of_one_process(two):
     plan.film = dataclasses.replace(plan.film, layers=("albedo", "variance"))
     with clpt.Renderer(plan, threads=1) as one:
         one.run(12)
-        wanted, saved = pictures(one), one.saved_film()
+        wanted, saved = pictures(one), one._saved_film()
     several = clpt.MultiRenderer(plan, [device.choose(threads=1)])
     many = ClusterRenderer(plan, two.client, device=device.choose(threads=1))
     with several, many:
         for renderer in (several, many):
             assert renderer.run(5, noise=None) and renderer.run(7)
             assert renderer.samples == 12 and renderer.active == 1.0
-            assert renderer.saved_film().counts["samples"] == saved.counts["samples"]
+            assert renderer._saved_film().counts["samples"] == saved.counts["samples"]
         assert np.array_equal(many.film.get(), several.film.get())
-        for source in (saved, several, many, several.saved_film(), many.saved_film()):
+        for source in (saved, several, many, several._saved_film(), many._saved_film()):
             found = pictures(source)
             assert found.keys() == wanted.keys()
             assert all(np.array_equal(found[name], image) for name, image in wanted.items())
@@ -248,8 +248,8 @@ def test_a_worker_with_two_devices(more, two, expected, tmp_path):
             stops = iter((True, False))
             assert not renderer.run(10**6, lambda progress: next(stops, False))
             assert not renderer.refused
-            renderer.hold()
-            held = renderer.saved_film(held=True).film
+            renderer._hold()
+            held = renderer._saved_film(held=True).film
             assert held.samples.max() == held.samples.min() >= before
     finally:
         two.end(third)

@@ -115,11 +115,11 @@ def test_saved_films_go_on_by_a_cluster_and_by_one_process(two, expected, tmp_pa
     path = tmp_path / "a.film"
     with ClusterRenderer(plan(), two.client) as renderer:
         assert renderer.run(40, noise=NOISE)
-        renderer.hold()
+        renderer._hold()
         assert not renderer.run(10**6, lambda p: p.samples < 60, noise=1e-4)
         assert renderer.film_state().samples.max() > 40
         assert renderer.run(2, noise=NOISE)
-        film_file.write(path, renderer.saved_film(held=True))
+        film_file.write(path, renderer._saved_film(held=True))
     for loading in (ClusterRenderer(plan(), two.client), clpt.Renderer(plan(), threads=1)):
         with loading:
             loading.load_state(path)

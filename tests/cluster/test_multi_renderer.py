@@ -352,15 +352,15 @@ def test_saved_films_go_on_on_one_device_and_on_several(
     for saving in makers():
         with saving:
             saving.run(20, noise=noise)
-            saving.hold()
+            saving._hold()
             saving.run(7)
             saving.save_state(tmp_path / "later.film")
-            film_file.write(path, saving.saved_film(held=True))
+            film_file.write(path, saving._saved_film(held=True))
         for loading in makers():
             with loading:
                 loading.run(3)
                 loading.load_state(path)
-                assert loading.samples == 20 and loading.former_seconds > 0.0
+                assert loading.samples == 20 and loading._former_seconds > 0.0
                 loading.run(100, noise=noise)
                 assert same(loading.film_state(), state)
                 assert loading.counts.samples == counts
@@ -370,7 +370,7 @@ def test_saved_films_go_on_on_one_device_and_on_several(
         faults[pair[0].queue] = FailsAfter(4)
         several.run(95, noise=noise)
         assert same(several.film_state(), state) and len(several.devices) == 1
-        assert len(several.saved_film().sessions) == 2
+        assert len(several._saved_film().sessions) == 2
     other = with_film(scene, exposure=2.0)
     several = clpt.MultiRenderer(other, pair[1:])
     with several, pytest.raises(SceneError, match=r"film\.exposure"):
@@ -419,7 +419,7 @@ def test_updates_with_motion_reach_all_devices(scene, pair):
         for changed in (one, several):
             changed.update(transforms={still: place}, motion=True)
             changed.run(4)
-        assert one.wavefront.features.motion.parts
+        assert one._wavefront.features.motion.parts
         assert same(several.film_state(), one.film_state())
 
 
@@ -476,7 +476,7 @@ def test_films_are_held_on_their_devices(scene, pair, faults, monkeypatch, noise
             else:
                 patched.setattr(crew.DeviceWorker, "take", None)
                 patched.setattr(crew.DeviceWorker, "show", None)
-            several.hold()
+            several._hold()
         if when in ("never", "in a run"):
             little = noise and 1e-4
             assert not several.run(10**6, lambda progress: progress.samples < 40, noise=little)
@@ -484,9 +484,9 @@ def test_films_are_held_on_their_devices(scene, pair, faults, monkeypatch, noise
             faults[queue] = FailsAfter(0)
         if when == "in a run":
             with pytest.raises(SceneError, match="had a part of the film"):
-                several.saved_film(held=True)
+                several._saved_film(held=True)
             return
-        saved = several.saved_film(held=True)
+        saved = several._saved_film(held=True)
         assert same(saved.film, state) and saved.counts["samples"] >= state.samples.sum()
-        assert several.saved_film(held=True) is saved
+        assert several._saved_film(held=True) is saved
         assert len(several.devices) == (2 if when == "never" else 1)

@@ -120,4 +120,3 @@ def no_images(monkeypatch: pytest.MonkeyPatch) -> None:
 
     for name in ("Image", "create_image", "ImageFormat"):
         monkeypatch.setattr(cl, name, refuse)
-

@@ -184,4 +184,3 @@ def test_nothing_needs_images_or_finish(
     no_images(monkeypatch)
     monkeypatch.setattr(cl.CommandQueue, "finish", lambda _: 1 / 0)
     assert np.array_equal(rendered(scene, BadDevice()), picture)
-

@@ -26,7 +26,7 @@ def main(scene_file: str) -> None:
             renderer.step(2)
             renderer.run(2)
             pictures.append(renderer.image())
-            found = [p.cl_program for p in renderer.wavefront.programs.values()]
+            found = [p.cl_program for p in renderer._wavefront.programs.values()]
             binaries = [program.get_info(cl.program_info.BINARIES) for program in found]
             built.append(max(len([b for b in several if b]) for several in binaries))
         tree = clpt.Accel(queue, vertices, np.arange(300, dtype=np.uint32).reshape(100, 3))

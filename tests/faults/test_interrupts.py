@@ -59,7 +59,7 @@ def test_a_broken_renderer_says_so_until_it_is_reset(
 ) -> None:
     renderer = trial.renderer
     renderer.reset()
-    wavefront = renderer.wavefront
+    wavefront = renderer._wavefront
 
     def fail(*_: object) -> None:
         raise clpt.DeviceError("the device is gone")
@@ -84,7 +84,7 @@ def test_a_callback_changes_no_film(trial: Trial) -> None:
 
     def progress(_: clpt.Progress) -> bool:
         assert np.isfinite(renderer.image()).all() and renderer.samples == 0
-        for change in (renderer.step, renderer.reset, renderer.film_state, renderer.hold):
+        for change in (renderer.step, renderer.reset, renderer.film_state, renderer._hold):
             with pytest.raises(clpt.DeviceError, match="the film changes: run calls this") as error:
                 change()
             told.append(error)
@@ -99,14 +99,14 @@ def test_a_hold_that_was_stopped_holds_nothing(trial: Trial) -> None:
     renderer = trial.renderer
     renderer.reset()
     renderer.run(1)
-    renderer.hold()
+    renderer._hold()
     renderer.run(1)
     with raising_at(0) as lines:
-        renderer.hold()
+        renderer._hold()
     with raising_at(lines[0] - 3), pytest.raises(Injected):
-        renderer.hold()
+        renderer._hold()
     with pytest.raises(clpt.SceneError, match="no film is held"):
-        renderer.saved_film(held=True)
+        renderer._saved_film(held=True)
 
 
 def test_a_handler_cancels_whatever_it_interrupts(trial: Trial) -> None:

@@ -440,7 +440,7 @@ def test_alone_in_the_studio(written) -> None:
         load(written(f"{scale}.nvdb", file_bytes({"density": grid_bytes(VALUES * scale)})))
         for scale in (1, 1000)
     )
-    assert first.extra["studio"] == {"camera": True, "shapes": 2, "lights": 1}
+    assert first.extra["studio"] == {"camera": True, "shapes": 2, "lights": 1, "up": "y"}
     box, cloud = first.shapes[0], first.shapes[0].interior
     np.testing.assert_allclose(box.to_world @ [-1, -1, -1, 1], cloud.to_world @ [0, 0, 0, 1])
     np.testing.assert_allclose(box.to_world @ [1, 1, 1, 1], cloud.to_world @ [1, 1, 1, 1])

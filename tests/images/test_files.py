@@ -233,8 +233,8 @@ def test_missing_and_unknown(tmp_path):
         images.read(tmp_path / "nothing.png")
     with pytest.raises(SceneError, match=r"unknown image suffix '\.xyz'"):
         images.read(tmp_path / "a.xyz")
-    with pytest.raises(SceneError, match=r"unknown image suffix '\.jpg'"):
-        images.write(tmp_path / "a.jpg", picture())
+    with pytest.raises(SceneError, match=r"unknown image suffix '\.gif'"):
+        images.write(tmp_path / "a.gif", picture())
     with pytest.raises(SceneError, match="folder does not exist"):
         images.write(tmp_path / "no" / "a.png", picture())
     with pytest.raises(SceneError, match=r"shape \(2, 2, 5\)"):

@@ -258,8 +258,6 @@ SINGULAR = np.diag([1.0, 0.0, 1.0, 1.0])
     ("camera", "part"),
     [
         (scene.Perspective(to_world=SINGULAR), "perspective.to_world"),
-        (scene.Perspective(to_world=np.eye(3)), "4x4"),
-        (scene.Perspective(to_world="here"), "4x4"),
         (scene.Perspective(to_world=np.full((4, 4), np.nan)), "finite"),
         (scene.Perspective(to_world=transforms.scale(2.0)), "scale"),
         (scene.Orthographic(to_world=_gl_perspective(50, 1, 1)), "0 0 0 1"),

@@ -642,8 +642,6 @@ def test_brightness_of_a_texture_is_its_mean():
 @pytest.mark.parametrize(
     ("lamp", "words"),
     [
-        (Directional(direction=(0, 0, 0)), "no length"),
-        (Point(position=(0, np.nan, 0)), "finite"),
         (Spot(to_world=np.zeros((4, 4))), "spot.to_world"),
         (Area(), "emission"),
         (Envmap(), "an image is needed"),

@@ -40,7 +40,7 @@ def exposures(scene: Scene, count: int, spp: int, first_seed: int = 1, **wavefro
     for seed in range(first_seed, first_seed + count):
         renderer.reset(seed=seed)
         assert renderer.run(spp)
-        assert renderer.wavefront.counts.rejected == 0, "samples were not finite"
+        assert renderer._wavefront.counts.rejected == 0, "samples were not finite"
         images.append(renderer.image().astype(np.float64))
     return np.array(images)
 

@@ -334,6 +334,7 @@ FORMS: dict[str, Callable[[Drawer, Param, Any], Any]] = {
     "boolean": lambda self, p, d: not d,
     "integer": _integer,
     "number": _host_number,
+    "optional_number": lambda self, p, d: self.one([None, 3000.0]),
     "text": lambda self, p, d: self.one(["a", "b"]),
     "names": lambda self, p, d: tuple(self.some(tuple(LAYERS), 5)),
     "vector": lambda self, p, d: self.one([(0.5, 0.25, 1.5), (-0.5, 0.0, 2.0)]),

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from clpt import transforms
+from clpt.scene import viewpoint
 from clpt.scene.cameras import Camera, Matrix, Orthographic, Perspective, Spherical, ThinLens
 from clpt.view import navigation
 
@@ -26,7 +27,7 @@ each = pytest.mark.parametrize("camera", CAMERAS, ids=lambda camera: camera.kind
 
 def on_screen(camera: Camera, point: np.ndarray) -> tuple[float, float]:
     """Where a point is seen: to the right and down, per unit of distance."""
-    at = navigation.pose(camera)
+    at = viewpoint.pose(camera)
     away = point - at.origin
     ahead = 1.0 if isinstance(camera, Orthographic) else float(away @ at.forward)
     return -float(away @ at.left) / ahead, -float(away @ at.up) / ahead
@@ -34,7 +35,7 @@ def on_screen(camera: Camera, point: np.ndarray) -> tuple[float, float]:
 
 @each
 def test_the_pose_is_that_of_look_at(camera: Camera) -> None:
-    at = navigation.pose(camera)
+    at = viewpoint.pose(camera)
     towards = (TARGET - ORIGIN) / np.linalg.norm(TARGET - ORIGIN)
     assert np.allclose(at.origin, ORIGIN) and np.allclose(at.forward, towards)
     assert np.allclose(np.cross(at.up, at.forward), at.left) and at.up[1] > 0
@@ -44,7 +45,7 @@ def test_the_pose_is_that_of_look_at(camera: Camera) -> None:
 def test_an_orbit_keeps_the_pivot_where_it_is_seen(camera: Camera) -> None:
     pivot, up = np.array([0.2, 0.4, -0.3]), np.array([0.0, 1.0, 0.0])
     turned = navigation.orbit(camera, pivot, up, 0.2, 0.1)
-    before, after = navigation.pose(camera), navigation.pose(turned)
+    before, after = viewpoint.pose(camera), viewpoint.pose(turned)
     assert np.linalg.norm(after.origin - pivot) == pytest.approx(
         np.linalg.norm(before.origin - pivot)
     )
@@ -59,21 +60,21 @@ def test_an_orbit_ends_before_the_pole(camera: Camera) -> None:
     up = np.array([0.0, 1.0, 0.0])
     for dy in (20.0, -20.0):
         turned = navigation.orbit(camera, TARGET, up, 0.0, dy)
-        height = abs(navigation.pose(turned).forward @ up)
+        height = abs(viewpoint.pose(turned).forward @ up)
         assert height == pytest.approx(math.cos(navigation.POLE), abs=1e-9)
 
 
 @pytest.mark.parametrize("camera", [CAMERAS[0], CAMERAS[1]], ids=lambda camera: camera.kind)
 def test_pan_and_look_follow_the_pointer(camera: Camera) -> None:
     """A drag by a tenth of the height moves what is in the middle by that."""
-    at, aspect = navigation.pose(camera), 1.5
+    at, aspect = viewpoint.pose(camera), 1.5
     height = 2.0 * navigation.half_height(camera, aspect)
     distance = float(np.linalg.norm(TARGET - ORIGIN))
     panned = navigation.pan(camera, distance, 0.1, 0.05, aspect)
     assert np.allclose(on_screen(panned, TARGET), (0.1 * height, 0.05 * height))
     looked = navigation.look(camera, at.up, 0.01, 0.005, aspect)
     assert np.allclose(on_screen(looked, TARGET), (0.01 * height, 0.005 * height), rtol=0.1)
-    assert np.allclose(navigation.pose(looked).origin, ORIGIN)
+    assert np.allclose(viewpoint.pose(looked).origin, ORIGIN)
 
 
 @each
@@ -83,13 +84,13 @@ def test_dolly_and_fly(camera: Camera) -> None:
         half = navigation.half_height
         assert half(near, 1.0) == pytest.approx(half(camera, 1.0) / 2.0)
     else:
-        assert np.allclose(navigation.pose(near).origin, (ORIGIN + TARGET) / 2.0)
-    at = navigation.pose(camera)
-    flown = navigation.pose(navigation.fly(camera, 2.0, 0.5, 0.25, 1.0))
+        assert np.allclose(viewpoint.pose(near).origin, (ORIGIN + TARGET) / 2.0)
+    at = viewpoint.pose(camera)
+    flown = viewpoint.pose(navigation.fly(camera, 2.0, 0.5, 0.25, 1.0))
     assert np.allclose(flown.origin, ORIGIN - at.left + 0.5 * at.up + 2.0 * at.forward)
 
 
 def test_the_axis_that_is_upright() -> None:
     for up in ([0, 1, 0], [0, 0, 1], [0, -1, 0]):
         camera = Perspective(to_world=transforms.look_at([3, 2, 1], [0, 0, 0], up))
-        assert np.allclose(navigation.upright(camera), up)
+        assert np.allclose(viewpoint.upright(camera), up)

@@ -21,5 +21,5 @@ def test_without_the_extra_it_says_what_to_install(monkeypatch: pytest.MonkeyPat
 
 
 def test_a_renderer_has_it() -> None:
-    assert clpt.Renderer.make_widget is notebook.widget
-    assert clpt.MultiRenderer.make_widget is notebook.widget
+    assert clpt.Renderer._make_widget is notebook.widget
+    assert clpt.MultiRenderer._make_widget is notebook.widget

@@ -109,8 +109,8 @@ def check(
 def go_on(renderer: AnyRenderer, saved: SavedFilm, path: Path, note: Callable[[str], None]) -> None:
     """Let a renderer go on from a film, and say so. Raises SceneError, which says what differs."""
     known = len(renderer.warnings)
-    refuse(saved.origin.differences(renderer.origin()), path)
-    renderer.restore(saved)
+    refuse(saved.origin.differences(renderer._origin()), path)
+    renderer._restore(saved)
     note(f"goes on from {path}: {summary(saved)}")
     for warning in renderer.warnings[known:]:
         note(f"clpt: warning: {warning}")
@@ -190,7 +190,7 @@ class Checkpoints:
         if time.monotonic() < self._holds_from:
             return
         try:
-            self._renderer.hold()
+            self._renderer._hold()
             self._held = True
         except MemoryBudgetError as error:
             self._note(f"clpt: warning: no checkpoints: {error}")
@@ -199,7 +199,7 @@ class Checkpoints:
 
     def _begin_to_write(self) -> None:
         try:
-            saved = self._renderer.saved_film(held=True)
+            saved = self._renderer._saved_film(held=True)
         except MemoryError as error:
             self._failure = outputs.failure(self._path, error)
             return

@@ -39,9 +39,9 @@ def metadata(renderer: DevicePictures, scene: Path, seconds: float) -> dict[str,
         "integrator": plan.integrator.kind,
         "sampler": plan.sampler.kind,
         "seed": plan.seed,
-        "spp": renderer.counts.samples / renderer.wavefront.paths.pixels,
-        "device": renderer.device_text,
-        "seconds": round(seconds + renderer.former_seconds, 3),
+        "spp": renderer.counts.samples / renderer._wavefront.paths.pixels,
+        "device": renderer._device_text,
+        "seconds": round(seconds + renderer._former_seconds, 3),
     }
 
 
@@ -99,7 +99,7 @@ def _rescue(
     for folder in folders:
         other = folder / f"{label}{FILM}"
         with suppress(*FAILURES):
-            film_file.write(other, film.saved_film())
+            film_file.write(other, film._saved_film())
             return f"the film is in {other}, of which clpt merge makes the picture"
     return f"nor can it in {' or '.join(map(str, folders))}"
 
@@ -116,9 +116,9 @@ def write(
     path: Path, source: Source, stats: dict[str, str | int | float], grading: Grading
 ) -> None:
     """Write the picture so far, or the film. Raises SceneError, OSError."""
-    form = source.form
+    form = source._form
     if path.suffix.lower() == FILM and not isinstance(source, DenoisedPicture):
-        saved = source.saved_film(held=True)
+        saved = source._saved_film(held=True)
         if not saved.film.taken:
             raise SceneError("no pass has come to its end: there is no film yet", file=path)
         film_file.write(path, saved)

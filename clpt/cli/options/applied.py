@@ -3,35 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
-import math
-from pathlib import Path
 from typing import Any
 
 import click
-import numpy as np
 
-from ... import images, transforms
 from ...choices import AUTO
 from ...denoise.needs import prepared
-from ...errors import SceneError
-from ...formats.meshes import framing
-from ...scene import Scene, kinds
+from ...scene import Scene, kinds, viewpoint
 from ...scene.integrators import NO_AOV, Auto
-from ...scene.lights import Envmap
 from ...scene.params import Kind, fields_of, params
-from ...view.navigation import upright
 from .changes import SceneChanges, Transport
-from .composition import Composition, Orbit
+from .composition import Composition
 
-# The scene's up from +y, by its axis and sign; the front is +z where up is +y, -y where it is +z.
-UPS = {
-    (0, 1): transforms.rotate([0.0, 0.0, 1.0], -90.0),
-    (0, -1): transforms.rotate([0.0, 0.0, 1.0], 90.0),
-    (1, 1): transforms.IDENTITY,
-    (1, -1): transforms.rotate([0.0, 0.0, 1.0], 180.0),
-    (2, 1): framing.Z_UP,
-    (2, -1): transforms.rotate([1.0, 0.0, 0.0], -90.0),
-}
 PARAMETERS = {  # of integrators, and what an integrator without one has not
     "max_depth": "depth",
     "light_paths": "light paths beside it",
@@ -95,62 +78,14 @@ def composed(scene: Scene, composition: Composition) -> Scene:
     camera, env, rotation = composition.camera, composition.env, composition.env_rotation
     if env is None and rotation is not None:
         raise click.BadParameter("there is no --env to turn", param_hint="--env-rotation")
-    if camera is not None or env is not None:
-        up = up_of(scene)
-        if camera is not None:
-            scene = dataclasses.replace(scene, camera=_orbiting(scene, camera, up))
-        if env is not None:
-            scene = _surrounded(scene, env, up, rotation or 0.0)
+    if env is not None:
+        scene = viewpoint.surrounded(scene, env, rotation or 0.0)
+    if camera is not None:
+        seen = viewpoint.orbiting(scene, camera.azimuth, camera.elevation, camera.distance)
+        scene = dataclasses.replace(scene, camera=seen)
     if composition.crop is not None:
         film, (columns, rows) = scene.film, composition.crop
         (x, width), (y, height) = columns.of(film.width), rows.of(film.height)
         film = dataclasses.replace(film, crop=(x, y, width, height))
         scene = dataclasses.replace(scene, film=film)
     return scene
-
-
-def up_of(scene: Scene) -> transforms.Matrix:
-    """Return the rotation (4, 4) that takes +y to the scene's up, and +z to its front.
-
-    Formats of objects have their own; of other scenes up is the axis nearest to the camera's up.
-    Raises SceneError for a camera without any.
-    """
-    if "studio" in scene.extra:
-        return framing.up_of(scene.extra["format"])
-    try:
-        up = upright(scene.camera)
-    except np.linalg.LinAlgError:
-        raise SceneError("flattens space: its up is not known", where="camera") from None
-    axis = int(np.argmax(np.abs(up)))
-    return UPS[axis, int(np.sign(up[axis]))]
-
-
-def _own_shapes(scene: Scene) -> list[Any]:
-    """Return the shapes of the scene's file, without those of the studio."""
-    return scene.shapes[: len(scene.shapes) - scene.extra.get("studio", {}).get("shapes", 0)]
-
-
-def _orbiting(scene: Scene, orbit: Orbit, up: transforms.Matrix) -> Any:
-    """Return a camera on the orbit. Raises SceneError where the scene is too large."""
-    azimuth, elevation = math.radians(orbit.azimuth), math.radians(orbit.elevation)
-    aside, ahead = math.sin(azimuth), math.cos(azimuth)
-    from_ = (math.cos(elevation) * aside, math.sin(elevation), math.cos(elevation) * ahead)
-    top = (-math.sin(elevation) * aside, math.cos(elevation), -math.sin(elevation) * ahead)
-    return framing.framing_camera(
-        _own_shapes(scene), up, from_=from_, top=top, distance=orbit.distance
-    )
-
-
-def _surrounded(scene: Scene, image: Path, up: transforms.Matrix, rotation: float) -> Scene:
-    """Return the scene in an image, without its own surroundings and without the studio's light."""
-    images.check_input(image)
-    studio = scene.extra.get("studio", {})
-    lights = scene.lights[: len(scene.lights) - studio.get("lights", 0)]
-    turned = up @ transforms.rotate([0.0, 1.0, 0.0], rotation)
-    around = Envmap(image=str(image), to_world=turned)
-    return dataclasses.replace(
-        scene,
-        shapes=_own_shapes(scene),
-        lights=[light for light in lights if light.reach != "infinite"] + [around],
-        extra=scene.extra | ({"studio": {**studio, "shapes": 0, "lights": 0}} if studio else {}),
-    )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import click
 
-from ...cluster.multi_renderer import MultiRenderer
 from ..opening.makers import AnyRenderer
 from .passes import End
 
@@ -25,7 +24,7 @@ def header(name: str, renderer: AnyRenderer, where: str) -> str:
 
 def ending(renderer: AnyRenderer, end: End, seconds: float) -> str:
     """Return the line that says how far the render came, in so many seconds of all."""
-    mean = renderer.counts.samples / renderer.wavefront.paths.pixels
+    mean = renderer.counts.samples / renderer._wavefront.paths.pixels
     samples = f"{mean:.0f}" if mean >= 10 or mean == int(mean) else f"{mean:.2g}"
     if not end.stopped:
         return f"{samples} spp, {seconds:.1f} s in all"
@@ -35,7 +34,7 @@ def ending(renderer: AnyRenderer, end: End, seconds: float) -> str:
 
 def before(renderer: AnyRenderer, loading: float) -> None:
     """Print what was made of the scene, and the time; loading: seconds for its file."""
-    first, stats = renderer.wavefront, renderer.stats
+    first, stats = renderer._wavefront, renderer.stats
     for on in renderer.devices:
         _line("device", on.info.label)
     parts = [f"{stats.triangles:,} triangles"]
@@ -73,6 +72,8 @@ def before(renderer: AnyRenderer, loading: float) -> None:
 
 def after(renderer: AnyRenderer) -> None:
     """Print the time of the first sample, what each device did, and each stage of the first."""
+    from ...cluster.multi_renderer import MultiRenderer  # here: one device has no use for it
+
     if isinstance(renderer, MultiRenderer):
         for one in renderer.shares:
             lost = f", failed: {one.failure}" if one.failure else ""
@@ -86,7 +87,7 @@ def after(renderer: AnyRenderer) -> None:
             "samples",
             f"{samples.mean():.1f} in the mean, {samples.min():.0f} to {samples.max():.0f}",
         )
-    timings = renderer.wavefront.timings.collect()
+    timings = renderer._wavefront.timings.collect()
     whole = sum(timing.seconds for timing in timings.values())
     for name, timing in timings.items():
         share = timing.seconds / max(whole, 1e-9)

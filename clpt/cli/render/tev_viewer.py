@@ -33,12 +33,12 @@ def showing(
 
 def shown(source: Film) -> dict[str, NDArray[np.float32]]:
     """Return all channels of the picture so far, (h, w) by name: colours, layers, bands."""
-    picture = source.colours() if source.form.bands else source.image()
+    picture = source.colours() if source._form.bands else source.image()
     made = {letter: picture[..., i] for i, letter in enumerate("RGBA"[: picture.shape[2]])}
     made |= channels_of(source.layers())
-    if source.form.adaptive:
+    if source._form.adaptive:
         made["samples.X"] = source.samples_per_pixel()
-    if source.form.bands:
+    if source._form.bands:
         spectral = source.spectral_image()
         for nm, band in zip(spectral.lambdas, np.moveaxis(spectral.values, 2, 0), strict=True):
             made[f"bands.{nm:g}nm"] = band

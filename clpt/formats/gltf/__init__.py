@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from clpt.choices import Missing
-from clpt.errors import SceneError
+from clpt.errors import SceneError, nearest
 from clpt.formats.gltf import (
     animation,
     cameras,
@@ -113,8 +113,8 @@ def _open(
     document = Document(path, missing)
     unknown = sorted(set(variables) - set(VARIABLES))
     if unknown:
-        known = ", ".join(VARIABLES)
-        raise SceneError(f"glTF has no variable {unknown[0]!r}; known: {known}", file=path)
+        advice = nearest(unknown[0], VARIABLES)
+        raise SceneError(f"glTF has no variable {unknown[0]!r}{advice}", file=path)
     document.lumens = _number(path, variables, "lumens", lights.lumens_of(document), 1e-6, 1e6)
     document.multiple_scattering = _number(path, variables, "multiple_scattering", 0.0, 0.0, 1.0)
     document.variant = variants.chosen(document, _text(variables.get("variant")))

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 from clpt.choices import Missing
-from clpt.formats.meshes.framing import framing_camera, world_bounds
 from clpt.formats.mitsuba import sensors
 from clpt.formats.mitsuba.bsdfs import bsdf
 from clpt.formats.mitsuba.emitters import emitter
@@ -23,6 +22,7 @@ from clpt.formats.mitsuba.shapes import shapes_of
 from clpt.formats.mitsuba.spectra import texture
 from clpt.formats.mitsuba.xml import Document, Element, parse
 from clpt.scene import Scene, integrators
+from clpt.scene.framing import framing_camera, world_bounds
 from clpt.scene.integrators import Film, Integrator
 from clpt.scene.media import Medium
 from clpt.scene.shapes import Instance, Shape

@@ -14,7 +14,7 @@ from typing import Any
 from xml.parsers import expat
 
 from clpt import budget, input_files
-from clpt.errors import SceneError
+from clpt.errors import SceneError, nearest
 from clpt.formats.located import Located
 
 MAX_NESTING = 64
@@ -101,10 +101,9 @@ def parse(path: Path, variables: Mapping[str, object]) -> Document:
     expander.expand(root, 0)
     unused = sorted(set(variables) - expander.used - {CAMERA})
     if unused:
-        known = (
-            ", ".join(sorted(expander.used | expander.values.keys() - variables.keys())) or "none"
-        )
-        raise SceneError(f"has no variable {unused[0]!r}; variables: {known}", file=path)
+        known = expander.used | expander.values.keys() - variables.keys()
+        advice = nearest(unused[0], known) if known else "; it has none"
+        raise SceneError(f"has no variable {unused[0]!r}{advice}", file=path)
     chosen = expander.values[CAMERA] if CAMERA in set(variables) - expander.used else None
     own = {name: value for name, value in expander.values.items() if name in expander.used}
     return Document(root, expander.folders, chosen, own)

@@ -440,6 +440,21 @@ FORMS: dict[str, Form] = {
         lambda cursor, reader: reader.kind(cursor, "filter"),
         lambda value, writer: writer.kind(value),
     ),
+    "optional_number": Form(
+        lambda param: f"{_number_words(param)}, or none",
+        lambda param: {"anyOf": [_number_schema(param), {"type": "null"}]},
+        lambda cursor, _: None if cursor.value is None else cursor.number(),
+    ),
+    "metal": Form(
+        "name of a metal, or a file",
+        {"anyOf": [{"enum": list(spectra.metals())}, json_schema.INDEX_FILE_OBJECT]},
+        lambda cursor, _: json_spectra.read_metal(cursor),
+    ),
+    "size": Form(
+        "two whole numbers",
+        {"type": "array", "items": WHOLE, "minItems": 2, "maxItems": 2},
+        lambda cursor, _: tuple(entry.integer() for entry in cursor.entries(2)),
+    ),
     "keys": Form(
         "list of [keys](motion.md#keys), or none",
         {"anyOf": [ref("keys"), {"type": "null"}]},

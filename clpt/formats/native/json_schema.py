@@ -33,3 +33,8 @@ def object_of(properties: Schema, required: list[str], description: str = "") ->
         "required": required,
         "additionalProperties": False,
     }
+
+
+INDEX_FILE_OBJECT = object_of(
+    {"file": {**STRING, "description": "columns, or a page of refractiveindex.info"}}, ["file"]
+)

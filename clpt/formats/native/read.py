@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from clpt import budget, measured, spectra
+from clpt import budget, measured
 from clpt.choices import Missing
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
 from clpt.formats import volumes
@@ -18,7 +18,7 @@ from clpt.formats.native import forms, shape_files
 from clpt.formats.native.cursor import Cursor, parse
 from clpt.formats.native.spectra import find_file, kind_name
 from clpt.scene import Scene, check_noise, integrators, kinds, lights, materials, media, shapes
-from clpt.scene.params import Kind, params
+from clpt.scene.params import Kind, params, shorthands
 from clpt.scene.volumes import Volume
 
 ON_SHAPES = tuple(cls.kind for cls in lights.ON_SHAPES)
@@ -107,20 +107,15 @@ class _Reader:
         """Read an object of a kind; `other_keys` are no parameters, and are not read."""
         budget.take_parts(1, "its objects", cursor.file)
         declared = params(cls)
-        shortcut = ("metal",) if {"eta", "k"} <= declared.keys() else ()
+        known = {**declared, **shorthands(cls)}
         values: dict[str, Any] = {}
         for key, child in cursor.items():
-            if key in declared:
-                values[key] = forms.read(child, declared[key], self)
-            elif key not in (*other_keys, *shortcut):
-                known = (*declared, *shortcut)
+            if key in known:
+                values[key] = forms.read(child, known[key], self)
+            elif key not in other_keys:
                 if key in KEYS and len(cursor.path) == 1:
                     raise child.error(f"stands at the top of the file, beside {cursor.path[0]!r}")
                 raise UnusedParameterError(cls.kind, key, known, **child.location())
-        if shortcut and "metal" in cursor.value:
-            if "eta" in values or "k" in values:
-                raise cursor.at("metal").error("stands for 'eta' and 'k'; give either")
-            values["eta"], values["k"] = _metal(cursor.at("metal"))
         with cursor.locating():
             return cls(**values)
 
@@ -304,20 +299,6 @@ def _merged(
         tangents=part.tangents,
         attributes=part.attributes,
     )
-
-
-def _metal(cursor: Cursor) -> tuple[spectra.Spectrum, spectra.Spectrum]:
-    """Read eta and k of a metal, by its name or from a file."""
-    if isinstance(cursor.value, dict):
-        if list(cursor.value) != ["file"]:
-            raise cursor.error("a metal is a name, or an object with the key 'file' alone")
-        path = find_file(cursor.at("file"))
-        with cursor.locating():
-            return spectra.read_refractive_index(path)
-    name = cursor.expect(str)
-    if name not in spectra.metals():
-        raise UnknownKindError("metal", name, spectra.metals(), **cursor.location())
-    return spectra.metal(name)
 
 
 def _noise(cursor: Cursor) -> float:

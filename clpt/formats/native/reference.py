@@ -147,7 +147,7 @@ def _spectra() -> list[str]:
     names = {
         "Illuminants": spectra.illuminants(),
         "Glasses and liquids": spectra.glasses(),
-        'Metals (`"metal": name` or `{"file": name}` in place of `eta` and `k`)': spectra.metals(),
+        'Metals (`"metal": name` or `{"file": name}`)': spectra.metals(),
     }
     lists = [
         f"{what}: {', '.join(f'`{name}`' for name in known)}." for what, known in names.items()
@@ -228,7 +228,7 @@ def _first_line(cls: type) -> str:
 def _table(cls: type[Kind]) -> str:
     """The parameters of a kind."""
     default, declared = defaults(cls), params(cls)
-    if not declared:
+    if not declared and not cls.shorthands:
         return "It has no parameters.\n"
     rows = ["| parameter | accepts | default | meaning |", "| --- | --- | --- | --- |"]
     if (file := FILES.get(cls)) is not None:
@@ -237,6 +237,12 @@ def _table(cls: type[Kind]) -> str:
         unit = f" [{param.unit}]" if param.unit else ""
         shown = _shown(default[name])
         rows.append(f"| `{name}` | {forms.words(param)} | {shown} | {param.doc}{unit} |")
+    for shorthand in cls.shorthands:
+        stands = " and ".join(f"`{name}`" for name in shorthand.stands_for)
+        for name, param in shorthand.arguments.items():
+            unit = f" [{param.unit}]" if param.unit else ""
+            meaning = f"stands for {stands}: {param.doc}{unit}"
+            rows.append(f"| `{name}` | {forms.words(param)} | - | {meaning} |")
     return "\n".join(rows) + "\n"
 
 

@@ -14,6 +14,7 @@ from typing import Any
 from clpt import output_files, spectra
 from clpt.formats.native import forms, motion
 from clpt.formats.native.json_schema import (
+    INDEX_FILE_OBJECT,
     NUMBER,
     NUMBERS,
     STRING,
@@ -30,7 +31,6 @@ from clpt.scene import KINDS, integrators, materials, roles
 from clpt.scene.params import Kind, defaults, params
 from clpt.scene.roles import Param, Role
 
-INDEX_FILE = {**STRING, "description": "columns, or a page of refractiveindex.info"}
 ANY_OF_SCALE = {"anyOf": [NUMBER, TRIPLE]}
 
 
@@ -98,10 +98,11 @@ def _kind(cls: type[Kind]) -> Schema:
     properties: Schema = {"type": {"const": cls.kind}}
     for name, param in params(cls).items():
         properties[name] = _parameter(param, default[name])
-    if {"eta", "k"} <= properties.keys():
-        named: Schema = {"enum": list(spectra.metals())}
-        either = [named, object_of({"file": INDEX_FILE}, ["file"])]
-        properties["metal"] = {"anyOf": either, "description": "stands for eta and k"}
+    for shorthand in cls.shorthands:
+        stands = f"stands for {' and '.join(shorthand.stands_for)}"
+        for name, param in shorthand.arguments.items():
+            doc = f"{param.doc} [{param.unit}]" if param.unit else param.doc
+            properties[name] = {"description": f"{doc}; {stands}", **forms.schema(param)}
     if (file := FILES.get(cls)) is not None:
         properties["file"] = {**STRING, "description": f"{file.accepts}: {file.meaning}"}
     summary = (cls.__doc__ or "").strip().splitlines()[0]
@@ -148,7 +149,7 @@ def _spectrum(role: Role) -> Schema:
 
 def _typed_spectra() -> Schema:
     variants = [
-        object_of({"file": INDEX_FILE}, ["file"]),
+        INDEX_FILE_OBJECT,
         object_of({"values": {**rows(2), "description": "[nm, value]"}}, ["values"]),
     ]
     for kind, cls in SPECTRA.items():

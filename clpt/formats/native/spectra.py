@@ -161,3 +161,17 @@ def find_file(cursor: Cursor, name: str | None = None) -> Any:
         with cursor.locating():
             return input_files.named("json", cursor.file.parent, path)
     raise cursor.error(f"there is no file {name!r}")
+
+
+def read_metal(cursor: Cursor) -> tuple[Spectrum, Spectrum]:
+    """Read eta and k of a metal, by its name or from a file."""
+    if isinstance(cursor.value, dict):
+        if list(cursor.value) != ["file"]:
+            raise cursor.error("a metal is a name, or an object with the key 'file' alone")
+        path = find_file(cursor.at("file"))
+        with cursor.locating():
+            return spectra.read_refractive_index(path)
+    name = cursor.expect(str)
+    if name not in spectra.metals():
+        raise UnknownKindError("metal", name, spectra.metals(), **cursor.location())
+    return spectra.metal(name)

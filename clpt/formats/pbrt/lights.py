@@ -18,13 +18,13 @@ from clpt.errors import SceneError, UnknownKindError
 from clpt.formats.missing import GREY
 from clpt.formats.pbrt import octahedral
 from clpt.formats.pbrt.params import Parameters
-from clpt.formats.pbrt.spectra import scaled, spectrum
+from clpt.formats.pbrt.spectra import spectrum
 from clpt.formats.pbrt.state import State
 from clpt.scene import lights
 from clpt.scene.lights import Light
 from clpt.scene.roles import EMISSION
 from clpt.scene.textures import Bitmap
-from clpt.spectra import RGBIlluminant, luminance
+from clpt.spectra import RGBIlluminant, luminance, scaled
 
 WHITE = RGBIlluminant(1.0, 1.0, 1.0)
 SWAP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])  # y is up for a goniometer

@@ -11,12 +11,12 @@ from clpt.errors import UnknownKindError
 from clpt.formats import volumes
 from clpt.formats.pbrt import coated_albedo
 from clpt.formats.pbrt.params import Parameters
-from clpt.formats.pbrt.spectra import scaled, spectrum
+from clpt.formats.pbrt.spectra import spectrum
 from clpt.formats.pbrt.state import Definition, State, nearest
 from clpt.scene.media import Cloud, Grid, HenyeyGreenstein, Homogeneous, Isotropic, Medium
 from clpt.scene.roles import COEFFICIENT, EMISSION
 from clpt.scene.volumes import Volume
-from clpt.spectra import Constant, RGBUnbounded
+from clpt.spectra import Constant, RGBUnbounded, scaled
 
 GRIDS = ("uniformgrid", "nanovdb", "rgbgrid", "cloud")
 HEAT = ("temperatureoffset", "temperaturecutoff", "temperaturescale")

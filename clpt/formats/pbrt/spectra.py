@@ -7,7 +7,6 @@ has luminance 1 here too, so no further factor stands between a file and a Scene
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -21,12 +20,10 @@ from clpt.formats.pbrt.state import State
 from clpt.scene.roles import EMISSION, REFLECTANCE, Spectral
 from clpt.spectra import (
     Blackbody,
-    Constant,
-    Illuminant,
-    RGBIlluminant,
     Spectrum,
     Tabulated,
     cie,
+    scaled,
     spaces,
 )
 
@@ -89,21 +86,6 @@ def to_rec709(rgb: Any, space: str, *, light: bool) -> Any:
     else:
         raise UnknownKindError("colour space", space, (*SPACES, ACES))
     return np.asarray(rgb, np.float64) @ matrix.T if space != "srgb" else np.asarray(rgb)
-
-
-def scaled(value: Any, factor: float) -> Any:
-    """An emitted spectrum times a number."""
-    if factor == 1.0:
-        return value
-    if isinstance(value, RGBIlluminant):
-        return RGBIlluminant(*(factor * float(c) for c in (value.r, value.g, value.b)))
-    if isinstance(value, Constant):
-        return Constant(factor * value.value)
-    if isinstance(value, (Blackbody, Illuminant)):
-        return replace(value, scale=factor * value.scale)
-    if isinstance(value, Tabulated):
-        return Tabulated(value.lambdas, factor * np.array(value.values), value.outside)
-    return Tabulated(cie.GRID, factor * value.sample(cie.GRID))
 
 
 def _rgb(given: Parameter, role: Spectral, state: State) -> Any:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.geometry.lamps import plainly_lit
 from clpt.geometry.motion import at_rest
 from clpt.render.analysis import open_boundaries
 from clpt.render.analysis.bodies import matter_of
@@ -76,6 +77,7 @@ def analyse(scene: Scene, cache: LoweringCache, before: Before | None = None) ->
     """
     scene = at_rest(scene)
     check_at_rest(scene, cache)
+    scene = plainly_lit(scene)
     index = replace(SceneIndex.of(scene), lit_before=before.lit_ghosts if before else None)
     geometry = assembled(index, cache)
     sphere = geometry.bounding_sphere()

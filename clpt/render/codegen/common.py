@@ -55,7 +55,7 @@ FUNCTIONS = (
         "real",
         "light_begins_pdf",
         _parameters(
-            "Scene scene, integer row, vec3 p, vec3 hemisphere, vec3 wi, real t, vec3 n, real *found"
+            "Scene scene, integer row, vec3 p, vec3 side, vec3 wi, real t, vec3 n, real *found"
         ),
         lambda f, cls: f.transport.balanced and not flags.is_null(f, cls),
     ),

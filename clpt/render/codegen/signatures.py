@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Container
 
 from clpt import device
-from clpt.records import INSTANCE, LIGHT, SETTINGS, SHAPE, SLABS, TABLES
+from clpt.records import INSTANCE, LAYER_SETTINGS, LIGHT, SETTINGS, SHAPE, SLABS, TABLES
 from clpt.render.codegen import blocks
 from clpt.render.contract.features import Features
 
@@ -48,18 +48,20 @@ def virtual_files(features: Features, layout: str) -> dict[str, str]:
         "light_layer": (light_layer_args(features), True),
         "flight": (flight_args(features), True),
     }
-    files = {"generated/scene.cl": scene_text(blocks.unused(features))}
+    files = {"generated/scene.cl": scene_text(blocks.unused(features), features)}
     for name, (args, behind) in groups.items():
         rows = args_text(name.upper(), args, behind)
         files[f"generated/{name}_args.cl"] = "\n".join([*rows, ""])
     return files
 
 
-def scene_text(unused: Container[str] = ()) -> str:
+def scene_text(unused: Container[str] = (), features: Features | None = None) -> str:
     """Return records, the `Scene` struct and the macros that carry it through arguments.
 
-    unused: members of the slabs that no kernel of the scene uses.
+    unused: members of the slabs that no kernel of the scene uses. features: without layers, the
+    settings end before what these need.
     """
+    without = () if features is None or features.film.layers.present else LAYER_SETTINGS
     slabs = [record.slab_text(unused) for record in SLABS]
     rows = [record.row_text() for record in (SHAPE, INSTANCE, LIGHT)]
     members = [
@@ -72,7 +74,7 @@ def scene_text(unused: Container[str] = ()) -> str:
     ]
     return "\n".join(
         [
-            SETTINGS.uniform_text(),
+            SETTINGS.without(*without).uniform_text(),
             *slabs,
             "typedef struct {",
             *members,

@@ -7,7 +7,7 @@ from clpt.layout import Record
 from clpt.scene.lights import KINDS as LIGHTS
 from clpt.scene.lights import Light
 from clpt.scene.params import params
-from clpt.scene.roles import REAL, Param
+from clpt.scene.roles import REAL, HostForm, Param
 
 _BANDS = {  # of an image of spectra
     "bands": ("integer", "values in a texel"),
@@ -73,6 +73,12 @@ _RADIANCE = ("integer", "first word of the emission parameter in `light_params`"
 _SCALE = ("real", "what the image's values were divided by")
 _FACTOR = ("integer", "first word of its factor in `light_params`")
 
+OF_HOST: tuple[HostForm, ...] = (
+    "text",
+    "keys",
+    "optional_number",
+)  # forms of parameters that are for the host alone
+
 PROJECTED_RECORDS: dict[str, Record] = {
     "projector": Record(
         "Projector",
@@ -119,7 +125,7 @@ def _members(name: str, param: Param) -> dict[str, str]:
     """The members of a parameter by name, with their types."""
     placement = {member: type_ for member, (type_, _) in _PLACEMENT.items()}
     forms = {"vector": {name: "vec3"}, "direction": {name: "vec3"}, "matrix4": placement}
-    forms |= {"text": {}, "keys": {}}  # for the host alone
+    forms |= {form: {} for form in OF_HOST}
     if param.role.place != "host":
         return {name: "real" if param.role is REAL else "integer"}
     if param.role.name not in forms:

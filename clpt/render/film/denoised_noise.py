@@ -52,7 +52,7 @@ class DenoisedNoise:
         noise before, which pixels of one colour alone may hide, as their edges are rough. Raises
         DeviceError where the denoiser fails.
         """
-        picture = self._renderer.developed()
+        picture = self._renderer._developed()
         halves, layers = picture.halves(), picture.layers()
         height, width = halves[0].shape[:2]
         down, across = -(-height // SIDE), -(-width // SIDE)

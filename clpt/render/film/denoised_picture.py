@@ -31,7 +31,7 @@ class DenoisedPicture(Still):
 
     def __init__(self, source: Pictures, method: str | None = None):
         self.method = needs.check_method(method or source.denoise or DENOISERS[0])
-        self._source, self.form = source.developed(), source.form
+        self._source, self._form = source._developed(), source._form
         self._noisy, self._image = self._source.colours(), self._source.image()
         self._layers = self._source.layers()
         surfaces = [self._layers.get(name) for name in needs.LAYERS]
@@ -42,13 +42,13 @@ class DenoisedPicture(Still):
             with Oidn(*surfaces) as oidn:
                 name += f" {oidn.version}"
                 self._colours = oidn.colours(self._noisy)
-                bands = oidn.bands(self._image) if self.form.bands else None
+                bands = oidn.bands(self._image) if self._form.bands else None
         else:
             on = getattr(source, "device", None) or device.choose()
             self._made = made = Statistical(on, self._halves(), *surfaces)
             self._colours = made.colours
-            bands = made.bands(self._image) if self.form.bands else None
-        alpha = self._image[..., 3:] if self.form.alpha else self._image[..., :0]
+            bands = made.bands(self._image) if self._form.bands else None
+        alpha = self._image[..., 3:] if self._form.alpha else self._image[..., :0]
         self._denoised = np.concatenate([self._colours, alpha], axis=2) if bands is None else bands
         self.text = name + (f" with {', '.join(with_layers)}" if with_layers else "")
 

@@ -34,13 +34,13 @@ class Developed(Still):
     """
 
     def __init__(self, film: FilmState, form: PictureForm):
-        self._film, self.form = film, form
+        self._film, self._form = film, form
 
     def image(self) -> Image:
         """The picture: colours, with alpha where the film has it, or the film's bands."""
-        if self.form.bands:
-            return self._mean_bands() * np.float32(self.form.exposure)
-        if self.form.alpha:
+        if self._form.bands:
+            return self._mean_bands() * np.float32(self._form.exposure)
+        if self._form.alpha:
             return np.dstack([self.colours(), self._alpha()])
         return self.colours()
 
@@ -80,35 +80,35 @@ class Developed(Still):
 
     def _colours(self, words: Words) -> Image:
         first, second, third = _sums(words, 0) * self._mean(words)
-        if self.form.weighed:
+        if self._form.weighed:
             brought = _sums(words, light_group(len(words))) * self._light_mean(words)
             first, second, third = first + brought[0], second + brought[1], third + brought[2]
-        rows = np.array(self.form.to_output, np.float32)
+        rows = np.array(self._form.to_output, np.float32)
         return np.stack([a * first + b * second + c * third for a, b, c in rows], axis=2)
 
     def _alpha(self) -> Image:
-        words, first = self._words, FILM_WORDS + SUM_WORDS * self.form.weights
+        words, first = self._words, FILM_WORDS + SUM_WORDS * self._form.weights
         return numbers(words[first : first + SUM_WORDS]) * self._mean(words)
 
     def _mean_bands(self) -> Image:
         sums, *others = self._film.bands
         for half in others:
             sums = add_sums(sums, half)
-        values, count = numbers(np.moveaxis(sums, 1, 0)), self.form.bands
+        values, count = numbers(np.moveaxis(sums, 1, 0)), self._form.bands
         words, scale = self._words, np.float32(self._film.scale)
         total = values[:count] * (self._mean(words) / scale)
-        if self.form.weighed:
+        if self._form.weighed:
             total += values[count:] * (self._light_mean(words) / scale)
         return np.ascontiguousarray(np.moveaxis(total, 0, 2))
 
     def _samples(self, words: Words) -> Image:
-        if not self.form.light_paths:
+        if not self._form.light_paths:
             return words[SAMPLES_WORD].astype(np.float32)
         return np.full(words.shape[1:], self._light_paths(words), np.float32)
 
     def _mean(self, words: Words) -> Image:
         """Return one over the divisor of each pixel's sums, 0 where that is 0."""
-        weighed = self.form.weights
+        weighed = self._form.weights
         by = numbers(words[FILM_WORDS:][:SUM_WORDS]) if weighed else self._samples(words)
         return _inverse(by)
 
@@ -119,7 +119,7 @@ class Developed(Still):
 
     def _light_paths(self, words: Words) -> float:
         """Return how many light paths there were for each pixel."""
-        first = light_group(len(words)) if self.form.weighed else 0
+        first = light_group(len(words)) if self._form.weighed else 0
         count = words[first + SAMPLES_WORD]
         return float(count.sum(dtype=np.uint64)) / count.size
 

@@ -154,7 +154,7 @@ def _header(path: Path, text: Any) -> dict[str, Any]:
 
 def _picture(saved: SavedFilm) -> Any:
     """The picture so far, with the header: what viewers show."""
-    form, made = saved.form, saved.developed()
+    form, made = saved.form, saved._developed()
     pixels = made.colours() if form.bands else made.image()
     letters = "RGBA"[: pixels.shape[2]]
     stored = np.clip(np.nan_to_num(pixels), -HALF_MAX, HALF_MAX).astype(np.float16)

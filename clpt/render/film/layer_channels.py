@@ -30,11 +30,12 @@ def write_layers(
 ) -> None:
     """Write the picture of a renderer or film and its layers as an .exr.
 
-    The picture is in half floats, or its bands in float32, layers in float32. names: a set of SETS;
-    "blender" gives names such as ViewLayer.Combined.R. Raises SceneError.
+    path: of the file. source: has the picture. names: a set of SETS; "blender" gives names such as
+    ViewLayer.Combined.R. metadata: further attributes of the file. The picture is in half floats,
+    or its bands in float32, layers in float32. Raises SceneError.
     """
-    source = source.developed()
-    layers, form = source.layers(), source.form
+    source = source._developed()
+    layers, form = source.layers(), source._form
     if form.adaptive:
         layers.setdefault("samples", source.samples_per_pixel()[..., None])
     channels = channels_of(layers, names)

@@ -30,7 +30,7 @@ def layers_of(arrays: Mapping[str, Words], picture: Pictures) -> dict[str, Image
     as in the sky, a layer is 0, an id -1. `light_groups` becomes a layer light_NAME for each group.
     """
     made: dict[str, Image] = {}
-    form = picture.form
+    form = picture._form
     sampled = _sampled(form, arrays["layers"])
     light = _light(form, arrays["light_layers"], picture)
     mattes = iter(arrays["mattes"])

@@ -27,11 +27,11 @@ class Pictures(ABC):
     for none.
     """
 
-    form: PictureForm
+    _form: PictureForm
     denoise: str | None = None
 
     @abstractmethod
-    def developed(self, *words: str) -> Pictures:
+    def _developed(self, *words: str) -> Pictures:
         """Return the pictures of the film as it is now, which then stay; wait for the film.
 
         words: which of those of `clpt.FilmState` are wanted, by default all.
@@ -44,25 +44,25 @@ class Pictures(ABC):
         to lie over another picture, which adds the rest of its own. Of a film with bands (h, w,
         bands), the mean radiance in each.
         """
-        return self.developed("words", "bands").image()
+        return self._developed("words", "bands").image()
 
     def colours(self) -> Image:
         """The picture so far in three colours, (h, w, 3) float32, also of a film with bands."""
-        return self.developed("words").colours()
+        return self._developed("words").colours()
 
     def spectral_image(self) -> SpectralImage:
         """The picture so far of a film with bands, at their centres. Raises SceneError without."""
-        if not self.form.bands:
+        if not self._form.bands:
             raise SceneError("this picture has no bands; set the film's", where="film.bands")
-        return SpectralImage(self.image(), self.form.band_centres, emissive=True)
+        return SpectralImage(self.image(), self._form.band_centres, emissive=True)
 
     def samples_per_pixel(self) -> Image:
         """Return how many samples each pixel has, (h, w) float32."""
-        return self.developed("words").samples_per_pixel()
+        return self._developed("words").samples_per_pixel()
 
     def light_paths_per_pixel(self) -> float:
         """Return how many paths have begun at lights for each pixel."""
-        return self.developed("words").light_paths_per_pixel()
+        return self._developed("words").light_paths_per_pixel()
 
     def halves(self) -> tuple[Image, Image]:
         """Return two independent pictures, of the even and of the odd samples.
@@ -70,7 +70,7 @@ class Pictures(ABC):
         (h, w, 3) float32 each, in the film's output space, of a Renderer with `halves=True`. Their
         mean, weighted as samples are, is the whole picture. Raises SceneError without.
         """
-        return self.developed("words").halves()
+        return self._developed("words").halves()
 
     def layers(self) -> dict[str, Image]:
         """The layers of the film by name, (h, w, 1 to 12) float32: what `film.layers` names.
@@ -80,12 +80,12 @@ class Pictures(ABC):
         group, `light_rest` of lights that name none; of mattes (h, w, 12), pairs of a name's hash
         and its coverage; see docs/layers.md.
         """
-        return self.developed("words", *LIGHT_LAYERS).layers()
+        return self._developed("words", *LIGHT_LAYERS).layers()
 
 
 class Still(Pictures):
     """Base of pictures of a film that does not change."""
 
-    def developed(self, *words: str) -> Self:
+    def _developed(self, *words: str) -> Self:
         """Return itself."""
         return self

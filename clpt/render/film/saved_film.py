@@ -62,7 +62,7 @@ class Origin:
 
 @dataclass(frozen=True, eq=False)
 class SavedFilm(Pictures):
-    """A film, and all that it takes to go on with it, from `Renderer.saved_film`.
+    """A film, and all that it takes to go on with it, as `Renderer.save_state` writes it.
 
     form: how its pictures are made; counts: paths and rays by name; sessions: what was
     done; adaptive: the state of adaptive sampling, arrays by name, empty without.
@@ -81,11 +81,16 @@ class SavedFilm(Pictures):
         if isinstance(state["counts"], tuple):
             (self.__dict__["counts"],) = state["counts"]
 
-    def developed(self, *words: str) -> Developed:
+    @property
+    def _form(self) -> PictureForm:  # type: ignore[override]
+        """The way from the film's words to a picture."""
+        return self.form
+
+    def _developed(self, *words: str) -> Developed:
         """Return the pictures of the film."""
         return Developed(self.film, self.form)
 
-    def saved_film(self, *, held: bool = False) -> SavedFilm:
+    def _saved_film(self, *, held: bool = False) -> SavedFilm:
         """Return itself; held: as of a renderer, here without a meaning."""
         return self
 

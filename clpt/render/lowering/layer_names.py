@@ -33,7 +33,7 @@ def lower_names(
     """
     layers, things = index.layers, index.scene.shapes
     names: dict[str, tuple[str, ...]] = {}
-    features = LayerFeatures(layers)
+    features = LayerFeatures(layers, present=bool(layers))
     if "crypto_object" in layers:
         if len(things) > MOST_NAMED:
             message = f"mattes are for {MOST_NAMED:,} shapes, not {len(things):,}"

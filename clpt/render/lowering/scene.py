@@ -42,14 +42,14 @@ from clpt.render.lowering.media.body_words import BodyWords
 from clpt.render.lowering.media.light_media import light_media_words
 from clpt.render.lowering.media.medium_words import MediumWords, medium_aims
 from clpt.render.lowering.motion import lower_motion
-from clpt.render.lowering.settings import Found, set_layers, settings_of
+from clpt.render.lowering.settings import Found, settings_of
 from clpt.render.lowering.textures.attributes import lower_attributes
 from clpt.scene import Scene
 from clpt.scene import materials as mt
 from clpt.scene.integrators import DEEPEST, Film, Integrator
 from clpt.scene.lights import Point
 from clpt.scene.media import Lattice
-from clpt.scene.params import params
+from clpt.scene.params import Kind, params
 from clpt.scene.roles import INDEX
 from clpt.scene.shapes import Mesh, Shape
 
@@ -157,10 +157,9 @@ def encode(found: Analysis, cache: LoweringCache, texture_budget: int | None = N
         ),
         materials=needs.of_materials(index, encoder, surfaces.materials),
     )
-    aims = rows.aims, len(found.aims)
-    own = Found(rows.density, rows.ambient, aims, surfaces.around, features.dispersion)
+    aims, around, disperses = (rows.aims, len(found.aims)), surfaces.around, features.dispersion
+    own = Found(rows.density, rows.ambient, aims, around, disperses, layers)
     settings = settings_of(index, geometry, lights, wavelengths, found.sphere, own)
-    set_layers(settings, layers)
     cache.settle()
     tables = encoder.store.arrays()
     encoder.textures.images.joined(tables["images"])
@@ -302,7 +301,8 @@ def _begin_materials(index: SceneIndex, encoder: Encoder) -> MaterialWords:
     """Append what idle lanes read as a material, and make the maker of material words."""
     if index.shifts:
         encoder.spectra.expect_light(emissions(index))
-    longest = max(map(row_words, (*mt.LEAVES, *index.leaves)))
+    leaves: tuple[type[Kind], ...] = (*mt.LEAVES, *index.leaves)
+    longest = max(map(row_words, leaves))
     encoder.store.append("materials", np.zeros(longest, np.uint32))
     return MaterialWords(encoder, index.leaves, index.normal_mapped)
 

@@ -33,7 +33,7 @@ class Found:
     density_row: where the table of the density of wavelengths begins in `distributions`;
     ambient_row: where the ambient light is in `light_params`; aims: the first of the spheres at
     which light paths aim, and their number; around: words of the bodies and of the medium at the
-    camera; disperses: whether directions depend on wavelengths.
+    camera; disperses: whether directions depend on wavelengths; layers: beside the picture.
     """
 
     density_row: int
@@ -41,6 +41,7 @@ class Found:
     aims: tuple[int, int]
     around: tuple[int, int]
     disperses: bool
+    layers: LayerFeatures
 
 
 def settings_of(
@@ -81,6 +82,7 @@ def settings_of(
     scale = settings["film_scale"] = film_scale(film, light_level(index, lights, sphere))
     settings["to_first"], settings["to_second"], settings["to_third"] = matrix / scale
     settings["center"], settings["scene_radius"] = sphere
+    _set_layers(settings, found.layers)
     return settings
 
 
@@ -111,7 +113,7 @@ def _set_paths(settings: NDArray[np.void], index: SceneIndex) -> None:
     settings["light_paths"] = index.weighed
 
 
-def set_layers(settings: NDArray[np.void], layers: LayerFeatures) -> None:
+def _set_layers(settings: NDArray[np.void], layers: LayerFeatures) -> None:
     """Set where the layers beside the picture stand."""
     for name, place in layers.places.items():
         settings[f"layer_{name}"] = place

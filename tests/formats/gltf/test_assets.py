@@ -11,7 +11,7 @@ import trimesh
 
 from clpt.cli.files.scene_contents import summary
 from clpt.formats import gltf, load
-from clpt.formats.meshes import framing
+from clpt.scene import framing
 
 # Where expected.json has bounds before sparse values and morph targets; Fox there is without skin.
 KNOWN = {

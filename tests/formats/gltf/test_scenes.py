@@ -124,7 +124,7 @@ def test_instances(read, build):
 
 def bounds(scene):
     """Least and largest corner of what the file itself holds."""
-    from clpt.formats.meshes import framing
+    from clpt.scene import framing
 
     return framing.world_bounds(scene.shapes[: -scene.extra["studio"]["shapes"]])
 

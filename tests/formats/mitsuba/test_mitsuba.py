@@ -11,8 +11,7 @@ import pytest
 from clpt import images, spectra
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
 from clpt.formats import load
-from clpt.formats.meshes import framing
-from clpt.scene import integrators, lights, materials, textures
+from clpt.scene import framing, integrators, lights, materials, textures
 from clpt.spectra import (
     RGB,
     Blackbody,
@@ -74,7 +73,7 @@ def test_variables(scene):
     )
     assert scene(body).integrator.max_depth == 3
     assert scene(body, n=7).integrator.max_depth == 7
-    with pytest.raises(SceneError, match=r"scene.xml: has no variable 'm'; variables: n"):
+    with pytest.raises(SceneError, match=r"scene.xml: has no variable 'm'; known: n"):
         scene(body, m=7)
     with pytest.raises(SceneError, match=r"scene.xml:2: .*\$q is not defined"):
         scene('<integrator type="$q"/>')

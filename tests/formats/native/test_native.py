@@ -225,7 +225,7 @@ ERRORS = [
     ({"shapes": [{"type": "mesh", "file": "no.ply"}]}, "shapes[0].file", "no file 'no.ply'"),
     ({"shapes": [{"type": "mesh"}]}, "shapes[0]", "needs a 'file'"),
     ({"shapes": [{"type": "mesh", "vertices": [[0, 0, 0]], "faces": [[0, 1, 2]]}]},
-     "shapes[0]", "outside 0 to 0"),
+     "shapes[0].faces", "a face names vertex 2, there are 1"),
     ({"shapes": [{"type": "mesh", "vertices": [[0, 0]], "faces": []}]},
      "shapes[0].vertices", "rows of 3 numbers"),
     ({"materials": {"a": {"type": "two_sided", "front": "a"}}},

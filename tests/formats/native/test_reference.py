@@ -9,7 +9,7 @@ from typing import get_args
 from clpt import scene
 from clpt.formats.native import forms, reference
 from clpt.scene import KINDS, integrators, materials
-from clpt.scene.params import params
+from clpt.scene.params import params, shorthands
 from clpt.scene.roles import HostForm
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -27,7 +27,7 @@ def test_every_form_is_read_and_written():
     declared = [
         (cls, name, param)
         for cls in (*classes, integrators.Film, materials.Layer)
-        for name, param in params(cls).items()
+        for name, param in {**params(cls), **shorthands(cls)}.items()
     ]
     assert set(get_args(HostForm)) < forms.FORMS.keys()
     assert not [(cls, name) for cls, name, p in declared if p.role.name == "host"]
@@ -41,6 +41,7 @@ def test_every_kind_and_parameter_is_in_the_reference():
         for cls in classes:
             section = page.split(f"### `{cls.kind}`\n")[1].split("\n## ")[0].split("\n### ")[0]
             assert all(f"| `{name}` |" in section for name in params(cls))
+            assert all(f"| `{name}` |" in section for name in shorthands(cls))
 
 
 def test_examples_say_the_same_in_json_and_python():

@@ -53,6 +53,7 @@ NEEDED: dict[type, dict[str, Any]] = {
 # Some value of a form or role that is not the default, whatever that is.
 VALUES: dict[str, Any] = {
     "lens": "planar",
+    "optional_number": 3000.0,
     "reflectance": (0.25, 0.5, 0.125),
     "emission": (2.0, 3.0, 4.0),
     "index": "diamond",

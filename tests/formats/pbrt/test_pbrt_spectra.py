@@ -7,9 +7,9 @@ import pytest
 
 from clpt import spectra
 from clpt.errors import SceneError
-from clpt.formats.pbrt.spectra import named, names, scaled, spectrum, to_rec709
+from clpt.formats.pbrt.spectra import named, names, spectrum, to_rec709
 from clpt.scene.roles import NAMED
-from clpt.spectra import cie
+from clpt.spectra import cie, scaled
 from tests.formats.pbrt.directives import params, state
 
 

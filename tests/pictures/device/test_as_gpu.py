@@ -34,7 +34,7 @@ def test_forms(gpu: dev.Device, scenes: Path) -> None:
     """One lane, queues that are appended to, compressed nodes; in all but a few pixels the same."""
     scene = with_film(clpt.load(scenes / "instances.xml"), mode="rgb")
     renderer = clpt.Renderer(scene, gpu, queued=True)  # one kind: it would not be asked for
-    front = renderer.wavefront
+    front = renderer._wavefront
     slots, strategy = front.paths.slots, front.scene.strategy
     assert (front.lanes, strategy.layout, strategy.queued) == (1, "compact", True)
     assert UNIT_SLOTS < slots <= 2 * UNIT_SLOTS  # whole pictures
@@ -54,7 +54,7 @@ def test_forms_of_light_paths(gpu: dev.Device, integrator: Integrator) -> None:
     mirror = Rectangle(to_world=plate, material=m.TwoSided(front=m.Conductor()))
     scene = dataclasses.replace(corner({}, lamp(0.1, 250.0), ball, mirror), integrator=integrator)
     renderer = clpt.Renderer(scene, gpu, layout="compact", queued=True)
-    front = renderer.wavefront
+    front = renderer._wavefront
     assert front.lanes == 1 and front.scene.strategy.queued
     renderer.run(8)
     image, plain = renderer.image(), clpt.render(scene, 8)

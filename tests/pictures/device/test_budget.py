@@ -59,7 +59,7 @@ def rebuild_and_move(renderer: clpt.Renderer, i: int) -> None:
 
 @pytest.mark.parametrize("change", [reset, move, deform, rebuild_and_move])
 def test_used_stays_where_it_was(renderer: clpt.Renderer, change) -> None:
-    buffers = renderer.wavefront.buffers
+    buffers = renderer._wavefront.buffers
     for i in range(2):
         change(renderer, i)
     used = buffers.used

@@ -81,7 +81,7 @@ def test_odd_sizes(size: tuple[int, int]) -> None:
     image = renderer.image()
     assert image.shape == (height, width, 3)
     np.testing.assert_allclose(image, np.broadcast_to([0.25, 0.5, 1.0], image.shape), rtol=1e-6)
-    assert renderer.wavefront.counts.samples == 3 * width * height
+    assert renderer._wavefront.counts.samples == 3 * width * height
 
 
 def test_seeds_differ(scenes: Path, once: np.ndarray) -> None:
@@ -103,4 +103,4 @@ def test_a_stopped_step_leaves_a_valid_picture(scenes: Path) -> None:
     assert not renderer.run(4096, lambda progress: progress.samples < 8)
     image = renderer.image()
     assert np.isfinite(image).all() and image.min() >= 0.0 and image.mean() > 0.01
-    assert renderer.wavefront.counts.samples < 4096 * 400
+    assert renderer._wavefront.counts.samples < 4096 * 400

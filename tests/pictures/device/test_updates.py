@@ -135,21 +135,21 @@ def test_values_are_a_few_words(
     """Colours and cameras write some bytes; they lower, build and bind nothing."""
     renderer.update(scene=scene())
     written: list[int] = []
-    stream = renderer.wavefront.stream
+    stream = renderer._wavefront.stream
     write = stream.write
     monkeypatch.setattr(
         stream, "write", lambda b, a, *more: (written.append(a.nbytes), write(b, a, *more))[1]
     )
     monkeypatch.setattr(renderer, "_rebuild", None)
-    buffers, used = renderer.wavefront.arguments, renderer.wavefront.buffers.used
+    buffers, used = renderer._wavefront.arguments, renderer._wavefront.buffers.used
     with caplog.at_level(logging.INFO, "clpt"):
         renderer.update(materials={RED: m.Diffuse(reflectance=(0.1, 0.2, 0.3))})
         assert 4 <= sum(written) <= 12
         renderer.update(camera=dataclasses.replace(CAMERA, fov=30.0))
         assert sum(written) < 200
     assert not caplog.records
-    assert renderer.wavefront.arguments == buffers
-    assert renderer.wavefront.buffers.used == used
+    assert renderer._wavefront.arguments == buffers
+    assert renderer._wavefront.buffers.used == used
     check(renderer)
 
 
@@ -179,7 +179,7 @@ def test_what_cannot_be_changes_nothing(renderer: clpt.Renderer) -> None:
         with pytest.raises(SceneError, match=message):
             renderer.update(**edit)
         assert renderer.scene is now
-    buffers = renderer.wavefront.buffers
+    buffers = renderer._wavefront.buffers
     limit, buffers.limit = buffers.limit, buffers.used + 40
     with pytest.raises(MemoryBudgetError):
         renderer.update(scene=dataclasses.replace(now, shapes=[*now.shapes, SIDE, SIDE]))
@@ -239,14 +239,14 @@ def test_arrays_of_another_context(renderer: clpt.Renderer) -> None:
 def test_trees_are_fitted_or_built(caplog: pytest.LogCaptureFixture) -> None:
     """A lamp that moves is lowered again and its tree fitted; a scene that is given is built."""
     own = clpt.Renderer(scene(), device.choose(), layout="wide8")
-    tree = own.wavefront.scene.trees.triangles
+    tree = own._wavefront.scene.trees.triangles
     own.update(transforms={LAMP: tf.translate([0.3, 2.8, 0.5]) @ LAMP.to_world, FLOOR: tf.scale(2)})
-    assert own.wavefront.scene.trees.triangles is tree
+    assert own._wavefront.scene.trees.triangles is tree
     fresh = picture(clpt.Renderer(own.scene, own.device, layout="wide8"))
     np.testing.assert_allclose(picture(own), fresh, atol=1e-5)
     with caplog.at_level(logging.INFO, "clpt.render.editing.rebuild"):
         own.update(scene=own.scene)
-    assert own.wavefront.scene.trees.triangles is not tree
+    assert own._wavefront.scene.trees.triangles is not tree
     assert [r.message for r in caplog.records] == ["trees are built over triangles and boxes"]
     np.testing.assert_array_equal(picture(own), fresh)
 
@@ -262,7 +262,7 @@ def test_values_and_sources(mode: str) -> None:
     ]
     film = Film(width=20, height=16, mode=mode)
     own = clpt.Renderer(scene(shapes=[FLOOR, LAMP, *balls], film=film), device.choose())
-    used = own.wavefront.buffers.used
+    used = own._wavefront.buffers.used
     for old, new in (
         (RED, m.Diffuse(reflectance=(0.9, 0.8, 0.1))),
         (kinds[2], m.Plastic(diffuse_reflectance=(0.1, 0.2, 0.3), int_ior=1.7)),
@@ -276,7 +276,7 @@ def test_values_and_sources(mode: str) -> None:
         check(own)
     own.update(scene=scene(shapes=[FLOOR, LAMP, *balls], film=film))
     check(own)
-    assert own.wavefront.buffers.used == used
+    assert own._wavefront.buffers.used == used
 
 
 @pytest.mark.slow

@@ -234,7 +234,7 @@ def test_a_stop_that_becomes_a_discard():
 def test_a_flag_that_running_kernels_see():
     """Where a device shares words, no bounce begins while `leave` is raised, but for steps."""
     with clpt.Renderer(sky(width=40, height=40), slots=64) as renderer:
-        wavefront = renderer.wavefront
+        wavefront = renderer._wavefront
         if not (wavefront.looped and renderer.device.info.shares_words):
             pytest.skip("this device's kernels see nothing while they run")
         taken = []
@@ -282,14 +282,14 @@ def test_sums_near_their_end_are_counted():
     with clpt.Renderer(painted(2.0**42)) as renderer:
         renderer.run(2)
         np.testing.assert_allclose(renderer.image()[..., 0], np.float32(2.0**42), 1e-6)
-        assert renderer.wavefront.counts.full == 0
+        assert renderer._wavefront.counts.full == 0
         renderer.run(20)
-        assert renderer.wavefront.counts.full > 0
+        assert renderer._wavefront.counts.full > 0
         (told,) = refusals(renderer)
         assert told == "pixels are too bright for the film: lower film.exposure"
         renderer.update(scene=painted(2.0**45))
         renderer.run(2)
-        assert renderer.wavefront.counts.rejected == 12 and not renderer.image().any()
+        assert renderer._wavefront.counts.rejected == 12 and not renderer.image().any()
         assert refusals(renderer)[0].startswith("12 samples were not finite, or too bright")
 
 
@@ -301,7 +301,7 @@ def test_the_exposure_moves_the_range():
         )
         with clpt.Renderer(scene) as renderer, clpt.Renderer(sky()) as plain:
             renderer.run(3)
-            assert renderer.wavefront.counts.rejected == 0
+            assert renderer._wavefront.counts.rejected == 0
             np.testing.assert_allclose(renderer.image(), [[[1.0, 0.5, 0.0]] * 3] * 2, rtol=1e-5)
             with pytest.raises(SceneError, match="exposure"):
                 plain.merge(renderer.film_state())

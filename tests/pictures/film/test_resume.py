@@ -128,9 +128,9 @@ def test_a_stopped_run_is_saved_as_it_was_before(mode, tmp_path: Path):
     with clpt.Renderer(scene, **options) as whole, clpt.Renderer(scene, **options) as cut:
         for renderer in (whole, cut):
             renderer.run(FIRST, noise=noise)
-        cut.hold()
+        cut._hold()
         assert not cut.run(2000, lambda progress: False, noise=noise)
-        film_file.write(tmp_path / "a.film", cut.saved_film(held=True))
+        film_file.write(tmp_path / "a.film", cut._saved_film(held=True))
         whole.run(SECOND, noise=noise)
         with clpt.Renderer(scene, **options) as renderer:
             renderer.load_state(tmp_path / "a.film")
@@ -181,7 +181,7 @@ def test_other_settings_and_kernels_are_refused(tmp_path: Path):
     path = tmp_path / "a.film"
     with clpt.Renderer(sky(sampler=Zsobol(), spp=16)) as renderer:
         renderer.run(2)
-        saved = renderer.saved_film()
+        saved = renderer._saved_film()
     film_file.write(path, saved)
     check_refused(path, r"halves: False -> True", spp=12, halves=True)
     check_refused(path, r"sampler\.points: 16 -> 32", spp=17)
@@ -199,14 +199,14 @@ def check_refused(path: Path, told: str, spp: int, **options: bool) -> None:
 def test_another_class_of_device_is_told(tmp_path: Path, caplog):
     with clpt.Renderer(sky()) as renderer:
         renderer.run(2)
-        saved = renderer.saved_film()
+        saved = renderer._saved_film()
         (session,) = saved.sessions
         other = dataclasses.replace(session, device={**session.device, "lanes": 4, "device": "X"})
         with caplog.at_level(logging.WARNING, "clpt"):
-            renderer.restore(dataclasses.replace(saved, sessions=(other, session)))
+            renderer._restore(dataclasses.replace(saved, sessions=(other, session)))
         assert "device: X -> " in renderer.warnings[-1] and "lanes: 4 -> " in caplog.text
         renderer.run(1)
-        sessions = renderer.saved_film().sessions
+        sessions = renderer._saved_film().sessions
         assert len(sessions) == 3 and sessions[0].device["device"] == "X"
 
 
@@ -218,12 +218,12 @@ def test_what_cannot_be_written_is_told(tmp_path: Path):
 def test_what_begins_anew_has_no_history():
     with clpt.Renderer(sky()) as renderer:
         with pytest.raises(SceneError, match="no film is held"):
-            renderer.saved_film(held=True)
+            renderer._saved_film(held=True)
         renderer.run(2)
-        renderer.restore(renderer.saved_film())
-        assert len(renderer.saved_film().sessions) == 2
+        renderer._restore(renderer._saved_film())
+        assert len(renderer._saved_film().sessions) == 2
         renderer.reset(seed=3)
-        saved = renderer.saved_film()
+        saved = renderer._saved_film()
         assert len(saved.sessions) == 1 and saved.seconds == 0.0 and not saved.film.taken
         assert saved.origin.scene.values["seed"] == 3
 
@@ -241,8 +241,8 @@ def test_saved_films_add(tmp_path: Path):
         total = films[0].merged(films[1]).merged(films[2])
         np.testing.assert_array_equal(total.film.words, whole.film_state().words)
         assert total.film.taken == ((0, 9),) and len(total.sessions) == 3
-        assert total.counts["samples"] == whole.wavefront.counts.samples
+        assert total.counts["samples"] == whole._wavefront.counts.samples
         with pytest.raises(SceneError, match="samples 4 to 5 would be taken twice"):
             total.merged(films[2])
     with clpt.Renderer(sky(seed=1)) as other, pytest.raises(SceneError, match="seed: 0 -> 1"):
-        total.merged(other.saved_film())
+        total.merged(other._saved_film())

@@ -75,7 +75,7 @@ def test_bright_light_and_many_samples():
             expected = np.broadcast_to(radiance * np.array([1.0, 0.5, 0.25]), (2, 2, 3))
             np.testing.assert_allclose(renderer.image(), expected, rtol=1e-5)
             assert (renderer.film_state().samples == samples).all()
-            assert renderer.wavefront.counts.full == 0
+            assert renderer._wavefront.counts.full == 0
 
 
 @pytest.mark.slow

@@ -54,4 +54,4 @@ def test_a_direction_that_is_no_number(sky: Light) -> None:
     renderer = clpt.Renderer(scene)
     renderer.run(4)
     assert renderer.image().max() == 0.0
-    assert renderer.wavefront.counts.rejected == 0
+    assert renderer._wavefront.counts.rejected == 0

@@ -171,7 +171,7 @@ def test_light_through_what_is_hidden() -> None:
             assert got == pytest.approx(np.exp(-lost) / (np.pi * 49.0), rel=1e-3)
             inside = tf.look_at([0, 0, 1.5], [0, 0, 9], [0, 1, 0])
             renderer.update(camera=dataclasses.replace(one.camera, to_world=inside, near=0.0))
-            assert renderer.wavefront.scene.lowered.settings["camera_bodies"] == first
+            assert renderer._wavefront.scene.lowered.settings["camera_bodies"] == first
 
 
 @pytest.mark.parametrize(

@@ -230,7 +230,7 @@ def test_a_lamp_that_moves_is_in_another_medium() -> None:
     scene.integrator = Path(light_paths=1)
     out = dataclasses.replace(SPOT, to_world=tf.translate([0, 3, 0]) @ SPOT.to_world)
     with clpt.Renderer(scene) as renderer:
-        first = renderer.wavefront.scene.lowered.tables["media"].copy()
+        first = renderer._wavefront.scene.lowered.tables["media"].copy()
         renderer.update(scene=dataclasses.replace(scene, lights=[out]))
-        second = renderer.wavefront.scene.lowered.tables["media"]
+        second = renderer._wavefront.scene.lowered.tables["media"]
         assert first[5] != 0 and second[5] == 0  # behind one aim of four words

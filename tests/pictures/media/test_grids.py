@@ -202,7 +202,7 @@ def test_light_comes_through() -> None:
 
 def assert_same_bricks(renderer: clpt.Renderer, values: np.ndarray) -> None:
     """What kernels make of a density on the device has the words that the host makes of it."""
-    scene, stream = renderer.wavefront.scene, renderer.wavefront.stream
+    scene, stream = renderer._wavefront.scene, renderer._wavefront.stream
     (grid,) = scene.lowered.device_grids
     found = stream.read(scene.tables["images"], np.empty_like(scene.lowered.table("images")))
     host, count = grids.bricks(values), int(np.prod(grid.bricks))
@@ -230,7 +230,7 @@ def test_bits_and_updates() -> None:
         renderer.run(2)
         before = renderer.image()
         values = (4.0 * RANDOM).astype(np.float32)
-        there = cl_array.to_device(renderer.wavefront.stream.queue, values)
+        there = cl_array.to_device(renderer._wavefront.stream.queue, values)
         renderer.update(scene=with_density(there))
         renderer.run(12)
         assert np.array_equal(renderer.image(), films[0])

@@ -142,7 +142,7 @@ def test_updates_move_from_the_last_to_this() -> None:
         keyed = scene([mesh(), turned])
         assert np.array_equal(picture(), np.asarray(clpt.render(keyed, 4)))
         renderer.update(vertices={"ball": BALL}, motion=True)
-        lowered = renderer.wavefront.scene.lowered
+        lowered = renderer._wavefront.scene.lowered
         assert lowered.features.motion.parts == ("vertices",)  # the cube has come to rest
         corners = lowered.vertices[-2 * len(BALL) :].reshape(-1, 2, 3)
         assert np.allclose(corners[:, 0], 3 * corners[:, 1], atol=1e-5)

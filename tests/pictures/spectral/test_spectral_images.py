@@ -169,7 +169,7 @@ def test_from_a_scene_file(tmp_path):
     }
     (tmp_path / "scene.json").write_text(json.dumps(text))
     renderer = clpt.Renderer(clpt.load(tmp_path / "scene.json"))
-    features = renderer.wavefront.features
+    features = renderer._wavefront.features
     assert features.textures.kinds == ("spectral_bitmap",)
     assert features.lights.kinds == ("spectral_envmap",)
     renderer.run(1)

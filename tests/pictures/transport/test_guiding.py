@@ -164,7 +164,7 @@ def test_a_crop_has_the_bits_of_the_whole() -> None:
 def test_what_is_counted_is_the_cameras() -> None:
     renderer = clpt.Renderer(guided(caustic()), narrow())
     renderer.run(3)
-    assert renderer.wavefront.counts.samples == 3 * 16 * 12
+    assert renderer._wavefront.counts.samples == 3 * 16 * 12
 
 
 def test_update_learns_again() -> None:

@@ -266,7 +266,7 @@ def test_stopped_early_is_as_bright() -> None:
     whole = clpt.render(scene, 4).mean(axis=(0, 1))
     renderer = clpt.Renderer(scene, slots=4096)
     assert not renderer.run(4, lambda progress: progress.samples < 0.5)
-    paths = renderer.wavefront.counts.samples
+    paths = renderer._wavefront.counts.samples
     assert 0 < paths < 4 * 256 * 256
     part = renderer.image().mean(axis=(0, 1))
     assert np.allclose(part, whole, rtol=0.05), "100 thousand paths and more: half of a per cent"

@@ -354,7 +354,7 @@ def test_everything_is_built_before_the_first_sample(monkeypatch: pytest.MonkeyP
     """`prepare` runs all of it once, with nothing to do."""
     renderer = clpt.Renderer(with_vcm(caustic(), max_depth=4), narrow())
     built, traced, run = renderer.device.builds.programs, [], BounceLoop.run
-    assert "photons" in renderer.wavefront.programs
+    assert "photons" in renderer._wavefront.programs
 
     def noted(loop: BounceLoop, *given: Any) -> bool:
         traced.append(loop.features.transport.light_paths)

@@ -47,16 +47,16 @@ def test_the_error_is_told(method):
         for _ in range(2)
     ]
     made = SimpleNamespace(halves=lambda: tuple(halves), layers=dict)
-    made.developed = lambda: made
+    made._developed = lambda: made
     cells = np.ones(2 * (size // 16) ** 2, bool)
     told = float(np.sqrt(DenoisedNoise(made, choose(), method).measure(cells).mean()))
     picture = SimpleNamespace(
         denoise=method, halves=made.halves, layers=dict,
         colours=lambda: sum(halves) / 2, image=lambda: sum(halves) / 2,
         samples_per_pixel=lambda: np.full((size, size), 2.0),
-        form=SimpleNamespace(bands=0, alpha=False),
+        _form=SimpleNamespace(bands=0, alpha=False),
     )  # fmt: skip
-    picture.developed = lambda: picture
+    picture._developed = lambda: picture
     weights = np.array([0.2126, 0.7152, 0.0722])
     wrong = (clpt.DenoisedPicture(picture).colours() - truth) @ weights / (truth @ weights)
     left = float(np.sqrt(np.mean(wrong**2)))
@@ -78,9 +78,9 @@ def test_a_limit_is_for_what_is_left():
         assert film[..., 3].min() >= 16 and film[..., 3].mean() < before.mean() / 2
         renderer.reset().wait()
         renderer.run(20, noise=LIMIT)
-        saved = renderer.saved_film()
+        saved = renderer._saved_film()
         renderer.reset().wait()
-        renderer.restore(saved)
+        renderer._restore(saved)
         renderer.run(MOST - 20, noise=LIMIT)
         np.testing.assert_array_equal(renderer.film.get(), film)
         assert renderer.active == active

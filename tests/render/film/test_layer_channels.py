@@ -38,7 +38,7 @@ class Source(Still):
     def __init__(self, bands: int = 0):
         names = LayerNames(objects=("a ball", "a ball", "floor"), materials=("ink",))
         output = tuple(tuple(row) for row in np.eye(3).tolist())
-        self.form = PictureForm(output, bands=bands, layers=tuple(LAYERS), names=names)
+        self._form = PictureForm(output, bands=bands, layers=tuple(LAYERS), names=names)
 
     def image(self):
         return np.full((*SIZE, 3), 0.5, np.float32)
@@ -49,7 +49,7 @@ class Source(Still):
         return pictures()
 
     def spectral_image(self):
-        lambdas = self.form.band_centres
+        lambdas = self._form.band_centres
         return clpt.SpectralImage(np.ones((*SIZE, len(lambdas)), np.float32), lambdas, True)
 
 

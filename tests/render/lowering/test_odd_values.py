@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -34,38 +34,44 @@ def placed(v: float) -> Iterator[np.ndarray]:
     yield tf.translate([v, 0.0, 0.0])
 
 
-def of_shapes(v: float) -> Iterator[Scene]:
+def of_shapes(v: float) -> Iterator[Callable[[], Scene]]:
     lit = {"emission": lights.Area()}
-    yield scene(shapes.Sphere(radius=v))
-    yield scene(shapes.Sphere(center=(v, 0, 0), **lit))
-    yield scene(shapes.Cylinder(p1=(0, 0, v), radius=1.0))
-    yield scene(shapes.Mesh(vertices=CORNERS * v, faces=FACE, normals="smooth", **lit))
-    yield scene(shapes.Curves(points=np.array([(0, 0, 0, 0.1), (0, v, 1, 0.1)]), basis="linear"))
-    yield scene(shapes.Spheres(centers=[(0, 0, 0), (v, 0, 0)], radii=[1.0, abs(v)], **lit))
+    yield lambda: scene(shapes.Sphere(radius=v))
+    yield lambda: scene(shapes.Sphere(center=(v, 0, 0), **lit))
+    yield lambda: scene(shapes.Cylinder(p1=(0, 0, v), radius=1.0))
+    yield lambda: scene(shapes.Mesh(vertices=CORNERS * v, faces=FACE, normals="smooth", **lit))
+    yield lambda: scene(
+        shapes.Curves(points=np.array([(0, 0, 0, 0.1), (0, v, 1, 0.1)]), basis="linear")
+    )
+    yield lambda: scene(shapes.Spheres(centers=[(0, 0, 0), (v, 0, 0)], radii=[1.0, abs(v)], **lit))
     for matrix in placed(v):
         for kind in (shapes.Sphere, shapes.Cylinder, shapes.Rectangle, shapes.Disk, shapes.Cube):
-            yield scene(kind(to_world=matrix, **lit))
+            yield lambda kind=kind, at=matrix: scene(kind(to_world=at, **lit))
             group = shapes.Group((kind(),), "two")
-            yield scene(*(shapes.Instance(group=group, to_world=at) for at in (np.eye(4), matrix)))
+            yield lambda group=group, at=matrix: scene(
+                *(shapes.Instance(group=group, to_world=one) for one in (np.eye(4), at))
+            )
 
 
-def of_lamps(v: float) -> Iterator[Scene]:
+def of_lamps(v: float) -> Iterator[Callable[[], Scene]]:
     even = {"image": np.ones((4, 8, 3), np.float32)}
     for matrix in placed(v):
-        yield scene(lights=[lights.Spot(to_world=matrix), *([lights.Point()] * 20)])
-        yield scene(lights=[lights.Projector(to_world=matrix, image=0.5)])
-        yield scene(lights=[lights.Envmap(to_world=matrix, **even)])
-    yield scene(lights=[lights.Point(position=(v, i, 0)) for i in range(20)])
-    yield scene(lights=[lights.Point(intensity=min(abs(v), 3e38))])
-    yield scene(lights=[lights.Directional(direction=(v, 0, 0))])
+        yield lambda at=matrix: scene(lights=[lights.Spot(to_world=at), *([lights.Point()] * 20)])
+        yield lambda at=matrix: scene(lights=[lights.Projector(to_world=at, image=0.5)])
+        yield lambda at=matrix: scene(lights=[lights.Envmap(to_world=at, **even)])
+    yield lambda: scene(lights=[lights.Point(position=(v, i, 0)) for i in range(20)])
+    yield lambda: scene(lights=[lights.Point(intensity=min(abs(v), 3e38))])
+    yield lambda: scene(lights=[lights.Directional(direction=(v, 0, 0))])
 
 
-def of_cameras(v: float) -> Iterator[Scene]:
+def of_cameras(v: float) -> Iterator[Callable[[], Scene]]:
     glass = shapes.Sphere(material=m.Dielectric())
     things = {"lights": [lights.Point(position=(0, 0, 3))], "integrator": integrators.Auto()}
     for matrix in placed(v):
         for kind in (cameras.Perspective, cameras.Orthographic, cameras.Spherical):
-            yield scene(glass, shapes.Rectangle(), camera=kind(to_world=matrix), **things)
+            yield lambda kind=kind, at=matrix: scene(
+                glass, shapes.Rectangle(), camera=kind(to_world=at), **things
+            )
 
 
 @pytest.mark.parametrize("v", ODD)
@@ -75,7 +81,7 @@ def test_odd_numbers_are_refused_or_lowered(scenes: Any, v: float) -> None:
         with warnings.catch_warnings():
             warnings.simplefilter("error", RuntimeWarning)
             try:
-                found = lower(one)
+                found = lower(one())
             except SceneError:
                 continue
         assert np.isfinite(found.vertices).all()

@@ -111,8 +111,8 @@ def test_an_empty_sky_with_a_light() -> None:
 
 
 def test_what_is_no_material_is_refused() -> None:
-    with pytest.raises(clpt.SceneError, match="kind of material"):
-        lower(scene(Rectangle(material="steel", name="door")))
+    with pytest.raises(clpt.SceneError, match=r"'door'\.material: must be a material"):
+        Rectangle(material="steel", name="door")
     glass = m.Blend(first=m.TwoSided(), second=m.Dielectric())
     with pytest.raises(clpt.SceneError, match="rectangle 'door': dielectric lets light"):
         lower(scene(Rectangle(material=glass, name="door")))

@@ -155,7 +155,7 @@ def test_other_films():
         made.reset()
         made.run(64, noise=1.0)
         assert (made.image().sum(axis=2) > 0).any()
-        assert made.wavefront.counts.samples >= made.film.get()[..., 3].sum()
+        assert made._wavefront.counts.samples >= made.film.get()[..., 3].sum()
 
 
 def test_cancel(renderer):

@@ -51,7 +51,7 @@ def test_the_same_picture(monkeypatch: pytest.MonkeyPatch, looped: bool) -> None
             lambda *of, larger=larger: larger,
         )
         with clpt.Renderer(scene(), layout="wide8", looped=looped) as renderer:
-            wavefront = renderer.wavefront
+            wavefront = renderer._wavefront
             assert wavefront.scene.strategy.interleaved == larger
             renderer.run(16)
             pictures.append(np.array(renderer.image()))
@@ -94,7 +94,7 @@ def test_the_same_picture_of_curves(monkeypatch, integrator, opacity, others, lo
     for least in (1 << 30, 100):
         monkeypatch.setattr(strategy, "INTERLEAVED_PIECES", least)
         with clpt.Renderer(shown, layout="wide8", looped=looped) as renderer:
-            assert renderer.wavefront.scene.strategy.interleaved == (least == 100)
+            assert renderer._wavefront.scene.strategy.interleaved == (least == 100)
             renderer.run(16)
             pictures.append(np.array(renderer.image()))
     assert pictures[0].std() > 0.01

@@ -65,8 +65,8 @@ kernel void probe(SLAB_ARGS, global const uint *queue, uint entry, uint end, uin
     store_path_pdf(path, block, all, load_path_pdf(path, block) * 2.0f);
     store_shadow_t(shadow, block, all, load_shadow_t(shadow, block) * 2.0f);
     store_hit_t(hit, block, all, (real)(-1.0f));
-    constant uchar *words = BLOCK_WORDS(0)->shadow_words;
-    queue_return(path, shadow, BLOCK_WORDS(0), words, BLOCK_WORDS(0)->shadow, queue, entry, end, block);
+    constant BlockWords *own = BLOCK_WORDS(0);
+    queue_return(path, shadow, own, own->shadow_words, own->shadow, queue, entry, end, block);
 }
 """,
 }

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
-
 from clpt.errors import SceneError
 from clpt.geometry import shapes
 from clpt.geometry.instancing import distinct
@@ -19,11 +16,8 @@ from clpt.render.analysis.checks.materials import check_material
 from clpt.render.analysis.checks.shapes import check_instances, check_shapes
 from clpt.render.analysis.checks.textures import check_textures
 from clpt.render.analysis.lowering_cache import LoweringCache
-from clpt.scene import Scene
-from clpt.scene.cameras import Camera
-from clpt.scene.integrators import Film, Filter, Integrator, ParticleTracer, Sampler
-from clpt.scene.lights import ON_SHAPES, Light
-from clpt.scene.materials import Material
+from clpt.scene import Scene, check_parts
+from clpt.scene.integrators import Film, ParticleTracer
 from clpt.scene.shapes import Instance, Shape
 
 
@@ -37,15 +31,10 @@ def check(scene: Scene) -> None:
 
 def check_at_rest(scene: Scene, cache: LoweringCache) -> None:
     """Raise SceneError as `check` does, for a scene that is `at_rest`; cache: of its analysis."""
-    _check_entries(scene)
+    check_parts(scene)
+    if isinstance(scene.seed, bool) or not isinstance(scene.seed, int):
+        raise SceneError(f"must be a whole number, not {scene.seed!r}", where="seed")
     shapes_ = list(distinct(scene.shapes))
-    for shape in [one for one in shapes_ if not isinstance(one.material, Material)]:
-        message = f"must be of a kind of material, not {shape.material!r}"
-        raise SceneError(message, where=f"{shapes.where(shape)}.material")
-    for shape in shapes_:
-        if not isinstance(shape.emission, (*ON_SHAPES, type(None))):
-            names = " or ".join(f"`{cls.kind}`" for cls in ON_SHAPES)
-            raise SceneError(f"its emission must be {names}", where=shapes.where(shape))
     check_film(scene)
     check_camera(scene.camera, scene.film)
     for light in scene.lights:
@@ -60,19 +49,6 @@ def check_at_rest(scene: Scene, cache: LoweringCache) -> None:
         check_lit_media(scene, cache)
 
 
-def _check_entries(scene: Scene) -> None:
-    """Raise SceneError for an entry of a scene that is of the wrong kind."""
-    _check_kinds("camera", Camera, [scene.camera])
-    _check_kinds("integrator", Integrator, [scene.integrator])
-    _check_kinds("sampler", Sampler, [scene.sampler])
-    _check_kinds("film", Film, [scene.film])
-    _check_kinds("film.filter", Filter, [scene.film.filter])
-    if isinstance(scene.seed, bool) or not isinstance(scene.seed, int):
-        raise SceneError(f"must be a whole number, not {scene.seed!r}", where="seed")
-    _check_kinds("lights[{}]", Light, scene.lights)
-    _check_kinds("shapes[{}]", Shape, scene.shapes)
-
-
 def _check_surfaces(shapes_: list[Shape], film: Film) -> None:
     """Raise SceneError for materials and lights of shapes; each is looked at once."""
     seen: set[int] = set()
@@ -85,11 +61,3 @@ def _check_surfaces(shapes_: list[Shape], film: Film) -> None:
         except SceneError as error:
             raise SceneError(str(error), where=shapes.where(shape)) from None
         seen |= {id(shape.material), id(shape.emission)}
-
-
-def _check_kinds(where: str, base: type, values: Sequence[Any]) -> None:
-    """Raise SceneError for the first value that is of no kind of a base."""
-    for i, value in enumerate(values):
-        if not isinstance(value, base):
-            message = f"must be of a kind of {base.__name__.lower()}, not {value!r}"
-            raise SceneError(message, where=where.format(i))

@@ -63,7 +63,8 @@ class Features:
     def passes(self) -> tuple[Features, ...]:
         """The features of each kind of paths, in their order; those of the film are the last."""
         if self.transport.guided:
-            return self._from_lights(self.film.filter, LayerFeatures(), 0), self
+            none = LayerFeatures(present=self.film.layers.present)
+            return self._from_lights(self.film.filter, none, 0), self
         if not self.transport.weighed:
             return (self,)
         layers = replace(self.film.layers, names=self.film.layers.lights, material_numbers=0)

@@ -43,6 +43,7 @@ class LayerFeatures:
     """The layers beside the picture, by their names in the order of LAYERS."""
 
     names: tuple[str, ...] = ()
+    present: bool = False  # for any kind of paths of the scene
     material_numbers: int = 0  # where they stand in `distributions`
     light_groups: int = 0  # of lights, where there is a layer for each
     light_group_row: int | None = None  # where in `distributions` they are

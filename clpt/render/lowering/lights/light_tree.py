@@ -219,7 +219,9 @@ def _costs(own: Bounds, power: Floats, key: NDArray[np.int64], k: int) -> Floats
     of the directions, of both sides. A little area is added to what is flat or a point.
     """
     sort = np.argsort(key, kind="stable")
-    present, starts = np.unique(key[sort], return_index=True)
+    ordered = key[sort]
+    starts = np.flatnonzero(np.diff(ordered, prepend=ordered[0] - 1))
+    present = ordered[starts]
     shape = (k, BINS)
     low, high = np.full((k * BINS, 3), np.inf), np.full((k * BINS, 3), -np.inf)
     low[present] = np.minimum.reduceat(own.low[sort], starts)

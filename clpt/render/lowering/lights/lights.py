@@ -93,7 +93,7 @@ def light_rows(
         power=power,
         radiance=max((one.radiance for one in every), default=0.0),
         infinite=infinite,
-        kinds=tuple(KINDS[i] for i in np.unique(rows["kind"])),
+        kinds=tuple(KINDS[i] for i in sorted({*rows["kind"].tolist()})),
         first=sources.first,
         whole=tuple(is_whole(emitter.shape) for emitter in emitters),
         visible=infinite > 0 or bool(shine.any()),

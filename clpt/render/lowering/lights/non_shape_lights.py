@@ -94,8 +94,7 @@ MEMBERS: dict[Role, Callable[[str, Any, Param, str], dict[str, ArrayLike]]] = {
     roles.host("vector"): lambda name, value, _, where: {name: light_power.three(value, where)},
     roles.host("direction"): lambda name, value, _, where: {name: light_power.unit(value, where)},
     roles.host("matrix4"): lambda _, value, __, where: light_power.placement(value, where),
-    roles.host("text"): lambda *_: {},
-    roles.host("keys"): lambda *_: {},
+    **{roles.host(form): lambda *_: {} for form in light_records.OF_HOST},
 }
 
 
