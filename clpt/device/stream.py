@@ -40,7 +40,7 @@ class Rows:
 
     @property
     def region(self) -> tuple[int, int, int]:
-        """What they are as OpenCL's commands take a rectangle."""
+        """The rows as OpenCL's commands take a rectangle."""
         return self.size, self.count, 1
 
 

@@ -137,7 +137,7 @@ class Scene:
         Raises SceneError for shapes too large to be framed.
         """
         listed = [things] if trimeshes.is_mesh(things) else _listed(things, "shapes")
-        shapes_ = [
+        shapes_: list[Any] = [
             shapes.Mesh.from_trimesh(thing) if trimeshes.is_mesh(thing) else thing
             for thing in listed
         ]

@@ -180,7 +180,7 @@ def _static(texts: dict[str, device.Source]) -> dict[str, device.Source]:
 
 
 def _defines(features: Features, lanes: int) -> flags.Defines:
-    """What is the same for all programs of a scene; lanes: paths that a work-item shades."""
+    """The macros that all programs of a scene have; lanes: paths that a work-item shades."""
     return {**flags.of_scene(features), "SLAB_BLOCK": SLAB_BLOCK if lanes == 1 else 0}
 
 
