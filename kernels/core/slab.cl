@@ -1,8 +1,7 @@
-/* Slabs: the state of paths, a word of all slots side by side, then the next word; a work-item serves LANES
- * neighbours, from the slot `at` on. So that neighbours read neighbours, a CPU has one such run of all slots. A GPU
- * has one for each block of SLAB_BLOCK slots: all words of a slot then lie at fixed distances from the first, whose
- * address is the one that a work-item keeps, in place of one a word. step: words of a slot in a block; else from a
- * word to the next. */
+/* Slabs: the state of paths, a word of all slots side by side, then the next word; a work-item serves LANES neighbours,
+ * from the slot `at` on. So that neighbours read neighbours, a CPU has one such run of all slots. A GPU has one for
+ * each block of SLAB_BLOCK slots: all words of a slot then lie at fixed distances from the first, whose address is what
+ * a work-item keeps, in place of one a word. step: words of a slot in a block; else from a word to the next. */
 typedef struct { global float *words; uint step; } Slab;
 
 #if SLAB_BLOCK

@@ -14,7 +14,7 @@ from clpt.scene import KINDS
 ALTERNATIVES = (  # files, of each row of which a program has one at most
     ("bvh/*_keyed.cl",),
     ("media/light_media.cl", "media/light_medium_none.cl"),
-    ("media/medium_dims_none.cl", "media/light_medium_none.cl"),
+    ("media/medium_dims*.cl", "media/light_medium_none.cl"),
     ("media/black_body_*.cl",),
     ("media/flight_medium*.cl",),
     ("media/grid_meet*.cl",),
