@@ -147,8 +147,8 @@ def loop_sources(
         stages_ = bounce.order(own, layout, lanes, interleaved)
         used |= dict.fromkeys(stage.program for stage in stages_)
     if shared := common.shared(features, lanes):
-        own_files = {"generated/common_part.cl": common.part_text(shared)}
-        own_files |= _shared(features, layout)
+        own_files = _shared(features, layout)
+        own_files["generated/common_part.cl"] = common.part_text(shared)
         made["common"] = _source("common", own_files, _defines(features, lanes), lanes)
         used["common"] = None
     files = {
