@@ -58,7 +58,7 @@ class Lamp(Light):
         name = self.emission_name
         if self.temperature is not None:
             Blackbody(self.temperature, normalised=True)
-            if _grey(getattr(self, name)) is None:
+            if _grey(vars(self)[name]) is None:
                 message = f"gives a colour, as {name} does: leave one out, or make {name} a number"
                 raise SceneError(message, where=f"{self.kind}.temperature")
 
@@ -87,11 +87,11 @@ class PoweredLamp(Lamp):
     def check(self) -> None:
         """Raise SceneError for a strength that is given twice."""
         super().check()
-        given = [name for name in ("power", "lumens") if getattr(self, name) is not None]
+        given = [name for name in ("power", "lumens") if vars(self)[name] is not None]
         if not given:
             return
         where, name = f"{self.kind}.{given[0]}", self.emission_name
-        emitted = getattr(self, name)
+        emitted = vars(self)[name]
         if len(given) > 1:
             raise SceneError("says what lumens say: give either", where=where)
         if not isinstance(emitted, Spectrum):
@@ -114,11 +114,11 @@ def with_emission(light: Light, area: float = 0.0) -> Light:
     """
     if not isinstance(light, Lamp):
         return light
-    asked = {name: None for name in STRENGTHS if getattr(light, name, None) is not None}
+    asked = {name: None for name in STRENGTHS if vars(light).get(name) is not None}
     if not asked:
         return light
     name = light.emission_name
-    emitted = getattr(light, name)
+    emitted = vars(light)[name]
     if light.temperature is not None:
         emitted = Blackbody(light.temperature, scale=_grey(emitted) or 0.0, normalised=True)
     if isinstance(light, PoweredLamp) and (light.power or light.lumens):
