@@ -13,6 +13,7 @@ import dataclasses
 import json
 import sys
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from .tiles import FILE, Reference, references, regions
 
 RENDERS = 64  # an even number: the degrees of freedom are odd
 FIRST_SEED = 1000
-SIZE, SAMPLES = "quick", 8  # of a render
+SIZE, SAMPLES = "quick", 32  # of a render
 
 
 def main(names: Sequence[str]) -> None:
@@ -55,7 +56,8 @@ def render(on: device.Device, name: str) -> Reference:
 
 def write(kept: dict[str, Reference], label: str) -> None:
     """Write references to the file; label: of the device that made them."""
-    arrays, scenes = {}, {}
+    arrays: dict[str, Any] = {}
+    scenes: dict[str, dict[str, object]] = {}
     for name, one in kept.items():
         arrays[f"{name}_mean"] = one.mean.astype(np.float32)
         arrays[f"{name}_deviation"] = one.deviation.astype(np.float32)

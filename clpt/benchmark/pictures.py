@@ -129,4 +129,4 @@ def film_digest(renderer: Renderer) -> str:
 
 def film_class(renderer: Renderer) -> str:
     """Return what decides the last bits of a film: the class of the device, and the kernels."""
-    return json.dumps({**renderer.device_class(), "kernels": kernels_digest()}, sort_keys=True)
+    return json.dumps({**renderer._device_class(), "kernels": kernels_digest()}, sort_keys=True)

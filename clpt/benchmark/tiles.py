@@ -29,7 +29,7 @@ ROUNDING = 1e-3  # by which devices may differ, as a share of a tile's mean
 
 @dataclass(frozen=True)
 class Reference:
-    """What the tiles of a scene should be.
+    """Means that the tiles of a scene should have.
 
     mean, deviation: (65, 3), of one render's `regions`; count: renders; samples: of all pixels of
     one render; films: digests of films by size, and the class of the device that made them.
@@ -43,8 +43,7 @@ class Reference:
 
 
 class Verdict(NamedTuple):
-    """What a picture is beside its reference: the share of wrong tiles, the largest |t|, and what
-    is wrong in words, or ""."""
+    """A picture beside its reference: share of wrong tiles, largest |t|, what is wrong or ""."""
 
     share: float
     largest: float
@@ -64,11 +63,12 @@ def compare(image: Image, reference: Reference, samples: int) -> Verdict:
     """Compare a picture, whose pixels have that many samples together, with its reference."""
     found = regions(image)
     share = reference.samples / samples + 1.0 / reference.count
-    expected = np.hypot(reference.deviation * math.sqrt(share), ROUNDING * np.abs(reference.mean))
+    noise, rounding = reference.deviation * math.sqrt(share), ROUNDING * np.abs(reference.mean)
+    expected: Floats = np.hypot(noise, rounding)
     with np.errstate(all="ignore"):
-        t = np.abs(found - reference.mean) / np.maximum(expected, 1e-9)
+        t: Floats = np.abs(found - reference.mean) / np.maximum(expected, 1e-9)
     t = np.where(np.isfinite(found), t, np.inf)
-    off = (t > limit(reference.count - 1, FALSE_ALARMS / t.size)).any(1)
+    off = np.any(t > limit(reference.count - 1, FALSE_ALARMS / t.size), axis=1)
     tiles, largest = float(off[:-1].mean()), float(t.max())
     if off[:-1].any():
         return Verdict(tiles, largest, f"wrong: {max(tiles, 0.01):.0%} of tiles".replace("%", " %"))

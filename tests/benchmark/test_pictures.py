@@ -46,7 +46,7 @@ class Painted:
     def film_state(self) -> Any:
         return SimpleNamespace(scale=1.0, words=np.full(4, self.runs * type(self).drifts))
 
-    def device_class(self) -> dict[str, str]:
+    def _device_class(self) -> dict[str, str]:
         return {"device": "a device of paint"}
 
 
