@@ -11,7 +11,7 @@ import numpy as np
 RESULTS = Path(__file__).parent / "results"
 WHICH = (
     "scene", "mode", "renderer", "sampler", "threads", "layout", "rays", "query", "effect",
-    "figure", "triangles", "builder", "bent", "as_file",
+    "figure", "triangles", "builder", "bent", "as_file", "size", "benchmark_version",
 )  # fmt: skip
 
 HEAD = """# What was measured
@@ -119,7 +119,7 @@ def figures(rows: Sequence[Row]) -> str:
         moved = (f"{row['gbytes']:.2f}", f"{row['of_copy']:.1%}") if "gbytes" in row else ("", "")
         built = f"{row['build_seconds']:.2f} s" if "build_seconds" in row else ""
         about = (str(row.get(name, "")) for name in ("scene", "mode", "figure"))
-        value = f"{row['value']:.3g} {row['unit']}"
+        value = row.get("refused") or f"{row['value']:.3g} {row['unit']}"
         return [row["device"], *about, value, f"{row['spread']:.1%}", *moved, built]
 
     headings = ("device", "scene", "mode", "figure", "", "±", "GB/s", "of a copy", "programs")

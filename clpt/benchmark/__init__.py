@@ -1,4 +1,4 @@
-"""The benchmark: rays, stages, builds and starts of any OpenCL device, from nothing but clpt.
+"""The benchmark: pictures, rays, stages, builds and starts of any OpenCL device, from clpt alone.
 
 `clpt bench` runs it; docs/benchmark.md tells what the figures mean. `measure` gives them one after
 the other, each as soon as it is known; one that cannot be true tells why in `refused`.
@@ -10,13 +10,15 @@ from collections.abc import Iterator, Sequence
 
 from clpt import bvh, device
 
-from . import bandwidth, building, rays, shading, stages, starting
+from . import bandwidth, building, pictures, rays, shading, stages, starting
 from .figures import Figure
+from .picture_scenes import PICTURES
 from .scenes import opened
 
 __all__ = ["DEFAULT_PARTS", "PARTS", "Figure", "measure", "opened"]
 
 PARTS = {
+    "pictures": "fixed scenes rendered, each picture verified: points of each, one number of all",
     "bandwidth": "a kernel that only copies, GB/s",
     "rays": "rays a second by layout, set and query, hits checked",
     "stages": "what each stage of a render gets through, Mitems/s and GB/s; sort and film too",
@@ -39,13 +41,17 @@ def measure(
     layouts: Sequence[str] = bvh.TREES,
     rounds: int = 5,
     count: int | None = None,
+    size: str = "standard",
 ) -> Iterator[Figure]:
     """Figures of a device, whose queue must be profiling.
 
     parts: names of PARTS; only: of the stages, kinds: of materials, if not all; scene: as of
     `opened`, by default the atrium, and for starts the Cornell box; layouts: names of
-    clpt.bvh.TREES; rounds: of each figure; count: rays of a set. Raises SceneError, DeviceError.
+    clpt.bvh.TREES; rounds: of each figure; count: rays of a set; size: of the pictures, which
+    are left out if the scene is none of theirs. Raises SceneError, DeviceError.
     """
+    if "pictures" in parts and (scene is None or scene in PICTURES):
+        yield from pictures.measure(on, rounds, size, (scene,) if scene else ())
     if "bandwidth" in parts:
         yield from bandwidth.measure(on, rounds)
     inside = {"rays", "stages", "build"} & set(parts)

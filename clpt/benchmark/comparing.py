@@ -12,7 +12,7 @@ from clpt.errors import SceneError
 from .figures import SECONDS, Figure
 
 Row = Mapping[str, Any]
-_KEY = ("bench", "scene", "figure", "unit", "mode")
+_KEY = ("bench", "scene", "figure", "unit", "mode", "size", "benchmark_version")
 
 
 @dataclass(frozen=True)

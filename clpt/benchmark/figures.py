@@ -54,16 +54,18 @@ class Figure:
         )
 
     def record(self) -> dict[str, Any]:
-        """Return this figure as a record of values that JSON can hold."""
-        own = {"scene": self.scene} if self.scene else {}
+        """Return this figure as a record of values that JSON can hold; refused, without a value."""
+        own: dict[str, Any] = {"scene": self.scene} if self.scene else {}
+        if self.refused:
+            own["refused"] = self.refused
         return {
             "bench": self.part,
             **own,
             "figure": self.name,
             "unit": self.unit,
-            "value": self.value,
+            "value": self.value if self.rounds and not self.refused else None,
             "spread": self.spread,
-            "rounds": list(self.rounds),
+            "rounds": [] if self.refused else list(self.rounds),
             **self.more,
         }
 

@@ -1,7 +1,7 @@
 """The scenes that come with the benchmark, made from formulas; no file is read.
 
 `atrium`: 309 thousand triangles of three kinds of material under sun and sky; `cornell`: 32
-triangles and a lamp, which are met without a tree.
+triangles and a lamp, which are met without a tree; the others: clpt.benchmark.balls.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from clpt.scene.materials import Diffuse, Material, RoughConductor, RoughPlastic
 from clpt.scene.shapes import Mesh, Rectangle, Shape
 
 from . import atrium as court
+from . import balls
 
 COLOURS = {
     "walls": (0.68, 0.55, 0.4),
@@ -104,7 +105,13 @@ def cornell() -> Scene:
     )
 
 
-SCENES: dict[str, Callable[[], Scene]] = {"atrium": atrium, "cornell": cornell}
+SCENES: dict[str, Callable[[], Scene]] = {
+    "atrium": atrium,
+    "cornell": cornell,
+    "spheres": balls.spheres,
+    "glass": balls.glass,
+    "mist": balls.mist,
+}
 
 
 def made(name: str) -> Scene:

@@ -46,7 +46,7 @@ from clpt.spectra.spectrum import WIDEST, extremes
 MOST_ROWS = 512  # of a table by wavelength
 SOOT = 0.26  # E(m), the imaginary part of (m^2 - 1) / (m^2 + 2) without its sign
 COLDEST = 100.0  # [K] below which nothing is seen of a black body
-ON_POINTS = ("emission_grid", "temperature", "albedo_grid", "colour_grid")  # of a `Grid`
+ON_POINTS = ("emission_grid", "temperature", "albedo_grid", "color_grid")  # of a `Grid`
 OCTAVE = 1.99  # how much finer each octave of a cloud's noise is than the one before
 CLOUD_LEAST, CLOUD_MOST, CLOUD_FINEST = 32, 256, 1024  # points along a cloud's longest side
 MOST_PARTS = 8  # of a mixture
@@ -572,7 +572,7 @@ class Grid(Lattice, Homogeneous):
     albedo_with_density: bool = host(
         False, "whether what is scattered, density times `albedo_grid`, is trilinear; else each is"
     )
-    colour_grid: Any = host(
+    color_grid: Any = host(
         None, "colours (nx, ny, nz, 3) up to 1 that multiply the extinction",
         form="colour_volume",
     )  # fmt: skip
@@ -611,7 +611,7 @@ class Grid(Lattice, Homogeneous):
         if given is None:
             return
         values = given.values if isinstance(given, Volume) else given
-        coloured = name in ("albedo_grid", "colour_grid")
+        coloured = name in ("albedo_grid", "color_grid")
         check_volume(values, where, colours=coloured)
         if coloured and not (isinstance(values, np.ndarray) and values.max() <= 1.0):
             raise SceneError("must be an array of numpy, of numbers up to 1", where=where)
@@ -630,7 +630,7 @@ class Grid(Lattice, Homogeneous):
 
     @property
     def is_chromatic(self) -> bool:
-        return self.colour_grid is not None or super().is_chromatic
+        return self.color_grid is not None or super().is_chromatic
 
     @property
     def light(self) -> Spectrum | None:
@@ -762,7 +762,7 @@ class Mixture(Lattice):
             raise SceneError("gives out light, as no part of a mixture can", where=where)
         if not isinstance(part, Grid):
             return
-        if part.albedo_grid is not None or part.colour_grid is not None:
+        if part.albedo_grid is not None or part.color_grid is not None:
             raise SceneError("has colours on its grid, as no part of a mixture can", where=where)
         if not np.allclose(part.box, self.grids[0].box, 1e-6, 1e-9):
             raise SceneError("its box is not that of the first grid", where=where)

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from clpt import benchmark
+from clpt import benchmark, device
 from clpt.__main__ import run
-from clpt.benchmark import records
+from clpt.benchmark import apart, records
 from clpt.benchmark.figures import Figure
+from clpt.errors import DeviceError
 from clpt.images import read
 
 Made = Callable[..., list[dict[str, Any]]]
+ABOUT = {
+    "device": "D", "kind": "gpu", "opencl": "OpenCL 3.0", "driver": "1", "compute_units": 1,
+    "global_mem": 1 << 30,
+}  # fmt: skip
+SCHEMA = Path(benchmark.__file__).parent / "data" / "record.schema.json"
 
 
 @pytest.fixture
@@ -23,8 +31,9 @@ def made(monkeypatch: pytest.MonkeyPatch) -> Made:
     asked: list[dict[str, Any]] = []
 
     def let(factor: float = 1.0, refused: str = "") -> list[dict[str, Any]]:
-        def measure(on: Any, **settings: Any) -> Iterator[Figure]:
-            asked.append(settings)
+        def measure() -> Iterator[Figure]:
+            picture = {"size": "quick", "benchmark_version": 1, "points": 7e3, "exact": True}
+            yield Figure("pictures", "mist", "Msamples/s", (factor,) * 2, "mist", picture)
             about = {"layout": "wide8", "count": 9}
             yield Figure("rays", "wide8 primary any", "Mrays/s", (factor,) * 3, "box", about)
             figure = Figure("rays", "wide8 diffuse any", "Mrays/s", (factor, 2 * factor), "box")
@@ -35,7 +44,13 @@ def made(monkeypatch: pytest.MonkeyPatch) -> Made:
             stats = {"programs": 5, "build_seconds": 1.0, "memory": 1 << 28}
             yield Figure("start", "cold start", "s", (2.0 / factor,), "box", stats)
 
-        monkeypatch.setattr(benchmark, "measure", measure)
+        def measured(which: Any, label: Any, settings: Any, limit: float) -> Iterator[apart.Told]:
+            asked.append(dict(settings))
+            if which == "no such device":
+                raise DeviceError("device 'no such device' is not there")
+            return ((ABOUT, figure) for figure in measure())
+
+        monkeypatch.setattr(apart, "measured", measured)
         return asked
 
     return let
@@ -53,6 +68,7 @@ def test_what_is_asked_for(made: Made, capsys: pytest.CaptureFixture) -> None:
     assert asked[-1]["parts"] == ["rays", "stages"]
     assert asked[-1]["only"] == ["shade_diffuse", "append"]
     assert (asked[-1]["layouts"], asked[-1]["scene"]) == (("wide8",), "cornell")
+    assert (asked[0]["size"], asked[-1]["size"]) == ("standard", "standard")
     assert run(["bench", "--stage", "shading_hair"]) == 0
     assert (asked[-1]["parts"], asked[-1]["kinds"]) == (["shading"], ["hair"])
 
@@ -64,9 +80,10 @@ def test_record_comparison_and_plot(
     made(1.0)
     assert run(["bench", "--json", str(file)]) == 0
     rows = records.read(file)
-    assert [row["figure"] for row in rows][:2] == ["wide8 primary any", "wide8 diffuse any"]
+    names = ["mist", "wide8 primary any", "wide8 diffuse any"]
+    assert [row["figure"] for row in rows][:3] == names
     about = {"device", "driver", "opencl", "clpt", "commit", "processor", "compute_units"}
-    assert all(about <= row.keys() for row in rows) and len(rows) == 4
+    assert all(about <= row.keys() for row in rows) and len(rows) == 5
     made(0.5)
     compared = ["bench", "--compare", str(file), "--plot", str(plot)]
     assert run([*compared, "--fail-below", "0.4"]) == 0
@@ -77,14 +94,67 @@ def test_record_comparison_and_plot(
     assert "below 0.6" in capsys.readouterr().out
 
 
-def test_a_refused_figure_is_told_and_not_recorded(
+def test_a_refused_figure_is_told_and_has_no_value(
     made: Made, tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:
+    """It is not what a later one is compared with."""
     made(1.0, "7 rays were not traced")
     file = tmp_path / "records.jsonl"
     assert run(["bench", "--json", str(file)]) == 3
     assert "refused: 7 rays were not traced" in capsys.readouterr().out
-    assert "wide8 diffuse any" not in [row["figure"] for row in records.read(file)]
+    (row,) = (row for row in records.read(file) if row["figure"] == "wide8 diffuse any")
+    assert (row["value"], row["rounds"], row["refused"]) == (None, [], "7 rays were not traced")
+    made(1.0)
+    assert run(["bench", "--compare", str(file)]) == 0
+    assert "diffuse any" not in capsys.readouterr().out.split("compared with")[1]
+
+
+def test_records_keep_to_the_schema(made: Made, tmp_path: Path) -> None:
+    jsonschema = pytest.importorskip("jsonschema")
+    validator = jsonschema.Draft202012Validator(json.loads(SCHEMA.read_text(encoding="utf-8")))
+    validator.check_schema(validator.schema)
+    file = tmp_path / "records.jsonl"
+    made(1.0, "wrong hits")
+    assert run(["bench", "--json", str(file)]) == 3
+    rows = records.read(file)
+    assert len(rows) == 5 and not [e for row in rows for e in validator.iter_errors(row)]
+    for row, change in ((0, {"benchmark_version": None}), (1, {"value": None}), (2, {"value": 1})):
+        assert list(validator.iter_errors({**rows[row], **change}))
+
+
+def test_pictures_of_another_size_or_version_are_not_compared(
+    made: Made, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    file, other = tmp_path / "records.jsonl", tmp_path / "other.jsonl"
+    made(1.0)
+    assert run(["bench", "--json", str(file)]) == 0
+    text = file.read_text(encoding="utf-8")
+    for changed in ('"size": "large"', '"benchmark_version": 2'):
+        name = changed.split(":")[0]
+        now = re.sub(f"{name}: [^,}}]*", changed, text)
+        assert now != text
+        other.write_text(now, encoding="utf-8")
+        capsys.readouterr()
+        assert run(["bench", "--compare", str(other)]) == 0
+        compared = capsys.readouterr().out.split("compared with")[1]
+        assert "pictures" not in compared and "rays wide8" in compared
+
+
+def test_every_device_is_a_process_and_a_card_is_written(
+    made: Made, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    card = tmp_path / "card.svg"
+    asked = made()
+    assert run(["bench", "--device", "all", "--size", "quick", "--card", str(card)]) == 0
+    assert len(asked) == len(device.devices()) and asked[0]["size"] == "quick"
+    assert "7,000 points; verified, to the bit" in capsys.readouterr().out
+    assert "7,000" in card.read_text(encoding="utf-8")
+
+
+def test_tables_have_80_columns(made: Made, capsys: pytest.CaptureFixture) -> None:
+    made()
+    assert run(["bench"]) == 0
+    assert max(len(line.rstrip()) for line in capsys.readouterr().out.splitlines()) <= 80
 
 
 def test_list(capsys: pytest.CaptureFixture) -> None:
@@ -100,6 +170,7 @@ def test_list(capsys: pytest.CaptureFixture) -> None:
         (["--fail-below", "0.9"], "--compare"),
         (["--compare", "none.jsonl"], "cannot be read"),
         (["--plot", "plot.txt"], ".svg"),
+        (["--card", "card.png"], ".svg"),
         (["--device", "no such device"], "not there"),
     ],
 )

@@ -1,4 +1,4 @@
-"""`clpt bench`: how fast rays, stages, builds and starts are on a device, and beside a record."""
+"""`clpt bench`: how fast pictures, rays, stages, builds and starts of a device are."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from pathlib import Path
 
 import click
 
-from ...choices import MODES, TREES
+from ...choices import MODES, PICTURE_SIZES, TREES
 from ..options.records import with_records
 from .settings import Report, Subject
 
 
 @click.command()
-@click.option("--scene", help="A scene's file or folder, or atrium or cornell, made from formulas.")
+@click.option("--scene", help="A scene's file or folder, or one of --list, made from formulas.")
 @click.option(
     "--stage", "stages", multiple=True, metavar="NAME",
     help="What to measure: see --list; repeat it for several.  [default: all but shading]",
@@ -23,6 +23,14 @@ from .settings import Report, Subject
 @click.option(
     "--rounds", type=click.IntRange(1), default=5, show_default=True, help="Of each figure."
 )
+@click.option(
+    "--size", type=click.Choice(PICTURE_SIZES), default="standard", show_default=True,
+    help="Of the pictures; quick takes two minutes.",
+)  # fmt: skip
+@click.option(
+    "--limit", type=click.FloatRange(1.0), default=900.0, show_default=True, metavar="SECONDS",
+    help="That may pass without a figure, then the device counts as hanging.",
+)  # fmt: skip
 @click.option("--count", type=click.IntRange(64), help="Rays of a set.")
 @click.option(
     "--json", "target", type=click.Path(path_type=Path), help="Append JSON lines to a file."
@@ -39,14 +47,19 @@ from .settings import Report, Subject
     "--plot", "plot", type=click.Path(path_type=Path),
     help="Plot the figures to a .png, .svg or .pdf; of several devices the last one's.",
 )  # fmt: skip
+@click.option(
+    "--card", "card", type=click.Path(path_type=Path),
+    help="Write a card of the pictures' points to an .svg; of several devices the last one's.",
+)  # fmt: skip
 @click.option("--list", "list_all", is_flag=True, help="List what can be measured, and where.")
 @with_records(subject=Subject, report=Report)
 def bench(subject: Subject, report: Report, device: str | None, list_all: bool) -> int:
-    """Measure rays, stages of rendering, builds and starts of an OpenCL device.
+    """Measure pictures, rays, stages of rendering, builds and starts of an OpenCL device.
 
     Figures are medians of rounds; ± is half the distance of their quartiles. A result that cannot
-    be true (rays not traced, wrong hits, times below what memory allows)
-    is refused: it is not recorded, and the exit status is 3.
+    be true (a wrong picture, rays not traced, wrong hits, times below what memory allows)
+    is refused: it is recorded without a value, and the exit status is 3.
+    Each device is measured in a process of its own.
     """
     from .measuring import show_list, tell_of_devices  # here: help needs no OpenCL
 

@@ -9,16 +9,16 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from ... import benchmark
+from ... import benchmark, output_files
 from ... import device as dev
-from ...benchmark import comparing, records, scenes
+from ...benchmark import apart, card, comparing, records, scenes
 from ...benchmark.comparing import Ratio
 from ...benchmark.figures import Figure
 from ...choices import TREES
-from ...device.context import trial
 from ..printing.console import output_console
 from .settings import STAGES, Report
 
+Which = tuple[str | int | None, str | None]  # see clpt.benchmark.apart.measured
 SLOWER = 3  # the exit status if a figure was refused, or is below --fail-below
 HEADINGS = ("figure", "", "unit", "±", "GB/s", "of a copy", "")
 
@@ -26,25 +26,24 @@ HEADINGS = ("figure", "", "unit", "±", "GB/s", "of a copy", "")
 def tell_of_devices(device: str | None, settings: Mapping[str, Any], report: Report) -> int:
     """Measure the devices of a name, or all, and tell of them; return the exit status."""
     console = output_console()
-    failed = [_report(console, info, settings, report) for info in _infos(device)]
+    which: list[Which] = [(device, None)]
+    if device == "all":
+        which = [(info.index, info.label) for info in dev.devices()]
+    failed = [_report(console, one, settings, report) for one in which]
     return SLOWER if any(failed) else 0
 
 
-def _report(
-    console: Console, info: dev.DeviceInfo, settings: Mapping[str, Any], report: Report
-) -> bool:
+def _report(console: Console, which: Which, settings: Mapping[str, Any], report: Report) -> bool:
     """Measure a device, and tell of it; return whether a figure is refused, or too low."""
-    on = dev.Device.open(info, profiling=True)
-    console.print(f"[bold]{info.label}[/], {info.version}, driver {info.driver}", highlight=False)
-    figures = _measured(console, on, settings)
+    about, figures = _measured(console, which, settings, report.limit)
     failed = any(figure.refused for figure in figures)
     if report.target is not None:
-        about = records.of_device(info)
-        good = [figure for figure in figures if figure.rounds and not figure.refused]
-        records.append(report.target, [{**figure.record(), **about} for figure in good])
+        known = [figure for figure in figures if figure.rounds or figure.refused]
+        records.append(report.target, [{**figure.record(), **about} for figure in known])
     ratios = []
+    label = str(about["device"])
     if report.before is not None:
-        ratios = comparing.against(figures, report.before, info.label)
+        ratios = comparing.against(figures, report.before, label)
         limit = report.fail_below
         _show_ratios(console, ratios, limit)
         failed |= limit is not None and any(ratio.below(limit) for ratio in ratios)
@@ -52,36 +51,44 @@ def _report(
         from ..plots import bench as bench_plot
 
         then = {figures.index(one.figure): float(one.then["value"]) for one in ratios}
-        bench_plot.write(report.plot, f"{info.label}, clpt bench", figures, then)
+        bench_plot.write(report.plot, f"{label}, clpt bench", figures, then)
+    if report.card is not None:
+        output_files.write_text(
+            report.card, card.card({**records.circumstances(), **about}, figures)
+        )
     return failed
 
 
-def _infos(device: str | None) -> list[dev.DeviceInfo]:
-    if device != "all":
-        return [dev.choose(device).info]
-    return [info for info in dev.devices() if trial(info) is None]
-
-
-def _measured(console: Console, on: dev.Device, settings: Mapping[str, Any]) -> list[Figure]:
-    """Return all figures; print each table when it is complete."""
+def _measured(
+    console: Console, which: Which, settings: Mapping[str, Any], limit: float
+) -> tuple[apart.About, list[Figure]]:
+    """Return what the device is and all figures; print each table when it is complete."""
     figures: list[Figure] = []
+    about: apart.About = {"device": which[1] or which[0] or "the default device"}
     table = None
     with console.status("measuring") as status:
-        for figure in benchmark.measure(on, **settings):
+        for about, figure in apart.measured(*which, settings, limit):
             if table is None or figure.part != figures[-1].part:
-                if table is not None:
-                    console.print(table)
+                console.print(_heading(about) if table is None else table)
                 table = _table(figure)
             table.add_row(*_cells(figure), style="red" if figure.refused else "")
             figures.append(figure)
             status.update(f"{figure.part}: {figure.name}")
     if table is not None:
         console.print(table)
-    return figures
+    return about, figures
+
+
+def _heading(about: apart.About) -> Text:
+    """Return a line of what a device is."""
+    more = [about["opencl"], f"driver {about['driver']}"] if "opencl" in about else []
+    return Text(", ".join([str(about["device"]), *more]), style="bold")
 
 
 def _table(figure: Figure) -> Table:
     title = " of ".join(filter(None, (figure.part, figure.scene)))
+    if figure.part == "pictures":  # each row has a scene of its own
+        title = f"pictures, {figure.more['size']}"
     table = Table(title=title, title_justify="left", title_style="bold", box=None, pad_edge=False)
     for i, heading in enumerate(HEADINGS):
         table.add_column(heading, justify="right" if i in (1, 3, 4, 5) else "left")
@@ -90,19 +97,31 @@ def _table(figure: Figure) -> Table:
 
 def _cells(figure: Figure) -> list[str | Text]:
     more = figure.more
-    note = f"refused: {figure.refused}" if figure.refused else str(more.get("note", ""))
+    note = figure.refused or str(more.get("note", ""))
+    if figure.refused and not note.startswith("wrong"):
+        note = f"refused: {note}"
+    if not note and figure.part == "pictures" and "points" in more:
+        note = f"{more['points']:,.0f} points; verified"
+        note += ", to the bit" if more["exact"] else ""
     if not note and figure.part == "start":
         note = f"{more['programs']} programs in {more['build_seconds']:.2f} s"
         note += f", {more['memory'] / 2**20:.0f} MiB" if more["memory"] else ""
     bytes_ = (f"{more['gbytes']:.2f}", f"{more['of_copy']:.1%}") if "gbytes" in more else ("", "")
     return [
         figure.name,
-        f"{figure.value:.3g}" if figure.rounds and figure.value < 1000 else f"{figure.value:.0f}",
+        _shown(figure),
         figure.unit,
         f"{figure.spread:.1%}" if len(figure.rounds) > 1 else "",
         *bytes_,
         Text(note),
     ]
+
+
+def _shown(figure: Figure) -> str:
+    """Return the value of a figure in digits, or nothing if it has none."""
+    if not figure.rounds or (figure.refused and figure.part == "pictures"):
+        return ""
+    return f"{figure.value:.3g}" if figure.value < 1000 else f"{figure.value:.0f}"
 
 
 def _show_ratios(console: Console, ratios: Sequence[Ratio], limit: float | None) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 import click
 
 from ...choices import TREES
+from ...errors import SceneError
 from ..process.extras import extra
 
 STAGES = (
@@ -28,6 +29,7 @@ class Subject:
     mode: str | None
     rounds: int
     count: int | None
+    size: str
 
     def settings(self) -> dict[str, Any]:
         """Return the arguments of `clpt.benchmark.measure`. Raises click.BadParameter."""
@@ -35,23 +37,27 @@ class Subject:
         return {
             "parts": parts, "only": only, "kinds": kinds, "scene": self.scene,
             "layouts": self.layouts or TREES, "mode": self.mode, "rounds": self.rounds,
-            "count": self.count,
+            "count": self.count, "size": self.size,
         }  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Report:
-    """Files that get figures, and a record to compare them with."""
+    """Files that get figures, a record to compare them with, and how long to wait for each."""
 
     target: Path | None
     record: Path | None
     fail_below: float | None
     plot: Path | None
+    card: Path | None
+    limit: float
 
     def check(self) -> None:
         """Raise what is wrong with a file, before anything is measured."""
         if self.fail_below is not None and self.record is None:
             raise click.UsageError("--fail-below compares: give --compare FILE too")
+        if self.card is not None and self.card.suffix.lower() != ".svg":
+            raise SceneError("a card is written to .svg", file=self.card)
         if self.plot is not None:
             with extra("plot", "a plot"):
                 from ..plots import bench as bench_plot  # here: matplotlib is an extra, and slow

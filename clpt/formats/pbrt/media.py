@@ -129,7 +129,7 @@ def _coloured(params: Parameters, state: State) -> dict[str, Any]:
     albedo = scatters / np.maximum(extinction, 1e-30)
     return {
         "density": Volume(density, found.to_world),
-        "colour_grid": None if colours is None else Volume(colours, found.to_world),
+        "color_grid": None if colours is None else Volume(colours, found.to_world),
         "sigma_t": sigma_t,
         "albedo_grid": Volume(np.clip(albedo, 0.0, 1.0).astype(np.float32), found.to_world),
         "albedo_with_density": True,  # as pbrt interpolates sigma_s

@@ -101,7 +101,7 @@ class SceneIndex:
             emissive=any(isinstance(medium, Lattice) for medium in emitting),
             hot=any(one.temperature is not None for one in emitting if isinstance(one, Grid)),
             tinted=any(one.albedo_grid is not None for one in grids),
-            coloured=any(one.colour_grid is not None for one in grids),
+            coloured=any(one.color_grid is not None for one in grids),
             mixed=max((len(one.parts) for one in media if isinstance(one, Mixture)), default=0),
             bytes=any(one.bits == 8 for one in grids),
         )

@@ -166,7 +166,7 @@ def _common(features: Features, layout: str, lanes: int) -> device.Source:
         **_shared(features, layout),
         "generated/common_part.cl": common.part_text(features),
     }
-    return _source("common", files, flags.of_scene(features), lanes)
+    return _source("common", files, _defines(features, lanes), lanes)
 
 
 def _alone(features: Features, layout: str, *names: str) -> dict[str, device.Source]:
@@ -180,7 +180,7 @@ def _static(texts: dict[str, device.Source]) -> dict[str, device.Source]:
 
 
 def _defines(features: Features, lanes: int) -> flags.Defines:
-    """The macros that all programs of a scene have; lanes: paths that a work-item shades."""
+    """Return what all programs of a scene define; lanes: paths that a work-item shades."""
     return {**flags.of_scene(features), "SLAB_BLOCK": SLAB_BLOCK if lanes == 1 else 0}
 
 

@@ -109,7 +109,7 @@ class MediumWords:
         if isinstance(medium, Lattice) and self._index.grids.tinted:
             rows.append(self._tint(medium, "albedo_grid"))
         if isinstance(medium, Lattice) and self._index.grids.coloured:
-            rows.append(self._tint(medium, "colour_grid"))
+            rows.append(self._tint(medium, "color_grid"))
         rows += mixture
         self._encoder.store.append("materials", np.concatenate(rows))
         return word

@@ -1,0 +1,108 @@
+"""Whether a picture is right: means of its tiles beside those of a reference, by Student's t.
+
+A reference is the mean and the standard deviation over `count` renders of one size with seeds of
+their own. The mean of a tile in a further render, of r times as many samples, has by the same
+deviation s the variance s^2 (1 / r + 1 / count): their difference over its root is distributed as
+t with count - 1 degrees of freedom. More samples a pixel lower the variance of Sobol points by
+more than 1 / r, and smaller pixels do not raise it, so that the test then errs to the safe side.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from clpt.arrays import Floats, Image
+
+FILE = Path(__file__).parent / "data" / "references.npz"
+TILES = 8  # along each side
+FALSE_ALARMS = 1e-4  # of right pictures, the share that is called wrong
+ROUNDING = 1e-3  # by which devices may differ, as a share of a tile's mean
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What the tiles of a scene should be.
+
+    mean, deviation: (65, 3), of one render's `regions`; count: renders; samples: of all pixels of
+    one render; films: digests of films by size, and the class of the device that made them.
+    """
+
+    mean: Floats
+    deviation: Floats
+    count: int
+    samples: int
+    films: Mapping[str, str]
+
+
+class Verdict(NamedTuple):
+    """What a picture is beside its reference: the share of wrong tiles, the largest |t|, and what
+    is wrong in words, or ""."""
+
+    share: float
+    largest: float
+    wrong: str
+
+
+def regions(image: Image) -> Floats:
+    """Return the means (65, 3) of the 8 x 8 tiles of a picture, row by row, and of all of it."""
+    height, width = image.shape[:2]
+    parts = image[..., :3].astype(np.float64)
+    parts = parts.reshape(TILES, height // TILES, TILES, width // TILES, 3)
+    means = parts.mean((1, 3)).reshape(-1, 3)
+    return np.concatenate([means, means.mean(0, keepdims=True)])
+
+
+def compare(image: Image, reference: Reference, samples: int) -> Verdict:
+    """Compare a picture, whose pixels have that many samples together, with its reference."""
+    found = regions(image)
+    share = reference.samples / samples + 1.0 / reference.count
+    expected = np.hypot(reference.deviation * math.sqrt(share), ROUNDING * np.abs(reference.mean))
+    with np.errstate(all="ignore"):
+        t = np.abs(found - reference.mean) / np.maximum(expected, 1e-9)
+    t = np.where(np.isfinite(found), t, np.inf)
+    off = (t > limit(reference.count - 1, FALSE_ALARMS / t.size)).any(1)
+    tiles, largest = float(off[:-1].mean()), float(t.max())
+    if off[:-1].any():
+        return Verdict(tiles, largest, f"wrong: {max(tiles, 0.01):.0%} of tiles".replace("%", " %"))
+    if off[-1]:
+        ratio = found[-1].mean() / reference.mean[-1].mean() - 1.0
+        return Verdict(0.0, largest, f"wrong: all of it is {100 * ratio:+.2g} % off")
+    return Verdict(0.0, largest, "")
+
+
+@cache
+def limit(freedom: int, rate: float) -> float:
+    """Return the |t| that is exceeded at that rate; freedom: degrees of it, an odd number.
+
+    The distribution is Abramowitz and Stegun 26.7.3.
+    """
+    low, high = 0.0, 1e6
+    for _ in range(80):
+        middle = 0.5 * (low + high)
+        angle = math.atan(middle / math.sqrt(freedom))
+        term, total = math.cos(angle), 0.0
+        for k in range(1, freedom, 2):
+            total += term
+            term *= (k + 1) / (k + 2) * math.cos(angle) ** 2
+        inside = 2.0 / math.pi * (angle + math.sin(angle) * total)
+        low, high = (middle, high) if 1.0 - inside > rate else (low, middle)
+    return high
+
+
+@cache
+def references() -> Mapping[str, Reference]:
+    """Return the references that clpt ships, by the names of scenes."""
+    with np.load(FILE, allow_pickle=False) as file:
+        about = json.loads(str(file["about"]))
+        return {
+            name: Reference(mean=file[f"{name}_mean"], deviation=file[f"{name}_deviation"], **own)
+            for name, own in about["scenes"].items()
+        }
