@@ -166,11 +166,11 @@ class Auto(Integrator):
     free_panes: bool = flag(True, "as of `path`")
 
 
-def shared(integrator: Integrator) -> dict[str, Any]:
-    """Return the parameters of an integrator that mean the same to `path`."""
-    given = fields_of(integrator)
+def shared(integrator: Integrator, other: Integrator) -> dict[str, Any]:
+    """Return the parameters of an integrator that mean the same to another one."""
+    given, known = fields_of(integrator), fields_of(other)
     names = ("max_depth", "rr_depth", "hide_lights", "free_panes")
-    return {name: given[name] for name in names if name in given}
+    return {name: given[name] for name in names if name in given and name in known}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -87,7 +87,7 @@ def decided(lit: Lit, former: Integrator | None = None) -> tuple[SceneIndex, str
         chosen, reason = Path(light_paths=chosen.light_paths), "photons do not know their group"
     if given.guiding:
         chosen, reason = Path(light_paths=0, guiding=True), "directions are guided"
-    chosen = replace(chosen, **shared(given))
+    chosen = replace(chosen, **shared(given, chosen))
     return replace(index, scene=replace(index.scene, integrator=chosen)), reason
 
 
@@ -100,7 +100,7 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
     if not cameras.is_connected(scene.camera, scene.film.mode):
         return without, "points cannot be joined to this camera"
     integrator = scene.integrator
-    fewest = FEWEST - integrator.free_panes
+    fewest = FEWEST - index.free_panes  # a pane on the way costs no depth
     if 0 <= integrator.max_depth < fewest:
         return without, "the longest path is too short for a caustic"
     in_fog = _in_fog(lit)
