@@ -26,7 +26,7 @@ BOUNDS = {
     ": Any": 380,
     "aliases of array types outside clpt/arrays.py": 0,
     "rooms in circles of imports": 0,
-    "lines of Python": 80_600,
+    "lines of Python": 80_800,
     "lines of OpenCL": 19_300,
     "words of README.md": 1_200,
     "docstrings that begin with What, Of, How, Those, The same": 0,
