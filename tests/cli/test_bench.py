@@ -7,13 +7,15 @@ import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import pytest
 
 from clpt import benchmark, device
 from clpt.__main__ import run
-from clpt.benchmark import apart, records
+from clpt.benchmark import apart, pictures, records
 from clpt.benchmark.figures import Figure
+from clpt.choices import PICTURE_SIZES
 from clpt.errors import DeviceError
 from clpt.images import read
 
@@ -22,6 +24,7 @@ ABOUT = {
     "device": "D", "kind": "gpu", "opencl": "OpenCL 3.0", "driver": "1", "compute_units": 1,
     "global_mem": 1 << 30,
 }  # fmt: skip
+PHORONIX = Path(__file__).parents[2] / "packaging" / "phoronix" / "clpt"
 SCHEMA = Path(benchmark.__file__).parent / "data" / "record.schema.json"
 
 
@@ -149,6 +152,46 @@ def test_every_device_is_a_process_and_a_card_is_written(
     assert len(asked) == len(device.devices()) and asked[0]["size"] == "quick"
     assert "7,000 points; verified, to the bit" in capsys.readouterr().out
     assert "7,000" in card.read_text(encoding="utf-8")
+
+
+def parsed(output: str) -> str:
+    """The word that the Phoronix Test Suite takes from the last line with its hint."""
+    root = ElementTree.parse(PHORONIX / "results-definition.xml").getroot()
+    template, hint = (
+        root.findtext(f"ResultsParser/{tag}") for tag in ("OutputTemplate", "LineHint")
+    )
+    assert template and hint and hint in template
+    (*_, line) = (line for line in output.splitlines() if hint in line)
+    words = re.sub(r"[()\t]", " ", line).split()
+    return words[template.split().index("#_RESULT_#")]
+
+
+@pytest.mark.parametrize("points", [0.51234, 87.4321, 2003.4, 1234567.0])
+def test_the_phoronix_profile_finds_the_number(
+    points: float, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    """A number that is refused is none, so that the suite calls the run failed."""
+    figure = Figure("pictures", pictures.ALL, "points", (points,), "", {"size": "quick"})
+    for one, found in ((figure, points), (figure.refuse("no score: mist did not pass"), None)):
+        told = [(ABOUT, one)]
+        monkeypatch.setattr(apart, "measured", lambda *given, told=told: iter(told))
+        assert run(["bench", "--stage", "pictures"]) == (3 if found is None else 0)
+        word = parsed(capsys.readouterr().out)
+        if found is None:
+            assert word == "points"
+        else:
+            assert float(word) == pytest.approx(found, rel=1e-3)
+
+
+def test_the_phoronix_profile_asks_for_what_there_is(made: Made) -> None:
+    root = ElementTree.parse(PHORONIX / "test-definition.xml").getroot()
+    given = (root.findtext("TestSettings/Default/Arguments") or "").split()
+    prefix = (root.findtext("TestSettings/Option/ArgumentPrefix") or "").strip()
+    sizes = [entry.text or "" for entry in root.iter("Value")]
+    asked = made()
+    for size in sizes:
+        assert run([*given, prefix, size]) == 0
+    assert [one["size"] for one in asked] == sizes == list(PICTURE_SIZES)
 
 
 def test_tables_have_80_columns(made: Made, capsys: pytest.CaptureFixture) -> None:
