@@ -118,8 +118,7 @@ def _queue(flight: Flight, copying: Copying, rounds: int) -> Figure:
         if step.bound.kernel.name == "shade" or step.name in QUEUEING:
             break
         flight.stage(step)
-    texts = programs.sources(features, layout, 1, queued=True)
-    program = device.build(on, texts["append"])
+    program = device.build(on, programs.append_source(features, layout, wave.lanes))
     named, give = dict(wave.arguments), device.Buffers(on)
     for name, size in queues.sizes(flight.slots, kinds, True).items():
         named[name] = give.allocate("the queues", 4 * size)

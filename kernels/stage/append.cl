@@ -17,14 +17,15 @@ kernel void append(SLAB_ARGS, global uint *queue, global uint *queue_counts, uin
     SLABS
     local uint tally[BSDF_COUNT], begin[BSDF_COUNT];
     uint own = get_local_id(0), slot = get_global_id(0), rank = 0;
-    uint items = get_local_size(0);
-    for (uint k = own; k < BSDF_COUNT; k += items) tally[k] = 0;
+    /* One work-item does this for all kinds: a group may be smaller than their number. */
+    if (own == 0)
+        for (uint k = 0; k < BSDF_COUNT; k++) tally[k] = 0;
     barrier(CLK_LOCAL_MEM_FENCE);
     int kind = slot < slots ? waiting_kind(path, hit, slot) : -1;
     if (kind >= 0) rank = atomic_inc(&tally[kind]);
     barrier(CLK_LOCAL_MEM_FENCE);
-    for (uint k = own; k < BSDF_COUNT; k += items)
-        if (tally[k]) begin[k] = atomic_add(&queue_counts[k], tally[k]);
+    if (own == 0)
+        for (uint k = 0; k < BSDF_COUNT; k++) begin[k] = tally[k] ? atomic_add(&queue_counts[k], tally[k]) : 0;
     barrier(CLK_LOCAL_MEM_FENCE);
     if (kind >= 0) queue[kind * slots + begin[kind] + rank] = slot;
 }

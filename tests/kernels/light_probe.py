@@ -24,6 +24,7 @@ from clpt.render.lowering.features import of_lights, of_textures
 from clpt.render.lowering.lights import lights
 from clpt.render.lowering.spectra.spectra_table import STEP
 from tests.kernels.harness import opened
+from tests.kernels.scene_harness import PLAIN
 
 LAMBDAS = (450.0, 520.0, 580.0, 640.0)  # of the spectral mode's probes [nm]
 INCLUDES = ("core/base.cl", "interface/shape.cl", "interface/light.cl", "generated/lights.cl")
@@ -115,6 +116,7 @@ def _program(
         + f"{reads}    {body}\n{writes}}}\n"
     )
     virtual = {
+        **PLAIN,
         **shape_text.virtual_files(),
         **light_dispatch.virtual_files(),
         "probe.cl": probe,

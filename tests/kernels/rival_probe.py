@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.render.codegen import lights
+from clpt.render.codegen.choices import either
 from tests.kernels.scene_harness import SceneProbe
 
 LIGHT_PATHS = 3  # a sample
@@ -57,11 +58,14 @@ inline Lamp lamp(integer row)
 #define light_path_pdf(scene, row, p, wi, t, n) (scene).emission
 #define light_emit_pdf(scene, row, wi, t) (scene).emission
 #define light_found_pdf(scene, row, p, hemisphere, wi, t, n) (scene).found
+#define common_light_begins_pdf(scene, row, p, hemisphere, wi, t, n, there) \
+    (*(there) = (scene).found, (scene).emission)
 #define load_path_rival(path, at) (path).rival
 #define load_path_pending(path, at) (path).pending
 #define load_path_light(path, at) (path).light
 #define load_path_sample(path, at) ((integer)(0))
 #define load_path_null_distance(path, at) ((real)(0.0f))
+#define store_path_pending(path, at, m, value)
 #define load_path_sampled_hemisphere(path, at) v3(0.0f, 0.0f, 0.0f)
 #include "lighting/rivals.cl"
 #undef Scene
@@ -150,14 +154,23 @@ class VertexProbe:
         writes = "".join(f"    r[{i}] = {name};\n" for i, name in enumerate(self.results))
         flags = {"JOINS_CAMERA": joined, "MERGES": merged}
         flags |= {"WEIGHS_LIGHT_PATHS": True, "BSDF_MERGES": merged}
+        flags |= {"BSDF_ENDS_LIGHT_PATHS": False, "BSDF_IS_PHASE": False}
         self.probe = SceneProbe(
             reads + (LIGHT if from_light else CAMERA) + writes,
             len(GIVEN),
             len(self.results),
             files=("interface/light.cl", "merging/area.cl", "merging/weight.cl", "world.cl"),
             lanes=1,
-            virtual={**lights.virtual_files(), "world.cl": WORLD},
-            defines={name: 1 for name, holds in flags.items() if holds},
+            virtual={
+                **lights.virtual_files(),
+                "generated/rival_steps.cl": (
+                    *either(merged, "lighting/rivals_merging.cl"),
+                    *either(joined, "lighting/rivals_camera.cl"),
+                    "lighting/rival_pdf_none.cl",
+                ),
+                "world.cl": WORLD,
+            },
+            defines={name: int(holds) for name, holds in flags.items()},
             settings={"light_paths": LIGHT_PATHS, "infinite_count": 1, "rival_area": 1.0},
         )
 

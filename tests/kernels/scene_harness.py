@@ -9,15 +9,21 @@ import pyopencl as cl
 
 from clpt import device
 from clpt.records import SETTINGS, TABLES
+from clpt.render.codegen import choices
 from clpt.render.codegen.signatures import scene_text
+from clpt.render.contract.features import Features
 from tests.kernels.harness import opened
 
 BLOCK = 16
 
 
-def scene_files(mode: str) -> dict[str, str]:
-    """The generated files that core/base.cl includes."""
+PLAIN = choices.virtual_files(Features(), "binary")  # the files of a plain scene
+
+
+def scene_files(mode: str) -> dict[str, device.Part | str | tuple[str, ...]]:
+    """The generated files that core/base.cl includes, and those of a plain scene."""
     return {
+        **PLAIN,
         "generated/scene.cl": scene_text(),
         "generated/spectrum.cl": f'#include "spectrum/{mode}.cl"\n',
         "generated/spectrum_read.cl": f'#include "spectrum/{mode}_read.cl"\n',

@@ -49,7 +49,7 @@ def sources(
         return _static(texts)
     texts |= _shading(features, layout, lanes, queued=queued)
     if queued:
-        texts |= _alone(features, layout, "append")
+        texts["append"] = append_source(features, layout, lanes)
     return _static(texts)
 
 
@@ -117,6 +117,15 @@ def _shading(
         name = f"shade_{cls.kind}"
         texts[name] = _source(name, own, {**defines, **kind}, lanes, "shade", part=part)
     return texts
+
+
+def append_source(features: Features, layout: str, lanes: int) -> device.Source:
+    """Return the text of `append`, which brings slots into queues.
+
+    lanes: paths that a work-item of the stages before it has, which tells how slabs lie.
+    """
+    files = _shared(features, layout)
+    return _source("append", files, _defines(features, lanes), 1)
 
 
 def film_sources(features: Features, layout: str) -> dict[str, device.Source]:
