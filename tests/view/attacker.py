@@ -24,6 +24,9 @@ class Recorder:
     def state(self) -> dict[str, Any]:
         return {"type": "state"}
 
+    def status(self) -> dict[str, Any]:
+        return {"type": "status"}
+
     def watched(self, viewers: int) -> None:
         self.viewers = viewers
 
