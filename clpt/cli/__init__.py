@@ -29,7 +29,7 @@ COMMANDS = {  # with the first words of their help, for which nothing is importe
     "mie": "Make the medium of spheres of RADIUS micrometres: fog, mist, milk.",
     "lens": "Tell of LENS: a file (.dat, .zmx, .txt) or a name of the library.",
     "completion": "Let the TAB key of a SHELL complete clpt's commands, options and values.",
-    "bench": "Measure rays, stages of rendering, builds and starts of an OpenCL device.",
+    "bench": "Measure pictures, rays, stages of rendering, builds and starts of an OpenCL device.",
 }
 
 

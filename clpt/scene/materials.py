@@ -104,6 +104,10 @@ class Layer(Kind):
     Up to 100 um thick; from about 10 um on, its fringes are finer than an eye can tell.
     """
 
+    shorthands = (METAL,)
+    if TYPE_CHECKING:  # arguments only: they stand for others
+        metal: InitVar[str | tuple[Spectrum, Spectrum] | None] = None
+
     eta: IndexLike = index("water", "index of refraction")
     k: IndexLike = index(0.0, "extinction coefficient; above 0 it absorbs", zero=True)
     thickness: float = real(400.0, "where it is thickest", "nm", low=0.0, high=1e5)

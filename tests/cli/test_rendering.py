@@ -221,5 +221,5 @@ SO_FAR = ", with the picture so far; 4.2 s in all"
 def test_the_last_line(mean, end, line):
     paths = SimpleNamespace(paths=SimpleNamespace(pixels=100))
     counts = SimpleNamespace(samples=100 * mean)
-    renderer = SimpleNamespace(counts=counts, wavefront=paths, first_sample=0)
+    renderer = SimpleNamespace(counts=counts, _wavefront=paths, first_sample=0)
     assert report.ending(renderer, end, 4.2) == line

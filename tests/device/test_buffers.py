@@ -29,7 +29,7 @@ def test_the_budget(device):
     buffers = Buffers(device, limit=1000)
     buffer = buffers.allocate("first", 600)
     with pytest.raises(
-        MemoryBudgetError, match=r"path state needs .* MiB: use fewer paths"
+        MemoryBudgetError, match=r"path state needs .* KiB: use fewer paths"
     ) as raised:
         buffers.allocate("path state", 500, "use fewer paths")
     assert (raised.value.asked, raised.value.available) == (500, 400)

@@ -20,7 +20,7 @@ def test_devices_programs_and_trees_are_told(caplog) -> None:
     said = [record.getMessage() for record in caplog.records]
     assert {record.name.split(".")[0] for record in caplog.records} == {"clpt"}
     assert any(on.info.label in text for text in said)
-    assert ["1 programs in" in text for text in said].count(True) == 2
+    assert [text.startswith("programs: 1 in") for text in said].count(True) == 2
     assert any("brute tree over 1 triangles in" in text for text in said)
 
 

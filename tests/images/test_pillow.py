@@ -139,6 +139,7 @@ def test_profiles_of_a_texture(tmp_path):
     """A bitmap is lowered as what the file means, and as stored where it is raw."""
     from clpt.render.lowering.tables import TableStore
     from clpt.render.lowering.textures.bitmaps import Images
+    from clpt.scene.roles import EMISSION
     from clpt.scene.textures import Bitmap
 
     path = files.png(tmp_path / "a.png", ROWS, 8, 2, [chunk_gamma(1.0), chunk_primaries("rec2020")])
@@ -146,7 +147,7 @@ def test_profiles_of_a_texture(tmp_path):
         store, lowered = TableStore(), Images(spectral=False)
         names = ("kind", "width", "height", "decode", "first", "levels", "table")
         row = np.zeros((), [(name, np.uint32) for name in names])
-        lowered.add(Bitmap(image=path, raw=raw), "emission", row)
+        lowered.add(Bitmap(image=path, raw=raw), EMISSION, row)
         lowered.finish(store, set())
         words = store.arrays()["images"]
         if raw:

@@ -11,6 +11,7 @@ from PIL import Image
 import clpt
 from clpt.formats.pbrt.textures import textured
 from clpt.render.lowering.scene import lower
+from clpt.scene.roles import REAL
 from tests.formats.pbrt.directives import define, params, state
 
 
@@ -45,6 +46,6 @@ def test_a_number_of_pbrt_tells(tmp_path):
     Image.new("RGB", (4, 4), (9, 8, 7)).save(tmp_path / "turned.jpg", exif=turned)
     at = state(tmp_path)
     define(at, "float", "t", "imagemap", filename=("string", "turned.jpg"))
-    textured(params(x=("texture", "t")), "x", "real", at)
+    textured(params(x=("texture", "t")), "x", REAL, at)
     [warning] = at.shared.warnings
     assert "its Exif orientation 3 is left out" in warning

@@ -169,10 +169,3 @@ def test_mappings(lanes):
 def test_unusable(make, part):
     with pytest.raises(SceneError, match=part):
         make()
-
-
-def test_a_projection_is_refused():
-    matrix = np.eye(4)
-    matrix[3, 2] = 1.0
-    with pytest.raises(SceneError, match="0 0 0 1"):
-        Encoder("rgb").textures.row(scene.Noise(to_texture=matrix), NAMED["real"])

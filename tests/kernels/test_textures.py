@@ -555,7 +555,6 @@ def test_no_textures_no_text():
         (scene.Bitmap(image=np.zeros((2, 2, 3), np.int16)), "floats"),
         (scene.Bitmap(image=np.zeros((2, 2, 2))), r"\(2, 2, 2\)"),
         (scene.Bitmap(image=np.zeros((0, 2, 3))), "not empty"),
-        (scene.Bitmap(image=COLOURS, to_uv=np.diag([1.0, 1.0, 0.0])), "bitmap.to_uv"),
     ],
 )
 def test_unusable_textures(texture, part):

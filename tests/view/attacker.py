@@ -25,7 +25,7 @@ class Recorder:
         return {"type": "state"}
 
     def status(self) -> dict[str, Any]:
-        return {"type": "status", "phase": "done"}
+        return {"type": "status"}
 
     def watched(self, viewers: int) -> None:
         self.viewers = viewers

@@ -49,8 +49,10 @@ glass = materials.Dielectric()
 scene = Scene(
     camera=cameras.Perspective(fov=40, to_world=look_at([0, 1, 5], [0, 1, 0], [0, 1, 0])),
     film=Film(width=640, height=480),
-    shapes=[shapes.Sphere(center=(0, 1, 0), material=red),
-            shapes.Mesh.from_trimesh(teapot, material=glass)],
+    shapes=[
+        shapes.Sphere(center=(0, 1, 0), material=red),
+        shapes.Mesh.from_trimesh(teapot, material=glass),
+    ],
     lights=[lights.Constant(radiance="D65")],
 )
 ```

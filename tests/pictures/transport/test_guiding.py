@@ -176,7 +176,7 @@ def test_update_learns_again() -> None:
     renderer.update(scene=turned)
     renderer.run(3)
     assert np.array_equal(renderer.image(), picture(turned, 3))
-    with pytest.raises(SceneError, match="guiding stay"):
+    with pytest.raises(SceneError, match="guiding must stay"):
         renderer.update(scene=dataclasses.replace(turned, integrator=Path(light_paths=0)))
 
 

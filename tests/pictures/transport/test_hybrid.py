@@ -453,7 +453,7 @@ def test_update_keeps_both_kinds_of_paths() -> None:
     renderer.update(scene=turned)
     renderer.run(3)
     assert np.array_equal(renderer.image(), picture(turned, 3))
-    with pytest.raises(SceneError, match="light paths and guiding stay"):
+    with pytest.raises(SceneError, match="light paths must stay"):
         renderer.update(scene=with_light_paths(turned, 0))
 
 

@@ -148,6 +148,10 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
         ball(m.Diffuse(reflectance=Bitmap(image=COLOURS, to_uv=PROJECTION[1:, 1:]))),
         "sphere: bitmap.to_uv: its last row",
     ),
+    "a texture whose places are at infinity": (
+        ball(m.Diffuse(reflectance=Bitmap(image=COLOURS, to_uv=np.diag([1.0, 1.0, 0.0])))),
+        "sphere: bitmap.to_uv: its last row",
+    ),
     "a solid texture that is projected": (
         ball(m.Diffuse(reflectance=Mix(amount=Checkers(to_texture=PROJECTION)))),
         "sphere: checkers.to_texture: its last row",
