@@ -71,7 +71,7 @@ def _measure(on: device.Device, plain: device.Device, name: str, size: str, roun
             seconds.append(time.perf_counter() - start)
             films.add(film_digest(renderer))
         image, made_by = renderer.image(), film_class(renderer)
-        layout = renderer.wavefront.scene.strategy.layout
+        layout = str(renderer._device_class()["layout"])
     reference = tiles.references()[name]
     verdict = tiles.compare(image, reference, all_samples)
     wrong = verdict.wrong

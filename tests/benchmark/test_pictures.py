@@ -15,7 +15,6 @@ from clpt.benchmark.figures import Figure
 from clpt.benchmark.picture_scenes import PICTURES, SIZES, picture
 from clpt.errors import UnknownKindError
 
-LAYOUT = SimpleNamespace(layout="wide8")
 GREY = np.full((128, 128, 3), 0.5, np.float32)
 RIGHT = tiles.Reference(
     np.full((65, 3), 0.5), np.full((65, 3), 0.01), 32, 1 << 17, MappingProxyType({})
@@ -30,7 +29,6 @@ class Painted:
 
     def __init__(self, scene: Any, on: Any):
         self.runs = 0
-        self.wavefront = SimpleNamespace(scene=SimpleNamespace(strategy=LAYOUT))
 
     def __enter__(self) -> Painted:
         return self
@@ -49,7 +47,7 @@ class Painted:
         return SimpleNamespace(scale=1.0, words=np.full(4, self.runs * type(self).drifts))
 
     def _device_class(self) -> dict[str, str]:
-        return {"device": "a device of paint"}
+        return {"device": "a device of paint", "layout": "wide8"}
 
 
 @pytest.fixture
