@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+Array = NDArray[Any]
 Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
 Integers = NDArray[np.int64]
@@ -28,7 +29,7 @@ def on_host(values: Any) -> Any:
     return values.get() if module and isinstance(values, module.Array) else values
 
 
-def on_device(values: Any) -> bool:
+def on_device(values: object) -> bool:
     """Return whether values lie in device memory, an array or a buffer."""
     opencl, module = sys.modules.get("pyopencl"), sys.modules.get("pyopencl.array")
     array = module is not None and isinstance(values, module.Array)

@@ -46,8 +46,8 @@ class Budget:
     parts: int | None = None
 
     def __post_init__(self) -> None:
-        for name in ("memory", "seconds", "parts"):
-            value = getattr(self, name)
+        given = {"memory": self.memory, "seconds": self.seconds, "parts": self.parts}
+        for name, value in given.items():
             if value is not None and not value > 0:
                 raise SceneError(f"a budget's {name} must be above 0, not {value!r}")
 

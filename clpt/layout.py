@@ -239,7 +239,7 @@ class Record:
         store one does nothing. So kernels need not ask whether a scene has them.
         """
         lower = self.snake_name
-        parts = [f"#define {lower.upper()}_STEP {self.step}"]
+        parts: list[str] = []
         for m in self.members:
             lane = TYPES[m.type][2]
             if m.name in unused:

@@ -7,7 +7,7 @@ import math
 import zipfile
 from collections.abc import Collection
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,7 @@ def array(path: Path) -> NDArray[Any]:
         except Exception as error:  # NumPy's parser raises tokenize's own, and more
             raise _broken(path, ".npy", error) from None
     _check_bytes(path, dtype, shape, path.stat().st_size - start)
-    order: Any = "F" if fortran else "C"
+    order: Literal["C", "F"] = "F" if fortran else "C"
     if math.prod(shape) == 0:
         return np.zeros(shape, dtype, order)
     return np.memmap(path, dtype, "r", start, shape, order)

@@ -94,7 +94,7 @@ class SpectralImage:
         return Tabulated(self.lambdas, values, "zero" if self.emissive else "hold")
 
 
-def find(image: Any, *, emissive: bool, where: str = "image") -> SpectralImage | None:
+def find(image: object, *, emissive: bool, where: str = "image") -> SpectralImage | None:
     """`image` itself if it is spectral, or what is in the file it names; None: it is another image.
 
     where: it stands, for errors that have no file. Raises SceneError if it holds reflectances where
@@ -175,13 +175,7 @@ def write(
         preview = image.to_rgb() * np.float32(2.0**image.exposure)
     if preview.shape != (*image.values.shape[:2], 3):
         _fail(path, f"the preview is {preview.shape}, the image {image.values.shape}")
-    kind, part = (np.float16 if half else np.float32), "S0" if image.emissive else "T"
-    channels = dict(zip("RGB", np.moveaxis(preview, 2, 0), strict=True))
-    for nm, band in zip(image.lambdas, np.moveaxis(image.values, 2, 0), strict=True):
-        channels[f"{part}.{_decimal(nm)}nm"] = band
-    if half:
-        channels = {name: np.clip(v, -HALF_MAX, HALF_MAX) for name, v in channels.items()}
-    stored = {name: np.ascontiguousarray(values, kind) for name, values in channels.items()}
+    stored = _channels(image, preview, half)
     stored |= {name: np.ascontiguousarray(v, np.float32) for name, v in (layers or {}).items()}
     header = {**(metadata or {}), "spectralLayoutVersion": VERSION, "EV": float(image.exposure)}
     if image.emissive:
@@ -196,6 +190,17 @@ def write(
         images.write_channels(path, header, stored)
     except (OSError, RuntimeError, ValueError) as error:
         raise SceneError(f"cannot be written: {error}", file=path) from error
+
+
+def _channels(image: SpectralImage, preview: Floats32, half: bool) -> dict[str, NDArray[Any]]:
+    """Return the preview and the bands by their names in a file."""
+    kind, part = (np.float16 if half else np.float32), "S0" if image.emissive else "T"
+    channels = dict(zip("RGB", np.moveaxis(preview, 2, 0), strict=True))
+    for nm, band in zip(image.lambdas, np.moveaxis(image.values, 2, 0), strict=True):
+        channels[f"{part}.{_decimal(nm)}nm"] = band
+    if half:
+        channels = {name: np.clip(v, -HALF_MAX, HALF_MAX) for name, v in channels.items()}
+    return {name: np.ascontiguousarray(values, kind) for name, values in channels.items()}
 
 
 def _fail(path: Path | None, message: str) -> NoReturn:

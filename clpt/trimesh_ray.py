@@ -171,8 +171,7 @@ class RayMeshIntersector:
         """
         again = np.zeros(len(order), np.bool_)
         key = 2 * rays[order] + facing[order]
-        _, inverse, counts = np.unique(key, return_inverse=True, return_counts=True)
-        places = np.flatnonzero(counts[inverse] > 1)
+        places = np.flatnonzero(_shared(key))
         found = []
         for some in np.split(places, range(CHUNK, len(places), CHUNK)):
             hits = order[some]
@@ -243,3 +242,9 @@ def _borders(
     missed = np.linalg.norm(across + share * along, axis=2)
     points = np.where(share == 1.0, np.roll(corners, -1, axis=1), corners + share * edges)
     return points, missed <= rounding[:, None]
+
+
+def _shared(keys: Integers) -> NDArray[np.bool_]:
+    """Whether others have the same key (n,)."""
+    _, inverse, counts = np.unique(keys, return_inverse=True, return_counts=True)
+    return np.asarray(counts[inverse] > 1)

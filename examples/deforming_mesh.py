@@ -15,7 +15,6 @@ import trimesh
 from pyopencl.array import empty_like, to_device
 
 import clpt
-from clpt import spectra
 from clpt.scene import Scene, cameras, integrators, lights, materials, shapes
 from clpt.transforms import look_at, scale, translate
 
@@ -35,8 +34,7 @@ kernel void deform(global const float *rest, global float *moved, float time)
 
 def scene(mesh: trimesh.Trimesh) -> Scene:
     """A thing of copper over a floor, between a lamp and a dim sky."""
-    eta, k = spectra.metal("Cu")
-    copper = materials.RoughConductor(eta=eta, k=k, alpha_u=0.2, alpha_v=0.2)
+    copper = materials.RoughConductor(metal="copper", alpha=0.2)
     floor = materials.Diffuse(reflectance=(0.2, 0.24, 0.3))
     lamp = lights.Area(radiance=(18.0, 16.0, 13.0))
     return Scene(

@@ -14,7 +14,6 @@ import numpy as np
 from PIL import Image
 
 import clpt
-from clpt import spectra
 from clpt.scene import Film, Scene, cameras, lights, materials, shapes
 from clpt.transforms import look_at
 
@@ -44,8 +43,7 @@ def studio() -> np.ndarray:
 
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
-eta, k = spectra.metal("Au")
-gold = materials.RoughConductor(eta=eta, k=k, alpha_u=0.12, alpha_v=0.12)
+gold = materials.RoughConductor(metal="gold", alpha=0.12)
 mesh = clpt.load(sys.argv[2]).shapes[0] if len(sys.argv) > 2 else ring()
 corners = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
 middle, radius = np.add(*corners) / 2, np.linalg.norm(np.subtract(*corners)) / 2

@@ -71,7 +71,7 @@ MAY_INCLUDE = {
     "integrator": SHARED | {"generated"},
     "bvh": {"bvh", "core", "generated", "tracing"},
     "motion": {"core", "generated", "bvh"},
-    "stage": SHARED | {"generated", "bvh"},
+    "stage": SHARED | {"generated", "bvh", "stage"},  # the loop is made of bounces
 }
 HAVE_KERNELS = {"stage", "bvh", "motion"}
 NOT_IN_MEMORY = {"float3", "int3", "uint3", "bool", "size_t"}

@@ -96,19 +96,30 @@ def test_stages_have_the_worst_of_their_programs() -> None:
 def test_the_longest_texts_of_each_stage() -> None:
     given = [
         programs.Program("a" * n, stage, "box", mode)
-        for n, stage, mode in [(3, "x", "rgb"), (5, "x", "rgb"), (1, "x", "spectral"), (2, "y", "rgb")]
+        for n, stage, mode in [
+            (3, "x", "rgb"),
+            (5, "x", "rgb"),
+            (1, "x", "spectral"),
+            (2, "y", "rgb"),
+        ]
     ]
     assert {len(p.text) for p in programs.longest(given, 1)} == {5, 1, 2}
 
 
 def test_what_is_kept_spills_nothing() -> None:
-    """Stack is for traversal alone; Intel's compiler is the only one that may spill there."""
+    """Stack is for traversal alone; trees of wide8, which spill on AMD's, are for NVIDIA's.
+
+    Some of Intel's spill still: see docs/gpus.md. They may not get worse, as below.
+    """
     assert ROWS
     for kept in ROWS:
         assert "failed" not in kept, kept
+        if FIRST[kept["device"]].name == "Intel":
+            continue
         traverses = any(name in kept["stage"] for name in ("intersect", "shadow", "splat"))
-        assert kept["spilled"] == 0 or (traverses and kept["device"] in ("dg2", "tgllp")), kept
         assert kept["stack"] == 0 or traverses, kept
+        others = "wide8" in kept["stage"] and FIRST[kept["device"]].name != "NVIDIA"
+        assert kept["spilled"] == 0 or others, kept
 
 
 @functools.lru_cache(maxsize=2)

@@ -31,7 +31,9 @@ def compiled(vendor: Vendor, device: str, program: programs.Program) -> Row:
         return row | {"error": str(error)}
 
 
-def measure(vendors: list[Vendor], given: list[programs.Program], known: list[Row]) -> Iterator[Row]:
+def measure(
+    vendors: list[Vendor], given: list[programs.Program], known: list[Row]
+) -> Iterator[Row]:
     """Yield a row for each device and program that is not known; devices of each vendor in turn."""
     done = {(row["device"], row["digest"]) for row in known}
     for number in range(max(len(vendor.devices) for vendor in vendors)):
@@ -47,7 +49,9 @@ def present() -> list[Vendor]:
     found = []
     for vendor in VENDORS:
         if vendor.missing:
-            click.echo(f"{vendor.name} is left out: {', '.join(vendor.missing)} not found", err=True)
+            click.echo(
+                f"{vendor.name} is left out: {', '.join(vendor.missing)} not found", err=True
+            )
         else:
             found.append(vendor)
     return found
@@ -86,12 +90,21 @@ def main(
             break
     stages = results.of_stages(rows)
     if keep:
-        results.keep(stages)
+        results.keep(stages, longest)
     machine.console().print(_summary(stages))
 
 
 def _summary(stages: list[Row]) -> Table:
-    columns = ("device", "stage", "programs", "registers", "occupancy", "stack", "spilled", "seconds")
+    columns = (
+        "device",
+        "stage",
+        "programs",
+        "registers",
+        "occupancy",
+        "stack",
+        "spilled",
+        "seconds",
+    )
     table = Table(*columns)
     for row in stages:
         table.add_row(*(str(row.get(name, "")) for name in columns))

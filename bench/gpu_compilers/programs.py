@@ -1,4 +1,4 @@
-"""The programs of the scenes as a GPU gets them: one lane, along queues, in two layouts of trees."""
+"""The programs of the scenes as a GPU gets them: one lane, along queues, two layouts of trees."""
 
 from __future__ import annotations
 

@@ -18,15 +18,16 @@ STAGES = RESULTS / "gpu_compilers.jsonl"
 LARGEST = ("stack", "spilled", "size", "memory", "arithmetic", "special", "seconds")
 HEAD = """# Programs through the compilers of GPUs that are not here
 
-All programs of the scenes in `scenes/`, both modes, one lane, along queues; a stage whose text hangs on
-the layout of trees stands once for each. `python -m bench.gpu_compilers` measures; the compilers and
-what the columns mean stand in [docs/gpus.md](../../docs/gpus.md). Rows: [gpu_compilers.jsonl](gpu_compilers.jsonl).
+WHICH of the scenes in `scenes/`, both modes, one lane, along queues; a stage whose text hangs on
+the layout of trees stands once for each. `python -m bench.gpu_compilers` measures; how, and what
+follows, stands in [docs/gpus.md](../../docs/gpus.md). Rows: [JSON lines](gpu_compilers.jsonl).
 
 ![Registers, stage by stage](gpu_compilers.png)
 
-Registers: the least and the most of a stage's programs. Waves: the least that a scheduler runs at once
-(NVIDIA: warps a multiprocessor; AMD: waves a SIMD; Intel: work-items a hardware thread, which has 128
-registers of 32 bytes). Stack and spills [bytes], code [KiB], instructions and seconds: the most.
+Registers: the least and the most of a stage's programs. Waves: the least that a scheduler runs at
+once (NVIDIA: warps a multiprocessor; AMD: waves a SIMD; Intel: work-items a hardware thread, which
+has 128 registers of 32 bytes). Stack and spills [bytes; AMD's and Intel's spills: registers], code
+[KiB], instructions, and seconds on a machine that other work shared: the most.
 """
 
 
@@ -60,9 +61,11 @@ def of_stages(rows: Iterable[Row]) -> list[Row]:
     return found
 
 
-def page(rows: list[Row]) -> str:
-    """The tables, a device each."""
-    parts = [HEAD]
+def page(rows: list[Row], longest: int | None = None) -> str:
+    """The tables, a device each; longest: how many texts of each stage and mode, None for all."""
+    few = f"The {longest} longest" if longest and longest > 1 else "The longest program"
+    some = f"{few}{'' if longest == 1 else ' programs'} of each stage and mode,"
+    parts = [HEAD.replace("WHICH", some if longest else "All programs")]
     for vendor in VENDORS:
         for device in vendor.devices:
             own = [row for row in rows if row["device"] == device]
@@ -78,18 +81,21 @@ def _table(title: str, rows: list[Row]) -> str:
     lines = [
         f"## {title}\n",
         f"{count} programs, {failed} refused; stages that spill: {spilling}.\n",
-        "| stage | programs | registers | waves | stack | spilled | code | memory | arithmetic | special | seconds |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+        "| stage | programs | registers | waves | stack | spilled | code "
+        "| memory | arithmetic | special | seconds |",
+        "| --- " * 11 + "|",
     ]
     for row in rows:
         if "registers" not in row:
             lines.append(f"| {row['stage']} | {row['programs']} | refused |" + " |" * 8)
             continue
         registers = f"{row['least']} to {row['registers']}"
-        counts = (row[name] if row[name] >= 0 else "" for name in ("memory", "arithmetic", "special"))
+        counts = (
+            row[name] if row[name] >= 0 else "" for name in ("memory", "arithmetic", "special")
+        )
         cells = (
-            row["stage"], row["programs"], registers, row["occupancy"], row["stack"], row["spilled"],
-            f"{row['size'] / 1024:.1f}", *counts, f"{row['seconds']:.1f}",
+            row["stage"], row["programs"], registers, row["occupancy"], row["stack"],
+            row["spilled"], f"{row['size'] / 1024:.1f}", *counts, f"{row['seconds']:.1f}",
         )  # fmt: skip
         lines.append("| " + " | ".join(map(str, cells)) + " |")
     return "\n".join(lines) + "\n"
@@ -116,9 +122,9 @@ def plot(rows: list[Row], path: Path) -> None:
     figure.savefig(path, dpi=100)
 
 
-def keep(rows: list[Row]) -> None:
+def keep(rows: list[Row], longest: int | None = None) -> None:
     """Write the rows of stages, the page and the picture."""
     lines = (json.dumps(row, separators=(",", ":")) + "\n" for row in rows)
     STAGES.write_text("".join(lines), encoding="utf-8")
-    (RESULTS / "gpu_compilers.md").write_text(page(rows), encoding="utf-8")
+    (RESULTS / "gpu_compilers.md").write_text(page(rows, longest), encoding="utf-8")
     plot(rows, RESULTS / "gpu_compilers.png")

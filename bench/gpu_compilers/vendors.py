@@ -1,7 +1,7 @@
 """Compilers of three vendors' GPUs: what each says of a program's text.
 
-NVIDIA's OpenCL front end is part of its driver; clang stands for it, and NVIDIA's own assembler makes
-the instructions. AMD's is clang. Intel's `ocloc` is Intel's own.
+NVIDIA's OpenCL front end is part of its driver; clang stands for it, and NVIDIA's own assembler
+makes the instructions. AMD's is clang. Intel's `ocloc` is Intel's own.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ class Figures:
     """What became of a program.
 
     registers: of 32 bits a work-item; Intel's of 32 bytes a hardware thread. stack: private memory
-    [bytes]; spilled: [bytes] a work-item, AMD's and Intel's registers. occupancy: groups of 32 or 64
-    work-items at once on a scheduler (NVIDIA: a multiprocessor); Intel's: work-items a hardware
-    thread. size: of the instructions [bytes]; memory, arithmetic, special: instructions in the text,
-    not how often they run; -1 without a disassembler. seconds: of compilation.
+    [bytes]; spilled: [bytes] a work-item, AMD's and Intel's registers. occupancy: groups of 32 or
+    64 work-items at once on a scheduler (NVIDIA: a multiprocessor); Intel's: work-items a hardware
+    thread. size: of the instructions [bytes]; memory, arithmetic, special: instructions in the
+    text, not how often they run; -1 without a disassembler. seconds: of compilation.
     """
 
     registers: int
@@ -54,7 +54,7 @@ class Figures:
 
 @dataclass(frozen=True)
 class Vendor:
-    """A vendor's compilers; tools: what must be found; compile: a text in a folder, for a device."""
+    """A vendor's compilers; tools: what must be found; compile: of a text, in a folder."""
 
     name: str
     devices: tuple[str, ...]

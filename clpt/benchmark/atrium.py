@@ -117,7 +117,7 @@ def columns() -> list[Mesh]:
             for x in COLUMNS:
 
                 def shaft(
-                    u: Angles, v: Angles, x: Any = x, z: Any = z, y0: Any = y0, y1: Any = y1
+                    u: Angles, v: Angles, x: float = x, z: float = z, y0: float = y0, y1: float = y1
                 ) -> Point:
                     r = 0.42 * (1 - 0.12 * v) * (1 + 0.06 * np.cos(12 * TAU * u))
                     r += 0.15 * np.exp(-((14 * v) ** 2)) + 0.18 * np.exp(-((12 * (1 - v)) ** 2))
@@ -139,10 +139,10 @@ def arches() -> list[Mesh]:
                 def arch(
                     u: Angles,
                     v: Angles,
-                    x: Any = (x0 + x1) / 2,
-                    radius: Any = (x1 - x0) / 2,
-                    y: Any = y,
-                    z: Any = z,
+                    x: float = (x0 + x1) / 2,
+                    radius: float = (x1 - x0) / 2,
+                    y: float = y,
+                    z: float = z,
                 ) -> Point:
                     a = np.pi * u
                     r = radius - 0.25 + 0.3 * np.cos(TAU * v) * (1 + 0.1 * np.sin(20 * a))
@@ -159,7 +159,9 @@ def curtains(rng: np.random.Generator) -> list[Mesh]:
         for z in ROWS:
             phase = 6 * rng.random()
 
-            def cloth(u: Angles, v: Angles, x: Any = x, z: Any = z, phase: Any = phase) -> Point:
+            def cloth(
+                u: Angles, v: Angles, x: float = x, z: float = z, phase: float = phase
+            ) -> Point:
                 y = 4.7 - 3.6 * v + 0.1 * np.sin(5 * u + phase)
                 depth = 0.22 * np.sin(18 * u + phase + 2 * v) * (0.4 + v)
                 depth += 0.1 * np.sin(7 * v + phase)
@@ -178,7 +180,7 @@ def vases() -> list[Mesh]:
     made = []
     for x, z in _pots():
 
-        def vase(u: Angles, v: Angles, x: Any = x, z: Any = z) -> Point:
+        def vase(u: Angles, v: Angles, x: float = x, z: float = z) -> Point:
             r = 0.35 + 0.25 * np.sin(3 * v) ** 2 - 0.1 * v
             return x + r * np.cos(TAU * u), 1.1 * v, z + r * np.sin(TAU * u)
 
@@ -208,7 +210,7 @@ def chains() -> list[Mesh]:
     for x in np.linspace(6, 34, 8):
         for link in range(14):
 
-            def ring(u: Angles, v: Angles, x: Any = x, link: Any = link) -> Point:
+            def ring(u: Angles, v: Angles, x: float = x, link: Any = link) -> Point:
                 r = 0.12 + 0.035 * np.cos(TAU * v)
                 p, q, s = r * np.cos(TAU * u), r * np.sin(TAU * u), 0.035 * np.sin(TAU * v)
                 across, along = (p, s) if link % 2 else (s, p)
@@ -223,7 +225,7 @@ def lamps() -> list[Mesh]:
     made = []
     for x in np.linspace(6, 34, 8):
 
-        def globe(u: Angles, v: Angles, x: Any = x) -> Point:
+        def globe(u: Angles, v: Angles, x: float = x) -> Point:
             r = 0.5 + 0.03 * np.sin(12 * TAU * u) * np.sin(6 * TAU * v)
             ring, y = r * np.sin(np.pi * v), 11 + r * np.cos(np.pi * v)
             return x + ring * np.cos(TAU * u), y, 9 + ring * np.sin(TAU * u)

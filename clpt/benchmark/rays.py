@@ -7,7 +7,7 @@ the nearest triangle, `any` whether there is one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +18,7 @@ from clpt import bvh, device
 from clpt.errors import SceneError
 from clpt.rays import Accel, Hits
 from clpt.records import HIT, PATH, SHADOW
+from clpt.render.wavefront.bounce_loop import Step
 from clpt.scene import Scene
 
 from . import checks, triangles
@@ -64,7 +65,7 @@ def sets(on: device.Device, scene: Scene, count: int | None = None) -> Sets:
         raise SceneError("rays are measured on triangles, and the scene has none")
     found: dict[str, Rays] = {}
 
-    def look(step: Any, enqueue: Any) -> None:
+    def look(step: Step, enqueue: Callable[[], Any]) -> None:
         enqueue()
         name = step.bound.kernel.name
         if name in ("generate", "emit"):

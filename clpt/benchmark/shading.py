@@ -6,7 +6,7 @@ a box of constant `diffuse`, measured by turns with each of the others.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from clpt.scene import Scene, integrators, lights, params, textures
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Film
 from clpt.scene.materials import LEAVES, Diffuse, Material
+from clpt.scene.roles import REFLECTANCE
 from clpt.scene.shapes import Rectangle, Shape
 
 from .figures import Figure, Taken, clock_complaint, timed
@@ -39,7 +40,7 @@ def variants(cls: type[Material]) -> dict[str, Material]:
     """
     made = {"constant": cls()}
     declared, usual = params.device_params(cls), params.defaults(cls)
-    colours = [n for n, p in declared.items() if p.role == "reflectance" and p.textured]
+    colours = [n for n, p in declared.items() if p.role is REFLECTANCE and p.textured]
     if colours:
         image: dict[str, Any] = {colours[0]: _image()}
         made["textured"] = cls(**image)
@@ -130,7 +131,7 @@ def _shade(flight: Flight) -> tuple[int, Taken]:
     """Items that were shaded in a few bounces, and what that took."""
     found: list[tuple[int, Taken]] = []
 
-    def around(step: Step, enqueue: Any) -> None:
+    def around(step: Step, enqueue: Callable[[], Any]) -> None:
         if step.bound.kernel.name == "shade":
             found.append((flight.items(step), timed(flight.device, lambda: [enqueue()])))
         else:

@@ -68,7 +68,7 @@ def compare(image: Image, reference: Reference, samples: int) -> Verdict:
     with np.errstate(all="ignore"):
         t: Floats = np.abs(found - reference.mean) / np.maximum(expected, 1e-9)
     t = np.where(np.isfinite(found), t, np.inf)
-    off = np.any(t > limit(reference.count - 1, FALSE_ALARMS / t.size), axis=1)
+    off = np.asarray((t > limit(reference.count - 1, FALSE_ALARMS / t.size)).any(1))
     tiles, largest = float(off[:-1].mean()), float(t.max())
     if off[:-1].any():
         return Verdict(tiles, largest, f"wrong: {max(tiles, 0.01):.0%} of tiles".replace("%", " %"))

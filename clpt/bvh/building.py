@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import pyopencl as cl
@@ -36,11 +36,11 @@ class Building:
         self.stream: Stream = stream or Stream(device.queue)
         self._programs: dict[str, Program] = {}
 
-    def run(self, root: str, kernel: str, n: int, **arguments: Any) -> None:
+    def run(self, root: str, kernel: str, n: int, **arguments: object) -> None:
         """Enqueue n work-items of a kernel of the program at `root`, in groups of one."""
         self._enqueue(root, kernel, n, 1, arguments)
 
-    def run_each(self, root: str, kernel: str, n: int, **arguments: Any) -> None:
+    def run_each(self, root: str, kernel: str, n: int, **arguments: object) -> None:
         """As `run`, in larger groups, for kernels whose argument `count` is n."""
         self._enqueue(root, kernel, n, _GROUP, {"count": n, **arguments})
 

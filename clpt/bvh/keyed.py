@@ -48,19 +48,7 @@ def keyed(
         quality,
     )
     packed = LAYOUTS[layout](building, mesh)
-    nodes, leaves = packed.buffers["nodes"], packed.buffers["leaves"]
-    places = building.upload(own, np.float32)
-    copies: list[tuple[NDArray[np.uint32], NDArray[np.uint32]]] = []
-    for key in range(keys):
-        source = {"vertices": places, "faces": building.upload(local + np.uint32(key), np.uint32)}
-        trees = {"nodes": nodes, "leaves": leaves, "boxes": None, "indices": None}
-        refit_nodes(building, packed.part, **trees, **source)
-        copies.append(
-            (
-                building.read(nodes, nodes.size // 4, np.uint32),
-                building.read(leaves, leaves.size // 4, np.uint32),
-            )
-        )
+    copies = _refitted(building, packed, own, local, keys)
     node_words, leaf_words = WORDS[layout]
     made = _side_by_side([one[0] for one in copies], node_words)
     if layout == "wide8":
@@ -69,6 +57,30 @@ def keyed(
     buffers["leaves"] = _whole_steps(_side_by_side([one[1] for one in copies], leaf_words))
     uploaded = {name: building.upload(words, np.uint32) for name, words in buffers.items()}
     return Packed(uploaded, Part(0), packed.stats)
+
+
+def _refitted(
+    building: Building,
+    packed: Packed,
+    vertices: NDArray[np.float32],
+    faces: NDArray[np.uint32],
+    keys: int,
+) -> list[tuple[NDArray[np.uint32], NDArray[np.uint32]]]:
+    """Return the nodes and leaves of a tree at each key."""
+    nodes, leaves = packed.buffers["nodes"], packed.buffers["leaves"]
+    places = building.upload(vertices, np.float32)
+    copies: list[tuple[NDArray[np.uint32], NDArray[np.uint32]]] = []
+    for key in range(keys):
+        source = {"vertices": places, "faces": building.upload(faces + np.uint32(key), np.uint32)}
+        trees = {"nodes": nodes, "leaves": leaves, "boxes": None, "indices": None}
+        refit_nodes(building, packed.part, **trees, **source)
+        copies.append(
+            (
+                building.read(nodes, nodes.size // 4, np.uint32),
+                building.read(leaves, leaves.size // 4, np.uint32),
+            )
+        )
+    return copies
 
 
 def _side_by_side(copies: list[NDArray[np.uint32]], words: int) -> NDArray[np.uint32]:

@@ -20,7 +20,9 @@ class PixelType(click.ParamType):
 
     name = "X,Y"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> Pixel:
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Pixel:
         match = re.fullmatch(r"(\d{1,9}),(\d{1,9})", str(value).replace(" ", ""))
         if not match:
             self.fail(f"{value!r} does not look like 120,80", param, ctx)

@@ -136,7 +136,7 @@ class Store:
         return False
 
 
-def check_digest(digest: Any) -> None:
+def check_digest(digest: object) -> None:
     """Raise ClusterError for what is no SHA-256 in hexadecimal."""
     if not isinstance(digest, str) or not _DIGEST.fullmatch(digest):
         raise ClusterError(f"this is no digest: {str(digest)[:80]!r}")
@@ -151,7 +151,7 @@ def file_digest(path: Path) -> str:
     return hashed.hexdigest()
 
 
-def canonical(document: Any) -> str:
+def canonical(document: object) -> str:
     """Return JSON that is the same for the same content."""
     return json.dumps(document, sort_keys=True, separators=(",", ":"))
 

@@ -38,7 +38,9 @@ class Calls:
         """Wait no longer for what a worker sends that is gone: it may be stopped, and silent."""
         self.client.loop.add_callback(self.client.rpc.remove, address)
 
-    async def at(self, addresses: Collection[str], function: Any, *arguments: Any) -> tasks.Reply:
+    async def at(
+        self, addresses: Collection[str], function: Callable[..., Any], *arguments: object
+    ) -> tasks.Reply:
         """Run a function at one of some workers and return what it returns, or an "error"."""
         from distributed import KilledWorker
 

@@ -29,7 +29,7 @@ class Once:
         self._lock = threading.Lock()
         self._made: dict[Any, Any] = {}
 
-    def __call__(self, key: Any, make: Callable[[], _Made]) -> _Made:
+    def __call__(self, key: object, make: Callable[[], _Made]) -> _Made:
         """Return what was made for a key. Raises what `make` raised."""
         with self._lock:
             if key not in self._made:
@@ -141,7 +141,7 @@ class DeviceWorker:
 
 def added(a: Counts, b: Counts) -> Counts:
     """Return the sums of what happened."""
-    return Counts(**{name: value + getattr(b, name) for name, value in vars(a).items()})
+    return Counts(**{name: value + vars(b)[name] for name, value in vars(a).items()})
 
 
 def device_names(devices: list[Device]) -> list[str]:

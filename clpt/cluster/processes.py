@@ -91,7 +91,11 @@ def run_worker(
 
 
 async def _worker(
-    address: str, host: str | None, folder: Path | None, name: str | None, tell: Any
+    address: str,
+    host: str | None,
+    folder: Path | None,
+    name: str | None,
+    tell: Callable[[str], object],
 ) -> int:
     with _scratch() as scratch:
         host = host or (LOOPBACK if is_loopback(address) else None)
@@ -187,7 +191,7 @@ def run_scheduler(
     return asyncio.run(_scheduler(host, port, folder, tell))
 
 
-async def _scheduler(host: str, port: int, folder: Path, tell: Any) -> int:
+async def _scheduler(host: str, port: int, folder: Path, tell: Callable[[str], object]) -> int:
     with _scratch() as scratch:
         try:
             scheduler = new_scheduler(host, port, folder, scratch)

@@ -159,25 +159,30 @@ def alone(entry: str) -> Iterator[None]:
 
     Nobody waits for longer than WAIT, nor where files have no locks.
     """
-    path = _lock_of(entry)
-    try:
+    path, handle = _lock_of(entry), None
+    with suppress(OSError):
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         handle = os.open(path, os.O_CREAT | os.O_RDWR, 0o600)
-    except OSError:
+    if handle is None:
         yield
         return
     try:
-        end, waited = time.monotonic() + WAIT, False
-        while not _locks(handle) and time.monotonic() < end:
-            if not waited:
-                log.info("another process builds the same program: waiting for it")
-            waited = True
-            time.sleep(0.05)
+        _wait_for(handle)
         yield
     finally:
         with suppress(OSError):
             path.unlink()
         os.close(handle)
+
+
+def _wait_for(handle: int) -> None:
+    """Lock a file as soon as no other process has, or go on without after WAIT."""
+    end, told = time.monotonic() + WAIT, False
+    while not _locks(handle) and time.monotonic() < end:
+        if not told:
+            log.info("another process builds the same program: waiting for it")
+        told = True
+        time.sleep(0.05)
 
 
 def is_being_made(entry: str) -> bool:

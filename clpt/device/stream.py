@@ -31,7 +31,7 @@ def tiles(width: int, height: int) -> tuple[tuple[int, int], tuple[int, int]]:
 
 @dataclass(frozen=True)
 class Rows:
-    """Parts of a buffer at equal distances: where the first begins, their size and distance [bytes]."""
+    """Parts of a buffer: where the first begins, their size, and their distance [bytes]."""
 
     first: int
     size: int
@@ -40,7 +40,7 @@ class Rows:
 
     @property
     def region(self) -> tuple[int, int, int]:
-        """What they are as OpenCL's commands take a rectangle."""
+        """The rows as OpenCL's commands take a rectangle."""
         return self.size, self.count, 1
 
 

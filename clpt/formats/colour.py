@@ -5,18 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from clpt.spectra import RGB, RGBIlluminant, RGBUnbounded
-
-COLOURS: dict[str, type[Any]] = {
-    "reflectance": RGB,
-    "index": RGBUnbounded,
-    "factor": RGBUnbounded,
-    "coefficient": RGBUnbounded,
-    "quantity": RGBUnbounded,
-    "emission": RGBIlluminant,
-}
+from clpt.scene.roles import REFLECTANCE, Spectral
 
 
-def colour(role: str, rgb: Sequence[float]) -> Any:
+def colour(role: Spectral, rgb: Sequence[float]) -> Any:
     """Return linear Rec.709 as the spectrum of a role; its kind checks the limits."""
-    return tuple(rgb) if role == "reflectance" else COLOURS[role](*rgb)
+    if role is REFLECTANCE or role.colour is None:
+        return tuple(rgb)
+    return role.colour(*rgb)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 GREY = np.full((1, 1, 3), 0.5, np.float32)
@@ -11,6 +9,6 @@ EVEN = np.array([[[0.5, 0.5, 1.0]]], np.float32)  # a normal map that bends noth
 GREY.flags.writeable = EVEN.flags.writeable = False
 
 
-def grey_for(name: Any) -> str:
+def grey_for(name: object) -> str:
     """Return the warning of an image for which GREY or EVEN stands."""
     return f"there is no file {str(name)!r}; grey stands for it"

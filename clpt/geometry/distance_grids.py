@@ -13,6 +13,7 @@ from itertools import permutations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clpt.arrays import Floats, Integers, on_host
 from clpt.errors import SceneError
@@ -201,7 +202,12 @@ def _zeros(
 
 
 def _outward(
-    points: Floats, faces: Integers, corners: Integers, inside: Any, owner: Integers, pieces: int
+    points: Floats,
+    faces: Integers,
+    corners: Integers,
+    inside: NDArray[np.bool_],
+    owner: Integers,
+    pieces: int,
 ) -> Integers:
     """The faces, turned to the corners of their tetrahedra that are outside."""
     a, b, c = (points[faces[:, i]] for i in range(3))

@@ -106,12 +106,12 @@ def at_rest(scene: Scene) -> Scene:
     if not isinstance(shutter, Shutter):
         raise SceneError(f"must be a Shutter, not {shutter!r}", where="camera.shutter")
     for i, shape in enumerate(scene.shapes):
-        for inner in getattr(getattr(shape, "group", None), "shapes", ()):
-            if inner.motion is not None:
+        for inner in shape.members:
+            if inner is not shape and inner.motion is not None:
                 message = "a shape of a group cannot move in it: give `motion` to its instance"
                 raise SceneError(message, where=shapes.where(inner))
         _check(shape, f"shapes[{i}]")
-        if getattr(shape.emission, "motion", None) is not None:
+        if shape.emission is not None and shape.emission.motion is not None:
             message = "an area light moves with its shape: give `motion` to that"
             raise SceneError(message, where=shapes.where(shape))
     for i, light in enumerate(scene.lights):
@@ -130,18 +130,13 @@ def at_rest(scene: Scene) -> Scene:
     return replace(scene, **changes) if changes else scene
 
 
-def _members(shape: Any) -> tuple[Any, ...]:
-    """A shape, or those that an instance places."""
-    return tuple(getattr(getattr(shape, "group", None), "shapes", (shape,)))
+def _deforms(shape: Shape) -> bool:
+    return any(one.deformation is not None for one in shape.members)
 
 
-def _deforms(shape: Any) -> bool:
-    return any(getattr(one, "deformation", None) is not None for one in _members(shape))
-
-
-def _times(shape: Any, shutter: Shutter) -> tuple[float, ...]:
+def _times(shape: Shape, shutter: Shutter) -> tuple[float, ...]:
     """The times between which all points of a shape or instance move linearly."""
-    found = [getattr(one, "deformation", None) for one in _members(shape)]
+    found = [one.deformation for one in shape.members]
     return tuple(sorted({t for one in found if one is not None for t in one.while_open(shutter)}))
 
 
@@ -166,7 +161,7 @@ def _undeformed(things: Sequence[Shape], shutter: Shutter) -> list[Shape]:
 def _opening(shape: Any, shutter: Shutter) -> Any:
     """A shape with its points where they are when the shutter opens; what stands still then has no
     deformation. Raises SceneError for one that is not of the shape's points."""
-    given = getattr(shape, "deformation", None)
+    given = shape.deformation
     if given is None:
         return shape
     triangles.check_deformation(shape)
@@ -225,9 +220,8 @@ def check(scene: Scene, motions: Motions) -> None:
             message = "a light may be moved and turned, not scaled or mirrored"
             raise SceneError(message, where=f"lights[{i}].motion")
     for i, keys in motions.shapes.items():
-        shape: Any = scene.shapes[i]
-        inner = getattr(getattr(shape, "group", None), "shapes", (shape,))
-        if any(one.emission is not None for one in inner) and not is_even(keys):
+        shape = scene.shapes[i]
+        if any(one.emission is not None for one in shape.members) and not is_even(keys):
             message = "a shape that emits light may be scaled evenly, not stretched"
             raise SceneError(message, where=f"{shapes.where(shape)}.motion")
 

@@ -16,6 +16,7 @@ from clpt.errors import SceneError
 from clpt.geometry.shapes import where
 from clpt.scene import subdivision
 from clpt.scene.pixels import pixels
+from clpt.scene.roles import REAL
 from clpt.scene.shapes import Mesh
 from clpt.scene.textures import Bitmap
 
@@ -62,7 +63,7 @@ def check(mesh: Mesh) -> None:
             raise SceneError(f"a mesh that is {made} has no {what}", where=name)
     if mesh.displacement is None:
         return
-    image: Any = mesh.displacement
+    image = mesh.displacement
     if mesh.uvs is None or not isinstance(image, Bitmap) or image.mapping != "uv":
         message = "displacement needs uvs, and a bitmap that is laid out by them"
         raise SceneError(message, where=name)
@@ -133,7 +134,8 @@ def _displaced(mesh: Mesh, parts: Parts, name: str) -> Parts:
         points, normals, uvs = (_grown(one, edges) for one in (points, normals, uvs))
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = normals / np.where(length > 0.0, length, 1.0)
-    image: Any = mesh.displacement
+    image = mesh.displacement
+    assert image is not None
     moved = points + mesh.displacement_scale * heights(image, uvs)[:, None] * normals
     _, welded, own = _welded(points, faces)
     shares = np.bincount(own)
@@ -155,7 +157,7 @@ def _smooth(points: Floats, faces: Integers) -> Floats:
 
 def heights(image: Bitmap, uvs: Floats) -> Floats:
     """Return what an image says at uvs (n, 2), as kernels/texture/bitmap.cl reads numbers: (n,)."""
-    values = pixels(image, "real")[..., 0].astype(np.float64)
+    values = pixels(image, REAL)[..., 0].astype(np.float64)
     to_uv = np.asarray(image.to_uv, np.float64)
     x, y = ((np.c_[uvs, np.ones(len(uvs))] @ to_uv.T)[:, :2] * [1.0, -1.0] + [0.0, 1.0]).T
     x, y = x * values.shape[1], y * values.shape[0]

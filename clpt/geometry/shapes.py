@@ -23,7 +23,7 @@ def where(shape: Shape) -> str:
 def geometry(shape: Shape) -> tuple[Any, ...]:
     """Return all that the triangles of a shape follow from: its fields but for the surface."""
     own = fields_of(shape)
-    return type(shape), *(own[name] for name in own if name not in ("material", "emission"))
+    return type(shape), *[own[name] for name in own if name not in ("material", "emission")]
 
 
 def placement(shape: Shape) -> NDArray[np.float64]:

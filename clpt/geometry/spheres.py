@@ -8,7 +8,6 @@ themselves there are so many rows for each key, and a word behind the row of `ge
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +16,7 @@ from clpt import transforms
 from clpt.arrays import Balls, Words, on_host, single
 from clpt.errors import SceneError
 from clpt.geometry import analytic, shapes, triangles
+from clpt.scene.params import fields_of
 from clpt.scene.shapes import Shape, Spheres
 
 FARTHEST = 1e38  # [m], of a centre or a radius: a box around them is float32
@@ -96,7 +96,7 @@ def boxes(placed: Sequence[Balls]) -> NDArray[np.float32]:
 
 def _numbers(shape: Shape, name: str) -> NDArray[np.float32]:
     """A parameter as float32 on the host."""
-    value: Any = getattr(shape, name)
+    value = fields_of(shape)[name]
     try:
         return single(on_host(value))
     except (TypeError, ValueError) as error:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
+from clpt.arrays import Floats32
 from clpt.errors import SceneError
 from clpt.geometry import analytic, shapes, tubes
 from clpt.scene.shapes import Curves
@@ -26,10 +27,7 @@ KINK = 1e-3  # between pieces, from which on the gap is closed by a half sphere 
 MOST = (1 << 31) // WORDS - 1  # pieces: kernels count words by an int
 
 
-Pieces = NDArray[np.float32]  # (n, WORDS), see `pieces`
-
-
-def pieces(shape: Curves, cut_as: Curves | None = None) -> Pieces:
+def pieces(shape: Curves, cut_as: Curves | None = None) -> Floats32:
     """Return the pieces of all strands in the world, (n, WORDS) float32.
 
     A row has of the four control points of a Bezier cubic the x, then the y, the z, and the radii
@@ -64,7 +62,7 @@ def pieces(shape: Curves, cut_as: Curves | None = None) -> Pieces:
     return made[_near_to_each_other(points[:, 0, :3])]
 
 
-def boxes(placed: Pieces) -> NDArray[np.float32]:
+def boxes(placed: Floats32) -> NDArray[np.float32]:
     """Return a box around each piece, (n, 2, 3) float32."""
     control = placed[:, :CONTROL].reshape(-1, 4, 4).swapaxes(1, 2)
     low, high = control[..., :3].min(axis=1), control[..., :3].max(axis=1)

@@ -19,7 +19,8 @@ from clpt.geometry.shapes import placement, where
 from clpt.geometry.tubes import tubes
 from clpt.scene import shapes
 from clpt.scene.motion import Deformation
-from clpt.scene.shapes import Shape
+from clpt.scene.params import fields_of
+from clpt.scene.shapes import Mesh, Shape
 
 POINTS = {  # what a deformation moves
     "mesh": "vertices", "curves": "points", "tubes": "points", "spheres": "centers",
@@ -93,7 +94,7 @@ def keyed(
     vertex. Triangles are left out that have no area at any time. Raises as `triangulate` does.
     """
     count = len(times)
-    if getattr(shape, "deformation", None) is None:
+    if shape.deformation is None:
         at_all = [_in_world(shape)] * count
     else:
         alike = [at_time(shape, time) for time in times]
@@ -119,25 +120,26 @@ def at_time(shape: Any, time: float) -> Any:
     """Return a shape with a deformation as it is at a time [s], which does not deform."""
     points, normals = shape.deformation.at(time)
     changes: dict[str, Any] = {POINTS[shape.kind]: points, "deformation": None}
-    if hasattr(shape, "normals"):
+    if isinstance(shape, Mesh):
         changes |= {"normals": shape.normals if normals is None else normals, "tangents": None}
     return replace(shape, **changes)
 
 
-def check_deformation(shape: Any) -> None:
+def check_deformation(shape: Shape) -> None:
     """Raise SceneError for a deformation that is not one of the shape's points."""
     given, place = shape.deformation, f"{where(shape)}.deformation"
     if not isinstance(given, Deformation):
         raise SceneError(f"must be a Deformation, not {given!r}", where=place)
     name = POINTS[shape.kind]
-    if getattr(shape, name) is None:
+    points = fields_of(shape)[name]
+    if points is None:
         raise SceneError(f"a {shape.kind} that deforms needs {name} too", where=place)
-    own = np.shape(on_host(getattr(shape, name)))
+    own = np.shape(on_host(points))
     with_radii = shape.kind == "spheres" and given.points.shape[1:] == (*own[:1], 4)
     if given.points.shape[1:] != own and not with_radii:
         message = f"its keys have {given.points.shape[1:]} where {name} are {own}"
         raise SceneError(message, where=place)
-    if shape.kind != "mesh":
+    if not isinstance(shape, Mesh):
         if given.normals is not None:
             raise SceneError(f"{shape.kind} take no normals", where=place)
         return
@@ -200,7 +202,7 @@ def attribute(shape: Shape, name: str) -> Points:
     else:
         vertices, faces, _, _ = _in_world(shape)
         count = len(faces) if by_face else len(vertices)
-    given: Any = shape.attributes[name]  # type: ignore[attr-defined]
+    given: Any = shape.attributes[name]
     values = np.asarray(on_host(given), np.float32)
     values = values[:, None] if values.ndim == 1 else values
     if values.shape not in ((count, 1), (count, 3)):
@@ -336,14 +338,13 @@ def points(shape: Shape) -> Points:
 
 def smooth(shape: Shape) -> bool:
     """Return whether a shape's normals follow from its triangles."""
-    normals = getattr(shape, "normals", None)
-    return isinstance(normals, str) and normals == shapes.SMOOTH
+    return isinstance(shape.normals, str) and shape.normals == shapes.SMOOTH
 
 
 def _array(shape: Shape, name: str, columns: int, rows: int | None = None) -> Points:
     """A mesh's array as float32. Raises SceneError for a wrong shape or values not finite."""
     try:
-        values = single(on_host(getattr(shape, name)))
+        values = single(on_host(fields_of(shape)[name]))
     except (TypeError, ValueError) as error:
         raise SceneError(f"{name} are not numbers: {error}", where=where(shape)) from error
     wanted = f"({'n' if rows is None else rows}, {columns})"

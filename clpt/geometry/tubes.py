@@ -7,7 +7,7 @@ emit light, that deform, that a transform stretches, or that many instances shar
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Floats, Integers, single
 from clpt.errors import SceneError
+from clpt.scene.params import fields_of
 from clpt.scene.shapes import Curves
 
 ERROR = 0.25  # of the radius: how far a tube's axis may be from its curve
@@ -36,7 +37,7 @@ class Tubes(Curves):
 
 def as_tubes(shape: Curves) -> Tubes:
     """Return the same curves as tubes."""
-    return Tubes(**{field.name: getattr(shape, field.name) for field in fields(shape)})
+    return Tubes(**fields_of(shape))
 
 
 def tubes(shape: Curves, name: str, alike: Sequence[Curves] = ()) -> tuple[Any, Any, Any, Any]:

@@ -50,17 +50,19 @@ class Measurement:
     description: str = ""
 
     def __post_init__(self) -> None:
+        given = dict(vars(self))
         for name in ("phi_i", "theta_i", "wavelengths"):
-            object.__setattr__(self, name, _ascending(name, getattr(self, name)))
+            object.__setattr__(self, name, _ascending(name, given[name]))
         for name in AXES:
-            object.__setattr__(self, name, _table(name, getattr(self, name)))
+            object.__setattr__(self, name, _table(name, given[name]))
         if not len(self.phi_i) or not len(self.theta_i):
             raise SceneError("'phi_i' and 'theta_i' must have an angle each, at least")
         if self.theta_i[0] < -1e-3 or self.theta_i[-1] > 0.5 * math.pi + 1e-3:
             raise SceneError("'theta_i' must lie within 0 and pi / 2")
         both = len(self.phi_i), len(self.theta_i)
-        for name in ("vndf", "luminance", "spectra"):
-            if (found := getattr(self, name).shape)[:2] != both:
+        tables = {"vndf": self.vndf, "luminance": self.luminance, "spectra": self.spectra}
+        for name, table in tables.items():
+            if (found := table.shape)[:2] != both:
                 raise SceneError(
                     f"{name!r} is of {found[0]} x {found[1]} viewers, but 'phi_i' and 'theta_i'"
                     f" of {both[0]} x {both[1]}"

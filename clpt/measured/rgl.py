@@ -50,7 +50,7 @@ def write(path: str | Path, measurement: Measurement) -> None:
     fields = {
         "description": np.frombuffer(measurement.description.encode(), np.uint8),
         "jacobian": np.array([measurement.jacobian], np.uint8),
-        **{name: getattr(measurement, name) for name in TABLES},
+        **{name: vars(measurement)[name] for name in TABLES},
         **({"wavelengths": measurement.wavelengths} if spectral else {}),
         "spectra" if spectral else "rgb": measurement.spectra,
     }

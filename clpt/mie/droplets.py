@@ -36,6 +36,13 @@ def angles(size: float) -> NDArray[np.float64]:
     return cosines
 
 
+def _wavelengths(lambdas: ArrayLike) -> NDArray[np.float64]:
+    at = np.asarray(lambdas, np.float64) if np.size(lambdas) else np.arange(360.0, 831.0, 10.0)
+    if not (np.isfinite(at) & (at > 0.0)).all() or not (np.diff(at) > 0.0).all():
+        raise SceneError("must ascend, and be above 0", where="lambdas")
+    return at
+
+
 def droplets(
     of: Sizes,
     share: float,
@@ -56,9 +63,7 @@ def droplets(
     The medium has sigma_t and albedo by wavelength, and a Tabulated phase function. Raises
     SceneError for a share above DENSE or not above 0, and as `spheres` does.
     """
-    at = np.asarray(lambdas, np.float64) if np.size(lambdas) else np.arange(360.0, 831.0, 10.0)
-    if not (np.isfinite(at) & (at > 0.0)).all() or not (np.diff(at) > 0.0).all():
-        raise SceneError("must ascend, and be above 0", where="lambdas")
+    at = _wavelengths(lambdas)
     if not 0.0 < share <= DENSE:
         raise SceneError(
             f"{share:g} of the volume; it must be above 0 and up to {DENSE:g}, as denser spheres do"

@@ -61,7 +61,7 @@ def device_arg(
     return DeviceArg(array.base_data, shape[0], array.offset // size, array.events)
 
 
-def _wrong(name: str, found: Any, columns: int, dtype: type) -> SceneError:
+def _wrong(name: str, found: object, columns: int, dtype: type) -> SceneError:
     wanted = f"(n, {columns})" if columns else "(n,)"
     return SceneError(f"{wanted} {np.dtype(dtype)} is wanted, not {found}", where=name)
 

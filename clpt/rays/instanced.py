@@ -68,23 +68,29 @@ class InstancedAccel(Queries):
         self._stream.after(wait_for)
         self._copy_trees(range(len(accels)))
         self._transforms = self._input(transforms)
-        self._place_instances()
-        corners = self._stream.read(boxes, np.empty((self.count, 2, 3), np.float32))
-        if not np.isfinite(corners).all():
-            wrong = np.argmin(np.isfinite(corners).all(axis=(1, 2)))
-            raise SceneError(f"instance {wrong} is singular or out of reach", where="transforms")
-        self.tree = bvh.build_boxes(self.device, corners, self.layout)
-        order = self._stream.read(self.tree.buffers["indices"], np.empty(self.count, np.uint32))
-        self._arrays["slots"] = buffers.upload(
-            "the order of instances", np.argsort(order), np.uint32
-        )
-        self._place_instances()
+        self.tree = self._built(buffers)
         self._refitting = bvh.Building(self.device, stream=self._stream)
         self._trees = {
             **self._tree_buffers,
             "instance_nodes": self.tree.buffers["nodes"],
             "instances": self._arrays["instances"],
         }
+
+    def _built(self, buffers: Buffers) -> bvh.Bvh:
+        """Place the instances, and return the tree over them. Raises SceneError."""
+        self._place_instances()
+        boxes = self._arrays["boxes"]
+        corners = self._stream.read(boxes, np.empty((self.count, 2, 3), np.float32))
+        if not np.isfinite(corners).all():
+            wrong = np.argmin(np.isfinite(corners).all(axis=(1, 2)))
+            raise SceneError(f"instance {wrong} is singular or out of reach", where="transforms")
+        tree = bvh.build_boxes(self.device, corners, self.layout)
+        order = self._stream.read(tree.buffers["indices"], np.empty(self.count, np.uint32))
+        self._arrays["slots"] = buffers.upload(
+            "the order of instances", np.argsort(order), np.uint32
+        )
+        self._place_instances()
+        return tree
 
     def update(self, transforms: ArrayInput | None = None, *, wait_for: Events = None) -> cl.Event:
         """Enqueue that instances move, and that meshes are as their `update` left them.

@@ -57,7 +57,7 @@ class RenderOptions(TypedDict, total=False):
     cancel_seconds: float | None
 
 
-def check_scene(scene: Any) -> None:
+def check_scene(scene: object) -> None:
     """Raise TypeError for what is no scene."""
     if isinstance(scene, Scene):
         return
@@ -100,7 +100,7 @@ def check_options(scene: Scene, options: Mapping[str, Any]) -> None:
             raise SceneError(message, where=name)
 
 
-def check_changes(camera: Any, **by_key: Any) -> None:
+def check_changes(camera: object, **by_key: object) -> None:
     """Raise SceneError for what `Renderer.update` cannot take as a camera or as changes by key."""
     if camera is not None and not isinstance(camera, Camera):
         message = f"must be a camera, such as clpt.scene.cameras.Perspective, not {camera!r}"

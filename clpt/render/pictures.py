@@ -23,7 +23,7 @@ from clpt.render.wavefront.wavefront import Wavefront
 class DevicePictures(FilmRenderer):
     """Base of renderers: their picture as an array on the device, beside those of the host.
 
-    make_widget: given by who shows pictures in notebooks, see `clpt/__init__`.
+    _make_widget: given by who shows pictures in notebooks, see `clpt/__init__`.
     """
 
     _make_widget: ClassVar[Callable[..., Any]]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import logging
 import time
 from collections.abc import Callable, Mapping
@@ -13,6 +14,7 @@ import pyopencl as cl
 from clpt import device as dev
 from clpt.denoise import needs
 from clpt.errors import DeviceError, MemoryBudgetError, SceneError
+from clpt.geometry import shapes
 from clpt.render.analysis.bodies import matter_of
 from clpt.render.analysis.surroundings import bodies_around, media_around
 from clpt.render.contents import Change, Contents
@@ -38,11 +40,14 @@ from clpt.render.resumable import Resumable
 from clpt.render.stats import RenderStats, collect
 from clpt.render.wavefront import adaptive
 from clpt.render.wavefront.film_state import FilmState, join_ranges
+from clpt.render.wavefront.strategy import Tuning
 from clpt.render.wavefront.tracer import Tracer, use_all_pixels
 from clpt.render.wavefront.wavefront import Counts, Wavefront
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
+from clpt.scene.lights import Light
 from clpt.scene.materials import Material
+from clpt.scene.params import fields_of, params
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -85,17 +90,7 @@ class Renderer(Resumable):
         self._discards = False
         self.denoise = options.get("denoise")
         self.scene = scene = needs.prepared(scene, self.denoise)
-        queue, threads = options.get("queue"), options.get("threads")
-        if threads is not None and (queue is not None or isinstance(device, dev.Device)):
-            raise DeviceError("threads are of a device that is chosen here; give its name or index")
-        if queue is not None:
-            if device is not None:
-                raise DeviceError("give a device or a queue; a queue has its device")
-            device = dev.Device.adopt(queue)
-        elif not isinstance(device, dev.Device):
-            profiling = options.get("profiling", False)
-            device = dev.choose(device, profiling=profiling, threads=threads)
-        self.device = device
+        self.device = device = _opened(device, options)
         self._start = time.perf_counter()
         before = device.builds.programs, device.builds.cached
         texture_budget = options.get("texture_budget")
@@ -108,13 +103,11 @@ class Renderer(Resumable):
         self._opened = first = Wavefront.create(
             device,
             lowered,
-            layout=options.get("layout"),
+            Tuning(options.get("layout"), options.get("queued"), options.get("cancel_seconds")),
             slots=options.get("slots"),
-            queued=options.get("queued"),
-            looped=options.get("looped", None if queue is None else True),
+            looped=options.get("looped", None if options.get("queue") is None else True),
             tree_quality=options.get("tree_quality", "high"),
             halves=options.get("halves", False) or needs.halves(scene, self.denoise),
-            cancel_seconds=options.get("cancel_seconds"),
         )
         first.prepare()
         self._built = device.builds.programs - before[0], device.builds.cached - before[1]
@@ -205,7 +198,7 @@ class Renderer(Resumable):
     def _add_samples(self, first: int, end: int, noise: float | None, watch: Watch) -> bool:
         """Add samples to all pixels, or to those with noise; return whether all were added."""
 
-        def on_batch(_: Any) -> bool:
+        def on_batch(_: object) -> bool:
             if self._stop.is_set() and self._discards:
                 raise _Discarded
             return watch()
@@ -442,22 +435,29 @@ class Renderer(Resumable):
             transforms = vertices = None
             if materials is None and camera is None:
                 return self._last
+        new, replaced = self._edited(scene, camera, materials, transforms, vertices)
+        write = self._patch(new) if quick and not transforms and not vertices else None
+        warnings = self.warnings
+        if write is None:
+            write, warnings = self._rebuild(new, events, refit=scene is None, motion=motion)
+        self._take(write, new, replaced, warnings, motion=motion)
+        return self._last
+
+    def _edited(
+        self,
+        scene: Scene | None,
+        camera: Camera | None,
+        materials: Mapping[MaterialKey, Material] | None,
+        transforms: Mapping[ShapeKey, Any] | None,
+        vertices: Mapping[ShapeKey, Any] | None,
+    ) -> tuple[Scene, Replacements]:
+        """Return the scene, or another one, with changes of `update`, and what stands for what."""
         new = self.scene if scene is None else scene
         replaced = {} if scene is None else match_replacements(self.scene, new)
         if materials or transforms or vertices:
             new, more = self._edit(new, materials, transforms, vertices)
             replaced |= more
-        if camera is not None:
-            new = dataclasses.replace(new, camera=camera)
-        parameters_only = quick and not transforms and not vertices
-        write = self._patch(new) if parameters_only else None
-        warnings = self.warnings
-        if write is None:
-            shown, remarks = between(self.scene, new) if motion else (new, [])
-            write, warnings = self._rebuild(shown, events, refit=scene is None)
-            warnings += remarks
-        self._take(write, new, replaced, warnings, motion=motion)
-        return self._last
+        return new if camera is None else dataclasses.replace(new, camera=camera), replaced
 
     def _take(
         self,
@@ -534,23 +534,25 @@ class Renderer(Resumable):
         return bodies_around(readable, matter_of, lowered.cache) != lowered.around
 
     def _rebuild(
-        self, scene: Scene, events: list[cl.Event], refit: bool
+        self, scene: Scene, events: list[cl.Event], *, refit: bool, motion: bool
     ) -> tuple[Callable[[], None], list[str]]:
         """Lower a scene; return what lets it be rendered, see `rebuild.prepare`, and its warnings.
 
-        events: that arrays on the device wait for, which may be read.
+        events: that arrays on the device wait for, which may be read. motion: things move to it
+        from where they are in the present scene.
         """
         for event in events:
             dev.wait(event)
+        shown, remarks = between(self.scene, scene) if motion else (scene, [])
         first = self._wavefront
-        lowered = self._lower(scene, first.scene.lowered)
+        lowered = self._lower(shown, first.scene.lowered)
         take = rebuild.prepare(first, lowered, refit)
 
         def write() -> None:
             take()
             self._moving = None
 
-        return write, list(lowered.warnings)
+        return write, [*lowered.warnings, *remarks]
 
     @property
     @synchronized
@@ -559,23 +561,36 @@ class Renderer(Resumable):
         return collect(self._wavefront, *self._built, dict(self._seconds))
 
 
+def _opened(device: dev.Device | str | int | None, options: RenderOptions) -> dev.Device:
+    """The device to render on. Raises DeviceError for options that contradict each other."""
+    queue, threads = options.get("queue"), options.get("threads")
+    if threads is not None and (queue is not None or isinstance(device, dev.Device)):
+        raise DeviceError("threads are of a device that is chosen here; give its name or index")
+    if queue is not None:
+        if device is not None:
+            raise DeviceError("give a device or a queue; a queue has its device")
+        return dev.Device.adopt(queue)
+    if isinstance(device, dev.Device):
+        return device
+    return dev.choose(device, profiling=options.get("profiling", False), threads=threads)
+
+
 def _lights_moved(former: Scene, scene: Scene) -> bool:
     """Whether lights, or boundaries of their media, may have other places."""
-    pairs = zip(former.shapes, scene.shapes, strict=False)
-    fields = ("to_world", "vertices", "center", "centers", "radius", "group")
-    return (
-        len(former.shapes) != len(scene.shapes)
-        or any(
-            getattr(old, name, None) is not getattr(new, name, None)
-            for old, new in pairs
-            for name in fields
-        )
-        or any(
-            getattr(old, name, None) is not getattr(new, name, None)
-            for old, new in zip(former.lights, scene.lights, strict=False)
-            for name in ("to_world", "position")
-        )
+    places = [
+        [*map(shapes.geometry, one.shapes), *map(_placement, one.lights)] for one in (former, scene)
+    ]
+    return len(places[0]) != len(places[1]) or any(
+        old is not new
+        for olds, news in zip(*places, strict=True)
+        for old, new in itertools.zip_longest(olds, news)
     )
+
+
+def _placement(light: Light) -> tuple[Any, ...]:
+    """Return the parameters of a light that say where it is."""
+    values = fields_of(light)
+    return tuple(values[n] for n, p in params(type(light)).items() if p.role.place == "host")
 
 
 def texture_budget_of(device: dev.Device) -> int:

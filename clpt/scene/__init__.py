@@ -137,11 +137,13 @@ class Scene:
         Raises SceneError for shapes too large to be framed.
         """
         listed = [things] if trimeshes.is_mesh(things) else _listed(things, "shapes")
-        shapes_ = [
-            shapes.Mesh.from_trimesh(thing) if trimeshes.is_mesh(thing) else thing
-            for thing in listed
-        ]
-        made = studio.parts(shapes_, camera=camera, own_lights=lights, up=up)
+        shown: list[Shape] = []
+        for i, thing in enumerate(listed):
+            if trimeshes.is_mesh(thing):
+                thing = shapes.Mesh.from_trimesh(thing)
+            _check_kind(thing, Shape, f"shapes[{i}]")
+            shown.append(thing)
+        made = studio.parts(shown, camera=camera, own_lights=lights, up=up)
         return cls(**made, name=name)
 
     @classmethod

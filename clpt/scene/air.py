@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from clpt import transforms as tf
@@ -42,15 +44,8 @@ def clear_air(
 
     Raises SceneError for a size that is not above 0, and for what no `Sky` may be.
     """
-    for name, value in (("width", width), ("height", height), ("layers", layers)):
-        if not value > 0:
-            raise SceneError(f"must be above 0, not {value!r}", where=f"clear_air.{name}")
     content = Atmosphere(aerosol, exponent, aerosol_albedo, asymmetry, ozone)
-    for name, value in vars(content).items():
-        limits = params(Sky)[name]
-        if not limits.low <= value <= limits.high:
-            message = f"must be {limits.low:g} to {limits.high:g}, not {value!r}"
-            raise SceneError(message, where=f"clear_air.{name}")
+    _check({"width": width, "height": height, "layers": layers}, content)
     step = height / layers
     shares = densities((altitude + step * np.arange(layers + 1)) / 1e3) / 1e3  # in a metre
     most, depths = shares.max(axis=1), content.depths(WAVELENGTHS)
@@ -73,3 +68,15 @@ def clear_air(
         if depths[i].any()
     ]
     return Mixture(parts=tuple(parts), name="air") if len(parts) > 1 else parts[0]
+
+
+def _check(sizes: Mapping[str, float], content: Atmosphere) -> None:
+    """Raise SceneError for sizes that are not above 0, and for what no `Sky` may be."""
+    for name, value in sizes.items():
+        if not value > 0:
+            raise SceneError(f"must be above 0, not {value!r}", where=f"clear_air.{name}")
+    for name, value in vars(content).items():
+        limits = params(Sky)[name]
+        if not limits.low <= value <= limits.high:
+            message = f"must be {limits.low:g} to {limits.high:g}, not {value!r}"
+            raise SceneError(message, where=f"clear_air.{name}")

@@ -10,9 +10,11 @@ import numpy as np
 from clpt import lenses, transforms
 from clpt.errors import SceneError
 from clpt.lenses import Prescription
+from clpt.scene import roles
 from clpt.scene.media import Medium
 from clpt.scene.motion import Keys, Shutter
-from clpt.scene.params import Kind, Param, Shorthand, choice, flag, host, index, real
+from clpt.scene.params import Kind, Shorthand, choice, flag, host, index, real
+from clpt.scene.roles import Param
 from clpt.scene.values import IndexLike, Matrix4, Vector3
 
 MOST_BLADES = 24
@@ -29,9 +31,9 @@ def _looking(
 
 LOOK_AT = Shorthand(
     {
-        "origin": Param("host", "where the camera is", "m", form="vector"),
-        "target": Param("host", "what it looks at", "m", form="vector"),
-        "up": Param("host", "what is up in the picture; (0, 1, 0) if left out", form="vector"),
+        "origin": Param(roles.host("vector"), "where the camera is", "m"),
+        "target": Param(roles.host("vector"), "what it looks at", "m"),
+        "up": Param(roles.host("vector"), "what is up in the picture; (0, 1, 0) if left out"),
     },
     ("to_world",),
     _looking,

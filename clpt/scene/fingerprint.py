@@ -20,7 +20,7 @@ from clpt import input_files
 from clpt.errors import SceneError
 from clpt.scene import Scene
 from clpt.scene.materials import Material
-from clpt.scene.params import Kind, params
+from clpt.scene.params import Kind, fields_of, params
 from clpt.scene.shapes import Group, Shape
 
 Plain: TypeAlias = bool | int | float | str | None
@@ -134,8 +134,9 @@ class _Walk:
         """The parameters of a kind, or the fields of another dataclass."""
         cls: Any = type(thing)
         found: Values = {".type": thing.kind if isinstance(thing, Kind) else cls.__name__}
+        given = fields_of(thing)
         for name, form in _plan(cls):
-            inner = self.values(getattr(thing, name), f"{where}.{name}", form)
+            inner = self.values(given[name], f"{where}.{name}", form)
             for below, value in inner.items():
                 found[f".{name}{below}"] = value
         return found
@@ -163,7 +164,7 @@ def _plan(cls: Any) -> list[tuple[str, str]]:
     """The fields of a class that count, with the forms of its host parameters."""
     declared, named = params(cls), issubclass(cls, (Shape, Material, Group))
     names = [part.name for part in dataclasses.fields(cls) if not (named and part.name == "name")]
-    return [(name, declared[name].form if name in declared else "") for name in names]
+    return [(name, declared[name].role.name if name in declared else "") for name in names]
 
 
 def _under(name: str, values: Values) -> Values:

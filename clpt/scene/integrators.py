@@ -9,8 +9,10 @@ import numpy as np
 
 from clpt.choices import AUTO, MOST_LIGHT_PATHS
 from clpt.errors import SceneError, UnknownKindError
+from clpt.scene import roles
 from clpt.scene.layers import LAYERS
-from clpt.scene.params import Kind, Param, Shorthand, choice, emission, flag, host, real
+from clpt.scene.params import Kind, Shorthand, choice, emission, fields_of, flag, host, real
+from clpt.scene.roles import Param
 from clpt.scene.values import SpectrumLike
 from clpt.spectra import Sensor, illuminants, spaces
 from clpt.spectra.sensors import OBSERVERS
@@ -19,6 +21,7 @@ from clpt.spectra.spectrum import LONGEST, SHORTEST
 
 MOST_BANDS = 1024
 FEWEST_LIGHT_PATHS = 1.0 / 64
+DEEPEST = 4000  # path state has 12 bits for the depth
 MOST_GROUPS = 64  # of wavelengths
 MOST_PHOTON_MEMORY = 8192  # [MiB]; words of photons are numbered by 31 bits
 NARROWEST = 0.01  # [nm], a range of wavelengths
@@ -26,11 +29,28 @@ NARROWEST = 0.01  # [nm], a range of wavelengths
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Integrator(Kind):
-    """Base of all integrators."""
+    """Base of all integrators, with what holds of one that has no such parameter."""
+
+    max_depth = -1
+    rr_depth = DEEPEST
+    hide_lights = False
+    free_panes = False
+    guiding = False
+    light_tracing = True
+    merging = False
+
+    @property
+    def light_paths(self) -> float | str:
+        """Paths from lights for each sample of the camera, weighed against it."""
+        return 0
+
+    @property
+    def ambient(self) -> SpectrumLike | None:
+        """The radiance that reaches every surface; None: there is none."""
+        return None
 
     def check(self) -> None:
-        for name in ("max_depth", "rr_depth"):
-            depth = getattr(self, name, 1)
+        for name, depth in (("max_depth", self.max_depth), ("rr_depth", self.rr_depth)):
             unlimited = name == "max_depth" and depth == -1
             whole = isinstance(depth, int) and not isinstance(depth, bool)
             if not whole or (depth < 1 and not unlimited):
@@ -117,18 +137,19 @@ class Vcm(Integrator):
 
     def check(self) -> None:
         super().check()
-        _check_whole(self, "light_paths", 1, MOST_LIGHT_PATHS)
-        _check_whole(self, "wavelength_groups", 0, MOST_GROUPS)
-        _check_whole(self, "photon_memory", 1, MOST_PHOTON_MEMORY)
+        for name, value, least, most in (
+            ("light_paths", self.light_paths, 1, MOST_LIGHT_PATHS),
+            ("wavelength_groups", self.wavelength_groups, 0, MOST_GROUPS),
+            ("photon_memory", self.photon_memory, 1, MOST_PHOTON_MEMORY),
+        ):
+            _check_whole(value, f"{self.kind}.{name}", least, most)
 
 
-def _check_whole(integrator: Integrator, name: str, least: int, most: int) -> None:
+def _check_whole(value: object, where: str, least: int, most: int) -> None:
     """Raise SceneError for a parameter that is no whole number between two."""
-    value: Any = getattr(integrator, name)
-    whole = isinstance(value, int) and not isinstance(value, bool)
-    if not whole or not least <= value <= most:
+    if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
         message = f"must be a whole number from {least} to {most}, not {value!r}"
-        raise SceneError(message, where=f"{integrator.kind}.{name}")
+        raise SceneError(message, where=where)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -145,9 +166,18 @@ class Auto(Integrator):
     free_panes: bool = flag(True, "as of `path`")
 
 
+def shared(integrator: Integrator, other: Integrator) -> dict[str, Any]:
+    """Return the parameters of an integrator that mean the same to another one."""
+    given, known = fields_of(integrator), fields_of(other)
+    names = ("max_depth", "rr_depth", "hide_lights", "free_panes")
+    return {name: given[name] for name in names if name in given and name in known}
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Direct(Integrator):
     """Direct light only: `path` with a depth of 2."""
+
+    max_depth = 2
 
     hide_lights: bool = flag(False, "the camera sees through lights, also those on shapes")
 
@@ -269,7 +299,7 @@ class Film(Kind):
 
     shorthands = (
         Shorthand(
-            {"size": Param("host", "(width, height)", "pixels", form="size")},
+            {"size": Param(roles.host("size"), "(width, height)", "pixels")},
             ("width", "height"),
             _width_and_height,
         ),
@@ -332,8 +362,7 @@ class Film(Kind):
         return (ends[1:] + ends[:-1]) / 2.0
 
     def check(self) -> None:
-        for name in ("width", "height"):
-            size = getattr(self, name)
+        for name, size in (("width", self.width), ("height", self.height)):
             if isinstance(size, bool) or not isinstance(size, int) or not 1 <= size <= 65536:
                 raise SceneError(f"must be 1 to 65536, not {size!r}", where=f"film.{name}")
         if self.crop is not None:
@@ -378,7 +407,7 @@ class Film(Kind):
         return x, y, width, height
 
 
-def _white_balance(given: Any) -> Any:
+def _white_balance(given: Any) -> str | float | tuple[float, float]:
     """A name, a temperature [K] or (x, y), checked. Raises SceneError."""
     where = "film.white_balance"
     if isinstance(given, str):

@@ -12,7 +12,19 @@ import numpy as np
 
 from clpt.errors import SceneError
 from clpt.scene.motion import Keys
-from clpt.scene.params import Kind, choice, emission, flag, host, params, real, reflectance
+from clpt.scene.params import (
+    Kind,
+    choice,
+    emission,
+    fields_of,
+    flag,
+    host,
+    params,
+    real,
+    reflectance,
+)
+from clpt.scene.roles import EMISSION
+from clpt.scene.textures import Texture
 from clpt.scene.values import ImageLike, Matrix4, SpectrumLike, Textured, Vector3
 from clpt.spectra import Blackbody, RGBIlluminant, Spectrum, lumens, scaled, watts
 
@@ -32,6 +44,8 @@ class Light(Kind):
     """
 
     reach: ClassVar[Reach] = "placed"
+    falloff = True  # irradiance falls with the distance
+    two_sided = False
 
     motion: Keys | None = host(
         None, "moves it after its place, or None; an area light moves with its shape", form="keys"
@@ -51,14 +65,14 @@ class Lamp(Light):
     @property
     def emission_name(self) -> str:
         """The name of the parameter that is emitted."""
-        return next(name for name, p in params(type(self)).items() if p.role == "emission")
+        return next(name for name, p in params(type(self)).items() if p.role is EMISSION)
 
     def check(self) -> None:
         """Raise SceneError for a temperature beside another colour."""
         name = self.emission_name
         if self.temperature is not None:
             Blackbody(self.temperature, normalised=True)
-            if _grey(getattr(self, name)) is None:
+            if _grey(fields_of(self)[name]) is None:
                 message = f"gives a colour, as {name} does: leave one out, or make {name} a number"
                 raise SceneError(message, where=f"{self.kind}.temperature")
 
@@ -87,11 +101,12 @@ class PoweredLamp(Lamp):
     def check(self) -> None:
         """Raise SceneError for a strength that is given twice."""
         super().check()
-        given = [name for name in ("power", "lumens") if getattr(self, name) is not None]
+        strengths = {"power": self.power, "lumens": self.lumens}
+        given = [name for name, value in strengths.items() if value is not None]
         if not given:
             return
         where, name = f"{self.kind}.{given[0]}", self.emission_name
-        emitted = getattr(self, name)
+        emitted = fields_of(self)[name]
         if len(given) > 1:
             raise SceneError("says what lumens say: give either", where=where)
         if not isinstance(emitted, Spectrum):
@@ -114,11 +129,12 @@ def with_emission(light: Light, area: float = 0.0) -> Light:
     """
     if not isinstance(light, Lamp):
         return light
-    asked = {name: None for name in STRENGTHS if getattr(light, name, None) is not None}
+    given = fields_of(light)
+    asked = {name: None for name in STRENGTHS if given.get(name) is not None}
     if not asked:
         return light
     name = light.emission_name
-    emitted = getattr(light, name)
+    emitted = given[name]
     if light.temperature is not None:
         emitted = Blackbody(light.temperature, scale=_grey(emitted) or 0.0, normalised=True)
     if isinstance(light, PoweredLamp) and (light.power or light.lumens):
@@ -205,7 +221,7 @@ class Spot(PoweredLamp):
 
     def check(self) -> None:
         super().check()
-        if getattr(self.image, "is_texture", False) and self.cutoff >= 90.0:
+        if isinstance(self.image, Texture) and self.cutoff >= 90.0:
             raise SceneError("an image needs a cutoff below 90 degrees", where="spot.cutoff")
 
 

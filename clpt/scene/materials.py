@@ -8,33 +8,32 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import InitVar, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from clpt.errors import SceneError
 from clpt.measured import Measurement, MerlTable
+from clpt.scene import roles
 from clpt.scene.energy import check_reradiation
 from clpt.scene.params import (
-    ORDERS,
     Kind,
-    Param,
     Shorthand,
     Texture,
-    check_number,
     choice,
     coefficient,
     factor,
+    fields_of,
     flag,
     host,
     index,
     layers,
     measurement,
     merl,
-    params,
     per_order,
     real,
     reflectance,
     reradiation,
 )
+from clpt.scene.roles import ORDERS, Param
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.textures import Bitmap
 from clpt.scene.values import IndexLike, SpectrumLike, Textured, TexturedNumber
@@ -64,12 +63,14 @@ def _metal(metal: str | tuple[Spectrum, Spectrum]) -> dict[str, Any]:
 def _roughness(names: tuple[str, ...]) -> tuple[Shorthand, ...]:
     """Return the shorthands for the parameters of roughness; one of a name needs no `alpha`."""
     alpha = Param(
-        "real", "roughness along both directions", low=LEAST_ALPHA, high=1.0, textured=True
+        roles.REAL, "roughness along both directions", low=LEAST_ALPHA, high=1.0, textured=True
     )
-    square = Param("real", "its root, as `principled` and glTF have it", low=0.0, high=1.0)
+    square = Param(roles.REAL, "its root, as `principled` and glTF have it", low=0.0, high=1.0)
 
     def squared(roughness: float) -> dict[str, Any]:
-        return dict.fromkeys(names, max(check_number(roughness, square) ** 2, LEAST_ALPHA))
+        return dict.fromkeys(
+            names, max(roles.REAL.check(roughness, square, None) ** 2, LEAST_ALPHA)
+        )
 
     rough = Shorthand({"roughness": square}, names, squared)
     even = Shorthand({"alpha": alpha}, names, lambda alpha: dict.fromkeys(names, alpha))
@@ -78,12 +79,12 @@ def _roughness(names: tuple[str, ...]) -> tuple[Shorthand, ...]:
 
 def _renamed(argument: str, name: str, doc: str) -> Shorthand:
     """Return the shorthand of another word for a parameter."""
-    param = Param("real", doc, low=0.0, high=1.0, textured=True)
+    param = Param(roles.REAL, doc, low=0.0, high=1.0, textured=True)
     return Shorthand({argument: param}, (name,), lambda **given: {name: given[argument]})
 
 
 METAL = Shorthand(
-    {"metal": Param("host", "such as gold or Au, or its (eta, k)", form="metal")},
+    {"metal": Param(roles.host("metal"), "such as gold or Au, or its (eta, k)")},
     ("eta", "k"),
     _metal,
 )
@@ -120,6 +121,10 @@ class Material(Scatterer):
     """
 
     name: str = host("", "for messages and for references in scene files")
+
+    # of a kind without such parameters
+    absorption = cast(SpectrumLike, CLEAR)
+    layers = cast("tuple[Layer, ...]", ())
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -730,7 +735,7 @@ class NormalMap(NormalMapped):
     along_v: bool = flag(False, "y of the map goes along v even where uv are mirrored, as in glTF")
 
     def check(self) -> None:
-        if self.map is not None and getattr(self.map, "kind", "") != "bitmap":
+        if self.map is not None and not isinstance(self.map, Bitmap):
             raise SceneError(f"must be a bitmap, not {self.map!r}", where="normal_map.map")
 
 
@@ -769,13 +774,12 @@ KINDS = LEAVES + COMPOSITES
 
 def inner(material: Material) -> Iterator[tuple[str, Material]]:
     """The materials that one is made of, by its parameters."""
-    for name in params(type(material)):
-        part = getattr(material, name)
+    for name, part in fields_of(material).items():
         if isinstance(part, Material):
             yield name, part
 
 
-def parts(material: Any) -> Iterator[Material]:
+def parts(material: Material) -> Iterator[Material]:
     """A material and those inside it; nothing of what is no material."""
     if isinstance(material, Material):
         yield material

@@ -21,6 +21,7 @@ from clpt.scene.params import (
     Kind,
     angular,
     coefficient,
+    fields_of,
     host,
     quantity,
     real,
@@ -29,7 +30,7 @@ from clpt.scene.params import (
 )
 from clpt.scene.params import emission as emitted
 from clpt.scene.scatterer import Scatterer
-from clpt.scene.values import Matrix4, SpectrumLike
+from clpt.scene.values import Matrix4, SpectrumLike, Vector3
 from clpt.scene.volumes import Volume, check_volume, resampled
 from clpt.spectra import (
     RGB,
@@ -45,7 +46,7 @@ from clpt.spectra.spectrum import WIDEST, extremes
 MOST_ROWS = 512  # of a table by wavelength
 SOOT = 0.26  # E(m), the imaginary part of (m^2 - 1) / (m^2 + 2) without its sign
 COLDEST = 100.0  # [K] below which nothing is seen of a black body
-ON_POINTS = ("emission_grid", "temperature", "albedo_grid", "colour_grid")  # of a `Grid`
+ON_POINTS = ("emission_grid", "temperature", "albedo_grid", "color_grid")  # of a `Grid`
 OCTAVE = 1.99  # how much finer each octave of a cloud's noise is than the one before
 CLOUD_LEAST, CLOUD_MOST, CLOUD_FINEST = 32, 256, 1024  # points along a cloud's longest side
 MOST_PARTS = 8  # of a mixture
@@ -112,8 +113,9 @@ class Tabulated(Phase):
 
     def check(self) -> None:
         """Check the three arrays, and scale the rows."""
-        values = np.atleast_2d(self._numbers("values"))
-        cosines, lambdas = self._numbers("cosines"), self._numbers("wavelengths")
+        values = np.atleast_2d(self._numbers("values", self.values))
+        cosines = self._numbers("cosines", self.cosines)
+        lambdas = self._numbers("wavelengths", self.wavelengths)
         if values.ndim != 2 or values.shape[1] < 2:
             raise self._error("values", "must be two numbers or more, or rows of them")
         if not cosines.size:
@@ -163,9 +165,9 @@ class Tabulated(Phase):
         whole = _whole(rows, self.cosines)
         return self.cosines, rows / whole[:, None], 0.0, 1.0
 
-    def _numbers(self, name: str) -> NDArray[np.float64]:
+    def _numbers(self, name: str, given: Any) -> NDArray[np.float64]:
         try:
-            made = np.array(getattr(self, name), np.float64)
+            made = np.array(given, np.float64)
         except (TypeError, ValueError):
             raise self._error(name, "must be numbers, in rows of one length") from None
         if not np.isfinite(made).all():
@@ -186,9 +188,10 @@ class Blend(Phase):
 
     def check(self) -> None:
         """Raise SceneError for what is no phase function."""
-        for name in ("first", "second"):
-            if not isinstance(getattr(self, name), Phase):
-                message = f"must be a phase function, not {getattr(self, name)!r}"
+        parts: dict[str, object] = {"first": self.first, "second": self.second}
+        for name, part in parts.items():
+            if not isinstance(part, Phase):
+                message = f"must be a phase function, not {part!r}"
                 raise SceneError(message, where=f"{self.kind}.{name}")
 
     @property
@@ -249,6 +252,16 @@ class Medium(Kind):
 
     name: str = host("", "for messages and for references in scene files")
     phase: Phase = host(Isotropic(), "what a point of it sends where", form="phase")
+
+    @property
+    def parts(self) -> tuple[Medium, ...]:
+        """The media that fill its place together: itself, or those of a mixture."""
+        return (self,)
+
+    @property
+    def glows(self) -> bool:
+        """Whether it has a dye that gives out light."""
+        return False
 
     @property
     def scatters(self) -> bool:
@@ -423,7 +436,8 @@ class Dyed(Homogeneous):
 
     @cached_property
     def _collisions(self) -> Phase:
-        dye: Any = self.dye
+        dye = self.dye
+        assert dye is not None
         scatters, sent = super().coefficients(True)[1], self.coefficients(True)[1]
         strength = self.strength * self.scale
         over = np.maximum(sent.sample(WIDEST), 1e-30)
@@ -437,13 +451,13 @@ class Dyed(Homogeneous):
     @property
     def _given(self) -> Spectrum:
         """Return the spectrum that the dye emits under light that is equal at all wavelengths."""
-        dye: Any = self.dye
-        out, into, values = dye.table
+        assert self.dye is not None
+        out, into, values = self.dye.table
         sums = 0.5 * (values[:, 1:] + values[:, :-1]) @ np.diff(into)
         return spectra.Tabulated(out, sums)
 
 
-def _whole(rows: Any, cosines: Any) -> NDArray[np.float64]:
+def _whole(rows: NDArray[Any], cosines: NDArray[Any]) -> NDArray[np.float64]:
     """Integrals over directions of rows (m, n) that are linear between cosines (n,)."""
     return np.pi * ((rows[:, 1:] + rows[:, :-1]) @ np.diff(cosines))
 
@@ -488,16 +502,16 @@ class Cloud(Lattice, Homogeneous):
     density: float = real(1.0, "how much of the noise becomes cloud", low=0.0)
     wispiness: float = real(1.0, "how much the noise is shifted", low=0.0, high=100.0)
     frequency: float = real(5.0, "cells of the first octave along a unit length", low=0.0, high=1e4)
-    low: Any = host((0.0, 0.0, 0.0), "a corner of the box", form="vector")
-    high: Any = host((1.0, 1.0, 1.0), "the opposite one", form="vector")
+    low: Vector3 = host((0.0, 0.0, 0.0), "a corner of the box", form="vector")
+    high: Vector3 = host((1.0, 1.0, 1.0), "the opposite one", form="vector")
     resolution: int = host(
         0, "points along the longest side of the box; 0: two for each cell of the finest octave, "
         f"from {CLOUD_LEAST} to {CLOUD_MOST}"
     )  # fmt: skip
 
     def check(self) -> None:
-        for name in ("low", "high"):
-            found = np.asarray(getattr(self, name), float)
+        for name, corner in (("low", self.low), ("high", self.high)):
+            found = np.asarray(corner, float)
             if found.shape != (3,) or not np.isfinite(found).all():
                 raise SceneError("must be three numbers", where=f"{self.kind}.{name}")
         corners = np.array([self.low, self.high], float)
@@ -558,7 +572,7 @@ class Grid(Lattice, Homogeneous):
     albedo_with_density: bool = host(
         False, "whether what is scattered, density times `albedo_grid`, is trilinear; else each is"
     )
-    colour_grid: Any = host(
+    color_grid: Any = host(
         None, "colours (nx, ny, nz, 3) up to 1 that multiply the extinction",
         form="colour_volume",
     )  # fmt: skip
@@ -593,11 +607,11 @@ class Grid(Lattice, Homogeneous):
 
     def _fit(self, name: str, own: Matrix4) -> None:
         """Bring numbers to the points of the density, or that to theirs where they are more."""
-        given, where = getattr(self, name), f"{self.kind}.{name}"
+        given, where = fields_of(self)[name], f"{self.kind}.{name}"
         if given is None:
             return
         values = given.values if isinstance(given, Volume) else given
-        coloured = name in ("albedo_grid", "colour_grid")
+        coloured = name in ("albedo_grid", "color_grid")
         check_volume(values, where, colours=coloured)
         if coloured and not (isinstance(values, np.ndarray) and values.max() <= 1.0):
             raise SceneError("must be an array of numpy, of numbers up to 1", where=where)
@@ -616,7 +630,7 @@ class Grid(Lattice, Homogeneous):
 
     @property
     def is_chromatic(self) -> bool:
-        return self.colour_grid is not None or super().is_chromatic
+        return self.color_grid is not None or super().is_chromatic
 
     @property
     def light(self) -> Spectrum | None:
@@ -689,7 +703,7 @@ def _single_albedo(reflected: Any, g: float) -> Any:
     return (1.0 - s2) / (1.0 - g * s2)
 
 
-def _is_grey(value: Any) -> bool:
+def _is_grey(value: object) -> bool:
     grey = isinstance(value, RGB | RGBUnbounded) and value.r == value.g == value.b
     return grey or isinstance(value, Constant)
 
@@ -698,7 +712,7 @@ def _is_zero(value: Any) -> bool:
     return _is_grey(value) and not value.to_rgb("unbounded").any()
 
 
-def _is_dark(value: Any) -> bool:
+def _is_dark(value: object) -> bool:
     """Whether an emission is black."""
     if isinstance(value, RGB | RGBIlluminant | RGBUnbounded):
         return max(value.r, value.g, value.b) == 0.0
@@ -740,7 +754,7 @@ class Mixture(Lattice):
             raise SceneError(message, where=f"{self.kind}.phase")
         super().check()
 
-    def _check_part(self, part: Any, where: str) -> None:
+    def _check_part(self, part: object, where: str) -> None:
         if not isinstance(part, Homogeneous) or isinstance(part, Cloud | Dyed):
             shown = part.kind if isinstance(part, Medium) else repr(part)
             raise SceneError(f"must be homogeneous or a grid, not {shown}", where=where)
@@ -748,7 +762,7 @@ class Mixture(Lattice):
             raise SceneError("gives out light, as no part of a mixture can", where=where)
         if not isinstance(part, Grid):
             return
-        if part.albedo_grid is not None or part.colour_grid is not None:
+        if part.albedo_grid is not None or part.color_grid is not None:
             raise SceneError("has colours on its grid, as no part of a mixture can", where=where)
         if not np.allclose(part.box, self.grids[0].box, 1e-6, 1e-9):
             raise SceneError("its box is not that of the first grid", where=where)
@@ -803,7 +817,9 @@ class Mixture(Lattice):
 
     @cached_property
     def _densest(self) -> list[float]:
-        densities: list[Any] = [getattr(part, "density", None) for part in self.parts]
+        densities: list[Any] = [
+            part.density if isinstance(part, Grid) else None for part in self.parts
+        ]
         numbers = [d.get() if hasattr(d, "get") else d for d in densities]
         return [1.0 if one is None else float(np.max(one)) for one in numbers]
 

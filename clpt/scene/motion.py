@@ -163,7 +163,7 @@ def _keyed(values: Any, where: str, count: int, widths: tuple[int, ...]) -> NDAr
     return found
 
 
-def placement(thing: Any) -> NDArray[np.float64] | None:
+def placement(thing: object) -> NDArray[np.float64] | None:
     """Return where a shape, light or camera is, (4, 4); None for what is at no place."""
     if hasattr(thing, "to_world"):
         return np.asarray(thing.to_world, np.float64)
@@ -215,8 +215,7 @@ class Shutter:
     shape: Any = "box"
 
     def __post_init__(self) -> None:
-        for name in ("open", "close"):
-            value = getattr(self, name)
+        for name, value in (("open", self.open), ("close", self.close)):
             number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
             if not number or not math.isfinite(value):
                 raise SceneError(f"must be a time [s], not {value!r}", where=f"shutter.{name}")

@@ -1,8 +1,8 @@
 """Declarations of the parameters of a kind.
 
 A kind is a frozen dataclass that derives from `Kind`. One of the functions below declares each
-field and gives it a role. The role decides which values it accepts, its type in the kernels, and
-its entry in the documentation and the JSON schema:
+field and gives it a role (`clpt.scene.roles`). The role decides which values it accepts, its type
+in the kernels, and its entry in the documentation and the JSON schema:
 
 =============  =====================================  ==========================  ===============
 role           accepted                               in the kernel               texture
@@ -22,7 +22,7 @@ flag           bool                                   int                       
 choice         one of the names listed                int, the name's position    no
 orders         numbers of orders -n to n              real[17], of -8 to 8        no
 layers         Layers, from the outside in            Layers                      their profile
-host           what the lowering needs, see HostForm  -                           -
+host forms     what the lowering needs, see HostForm  -                           -
 =============  =====================================  ==========================  ===============
 """
 
@@ -34,79 +34,27 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
+from operator import attrgetter
 from types import MappingProxyType
 from typing import Any, ClassVar, Literal, cast
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from clpt.errors import SceneError, UnusedParameterError
-from clpt.measured import Measurement, MerlTable
-from clpt.spectra import (
-    RGB,
-    Constant,
-    Reradiation,
-    RGBIlluminant,
-    RGBUnbounded,
-    Spectrum,
-    Tabulated,
-    illuminant,
-)
-from clpt.spectra import index as index_of
-from clpt.spectra.spectrum import check_reach, extremes
+from clpt.scene import roles
+from clpt.scene.roles import HostForm, Param
 
-SPECTRUM_ROLES = ("reflectance", "emission", "index", "factor", "coefficient", "quantity")
-DEVICE_ROLES = (
-    "reflectance", "emission", "index", "factor", "reradiation", "real", "flag", "choice", "orders",
-    "layers", "quantity", "angular", "measurement",
-    "merl",
-)  # fmt: skip
-# What a host parameter holds. clpt/formats/native/forms.py reads, writes and describes each form.
-HostForm = Literal[
-    "boolean", "integer", "number", "text", "names", "numbers",
-    "vector", "direction", "matrix3", "matrix4",
-    "material", "medium", "media", "phase", "texture", "filter", "area_light", "group",
-    "rows2", "rows3", "rows4", "grid", "normals", "triangles", "attributes",
-    "number_or_list", "lengths",
-    "image", "volume", "colour_volume", "cube_images", "crop", "sensor", "white_balance",
-    "number_or_auto", "lens", "keys", "deformation", "shutter", "optional_number", "metal", "size",
-]  # fmt: skip
-MEASURED = {"measurement": Measurement, "merl": MerlTable}
-ORDERS = 8  # highest order of diffraction, see kernels/optics/diffraction.cl
 MOST_PARTS, MOST_NESTED = 1000, 64  # of a material, texture, light or medium
-ROUNDING = 1e-6  # by which a spectrum may be beyond its limits
-LARGEST = float(np.finfo(np.float32).max)  # number of a parameter: kernels have no larger ones
 
 
-@dataclass(frozen=True)
-class Param:
-    """One parameter: role (see the table above), documentation, unit, limits, form in files.
-
-    form: of a host parameter, "" where a scene file cannot hold it.
-    """
-
-    role: str
-    doc: str
-    unit: str = ""
-    low: float = -math.inf
-    high: float = math.inf
-    choices: tuple[str, ...] = ()
-    optional: bool = False
-    textured: bool = False
-    form: str = ""
-    lobe: bool = False  # 0 leaves a lobe out: kernels are made without it where all have 0
-    positive: bool = False  # it cannot be 0 either, at any wavelength of the film
-    linear: bool = False  # f is linear in it and no pdf knows it: a random texel may stand for it
-
-
-def _field(default: Any, param: Param) -> Any:
+def _field(default: object, param: Param) -> Any:
     if isinstance(default, (list, dict, np.ndarray)):
         return field(default_factory=lambda: default, metadata={"param": param})
     return field(default=default, metadata={"param": param})
 
 
 def reflectance(
-    default: Any,
+    default: object,
     doc: str,
     *,
     lobe: bool = False,
@@ -122,63 +70,63 @@ def reflectance(
     low, high = (0.0, 1.0) if limited else (-math.inf, math.inf)
     return _field(
         default,
-        Param("reflectance", doc, "", low, high, textured=textured, lobe=lobe, linear=linear),
+        Param(roles.REFLECTANCE, doc, "", low, high, textured=textured, lobe=lobe, linear=linear),
     )
 
 
-def emission(default: Any, doc: str, unit: str, *, textured: bool = False) -> Any:
+def emission(default: object, doc: str, unit: str, *, textured: bool = False) -> Any:
     """Declare an emitted spectrum; a number or an rgb triple means that multiple of D65."""
-    return _field(default, Param("emission", doc, unit, low=0.0, textured=textured))
+    return _field(default, Param(roles.EMISSION, doc, unit, low=0.0, textured=textured))
 
 
-def index(default: Any, doc: str, *, zero: bool = False, textured: bool = False) -> Any:
+def index(default: object, doc: str, *, zero: bool = False, textured: bool = False) -> Any:
     """Declare a refractive index or extinction coefficient; may be a name or dispersive.
 
     zero: it may be 0, as a metal's eta and k may.
     """
-    return _field(default, Param("index", doc, low=0.0, textured=textured, positive=not zero))
+    return _field(default, Param(roles.INDEX, doc, low=0.0, textured=textured, positive=not zero))
 
 
-def factor(default: Any, doc: str) -> Any:
+def factor(default: object, doc: str) -> Any:
     """Declare a factor: a spectrum without limits; may be a texture."""
-    return _field(default, Param("factor", doc, textured=True))
+    return _field(default, Param(roles.FACTOR, doc, textured=True))
 
 
-def coefficient(default: Any, doc: str, unit: str = "1/m") -> Any:
+def coefficient(default: object, doc: str, unit: str = "1/m") -> Any:
     """Declare a property of the inside of a body; it is no member of its kind's struct.
 
     It acts between surfaces: kernels/media/medium.cl reads it after the kind's row.
     """
-    return _field(default, Param("coefficient", doc, unit, low=0.0))
+    return _field(default, Param(roles.COEFFICIENT, doc, unit, low=0.0))
 
 
-def quantity(default: Any, doc: str, low: float = -math.inf, high: float = math.inf) -> Any:
+def quantity(default: object, doc: str, low: float = -math.inf, high: float = math.inf) -> Any:
     """Declare a number that may depend on the wavelength and is no colour, with its limits."""
-    return _field(default, Param("quantity", doc, low=low, high=high))
+    return _field(default, Param(roles.QUANTITY, doc, low=low, high=high))
 
 
 def angular(doc: str) -> Any:
     """Declare a table over the cosine of an angle; `clpt.scene.media.Tabulated` says of what."""
-    return _field((1.0, 1.0), Param("angular", doc))
+    return _field((1.0, 1.0), Param(roles.ANGULAR, doc))
 
 
-def reradiation(default: Any, doc: str) -> Any:
+def reradiation(default: object, doc: str) -> Any:
     """Declare a re-radiation matrix; None for no fluorescence."""
-    return _field(default, Param("reradiation", doc))
+    return _field(default, Param(roles.RERADIATION, doc))
 
 
 def measurement(doc: str) -> Any:
     """Declare what was measured of a material; None for a matt grey."""
-    return _field(None, Param("measurement", doc))
+    return _field(None, Param(roles.MEASUREMENT, doc))
 
 
 def merl(doc: str) -> Any:
     """Declare a table of MERL; None for a matt grey."""
-    return _field(None, Param("merl", doc))
+    return _field(None, Param(roles.MERL, doc))
 
 
 def real(
-    default: Any,
+    default: object,
     doc: str,
     unit: str = "",
     low: float = -math.inf,
@@ -188,32 +136,32 @@ def real(
     lobe: bool = False,
 ) -> Any:
     """Declare a number with its limits; may be a texture where `textured`. `lobe`: see `Param`."""
-    return _field(default, Param("real", doc, unit, low, high, textured=textured, lobe=lobe))
+    return _field(default, Param(roles.REAL, doc, unit, low, high, textured=textured, lobe=lobe))
 
 
 def flag(default: bool, doc: str) -> Any:
     """Declare true or false."""
-    return _field(default, Param("flag", doc))
+    return _field(default, Param(roles.FLAG, doc))
 
 
 def choice(default: str | None, doc: str, choices: Sequence[str]) -> Any:
     """Declare one of several names; with the default None, also None."""
     optional = default is None
-    return _field(default, Param("choice", doc, choices=tuple(choices), optional=optional))
+    return _field(default, Param(roles.CHOICE, doc, choices=tuple(choices), optional=optional))
 
 
 def per_order(default: Sequence[float], doc: str) -> Any:
-    """Declare a number for each order of diffraction from -n to n, n at most ORDERS."""
-    return _field(tuple(default), Param("orders", doc, low=0.0))
+    """Declare a number for each order of diffraction from -n to n, n at most 8."""
+    return _field(tuple(default), Param(roles.ORDERS_OF_LIGHT, doc, low=0.0))
 
 
 def layers(doc: str) -> Any:
     """Declare the thin films on a boundary; none by default."""
-    return _field((), Param("layers", doc))
+    return _field((), Param(roles.LAYERS, doc))
 
 
 def host(
-    default: Any,
+    default: object,
     doc: str,
     unit: str = "",
     *,
@@ -224,21 +172,22 @@ def host(
 
     form: what it holds; None for what the type of the default implies. positive: of a number.
     """
-    low = 0.0 if positive else -math.inf
-    made = Param("host", doc, unit, low, form=form or _form_of(default), positive=positive)
-    return _field(default, made)
+    role, low = roles.host(form or _form_of(default)), 0.0 if positive else -math.inf
+    return _field(default, Param(role, doc, unit, low, positive=positive))
 
 
-def _form_of(default: Any) -> str:
-    """Return the HostForm that a default's type implies, "" where it implies none."""
+def _form_of(default: object) -> HostForm | Literal["host"]:
+    """Return the HostForm that a default's type implies, "host" where it implies none."""
     if isinstance(default, np.ndarray) and default.shape in ((3, 3), (4, 4)):
-        return f"matrix{len(default)}"
+        return "matrix3" if len(default) == 3 else "matrix4"
     if isinstance(default, tuple) and default:
         if isinstance(default[0], str):
             return "names"
         return "vector" if len(default) == 3 else "numbers"
-    forms: dict[type, str] = {bool: "boolean", int: "integer", float: "number", str: "text"}
-    return forms.get(type(default), "")
+    return _FORMS.get(type(default), "host")
+
+
+_FORMS: dict[type, HostForm] = {bool: "boolean", int: "integer", float: "number", str: "text"}
 
 
 @dataclass(frozen=True)
@@ -260,7 +209,7 @@ class classproperty:
     def __init__(self, function: Callable[[Any], str]):
         self.function = function
 
-    def __get__(self, _: Any, owner: type) -> str:
+    def __get__(self, _: object, owner: type) -> str:
         return self.function(owner)
 
 
@@ -349,8 +298,6 @@ class Kind(metaclass=KindType):
 class Texture(Kind):
     """Base of all textures."""
 
-    is_texture = True
-
 
 @cache
 def _snake(name: str) -> str:
@@ -364,8 +311,9 @@ def _declared(cls: Any) -> Mapping[str, Param]:
 
 
 @cache
-def _declared_of(cls: Any, *roles: str) -> Mapping[str, Param]:
-    return MappingProxyType({name: p for name, p in _declared(cls).items() if p.role in roles})
+def _declared_of(cls: Any, place: str) -> Mapping[str, Param]:
+    found = {name: p for name, p in _declared(cls).items() if p.role.place == place}
+    return MappingProxyType(found)
 
 
 def params(cls: type) -> Mapping[str, Param]:
@@ -392,197 +340,40 @@ def defaults(cls: type) -> dict[str, Any]:
 def fields_of(kind: Kind) -> dict[str, Any]:
     """Return the values of an object's fields by name."""
     cls: Any = type(kind)
-    return {name: getattr(kind, name) for name in _field_names(cls)}
+    names, read = _fields(cls)
+    return dict(zip(names, read(kind), strict=False))
 
 
 @cache
+def _fields(cls: Any) -> tuple[tuple[str, ...], Callable[[Any], tuple[Any, ...]]]:
+    """The names of a class's fields, and what reads them all at once, and more."""
+    names = tuple(field.name for field in dataclasses.fields(cls))
+    return names, attrgetter(*names, "__class__", "__class__")  # of two or more: a tuple
+
+
 def _field_names(cls: Any) -> tuple[str, ...]:
-    return tuple(field.name for field in dataclasses.fields(cls))
+    return _fields(cls)[0]
 
 
 def place_of(kind: Kind, name: str) -> str:
     """Return the name of a parameter for messages, with the name of its material."""
-    named = getattr(kind, "name", "")
+    named = fields_of(kind).get("name")
     return f"{kind.kind}.{name}" + (f" of {named!r}" if named else "")
 
 
 def device_params(cls: type) -> Mapping[str, Param]:
     """Return the parameters that the kernels read."""
-    return _declared_of(cls, *DEVICE_ROLES)
+    return _declared_of(cls, "row")
 
 
 def interior_params(cls: type) -> Mapping[str, Param]:
     """Return the parameters of the inside of a body; they follow the others in its row."""
-    return _declared_of(cls, "coefficient")
+    return _declared_of(cls, "inside")
 
 
-def _checked(value: Any, param: Param, where: str) -> Any:
-    if param.role == "host" and param.form in _CHECKED_FORMS:
-        return _CHECKED_FORMS[param.form](value, param, where)
-    if param.role in ("host", "angular"):
-        return value
-    if param.role == "flag":
-        if not isinstance(value, (bool, np.bool_)):
-            raise SceneError(f"must be true or false, not {value!r}", where=where)
-        return bool(value)
-    if param.role == "choice":
-        if value not in param.choices and not (param.optional and value is None):
-            raise SceneError(f"{value!r} is none of {', '.join(param.choices)}", where=where)
-        return value
-    if param.role == "layers":
-        return _layers(value, where)
-    if param.role == "reradiation":
-        if not isinstance(value, (Reradiation, type(None))):
-            raise SceneError(f"must be a re-radiation matrix, not {value!r}", where=where)
-        return value
-    if param.role in MEASURED:
-        if not isinstance(value, (MEASURED[param.role], type(None))):
-            name = MEASURED[param.role].__name__
-            raise SceneError(f"must be a {name} of clpt.measured, not {value!r}", where=where)
-        return value
-    if getattr(value, "is_texture", False):
+def _checked(value: object, param: Param, where: str) -> Any:
+    if isinstance(value, Texture) and param.role.place != "host":
         if not param.textured:
             raise SceneError("cannot be a texture", where=where)
         return value
-    if param.role == "real":
-        return check_number(value, param, where)
-    if param.role == "orders":
-        return _orders(value, param, where)
-    return _spectrum(value, param, where)
-
-
-def _layers(value: Any, where: str) -> tuple[Kind, ...]:
-    if not isinstance(value, (list, tuple)):
-        raise SceneError(f"must be a list of layers, not {value!r}", where=where)
-    for i, entry in enumerate(value):
-        if not (isinstance(entry, Kind) and entry.kind == "layer"):
-            raise SceneError(f"must be a layer, not {entry!r}", where=f"{where}[{i}]")
-    return tuple(value)
-
-
-def check_number(value: Any, param: Param, where: str | None = None) -> float:
-    """Return the value of a number's parameter. Raises SceneError."""
-    if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
-        raise SceneError(f"must be a number, not {value!r}", where=where)
-    if not math.isfinite(value):
-        raise SceneError(f"must be finite, not {value}", where=where)
-    if abs(value) > LARGEST:
-        raise SceneError(f"{value:g} is beyond {LARGEST:g}, where float32 ends", where=where)
-    if param.positive and value <= 0.0:
-        raise SceneError(f"must be above 0, not {value}", where=where)
-    if not param.low <= value <= param.high:
-        advice = (
-            "; colours are 0 to 1, linear" if param.role == "reflectance" and value > 1.0 else ""
-        )
-        message = f"{value} is outside [{param.low:g}, {param.high:g}]{advice}"
-        raise SceneError(message, where=where)
-    return float(value)
-
-
-def _vector(value: object, param: Param, where: str) -> Any:
-    """Check three numbers; those of a direction cannot all be 0."""
-    try:
-        numbers = np.asarray(cast("ArrayLike", value), np.float64)
-    except (TypeError, ValueError):
-        numbers = np.empty(0)
-    if numbers.shape != (3,) or not np.isfinite(numbers).all():
-        raise SceneError(f"must be three finite numbers, not {value!r}", where=where)
-    if np.abs(numbers).max() > LARGEST:
-        raise SceneError(f"is beyond {LARGEST:g}, where float32 ends", where=where)
-    if param.form == "direction" and not numbers.any():
-        raise SceneError("has no length", where=where)
-    return value
-
-
-def _matrix(value: object, param: Param, where: str) -> Any:
-    """Check the form of a matrix that is not on a device."""
-    if isinstance(value, np.ndarray) and value.shape == _MATRICES[param.form]:
-        return value
-    if hasattr(value, "context"):
-        return value
-    try:
-        shape = np.asarray(cast("ArrayLike", value), np.float64).shape
-    except (TypeError, ValueError) as error:
-        raise SceneError(f"is not a matrix: {error}", where=where) from None
-    if shape != _MATRICES[param.form]:
-        raise SceneError(f"must be {_MATRICES[param.form]}, found {shape}", where=where)
-    return value
-
-
-_MATRICES = {"matrix3": (3, 3), "matrix4": (4, 4)}
-
-
-def _optional_number(value: object, param: Param, where: str) -> float | None:
-    return None if value is None else check_number(value, param, where)
-
-
-_CHECKED_FORMS: dict[str, Callable[[Any, Param, str], Any]] = {
-    "number": check_number,
-    "optional_number": _optional_number,
-    "vector": _vector,
-    "direction": _vector,
-    "matrix3": _matrix,
-    "matrix4": _matrix,
-}
-
-
-def _orders(value: Any, param: Param, where: str) -> tuple[float, ...]:
-    if not isinstance(value, (list, tuple, np.ndarray)):
-        raise SceneError(f"must be a list of numbers, not {value!r}", where=where)
-    if len(value) % 2 == 0 or len(value) > 2 * ORDERS + 1:
-        raise SceneError(
-            f"must be an odd count of numbers, for orders -n to n with n up to {ORDERS}",
-            where=where,
-        )
-    return tuple(check_number(v, param, where) for v in value)
-
-
-def _spectrum(value: Any, param: Param, where: str) -> Any:
-    if isinstance(value, str) and param.role in ("index", "emission"):
-        try:
-            known = index_of(value) if param.role == "index" else illuminant(value)
-        except SceneError as error:
-            raise SceneError(error.message, where=where) from None
-        return value if param.role == "index" else known
-    if isinstance(value, Spectrum):
-        _check_spectrum(value, param, where)
-        return value
-    if isinstance(value, (list, tuple, np.ndarray)) and len(value) == 3:
-        bounded = param.role not in ("factor", "quantity") and max(value) <= 1.0
-        made = RGB if bounded or param.role == "emission" else RGBUnbounded
-        colour = made(*(check_number(v, param, where) for v in value))
-        if param.role == "quantity":
-            _check_spectrum(colour, param, where)
-        return colour
-    if isinstance(value, (int, float, np.number)):
-        number = check_number(value, param, where)
-        return RGBIlluminant(*[number] * 3) if param.role == "emission" else Constant(number)
-    names = ", a name" if param.role in ("index", "emission") else ""
-    raise SceneError(
-        f"must be a number, three numbers{names} or a spectrum of clpt.spectra, not {value!r}",
-        where=where,
-    )
-
-
-def _check_spectrum(value: Spectrum, param: Param, where: str) -> None:
-    """Raise SceneError for a spectrum beyond its limits, or a table that no film can reach."""
-    if isinstance(value, Tabulated):
-        try:
-            check_reach(value.lambdas[0], value.lambdas[-1])
-        except SceneError as error:
-            raise SceneError(error.message, where=where) from None
-    if math.isinf(param.low) and math.isinf(param.high):
-        return
-    least = 0.0 if param.role == "quantity" else param.low
-    if isinstance(value, RGBUnbounded) and min(value.r, value.g, value.b) < least:
-        shown = ", ".join(f"{part:g}" for part in (value.r, value.g, value.b))
-        raise SceneError(f"a colour cannot be negative here: {shown}", where=where)
-    meant = index_of(value) if param.role in ("index", "coefficient", "quantity") else value
-    for found, at in extremes(meant):
-        if abs(found) > LARGEST:
-            message = f"{found:g} at {at:g} nm is beyond {LARGEST:g}, where float32 ends"
-            raise SceneError(message, where=where)
-        if not param.low - ROUNDING <= found <= param.high + ROUNDING:
-            raise SceneError(
-                f"{found:g} at {at:g} nm is outside [{param.low:g}, {param.high:g}]", where=where
-            )
+    return param.role.check(value, param, where)

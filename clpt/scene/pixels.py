@@ -11,22 +11,23 @@ from numpy.typing import NDArray
 from clpt import images, spectra, spectral_exr
 from clpt.arrays import Floats32, on_host
 from clpt.errors import SceneError
+from clpt.scene.roles import EMISSION, REAL, Role
 from clpt.scene.textures import Bitmap
 from clpt.spectral_exr import SpectralImage
 
 
-def spectral_image(texture: Any, role: str) -> SpectralImage | None:
+def spectral_image(texture: object, role: Role) -> SpectralImage | None:
     """Return a texture's image if it is a bitmap of spectra, in the role of a parameter."""
     if not isinstance(texture, Bitmap):
         return None
-    return spectral_exr.find(texture.image, emissive=role == "emission", where="bitmap.image")
+    return spectral_exr.find(texture.image, emissive=role is EMISSION, where="bitmap.image")
 
 
-def pixels(texture: Bitmap, role: str) -> Floats32:
-    """Return a bitmap's image, (h, w, 1 or 3) float32, top row first; for "real" (h, w, 1).
+def pixels(texture: Bitmap, role: Role) -> Floats32:
+    """Return a bitmap's image, (h, w, 1 or 3) float32, top row first; for REAL (h, w, 1).
 
-    role: "reflectance", "emission", "index" or "real"; of spectra it chooses the colour that stands
-    for them. Raises SceneError if it cannot be read or is no image.
+    role: of spectra it chooses the colour that stands for them. Raises SceneError if it cannot be
+    read or is no image.
     """
     spectral = spectral_image(texture, role)
     image = texture.image if spectral is None else spectral.to_rgb()
@@ -42,7 +43,7 @@ def pixels(texture: Bitmap, role: str) -> Floats32:
     if image.ndim != 3 or image.shape[2] not in (1, 3, 4) or image.size == 0:
         wanted = "must be (h, w) or (h, w, 1, 3 or 4) and not empty"
         raise SceneError(f"{wanted}, not {image.shape}", where="bitmap.image")
-    chosen = channel(image, texture.channel) if role == "real" else image[..., :3]
+    chosen = channel(image, texture.channel) if role is REAL else image[..., :3]
     return np.nan_to_num(chosen.astype(np.float32))
 
 

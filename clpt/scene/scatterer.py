@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
-from clpt.scene.params import Kind
+from clpt.scene.params import Kind, fields_of
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -37,5 +37,6 @@ class Scatterer(Kind):
     @property
     def uses_tangents(self) -> bool:
         """Whether what it does differs between the tangent and across."""
-        u, v = (getattr(self, name, None) for name in ("alpha_u", "alpha_v"))
+        given = fields_of(self)
+        u, v = given.get("alpha_u"), given.get("alpha_v")
         return u is not v and u != v

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from types import MappingProxyType
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +21,7 @@ from clpt.scene.textures import Bitmap
 from clpt.scene.values import Matrix4, OnDevice, Vector3
 
 SMOOTH = "smooth"  # normals of a mesh: the means of the triangles around a vertex, by their areas
+NO_ATTRIBUTES: Mapping[str, Any] = MappingProxyType({})
 BASES = ("linear", "bspline", "bezier")
 
 
@@ -27,6 +30,16 @@ class Shape(Kind):
     """Base of all shapes; placed by `to_world`."""
 
     is_tree = False  # it holds trees side by side
+    # of a kind without such parameters
+    attributes = NO_ATTRIBUTES
+    normals = cast(Any, None)
+    tangents = cast(Any, None)
+    deformation = cast("Deformation | None", None)
+
+    @property
+    def members(self) -> tuple[Shape, ...]:
+        """The shape, or those that an instance places."""
+        return (self,)
 
     material: Material = host(Diffuse(), "of the surface", form="material")
     emission: Light | None = host(None, "an `area` light, or None", form="area_light")
@@ -263,6 +276,10 @@ class Instance(Shape):
     material: Any = field(default=None, init=False, repr=False)
     emission: Any = field(default=None, init=False, repr=False)
     flip_normals: bool = field(default=False, init=False, repr=False)
+
+    @property
+    def members(self) -> tuple[Shape, ...]:
+        return self.group.shapes
 
     def check(self) -> None:
         """Raise SceneError for what is no group."""

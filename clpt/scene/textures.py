@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from clpt.errors import SceneError
-from clpt.scene.params import Kind, choice, factor, host, params, real, reflectance
+from clpt.scene.params import Kind, choice, factor, fields_of, host, real, reflectance
 from clpt.scene.params import Texture as Texture
 from clpt.scene.values import ImageLike, Matrix4, Textured, TexturedNumber
 
@@ -166,20 +165,20 @@ KINDS = (Bitmap, Checkerboard, Product, Mix, MeshAttribute, Dots, Checkers, Nois
 
 def _matrix(texture: Texture, name: str, size: int) -> None:
     """Make a texture's matrix float64. Raises SceneError for one of another form."""
-    matrix = np.asarray(getattr(texture, name), dtype=np.float64)
+    matrix = np.asarray(fields_of(texture)[name], dtype=np.float64)
     if matrix.shape != (size, size) or not np.isfinite(matrix).all():
         raise SceneError(f"must be a finite {size}x{size} matrix", where=f"{texture.kind}.{name}")
     object.__setattr__(texture, name, matrix)
 
 
-def _octaves(texture: Any) -> None:
+def _octaves(texture: Noise | Marble) -> None:
     """Raises SceneError for so many octaves that float32 ends before."""
     if not 0 < texture.octaves <= MOST_OCTAVES:
         message = f"must be 1 to {MOST_OCTAVES}, not {texture.octaves}"
         raise SceneError(message, where=f"{texture.kind}.octaves")
 
 
-def attributes_in(value: Any) -> set[str]:
+def attributes_in(value: object) -> set[str]:
     """Return the names of the attributes of meshes that the textures in a kind read."""
     names: set[str] = set()
     for texture in textures_in(value):
@@ -190,7 +189,7 @@ def attributes_in(value: Any) -> set[str]:
     return names
 
 
-def textures_in(value: Any) -> Iterator[Texture]:
+def textures_in(value: object) -> Iterator[Texture]:
     """Yield the textures that a kind's parameters hold, and those in what these hold, and so on."""
     if isinstance(value, (list, tuple)):
         for entry in value:
@@ -198,7 +197,6 @@ def textures_in(value: Any) -> Iterator[Texture]:
     elif isinstance(value, Kind):
         if isinstance(value, Texture):
             yield value
-        for name in params(type(value)):
-            part = getattr(value, name)
+        for part in fields_of(value).values():
             if isinstance(part, (Kind, list, tuple)):
                 yield from textures_in(part)

@@ -288,16 +288,17 @@ def _between(grid: Floats, x: Floats) -> tuple[NDArray[np.int64], Floats]:
     return i, np.clip((x - grid[i]) / (grid[i + 1] - grid[i]), 0.0, 1.0)
 
 
-def field(a: Air, albedo: Floats, sun: float) -> Field:
-    """The light that was scattered once or more, around a place where the sun is at an angle [rad]
-    to the vertical; albedo (n,): of the ground."""
+def _places_around(sun: float) -> Floats:
+    """Return angles of the sun to the vertical (n,) at places around one of `sun` [rad]."""
     low = max(np.degrees(sun) - AROUND, 0.0)
     high = min(np.degrees(sun) + AROUND, 180.0)
     apart = BETWEEN if np.degrees(sun) < DUSK else AT_DUSK
-    angles = np.radians(np.linspace(low, high, int(np.ceil((high - low) / apart)) + 1))
+    return np.asarray(np.radians(np.linspace(low, high, int(np.ceil((high - low) / apart)) + 1)))
+
+
+def _heights_of_directions(radii: Floats) -> tuple[Floats, Floats]:
+    """Return cosines to the vertical, and their weights, above and below the horizon at radii."""
     x, w = np.polynomial.legendre.leggauss(SIDE_ANGLES)
-    turns = np.cos(np.pi * (np.arange(TURNS) + 0.5) / TURNS)
-    radii = np.maximum(HEIGHTS, 1e-3) + EARTH
     horizon = -np.sqrt(1.0 - (EARTH / radii) ** 2)
     mu = np.concatenate(
         [
@@ -310,6 +311,16 @@ def field(a: Air, albedo: Floats, sun: float) -> Field:
     span = np.concatenate(
         [(1.0 - horizon)[:, None] * each, (1.0 + horizon)[:, None] * each], axis=1
     )
+    return mu, span
+
+
+def field(a: Air, albedo: Floats, sun: float) -> Field:
+    """The light that was scattered once or more, around a place where the sun is at an angle [rad]
+    to the vertical; albedo (n,): of the ground."""
+    angles = _places_around(sun)
+    turns = np.cos(np.pi * (np.arange(TURNS) + 0.5) / TURNS)
+    radii = np.maximum(HEIGHTS, 1e-3) + EARTH
+    mu, span = _heights_of_directions(radii)
     shape = (len(radii), len(angles), 2 * SIDE_ANGLES, TURNS)
     one = rays(np.repeat(radii, 2 * SIDE_ANGLES), mu.ravel(), FAR_NODES)
     number = np.arange(len(radii) * 2 * SIDE_ANGLES).reshape(len(radii), 1, -1, 1)
@@ -322,8 +333,7 @@ def field(a: Air, albedo: Floats, sun: float) -> Field:
     )
     radius, suns, cosines, turned = (np.broadcast_to(v, shape).ravel() for v in starts)
     at = places(radius[way.ray], suns[way.ray], cosines[way.ray], turned[way.ray], way.t)
-    count = radius.size
-    bands = a.extinct.shape[1]
+    count, bands = radius.size, a.extinct.shape[1]
     single, seen = once(a, way, at, count), plans(a, angles, way, at)
     look = harmonics(cosines, turned).reshape(-1, *shape)
     solid = np.broadcast_to((span * 2.0 * np.pi / TURNS)[:, None, :, None], shape)

@@ -81,8 +81,7 @@ class Donaldson(Reradiation):
     rows: tuple[tuple[float, ...], ...]
 
     def __post_init__(self) -> None:
-        for name in ("out", "into"):
-            lambdas = getattr(self, name)
+        for name, lambdas in (("out", self.out), ("into", self.into)):
             if len(lambdas) < 2 or not (np.diff(lambdas) > 0.0).all():
                 raise SceneError(f"the wavelengths {name!r} of a matrix must be two or more, and"
                                  " ascend")  # fmt: skip

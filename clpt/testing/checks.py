@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.records import LOBE_BITS
+from clpt.scene import roles
 from clpt.scene.materials import Material
 from clpt.scene.params import device_params
 from clpt.testing.probe import Probe
@@ -220,13 +221,13 @@ def _limits(cls: type) -> list[dict[str, Any]]:
     limits: list[dict[str, Any]] = [{}]
     declared = device_params(cls)
     for name, param in declared.items():
-        if param.role == "real":
+        if param.role is roles.REAL:
             limits += [{name: max(param.low, -1e5)}, {name: min(param.high, 1e5)}]
-        if param.role == "index":
+        if param.role is roles.INDEX:
             limits += [{name: 1.0}, {name: 0.0 if not name.endswith("ior") else 1.7}]
-        if param.role == "choice":
+        if param.role is roles.CHOICE:
             limits += [{name: i} for i in range(len(param.choices))]
-    least = {k: max(p.low, -1e5) for k, p in declared.items() if p.role == "real"}
+    least = {k: max(p.low, -1e5) for k, p in declared.items() if p.role is roles.REAL}
     flat = {k: 1.0 for k in declared if k.endswith("ior")}
     return [*limits, least, flat, least | flat, least | {"distribution": 1}]
 
@@ -280,7 +281,7 @@ def chi_square_tail(x: float, degrees: int) -> float:
     return min(1.0, math.fsum(terms) + (math.erfc(math.sqrt(half)) if odd else 0.0))
 
 
-def _hold(held: Any, message: str) -> None:
+def _hold(held: object, message: str) -> None:
     if not held:
         raise AssertionError(message)
 

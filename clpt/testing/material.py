@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -9,9 +10,10 @@ import numpy as np
 from clpt import device, spectra
 from clpt.render.contract import custom_materials
 from clpt.render.contract.parameter_words import ORDERS_WORDS
-from clpt.render.lowering.spectra.spectra_table import RGB_ROLES
+from clpt.scene import roles
 from clpt.scene.materials import LEAVES, Material
-from clpt.scene.params import Param, device_params
+from clpt.scene.params import Texture, device_params, fields_of
+from clpt.scene.roles import Param, Role, Spectral
 from clpt.testing import checks
 from clpt.testing.probe import LAMBDAS, Probe
 from clpt.testing.settings import settings, white
@@ -74,23 +76,47 @@ def _chosen(given: device.Device | None) -> device.Device:
 
 def _values(material: Material, mode: str) -> dict[str, Any]:
     """The parameters of a material as the kernels get them; those of textures are left out."""
-    declared = device_params(type(material))
-    given = {name: getattr(material, name) for name in declared}
+    given, declared = fields_of(material), device_params(type(material))
     return {
-        name: _value(value, declared[name], mode)
-        for name, value in given.items()
-        if not getattr(value, "is_texture", False)
+        name: _value(given[name], param, mode)
+        for name, param in declared.items()
+        if not isinstance(given[name], Texture)
     }
 
 
-def _value(value: Any, param: Param, mode: str) -> Any:
-    if param.role == "choice":
-        return np.array(param.choices.index(value))
-    if param.role == "orders":
-        return np.pad(value, (ORDERS_WORDS - len(value)) // 2)
-    if param.role in RGB_ROLES:
-        spectrum = spectra.index(value)
-        if mode == "rgb":
-            return np.asarray(spectrum.to_rgb(RGB_ROLES[param.role]))
-        return np.asarray(spectrum.sample(np.array(LAMBDAS)))
-    return value if param.role in ("layers", "measurement", "merl") else np.array(value, float)
+def _value(value: object, param: Param, mode: str) -> Any:
+    change: Callable[..., Any] = VALUES.get(param.role, _numbers)
+    return change(value, param, mode)
+
+
+def _numbers(value: object, param: Param, mode: str) -> Any:
+    return np.array(value, float)
+
+
+def _same(value: object, param: Param, mode: str) -> Any:
+    return value
+
+
+def _choice(value: object, param: Param, mode: str) -> Any:
+    return np.array(param.choices.index(value))
+
+
+def _orders(value: Any, param: Param, mode: str) -> Any:
+    return np.pad(value, (ORDERS_WORDS - len(value)) // 2)
+
+
+def _spectrum(value: Any, param: Param, mode: str) -> Any:
+    spectrum = spectra.index(value)
+    if mode == "rgb":
+        assert isinstance(param.role, Spectral)
+        return np.asarray(spectrum.to_rgb(param.role.meaning))
+    return np.asarray(spectrum.sample(np.array(LAMBDAS)))
+
+
+# the value of a parameter as kernels get it, by its role; else its numbers
+VALUES: dict[Role, Callable[[Any, Param, str], Any]] = {
+    **dict.fromkeys(roles.SPECTRA, _spectrum),
+    **dict.fromkeys((roles.LAYERS, roles.MEASUREMENT, roles.MERL), _same),
+    roles.CHOICE: _choice,
+    roles.ORDERS_OF_LIGHT: _orders,
+}

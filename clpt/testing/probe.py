@@ -11,14 +11,16 @@ from numpy.typing import NDArray
 from clpt import device
 from clpt.render.codegen import rough_coat_table
 from clpt.render.codegen.library import BSDF
-from clpt.render.codegen.parameters import array_size, lane_type, struct_text
+from clpt.render.codegen.parameters import struct_text
 from clpt.render.contract import custom_materials
-from clpt.render.contract.parameter_words import FILM_COSINES
+from clpt.render.contract.parameter_words import FILM_COSINES, array_size, lane_type
 from clpt.render.lowering.spectra import measurements
 from clpt.render.lowering.spectra.spectra_table import angular_values
 from clpt.render.lowering.spectra.thin_films import film_colours
+from clpt.scene import roles
 from clpt.scene.materials import Layer, Material
-from clpt.scene.params import Param, device_params
+from clpt.scene.params import device_params
+from clpt.scene.roles import Param, Role
 from clpt.spectra.spectrum import primaries
 
 COMPONENTS = {"rgb": 3, "spectral": 4}
@@ -100,11 +102,11 @@ class Probe:
         given = np.concatenate(columns, axis=1).T.astype(np.float32)
         c = self.components
         extra = self._layers_text(len(layers), len(given))
-        if self._named("angular"):
+        if self._named(roles.ANGULAR):
             extra = self._angular_text(params, len(given))
-        elif self._named("measurement"):
+        elif self._named(roles.MEASUREMENT):
             extra = self._measurement_text(params, len(given))
-        elif self._named("merl"):
+        elif self._named(roles.MERL):
             extra = self._merl_text(len(given))
         virtual: dict[str, str | device.Part] = {"probe.cl": self._text(*extra)}
         if self.cls.source is not None:
@@ -116,9 +118,9 @@ class Probe:
         named["lobe"] = named["lobe"].astype(int)
         return {k: v[:, 0] if v.shape[1] == 1 else v for k, v in named.items()}
 
-    def _named(self, role: str) -> str:
+    def _named(self, role: Role) -> str:
         """The parameter of a role, "" where there is none."""
-        return next((k for k, p in device_params(self.cls).items() if p.role == role), "")
+        return next((k for k, p in device_params(self.cls).items() if p.role is role), "")
 
     def _angular_text(self, params: Mapping[str, Any], rows: int) -> list[str]:
         """Return the text that sets m's AngularTable, whose data follow the rows in `in`."""
@@ -132,12 +134,12 @@ class Probe:
         made = f"{{in + {rows} * n, (integer)(0), {counts}, {{{row}}}}}"
         return [
             '#include "optics/angular_table.cl"',
-            f"    AngularTable table = {made};\n    m.{self._named('angular')} = table;",
+            f"    AngularTable table = {made};\n    m.{self._named(roles.ANGULAR)} = table;",
         ]
 
     def _measurement(self, params: Mapping[str, Any]) -> measurements.Rows:
         film = (min(LAMBDAS), max(LAMBDAS)) if self.mode == "spectral" else None
-        return measurements.rows(params[self._named("measurement")], film)
+        return measurements.rows(params[self._named(roles.MEASUREMENT)], film)
 
     def _measurement_text(self, params: Mapping[str, Any], rows: int) -> list[str]:
         """Return the text that sets m's Measurement, whose data follow the rows in `in`."""
@@ -145,7 +147,7 @@ class Probe:
         at = np.interp(LAMBDAS, nodes, np.arange(len(nodes))) if len(nodes) else np.arange(3.0)
         row = ", ".join(f"(real)({one:.9e}f)" for one in at)
         made = f"{{in + {rows} * n, (integer)(1), {{{row}}}}}"
-        name = self._named("measurement")
+        name = self._named(roles.MEASUREMENT)
         return [
             '#include "optics/measurement.cl"',
             f"    Measurement data = {made};\n    m.{name} = data;",
@@ -158,23 +160,23 @@ class Probe:
             one = np.array([curve.sample(LAMBDAS) for curve in primaries()])
         basis = [", ".join(f"(real)({value:.9e}f)" for value in curve) for curve in one]
         made = f"{{in + {rows} * n, (integer)(1), {', '.join(f'{{{row}}}' for row in basis)}}}"
-        name = self._named("merl")
+        name = self._named(roles.MERL)
         return [
             '#include "optics/merl_table.cl"',
             f"    MerlTable data = {made};\n    m.{name} = data;",
         ]
 
     def _streamed(self) -> list[tuple[str, Param]]:
-        beside = ("layers", "angular", "measurement", "merl")
+        beside = (roles.LAYERS, roles.ANGULAR, roles.MEASUREMENT, roles.MERL)
         return [(k, p) for k, p in device_params(self.cls).items() if p.role not in beside]
 
     def _table(self, params: Mapping[str, Any], layers: Sequence[Layer]) -> NDArray:
         """Return the data that follow the streams in `in`: a table, layers, or layers' colours."""
-        if self._named("measurement"):
+        if self._named(roles.MEASUREMENT):
             return np.append(0.0, self._measurement(params).values)
-        if name := self._named("merl"):
+        if name := self._named(roles.MERL):
             return np.append(0.0, measurements.merl_rows(params[name]).values)
-        if self._named("angular"):
+        if self._named(roles.ANGULAR):
             kind: Any = self.cls(**params)
             return angular_values(*kind.device_rows(self.mode == "spectral")[:2])
         if not layers:
@@ -184,7 +186,7 @@ class Probe:
             films = [[e.eta.value, e.k.value, e.thickness, e.profile] for e in constants]
             return np.array(films, np.float32)
         indices = {
-            k: np.asarray(params[k], float) for k, p in self._streamed() if p.role == "index"
+            k: np.asarray(params[k], float) for k, p in self._streamed() if p.role is roles.INDEX
         }
         if "int_ior" in indices:  # in RGB mode light is refracted by the mean ratio
             indices = {"int_ior": indices["int_ior"] / indices["ext_ior"], "ext_ior": np.ones(1)}
@@ -217,9 +219,10 @@ class Probe:
             "    m.layers = layers;",
         ]
 
-    def _text(self, boundary: str, film: str) -> str:
-        kind, names = self.cls.kind, "xyzw"[: self.components]
-        at, reads = 9, []
+    def _reads(self) -> list[str]:
+        """Return the rows that set a material's members from `in`, behind three vectors."""
+        names = "xyzw"[: self.components]
+        reads, at = [], 9
         for name, param in self._streamed():
             form = lane_type(param)
             members = [f"m.{name}.{c}" for c in names] if form == "Spectrum" else [f"m.{name}"]
@@ -235,6 +238,11 @@ class Probe:
         if self.cls.needs_wavelengths:
             for i, c in enumerate(names):
                 reads.append(f"    m.lambdas.{c} = block_load(in + {at + i} * n + at);")
+        return reads
+
+    def _text(self, boundary: str, film: str) -> str:
+        kind, names = self.cls.kind, "xyzw"[: self.components]
+        reads = self._reads()
         spectra = {name: [f"{name}.{c}" for c in names] for name in ("f", "again", "albedo")}
         weight = [f"s.weight.{c}" for c in names]
         results = ["s.wi.x", "s.wi.y", "s.wi.z", *weight, "s.pdf", "s.eta", "to_real(s.lobe)"]

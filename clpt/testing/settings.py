@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from clpt.measured import Measurement, MerlTable, fit
-from clpt.render.codegen.parameters import array_size, lane_type
+from clpt.render.contract.parameter_words import array_size
+from clpt.scene import roles
 from clpt.scene.materials import Layer
-from clpt.scene.params import Kind, Param, device_params
+from clpt.scene.params import Kind, device_params
+from clpt.scene.roles import Param, Role
 from clpt.testing.probe import COMPONENTS
 
 # limits of what principled kinds, glTF's and hair would make too narrow lobes of for bins
@@ -57,26 +60,27 @@ def settings(
     takes them, which absorb nothing.
     """
     result = []
-    indices = [k for k, p in device_params(cls).items() if p.role == "index"]
+    indices = [k for k, p in device_params(cls).items() if p.role is roles.INDEX]
     dense_first = len(indices) == 1 or "coat_ior" in indices
     for i in range(count):
         disperses, turn = 2 * i >= count, 1 if dense_first else int(rng.integers(2))
         drawn: dict[str, Any] = {}
         for name, param in device_params(cls).items():
-            if param.role == "index":
+            if param.role is roles.INDEX:
                 turn += 1
                 drawn[name] = _draw_index(turn % 2 == 0, mode, rng, disperses)
-            elif param.role == "layers":
+            elif param.role is roles.LAYERS:
                 drawn[name] = _draw_layers(rng) if i % 2 else ()
             else:
-                drawn[name] = _draw(dataclasses.replace(param, **WIDE.get(name, {})), mode, rng)
+                drawn_from = dataclasses.replace(param, **WIDE.get(name, {}))
+                drawn[name] = _draw(drawn_from, mode, rng)
         result.append(drawn | {k: v for k, v in fixed.items() if k in drawn})
     return result
 
 
 def white(cls: type[Kind]) -> dict[str, float]:
     """Values for `settings` that make every reflectance one, of light that keeps its wavelength."""
-    kept = {"reflectance": 1.0, "reradiation": 0.0}
+    kept = {roles.REFLECTANCE: 1.0, roles.RERADIATION: 0.0}
     return {k: kept[p.role] for k, p in device_params(cls).items() if p.role in kept}
 
 
@@ -109,18 +113,27 @@ def _draw_measurement(rng: np.random.Generator) -> Measurement:
     )
 
 
-def _draw(param: Param, mode: str, rng: np.random.Generator) -> Any:
-    if lane_type(param) == "Spectrum":
-        return rng.uniform(0.0, 1.0, COMPONENTS[mode])
-    if param.role == "measurement":
-        return _draw_measurement(rng)
-    if param.role == "merl":
-        return MerlTable(values=rng.uniform(0.05, 1.0, (6, 5, 8, 3)) / np.pi)
-    if param.role == "orders":
-        return rng.uniform(0.0, 1.0, array_size(param))
-    if param.role == "flag":
-        return np.array(rng.integers(2))
-    if param.role == "choice":
-        return np.array(rng.integers(len(param.choices)))
+def _draw_spectrum(param: Param, mode: str, rng: np.random.Generator) -> np.ndarray:
+    return rng.uniform(0.0, 1.0, COMPONENTS[mode])
+
+
+def _draw_number(param: Param, mode: str, rng: np.random.Generator) -> np.ndarray:
     high = min(param.high, param.low + 100.0)  # lobes no narrower than a grid of bins can tell
     return np.array(param.low + rng.uniform(0.1, 1.0) * (high - param.low))
+
+
+def _draw(param: Param, mode: str, rng: np.random.Generator) -> Any:
+    draw: Callable[..., Any] = DRAWS.get(param.role, _draw_number)
+    return draw(param, mode, rng)
+
+
+# a random value of a parameter as kernels have it, by its role
+DRAWS: dict[Role, Callable[[Param, str, np.random.Generator], Any]] = {
+    **dict.fromkeys((*roles.SPECTRA, roles.RERADIATION), _draw_spectrum),
+    roles.REAL: _draw_number,
+    roles.MEASUREMENT: lambda _, __, rng: _draw_measurement(rng),
+    roles.MERL: lambda _, __, rng: MerlTable(values=rng.uniform(0.05, 1.0, (6, 5, 8, 3)) / np.pi),
+    roles.ORDERS_OF_LIGHT: lambda param, _, rng: rng.uniform(0.0, 1.0, array_size(param)),
+    roles.FLAG: lambda _, __, rng: np.array(rng.integers(2)),
+    roles.CHOICE: lambda param, _, rng: np.array(rng.integers(len(param.choices))),
+}

@@ -12,7 +12,7 @@ import numpy as np
 from clpt.arrays import Floats
 from clpt.scene import Scene, viewpoint
 from clpt.scene.cameras import Camera, Perspective, ThinLens
-from clpt.scene.params import params
+from clpt.scene.params import fields_of
 from clpt.view import navigation, views
 from clpt.view.commands import OF_VIEW, CommandError, Request
 from clpt.view.messages import Reply
@@ -104,7 +104,7 @@ class CameraWork:
         if isinstance(camera, ThinLens):
             camera = dataclasses.replace(camera, focus_distance=distance)
         elif isinstance(camera, Perspective):
-            given = {name: getattr(camera, name) for name in params(type(camera))}
+            given = fields_of(camera)
             radius = LENS_SHARE * distance
             camera = ThinLens(**given, focus_distance=distance, aperture_radius=radius)
         else:
@@ -166,7 +166,7 @@ class CameraWork:
         """Let the pivot be where the camera focuses, or as far away as the world's origin."""
         camera = self.scene.camera
         at = viewpoint.pose(camera)
-        distance = float(getattr(camera, "focus_distance", np.linalg.norm(at.origin))) or 1.0
+        distance = float(fields_of(camera).get("focus_distance", np.linalg.norm(at.origin))) or 1.0
         self._pivot, self._up = at.origin + distance * at.forward, viewpoint.upright(camera)
         self._aimed = False
 

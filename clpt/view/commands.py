@@ -26,7 +26,7 @@ class CommandError(ClptError):
 class Type(Protocol):
     """A type of a parameter."""
 
-    def check(self, value: Any) -> Any:
+    def check(self, value: object) -> Any:
         """Return the value. Raises CommandError."""
 
 
@@ -37,7 +37,7 @@ class Number:
     low: float
     high: float
 
-    def check(self, value: Any) -> float:
+    def check(self, value: object) -> float:
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise CommandError(f"must be a number, not {_shown(value)}")
         if not self.low <= value <= self.high:  # a NaN is neither
@@ -52,7 +52,7 @@ class Whole:
     low: int
     high: int
 
-    def check(self, value: Any) -> int:
+    def check(self, value: object) -> int:
         if isinstance(value, bool) or not isinstance(value, int):
             raise CommandError(f"must be a whole number, not {_shown(value)}")
         if not self.low <= value <= self.high:
@@ -64,7 +64,7 @@ class Whole:
 class Flag:
     """True or false."""
 
-    def check(self, value: Any) -> bool:
+    def check(self, value: object) -> bool:
         if not isinstance(value, bool):
             raise CommandError(f"must be true or false, not {_shown(value)}")
         return value
@@ -76,7 +76,7 @@ class Choice:
 
     names: tuple[str, ...]
 
-    def check(self, value: Any) -> str:
+    def check(self, value: object) -> str:
         if not isinstance(value, str) or value not in self.names:
             raise CommandError(f"must be one of {', '.join(self.names)}, not {_shown(value)}")
         return value
@@ -88,7 +88,7 @@ class Name:
 
     longest: int = 40
 
-    def check(self, value: Any) -> str:
+    def check(self, value: object) -> str:
         pattern = rf"[A-Za-z0-9_][A-Za-z0-9_-]{{0,{self.longest - 1}}}"
         if not isinstance(value, str) or not re.fullmatch(pattern, value):
             raise CommandError(f"must be a word, not {_shown(value)}")
@@ -102,7 +102,7 @@ class Value:
     `clpt.view.panels.read` takes it, and lets it name no file.
     """
 
-    def check(self, value: Any) -> Any:
+    def check(self, value: object) -> Any:
         if _check_value(value, DEEPEST) > MOST_PARTS:
             raise CommandError(f"has more than {MOST_PARTS} parts")
         return value
@@ -114,7 +114,7 @@ class Optional:
 
     type: Type
 
-    def check(self, value: Any) -> Any:
+    def check(self, value: object) -> Any:
         return None if value is None else self.type.check(value)
 
 
@@ -255,7 +255,7 @@ def parse(message: str | bytes) -> Request:
     return checked(found)
 
 
-def checked(found: Any) -> Request:
+def checked(found: object) -> Request:
     """Return the command that a message is, with values of its declared types.
 
     Here alone a command is looked up. Raises CommandError.
@@ -284,7 +284,7 @@ def _no_constant(name: str) -> Any:
     raise ValueError(f"{name} is not JSON")
 
 
-def _shown(value: Any) -> str:
+def _shown(value: object) -> str:
     """Return a value for a message, cut short."""
     try:
         text = json.dumps(value)
@@ -293,7 +293,7 @@ def _shown(value: Any) -> str:
     return text if len(text) <= 40 else f"{text[:40]}..."
 
 
-def _check_value(value: Any, levels: int) -> int:
+def _check_value(value: object, levels: int) -> int:
     """Return how many parts a value has.
 
     Raises CommandError for what is nested too deeply, and numbers too large or not finite.

@@ -13,7 +13,8 @@ import numpy as np
 from clpt.denoise import needs
 from clpt.scene import Film, Scene
 from clpt.scene.lights import Light
-from clpt.scene.params import params
+from clpt.scene.params import fields_of, params
+from clpt.scene.roles import EMISSION
 from clpt.spectra import Constant, Illuminant, Spectrum, illuminant, on_grid
 from clpt.spectra.cie import CIE_Y_INTEGRAL, LAMBDA_MAX, LAMBDA_MIN, cie_xyz
 from clpt.view.maps import PICTURE
@@ -91,16 +92,19 @@ class Look:
 def with_spectrum(light: Light, lamp: str) -> Light:
     """Return a light with a lamp's spectrum and its own luminance; textures and images stay."""
     changes: dict[str, Any] = {}
+    given = fields_of(light)
     for name, param in params(type(light)).items():
-        value = getattr(light, name)
-        if param.role == "emission" and isinstance(value, Spectrum):
+        value = given[name]
+        if param.role is EMISSION and isinstance(value, Spectrum):
             changes[name] = illuminant(lamp, _luminance(value))
     return dataclasses.replace(light, **changes) if changes else light
 
 
 def _luminance(spectrum: Spectrum) -> float:
     """Return the luminance of an emission; that of the constant 1 is 1."""
-    if isinstance(spectrum, (Constant, Illuminant)):
-        return float(getattr(spectrum, "value", getattr(spectrum, "scale", 1.0)))
+    if isinstance(spectrum, Constant):
+        return float(spectrum.value)
+    if isinstance(spectrum, Illuminant):
+        return float(spectrum.scale)
     values = np.asarray(on_grid(spectrum, LAMBDA_MIN, LAMBDA_MAX), float)
     return float(values @ cie_xyz(GRID)[..., 1] / CIE_Y_INTEGRAL)

@@ -23,7 +23,7 @@ PREPARING: Final[dict[str, Any]] = {"type": "status", "phase": "preparing"}
 Reply = Callable[[dict[str, Any]], None]
 
 
-def as_json(message: Any) -> str:
+def as_json(message: object) -> str:
     """Return a message as JSON; what is no finite number is null."""
     try:
         return json.dumps(message, allow_nan=False)
@@ -31,7 +31,7 @@ def as_json(message: Any) -> str:
         return json.dumps(finite(message))
 
 
-def finite(value: Any) -> Any:
+def finite(value: object) -> Any:
     """Return a message in which what is no finite number is None."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None

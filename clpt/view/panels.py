@@ -17,16 +17,17 @@ from clpt.formats.native.cursor import Cursor
 from clpt.render.editing.scene_edit import Successors, edit_scene
 from clpt.scene import Scene
 from clpt.scene.materials import Material, parts
-from clpt.scene.params import SPECTRUM_ROLES, Kind, Param, defaults, params
+from clpt.scene.params import Kind, defaults, fields_of, params
+from clpt.scene.roles import INDEX, SPECTRA, Param
 from clpt.scene.shapes import Group, Instance, Shape
 from clpt.scene.textures import Texture
 from clpt.spectra.sensors import OBSERVERS
 from clpt.view.commands import OF_VIEW, CommandError
 from clpt.view.target import Change
 
-# Controls of the page by roles, and by forms of host parameters; others cannot be edited there.
+# Controls of the page by the names of roles; others cannot be edited there.
 CONTROLS = {
-    **dict.fromkeys(SPECTRUM_ROLES, "spectrum"),
+    **dict.fromkeys((role.name for role in SPECTRA), "spectrum"),
     "real": "number",
     "flag": "flag",
     "choice": "choice",
@@ -100,7 +101,7 @@ def object_of(scene: Scene, index: int) -> dict[str, Any]:
     shape = scene.shapes[index]
     materials = [id(material) for material, _ in _targets(scene)["material"]]
     panel = materials.index(id(shape.material)) if id(shape.material) in materials else None
-    made_of = getattr(shape.material, "name", "") or getattr(shape.material, "kind", "")
+    made_of = "" if shape.material is None else shape.material.name or shape.material.kind
     name = for_people(shape.name) or f"{shape.kind} {index + 1}"
     return {
         "name": name, "kind": shape.kind, "made_of": for_people(made_of), "material": panel
@@ -116,7 +117,7 @@ def for_people(name: str) -> str:
     return shown if len(shown) <= LONGEST_NAME else f"{shown[: LONGEST_NAME - 3]}..."
 
 
-def edited(scene: Scene, target: str, index: int, key: str, value: Any) -> tuple[Scene, Change]:
+def edited(scene: Scene, target: str, index: int, key: str, value: object) -> tuple[Scene, Change]:
     """Return a scene in which a parameter has another value, and how it differs.
 
     value: as in scene.json, but it names no file. Raises CommandError, SceneError.
@@ -134,8 +135,8 @@ def edited(scene: Scene, target: str, index: int, key: str, value: Any) -> tuple
 
 def written(thing: Kind) -> dict[str, Any]:
     """Return a camera or a light as scene.json has it, without what cannot be shown."""
-    declared = params(type(thing)).items()
-    known = {name: _shown(getattr(thing, name), param) for name, param in declared}
+    given, declared = fields_of(thing), params(type(thing)).items()
+    known = {name: _shown(given[name], param) for name, param in declared}
     return {"type": thing.kind, **{key: value for key, value in known.items() if value is not None}}
 
 
@@ -173,9 +174,9 @@ def _title(target: str, thing: Any, owners: list[int], scene: Scene) -> str:
 
 
 def _parameters(target: str, thing: Kind) -> list[dict[str, Any]]:
-    default = defaults(type(thing))
+    given, default = fields_of(thing), defaults(type(thing))
     return [
-        _parameter(name, param, getattr(thing, name), default[name])
+        _parameter(name, param, given[name], default[name])
         for name, param in params(type(thing)).items()
         if _editable(target, name, param)
     ]
@@ -183,18 +184,18 @@ def _parameters(target: str, thing: Kind) -> list[dict[str, Any]]:
 
 def is_plain(param: Param) -> bool:
     """Return whether a parameter can go to a page and come back: a value, no other thing."""
-    return (param.form or param.role) in (*CONTROLS, "matrix4")
+    return param.role.name in (*CONTROLS, "matrix4")
 
 
 def _editable(target: str, key: str, param: Param) -> bool:
     if target == "film" and key not in OF_FILM:
         return False
-    return (param.form or param.role) in CONTROLS
+    return param.role.name in CONTROLS
 
 
-def _parameter(name: str, param: Param, value: Any, default: Any) -> dict[str, Any]:
+def _parameter(name: str, param: Param, value: object, default: object) -> dict[str, Any]:
     """Return what the page has to know: control, words, unit, limits, choices, value."""
-    form = param.form or param.role
+    form = param.role.name
     choices = list(OBSERVERS) if form == "sensor" else list(param.choices)
     if form == "white_balance":
         choices = ["none", *spectra.illuminants()]
@@ -207,7 +208,7 @@ def _parameter(name: str, param: Param, value: Any, default: Any) -> dict[str, A
         "high": param.high if math.isfinite(param.high) else None,
         "choices": choices,
         "optional": param.optional,
-        "role": param.role,
+        "role": form,
         "value": _shown(value, param),
         "default": _shown(default, param),
         "curve": _curve(value, param),
@@ -217,10 +218,10 @@ def _parameter(name: str, param: Param, value: Any, default: Any) -> dict[str, A
 
 def _curve(value: Any, param: Param) -> list[float] | None:
     """Return a spectrum at CURVE_AT, for a small plot; None for what is none."""
-    if param.role not in SPECTRUM_ROLES or isinstance(value, Texture):
+    if param.role not in SPECTRA or isinstance(value, Texture):
         return None
     try:
-        if param.role == "index":
+        if param.role is INDEX:
             spectrum: Any = spectra.index(value)
         else:
             plain = isinstance(value, (int, float))
@@ -230,7 +231,7 @@ def _curve(value: Any, param: Param) -> list[float] | None:
         return None
 
 
-def _shown(value: Any, param: Param) -> Any:
+def _shown(value: object, param: Param) -> Any:
     """Return a value as scene.json has it, None where the page cannot show it."""
     if isinstance(value, (Texture, Material, Group)) or not is_plain(param):
         return None
@@ -241,7 +242,7 @@ def _shown(value: Any, param: Param) -> Any:
         return None
 
 
-def read(key: str, value: Any, param: Param) -> Any:
+def read(key: str, value: object, param: Param) -> Any:
     """Return the value of a parameter that a page gave, which names no file.
 
     Raises SceneError, CommandError.
@@ -251,7 +252,7 @@ def read(key: str, value: Any, param: Param) -> Any:
     document = {key: value}
     cursor = Cursor(document, None, json.dumps(document)).at(key)
     try:
-        if param.form == "sensor" and not isinstance(value, str):
+        if param.role.name == "sensor" and not isinstance(value, str):
             raise CommandError("must be the name of an observer")
         return forms.read(cursor, param, _READER)
     except SceneError as error:

@@ -19,7 +19,8 @@ from clpt.device import Device
 from clpt.render.renderer import Renderer
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Camera, Matrix, Orthographic, Perspective
-from clpt.scene.integrators import Box, Direct, Path, Whitted
+from clpt.scene.integrators import Box, Direct, Integrator, Path, Whitted, shared
+from clpt.scene.params import fields_of
 from clpt.scene.shapes import Group, Instance, Shape
 from clpt.view.messages import Reply, answering
 
@@ -61,7 +62,7 @@ def window(camera: Camera, film: Film, x: int, y: int) -> Camera | None:
     return None
 
 
-def pixel_of(scene: Scene, x: int, y: int, bands: int, integrator: Any) -> Scene:
+def pixel_of(scene: Scene, x: int, y: int, bands: int, integrator: Integrator) -> Scene:
     """Return a scene that shows the pixel (x, y) of another one alone."""
     camera = window(scene.camera, scene.film, x, y)
     size: dict[str, Any] = {"width": 1, "height": 1, "crop": None}
@@ -71,14 +72,22 @@ def pixel_of(scene: Scene, x: int, y: int, bands: int, integrator: Any) -> Scene
     return dataclasses.replace(scene, camera=camera, film=film, integrator=integrator, noise=None)
 
 
-def plain(integrator: Any) -> tuple[Any, str]:
+def plain(integrator: Integrator) -> tuple[Integrator, str]:
     """Return an integrator that renders one pixel well, and what to say if it is another."""
     if isinstance(integrator, (Direct, Whitted)):
         return integrator, ""
-    names = ("max_depth", "rr_depth", "hide_lights", "free_panes")
-    shared = {name: getattr(integrator, name) for name in names if hasattr(integrator, name)}
     alone = isinstance(integrator, Path) and integrator.light_paths == 0
-    return Path(**shared, light_paths=0), "" if alone else "by paths from the camera alone"
+    remark = "" if alone else "by paths from the camera alone"
+    return Path(**shared(integrator), light_paths=0), remark
+
+
+def _differ_by_camera(former: Scene, scene: Scene) -> bool:
+    """Whether all but the cameras of two scenes are the same objects."""
+    parts = [
+        (one.shapes, one.lights, one.film, one.integrator, one.sampler, one.seed)
+        for one in (former, scene)
+    ]
+    return all(old is new for old, new in zip(*parts, strict=True))
 
 
 class Follower:
@@ -91,13 +100,12 @@ class Follower:
 
     def follow(self, whole: Scene, pixel: Scene) -> Renderer:
         """Return the renderer, with an empty film, of a pixel of a whole scene."""
-        parts = ("shapes", "lights", "film", "integrator", "sampler", "seed")
         former, self._former = self._former, whole
         try:
             if self.renderer is None or _frame(self.renderer.scene) != _frame(pixel):
                 self.close()
                 self.renderer = Renderer(pixel, self.device)
-            elif all(getattr(former, part) is getattr(whole, part) for part in parts):
+            elif former is not None and _differ_by_camera(former, whole):
                 self.renderer.update(camera=pixel.camera)
             else:
                 self.renderer.update(scene=pixel)
@@ -256,7 +264,8 @@ def surfaces_of(scene: Scene, x: int, y: int) -> Scene:
 
 def _bare(shape: Shape) -> Shape:
     plain: dict[str, Any] = {"emission": None, "interior": None, "exterior": None, "priority": 0}
-    own = {name: value for name, value in plain.items() if getattr(shape, name) != value}
+    given = fields_of(shape)
+    own = {name: value for name, value in plain.items() if given[name] != value}
     return dataclasses.replace(shape, **own) if own else shape
 
 

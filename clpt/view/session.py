@@ -348,7 +348,7 @@ class Session(CameraWork):
 
     # the scene
 
-    def _do_edit(self, reply: Reply, target: str, index: int, key: str, value: Any) -> None:
+    def _do_edit(self, reply: Reply, target: str, index: int, key: str, value: object) -> None:
         scene, change = panels.edited(self.scene, target, index, key, value)
         if target == "camera":
             self._move(scene.camera)

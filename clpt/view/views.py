@@ -10,7 +10,7 @@ from clpt import text
 from clpt.errors import SceneError, UnknownKindError
 from clpt.scene import Scene, kinds
 from clpt.scene.cameras import Camera
-from clpt.scene.params import params
+from clpt.scene.params import fields_of, params
 from clpt.view import panels
 from clpt.view.commands import COMMANDS, CommandError, Request
 from clpt.view.pictures import Display
@@ -39,8 +39,8 @@ def camera_of(document: Any, present: Camera | None = None) -> Camera:
         if name not in held:
             raise CommandError(f"a view of a camera {kind} has no {name!r}")
     read = {name: panels.read(name, value, held[name]) for name, value in values.items()}
-    had = {} if present is None else params(type(present))
-    kept = {name: getattr(present, name) for name in declared if name in had and name not in held}
+    had = {} if present is None else fields_of(present)
+    kept = {name: had[name] for name in declared if name in had and name not in held}
     try:
         return cast(Camera, known[kind](**kept, **read))
     except SceneError as error:

@@ -102,7 +102,7 @@ class Widget(anywidget.AnyWidget):
 
     # what a notebook sends
 
-    def _obey(self, _: Any, content: Any, buffers: Any) -> None:
+    def _obey(self, _: object, content: Any, buffers: object) -> None:
         """Do what a view asks for, or say why not."""
         asked = content.get("do") if isinstance(content, dict) else None
         with answering(self.message):

@@ -16,7 +16,9 @@ import griffe
 import numpy as np
 
 from clpt import errors
-from clpt.scene.params import Kind, Param, params
+from clpt.scene import roles
+from clpt.scene.params import Kind, params
+from clpt.scene.roles import Param
 
 ERRORS = [
     name
@@ -25,20 +27,20 @@ ERRORS = [
 ]
 SESSION = re.compile(r"^>>> .*(?:\n.+)*", re.M)
 ROLES = {
-    "reflectance": "reflectance, spectrum in 0 to 1",
-    "emission": "emitted spectrum",
-    "index": "refractive index",
-    "factor": "spectrum",
-    "coefficient": "spectrum",
-    "real": "number",
-    "flag": "`bool`",
-    "reradiation": "`spectra.Reradiation`",
-    "orders": "numbers",
-    "layers": "`Layer`s",
-    "quantity": "spectrum",
-    "angular": "rows of numbers",
-    "measurement": "`measured.Measurement`",
-    "merl": "`measured.MerlTable`",
+    roles.REFLECTANCE: "reflectance, spectrum in 0 to 1",
+    roles.EMISSION: "emitted spectrum",
+    roles.INDEX: "refractive index",
+    roles.FACTOR: "spectrum",
+    roles.COEFFICIENT: "spectrum",
+    roles.REAL: "number",
+    roles.FLAG: "`bool`",
+    roles.RERADIATION: "`spectra.Reradiation`",
+    roles.ORDERS_OF_LIGHT: "numbers",
+    roles.LAYERS: "`Layer`s",
+    roles.QUANTITY: "spectrum",
+    roles.ANGULAR: "rows of numbers",
+    roles.MEASUREMENT: "`measured.Measurement`",
+    roles.MERL: "`measured.MerlTable`",
 }
 
 
@@ -114,12 +116,12 @@ def _default(field: dataclasses.Field[Any]) -> str:
 
 
 def _accepts(param: Param, field: dataclasses.Field[Any]) -> str:
-    if param.role == "host":
+    if param.role.place == "host":
         return "" if field.type == "Any" else f"`{field.type}`".replace("|", "\\|")
-    if param.role == "choice":
+    if param.role is roles.CHOICE:
         return ", ".join([f"`{c!r}`" for c in param.choices] + ["`None`"] * param.optional)
     limits = ""
-    if param.role == "real" and math.isfinite(param.low):
+    if param.role is roles.REAL and math.isfinite(param.low):
         limits = f" from {param.low:g}" + (
             f" to {param.high:g}" if math.isfinite(param.high) else ""
         )

@@ -1,15 +1,13 @@
-/* Slabs: the state of paths, a word of all slots side by side, then the next word; a work-item serves LANES neighbours,
- * from the slot `at` on. So that neighbours read neighbours, a CPU has one such run of all slots. A GPU has one for each
- * block of SLAB_BLOCK slots: all words of a slot then lie at fixed distances from the first, whose address is the one
- * that a work-item keeps, in place of one a word. step: words of a slot in a block; else from a word to the next. */
+/* Slabs: structure-of-arrays state, one stream per word. A work-item serves LANES neighbours, from the slot `at` on. */
 typedef struct { global float *words; uint step; } Slab;
-
 #if SLAB_BLOCK
+/* A GPU has streams for each block of so many slots: all words of a slot then lie at fixed distances from the first,
+ * and a work-item keeps one address in place of one a word. step: words of a slot. */
 #define SLAB_STEP(words_of_slot, stride) words_of_slot
 #define slab_at(s, c, at) \
     ((s).words + ((size_t)((at) / SLAB_BLOCK * SLAB_BLOCK) * (s).step + (at) % SLAB_BLOCK) + (c) * SLAB_BLOCK)
 #else
-#define SLAB_STEP(words_of_slot, stride) stride
+#define SLAB_STEP(words_of_slot, stride) stride /* from a word to the next */
 #define slab_at(s, c, at) ((s).words + (size_t)(c) * (s).step + (at))
 #endif
 #define slab_read(s, c, at) block_load(slab_at(s, c, at))

@@ -72,7 +72,7 @@ inline void layer_put_long(integer *words, mask m, real v)
 /* Puts an id. */
 inline void layer_put_id(integer *words, mask m, integer id) { words[0] = sel_i(m, id + 1, (integer)(0)); }
 
-/* Names that a pixel's samples have met, and how often: LAYER_MATTE_SLOTS words a list, ascending. A word has 1 more than the
+/* Names that a pixel's samples have met, and how often: words of a list, ascending. A word has 1 more than the
  * name's number in its upper 25 bits and how often in its lower 7; 0 is none. Of more names the first ones of the scene
  * are kept: a slot keeps the least that comes to it, with all its counts, and hands the others to the next slot. So
  * what it ends with depends neither on the order of samples nor on who adds them, and lists of films add likewise. */
@@ -102,5 +102,8 @@ inline void mattes_add(Scene scene, global uint *mattes, mask m, integer pixel_i
     const int *adds = (const int *)&m, *pixels = (const int *)&pixel_index;
     const uint *numbers = (const uint *)&number;
     for (int i = 0; i < LANES; i++)
-        if (adds[i]) matte_add(mattes + ((size_t)pixels[i] * scene.settings->mattes + which) * LAYER_MATTE_SLOTS, numbers[i]);
+        if (adds[i]) {
+            size_t list = (size_t)pixels[i] * scene.settings->mattes + which;
+            matte_add(mattes + list * LAYER_MATTE_SLOTS, numbers[i]);
+        }
 }

@@ -1,3 +1,4 @@
+/* Light of infinite lights, for paths that leave the scene. */
 #include "generated/infinite_weight.cl"
 
 /* What one infinite light sends to a path that leaves the scene along d [W m^-2 sr^-1 nm^-1], and the share `w` of it

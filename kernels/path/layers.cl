@@ -44,8 +44,10 @@ inline void layers_put_first(Scene scene, Slab path, uint at, integer *words, ma
         vec3 albedo = layer_albedo(scene, scatter, v.lambdas, spectrum_of(1.0f), weight);
         layer_put(words + settings->layer_albedo, first, albedo);
     }
-    if (settings->layer_shading_normal) layer_put(words + settings->layer_shading_normal, first, scale3(layer_normal(scatter), weight));
-    if (settings->layer_geometric_normal) layer_put(words + settings->layer_geometric_normal, first, scale3(v.s.n, weight));
+    if (settings->layer_shading_normal)
+        layer_put(words + settings->layer_shading_normal, first, scale3(layer_normal(scatter), weight));
+    if (settings->layer_geometric_normal)
+        layer_put(words + settings->layer_geometric_normal, first, scale3(v.s.n, weight));
     if (settings->layer_depth)
         layer_put_long(words + settings->layer_depth, first, (v.t + load_path_null_distance(path, at)) * weight);
     if (settings->layer_z) layer_put_long(words + settings->layer_z, first, layer_z(scene, v.s.p) * weight);
@@ -81,7 +83,8 @@ inline integer layers_record(Scene scene, Slab path, uint at, LAYER_ARGS, mask m
     }
     if (DENOISERS_SEE && settings->layer_denoising_normal)
         layer_put(words + settings->layer_denoising_normal, adds, scale3(layer_normal(scatter), weight));
-    int count = settings->layer_denoising && BSDF_DELTA ? settings->layer_denoising : settings->layer_words; /* theirs come last */
+    int count = settings->layer_words, before = settings->layer_denoising; /* theirs come last */
+    if (before && BSDF_DELTA) count = before;
     integer pixel_index = load_path_pixel_index(path, at);
     layers_add(scene, layers, adds, pixel_index, words, count);
     mattes_record(scene, mattes, first, pixel_index, v);

@@ -8,7 +8,7 @@
 #include "generated/bounce_stages.cl"
 
 #define BLOCK (settings->slots + get_global_id(0) * LANES) /* the first slot of the work-item's block */
-#define bounce_shade(kind, first, end) \
+#define bounce_shade(kind, first, end)                 \
     for (uint slot = first; slot < end; slot += LANES) \
         bounce_shade_at(SLAB_PASSED, SCENE_PASSED, LOOP_PASSED, which, kind, slot)
 #include "generated/walk.cl"

@@ -19,6 +19,7 @@ from clpt.transforms import look_at
 from tests.device.bad_device import CODE, BadDevice, Launch, driver_error, no_images
 
 MIB = 1 << 20
+LOST = CODE.DEVICE_NOT_AVAILABLE
 
 
 @pytest.fixture(scope="module")
@@ -116,7 +117,8 @@ HAZARDS = {
     ),
     "hardly any memory": Hazard(
         lambda: BadDevice({"global_mem": MIB, "max_alloc": 1 << 14}),
-        "the least number of paths needs .* KiB, the device has .* KiB: close other programs", clpt.MemoryBudgetError,
+        "the least number of paths needs .* KiB, the device has .* KiB: close other",
+        clpt.MemoryBudgetError,
     ),
     "memory that fails late": Hazard(
         lambda: BadDevice(launch=refused_at(3, CODE.MEM_OBJECT_ALLOCATION_FAILURE)),
@@ -136,11 +138,12 @@ HAZARDS = {
         lambda: BadDevice(launch=watchdog(1 << 15)), options=(("slots", 1 << 13),)
     ),
     "a device that is lost": Hazard(
-        lambda: BadDevice(launch=killed_at(4, CODE.DEVICE_NOT_AVAILABLE), dead=CODE.DEVICE_NOT_AVAILABLE),
+        lambda: BadDevice(launch=killed_at(4, LOST), dead=LOST),
         "was reset or removed: open it again in a new process",
     ),
     "a context that is lost": Hazard(
-        lambda: BadDevice(launch=refused_at(2, CODE.INVALID_CONTEXT)), "open it again in a new process"
+        lambda: BadDevice(launch=refused_at(2, CODE.INVALID_CONTEXT)),
+        "open it again in a new process",
     ),
     "a kernel that leaves its buffers": Hazard(
         lambda: BadDevice(launch=refused_at(2, -9999)), "beyond its buffers"

@@ -340,10 +340,10 @@ def test_mitsuba(written) -> None:
     given = np.random.default_rng(3).random((2, 2, 2, 3), np.float32)
     written("a.vol", vol_bytes(given))
     medium = load(path).shapes[0].interior
-    colours = medium.density[..., None] * medium.colour_grid * medium.sigma_t.to_rgb("unbounded")
+    colours = medium.density[..., None] * medium.color_grid * medium.sigma_t.to_rgb("unbounded")
     np.testing.assert_allclose(colours, given, rtol=1e-5)
     lambdas, point = np.linspace(400.0, 700.0, 7), (1, 0, 1)
-    share = RGB(*medium.colour_grid[point].tolist()).sample(lambdas)
+    share = RGB(*medium.color_grid[point].tolist()).sample(lambdas)
     expected = RGBUnbounded(*given.transpose(2, 1, 0, 3)[point].tolist()).sample(lambdas)
     spectrum = medium.density[point] * medium.sigma_t.sample(lambdas) * share
     np.testing.assert_allclose(spectrum, expected, rtol=2e-3)

@@ -10,6 +10,7 @@ import pytest
 
 from clpt.scene import materials as m
 from clpt.scene.params import device_params
+from clpt.scene.roles import CHOICE
 from clpt.testing.settings import directions, pairs
 from tests.kernels.harness import Probe
 
@@ -75,7 +76,7 @@ def variant():
 
 def _ours(cls, params):
     """Choices and flags as the kernels see them."""
-    choices = {k: p.choices for k, p in device_params(cls).items() if p.role == "choice"}
+    choices = {k: p.choices for k, p in device_params(cls).items() if p.role is CHOICE}
     return {k: choices[k].index(v) if k in choices else v for k, v in params.items()}
 
 

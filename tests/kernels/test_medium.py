@@ -8,6 +8,7 @@ import pytest
 from clpt import spectra
 from clpt.render.codegen.parameters import medium_text
 from clpt.render.lowering.encoder import Encoder
+from clpt.scene.roles import COEFFICIENT
 from tests.kernels.scene_harness import SceneProbe
 
 FAR = 1e30
@@ -22,8 +23,8 @@ LAW = """
 def transmittance(lanes: int, medium: np.ndarray, t: np.ndarray, lambdas: np.ndarray) -> np.ndarray:
     """medium_transmittance in spectral mode; the media: 1 the dye, 6 a constant 2.5, 11 none."""
     encoder = Encoder("spectral")
-    words = [encoder.spectra.words(s, "coefficient")[0] for s in (DYE, spectra.Constant(2.5))]
-    words.append(encoder.spectra.words(spectra.Constant(0.0), "coefficient")[0])
+    words = [encoder.spectra.words(s, COEFFICIENT)[0] for s in (DYE, spectra.Constant(2.5))]
+    words.append(encoder.spectra.words(spectra.Constant(0.0), COEFFICIENT)[0])
     encoder.store.append("materials", np.concatenate(words))
     probe = SceneProbe(
         LAW,

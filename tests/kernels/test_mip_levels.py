@@ -10,6 +10,7 @@ from clpt.render.codegen.textures import dispatch_text
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.features import of_textures
 from clpt.render.lowering.textures.bitmaps import _level_sizes, _levels
+from clpt.scene.roles import REAL, REFLECTANCE, Param
 from clpt.scene.textures import Bitmap
 from tests.kernels.scene_harness import SceneProbe
 from tests.kernels.test_textures import PLAIN, TURNED, reference
@@ -38,8 +39,8 @@ class LookUp:
     def __init__(self, made: list[Bitmap]):
         encoder = Encoder("rgb")
         self.rows, self.numbers = (
-            np.array([encoder.param_words(t, role)[0][-1] - 1 for t in made])
-            for role in ("reflectance", "real")
+            np.array([encoder.param_words(t, Param(role))[0][-1] - 1 for t in made])
+            for role in (REFLECTANCE, REAL)
         )
         encoder.textures.finish()
         self.probe = SceneProbe(

@@ -13,7 +13,12 @@ from clpt.scene import KINDS
 
 ALTERNATIVES = (  # files, of each row of which a program has one at most
     ("bvh/*_keyed.cl",),
-    ("media/medium.cl", "media/light_medium_none.cl"),
+    ("media/light_media.cl", "media/light_medium_none.cl"),
+    ("media/medium_dims*.cl", "media/light_medium_none.cl"),
+    ("media/black_body_*.cl",),
+    ("media/flight_medium*.cl",),
+    ("media/grid_meet*.cl",),
+    ("media/way_*.cl",),
     ("bvh/query*.cl",),
     ("bvh/shapes_*.cl",),
     ("film/exposure.cl", "film/splatting.cl"),

@@ -12,6 +12,7 @@ from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.features import of_textures
 from clpt.render.lowering.textures import noise
 from clpt.scene import textures as scene
+from clpt.scene.roles import NAMED, Param
 from clpt.spectra.spectrum import d65
 from tests.kernels.harness import assert_lanes_agree
 from tests.kernels.scene_harness import SceneProbe
@@ -28,7 +29,7 @@ IMAGE = np.random.default_rng(4).random((5, 7, 3)).astype(np.float32)
 def look_up(made, role, places=PLACES, mode="rgb", lanes=8):
     """Values of textures, one after the other, at places: (n, 3 or 4) or (n,)."""
     encoder = Encoder(mode)
-    words = np.array([encoder.param_words(t, role)[0][-1] - 1 for t in made])
+    words = np.array([encoder.param_words(t, Param(NAMED[role]))[0][-1] - 1 for t in made])
     encoder.textures.finish()
     components = "x" if role == "real" else "xyzw" if mode == "spectral" else "xyz"
     body = "TexturePoint point = texture_point_nowhere(); Wavelengths lambdas;"
@@ -174,4 +175,4 @@ def test_a_projection_is_refused():
     matrix = np.eye(4)
     matrix[3, 2] = 1.0
     with pytest.raises(SceneError, match="0 0 0 1"):
-        Encoder("rgb").textures.row(scene.Noise(to_texture=matrix), "real")
+        Encoder("rgb").textures.row(scene.Noise(to_texture=matrix), NAMED["real"])

@@ -10,6 +10,7 @@ from clpt.render.analysis.texels import FAR, bands
 from clpt.render.codegen.textures import dispatch_text
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.features import of_textures
+from clpt.scene import roles
 from clpt.scene import textures as scene
 from clpt.scene.lights import Constant, CubeMap, Envmap
 from clpt.spectra import Tabulated, luminance
@@ -104,7 +105,7 @@ def test_only_the_bands_of_the_film_s_range_are_kept():
     np.testing.assert_allclose(number.sample([395.0, 400.0, 705.0]), [0.0, 0.5, 31.0])
     assert number.values[0] == -FAR
     encoder = Encoder("spectral", 400.0, 700.0)
-    encoder.textures.row(scene.Bitmap(image=made), "emission")
+    encoder.textures.row(scene.Bitmap(image=made), roles.EMISSION)
     assert encoder.store.size("texels") == 4 + 32
     for lo, hi in ((1.0, 2.0), (3000.0, 4000.0)):
         assert bands(made, lo, hi)[0].shape == (1, 2)
@@ -112,7 +113,7 @@ def test_only_the_bands_of_the_film_s_range_are_kept():
 
 def test_scenes_without_spectral_images_do_not_hold_their_text():
     encoder = Encoder("spectral")
-    encoder.textures.row(scene.Bitmap(image=np.zeros((2, 2, 3))), "reflectance")
+    encoder.textures.row(scene.Bitmap(image=np.zeros((2, 2, 3))), roles.REFLECTANCE)
     encoder.textures.finish()
     text = dispatch_text(of_textures(encoder))
     assert "pectral" not in text.replace("spectrum", "")
@@ -121,13 +122,13 @@ def test_scenes_without_spectral_images_do_not_hold_their_text():
 
 def test_a_role_needs_its_kind_of_spectra():
     for role, emissive, words in (
-        ("reflectance", True, "holds light .* where reflectances"),
-        ("emission", False, "holds reflectances .* where light"),
+        (roles.REFLECTANCE, True, "holds light .* where reflectances"),
+        (roles.EMISSION, False, "holds reflectances .* where light"),
     ):
         with pytest.raises(SceneError, match=words):
             Encoder("spectral").textures.row(scene.Bitmap(image=image(emissive=emissive)), role)
     with pytest.raises(SceneError, match="two wavelengths"):
-        Encoder("spectral").textures.row(scene.Bitmap(image=image(ODD[:1])), "reflectance")
+        Encoder("spectral").textures.row(scene.Bitmap(image=image(ODD[:1])), roles.REFLECTANCE)
     with pytest.raises(SceneError, match="envmap only"):
         lit([CubeMap(image=[image(emissive=True, size=(4, 4))] * 6)])
     with pytest.raises(SceneError, match="holds reflectances"):

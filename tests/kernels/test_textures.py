@@ -17,6 +17,7 @@ from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.textures.bitmaps import NODES, pack
 from clpt.render.lowering.textures.texture_programs import folded
 from clpt.scene import textures as scene
+from clpt.scene.roles import EMISSION, NAMED, REAL, REFLECTANCE, Param
 from clpt.spectra import cie
 from clpt.spectra.spectrum import d65
 from clpt.spectra.upsampling import evaluate
@@ -62,8 +63,8 @@ def look_up(made, role, uv, mode="rgb", lanes=8, rows=None, u=()):
 
     u: (n, 2), which choose texels for the role "texel", see `_body`.
     """
-    encoder, given = Encoder(mode), "reflectance" if role == "texel" else role
-    words = np.array([encoder.param_words(t, given)[0][-1] - 1 for t in made])
+    encoder, given = Encoder(mode), NAMED["reflectance" if role == "texel" else role]
+    words = np.array([encoder.param_words(t, Param(given))[0][-1] - 1 for t in made])
     encoder.textures.finish()
     which = words[np.zeros(len(uv), int) if rows is None else rows]
     body, components = _body(role, mode)
@@ -310,13 +311,13 @@ def test_composites_of_numbers_and_of_light():
     ],
 )
 def test_constants_are_folded(texture, role, expected):
-    assert folded(texture, role).value == pytest.approx(expected, rel=1e-3)
+    assert folded(texture, NAMED[role]).value == pytest.approx(expected, rel=1e-3)
 
 
 def test_folding_takes_away_what_changes_nothing():
     bitmap = scene.Bitmap(image=COLOURS)
-    assert folded(scene.Product(first=1.0, second=bitmap), "emission") is bitmap
-    assert folded(scene.Mix(first=bitmap, second=0.4, amount=0.0), "reflectance") is bitmap
+    assert folded(scene.Product(first=1.0, second=bitmap), EMISSION) is bitmap
+    assert folded(scene.Mix(first=bitmap, second=0.4, amount=0.0), REFLECTANCE) is bitmap
 
 
 def test_reflectance_is_clipped_and_emission_is_not():
@@ -385,7 +386,7 @@ def test_a_budget_halves_the_largest():
     large, small = BYTES[:, :, :3], COLOURS[:2, :2]
     encoder = Encoder("rgb", texture_budget=100)
     for image in (large, small):
-        encoder.textures.row(scene.Bitmap(image=image), "reflectance")
+        encoder.textures.row(scene.Bitmap(image=image), REFLECTANCE)
     notes = encoder.textures.finish()
     assert len(notes) == 1
     assert "5 x 6 texels made 3 x 3" in notes[0]
@@ -399,7 +400,7 @@ def test_a_budget_halves_the_largest():
 def test_eight_bit_images_share_their_colours():
     """The short cut for images of few levels gives what uplifting every texel gives."""
     levels = np.round(np.random.default_rng(3).random((40, 50, 3)) * 255) / 255
-    made = texels(levels.astype(np.float32), "reflectance", True)
+    made = texels(levels.astype(np.float32), REFLECTANCE, True)
     np.testing.assert_array_equal(
         made[:, :3], spectra.uplift(levels.astype(np.float32).reshape(-1, 3))
     )
@@ -502,10 +503,10 @@ def test_parameters_that_are_textures():
     encoder, uv = Encoder("rgb"), _uvs(32)
     colour = scene.Bitmap(image=COLOURS)
     words = [
-        *encoder.param_words(spectra.Constant(0.5), "reflectance")[0],
-        *encoder.param_words(0.5, "real")[0],
-        *encoder.param_words(colour, "reflectance")[0],
-        *encoder.param_words(colour, "real")[0],
+        *encoder.param_words(spectra.Constant(0.5), Param(REFLECTANCE))[0],
+        *encoder.param_words(0.5, Param(REAL))[0],
+        *encoder.param_words(colour, Param(REFLECTANCE))[0],
+        *encoder.param_words(colour, Param(REAL))[0],
     ]
     encoder.store.append("materials", words)
     encoder.textures.finish()
@@ -528,12 +529,12 @@ def test_a_texture_is_put_in_once(tmp_path):
     Image.fromarray(np.zeros((3, 4, 3), np.uint8)).save(path)
     encoder = Encoder("rgb")
     board, file = scene.Checkerboard(), scene.Bitmap(image=path)
-    first = [encoder.textures.row(t, "reflectance") for t in (board, file)]
+    first = [encoder.textures.row(t, REFLECTANCE) for t in (board, file)]
     sizes = encoder.store.size("textures")
-    again = [encoder.textures.row(t, "reflectance") for t in (board, scene.Bitmap(image=str(path)))]
+    again = [encoder.textures.row(t, REFLECTANCE) for t in (board, scene.Bitmap(image=str(path)))]
     assert first == again
     assert sizes == encoder.store.size("textures")
-    assert encoder.textures.row(file, "real") not in first
+    assert encoder.textures.row(file, REAL) not in first
     encoder.textures.finish()
     assert encoder.textures.roles == {
         ("checkerboard", "reflectance"),
@@ -560,7 +561,7 @@ def test_no_textures_no_text():
 def test_unusable_textures(texture, part):
     with pytest.raises(SceneError, match=part):
         encoder = Encoder("rgb")
-        encoder.textures.row(texture, "reflectance")
+        encoder.textures.row(texture, REFLECTANCE)
         encoder.textures.finish()
 
 

@@ -10,7 +10,17 @@ import pytest
 
 import clpt
 from clpt.errors import SceneError
-from clpt.scene import KINDS, Scene, cameras, integrators, lights, materials, shapes, textures
+from clpt.scene import (
+    KINDS,
+    Scene,
+    cameras,
+    integrators,
+    lights,
+    materials,
+    roles,
+    shapes,
+    textures,
+)
 from clpt.scene.fingerprint import Fingerprint, fingerprint
 from clpt.scene.params import params
 from clpt.spectra import Tabulated
@@ -83,9 +93,9 @@ def test_every_number_of_every_kind_counts(cls):
     assert before == Fingerprint(_values(cls(**given)))
     for name, param in params(cls).items():
         value = getattr(thing, name)
-        if param.role == "flag":
+        if param.role is roles.FLAG:
             other: object = not value
-        elif param.role == "real" and isinstance(value, float):
+        elif param.role is roles.REAL and isinstance(value, float):
             other = value + 1e-3 if value + 1e-3 <= param.high else value - 1e-3
         else:
             continue

@@ -44,6 +44,8 @@ def test_the_studio_adds_what_is_missing() -> None:
         Scene.studio(ball, up="x")  # type: ignore[arg-type]
     with pytest.raises(SceneError, match=r"^shapes: must be a list of shapes, not 3$"):
         Scene.studio(3)
+    with pytest.raises(SceneError, match=r"^shapes\[1\]: must be of a kind of shape, not 3$"):
+        Scene.studio([ball, 3])
 
 
 def test_the_mesh_is_brighter_than_the_backdrop_and_nothing_is_clipped(one_context: None) -> None:

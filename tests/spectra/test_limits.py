@@ -7,15 +7,16 @@ import pytest
 
 from clpt import spectra
 from clpt.errors import SceneError
-from clpt.scene import KINDS, materials
-from clpt.scene.params import SPECTRUM_ROLES, Kind, Param, params
+from clpt.scene import KINDS, materials, roles
+from clpt.scene.params import Kind, params
+from clpt.scene.roles import Param
 from clpt.spectra import Tabulated
 
 LIMITED = [
     pytest.param(cls, name, param, id=f"{cls.kind}.{name}")
     for cls in (*(kind for group in KINDS.values() for kind in group), materials.Layer)
     for name, param in params(cls).items()
-    if param.role in SPECTRUM_ROLES and param.low == 0.0
+    if param.role in roles.SPECTRA and param.low == 0.0
 ]
 
 
@@ -25,7 +26,7 @@ def flat(value: float, low: float = 400.0, high: float = 700.0) -> Tabulated:
 
 @pytest.mark.parametrize(("cls", "name", "param"), LIMITED)
 def test_a_table_has_the_limits_of_a_number(cls: type[Kind], name: str, param: Param) -> None:
-    beyond = [-0.5, *([1.5] if param.role == "reflectance" else [])]
+    beyond = [-0.5, *([1.5] if param.role is roles.REFLECTANCE else [])]
     for value in beyond:
         for given in (value, flat(value), spectra.Constant(value)):
             with pytest.raises(SceneError, match=rf"{cls.kind}\.{name}.* is outside"):

@@ -196,7 +196,7 @@ def mixtures_of_one(scene: Scene) -> Scene | None:
         plain = type(medium) in (media.Homogeneous, media.Grid) and medium.light is None
         if not plain or getattr(medium, "albedo_grid", None) is not None:
             return medium
-        if getattr(medium, "colour_grid", None) is not None:
+        if getattr(medium, "color_grid", None) is not None:
             return medium
         empty = media.Grid(density=np.zeros((2, 2, 2), np.float32), to_world=_box_of(medium))
         parts = (medium,) if isinstance(medium, media.Grid) else (medium, empty)

@@ -1,6 +1,6 @@
 """Whole random scenes, drawn from the tables of kinds: `scenes()` is a strategy of Hypothesis.
 
-A kind is drawn by being listed, and its parameters by their roles and forms (`clpt.scene.params`);
+A kind is drawn by being listed, and its parameters by their roles (`clpt.scene.roles`);
 a new role or form needs an entry in ROLES or FORMS here. Images and grids are tiny. The first
 choice is always the plainest, so that a scene shrinks to what a failure needs. What the rules of
 `clpt.render.analysis.checks` refuse is left out of parts and of scenes, but of a few.
@@ -28,11 +28,22 @@ from clpt.render.analysis.checks.lights import check_light
 from clpt.render.analysis.checks.materials import check_material
 from clpt.render.analysis.checks.shapes import check_shapes
 from clpt.render.analysis.checks.textures import check_textures
-from clpt.scene import Scene, cameras, integrators, lights, materials, media, shapes, textures
+from clpt.scene import (
+    Scene,
+    cameras,
+    integrators,
+    lights,
+    materials,
+    media,
+    roles,
+    shapes,
+    textures,
+)
 from clpt.scene.air import clear_air
 from clpt.scene.layers import LAYERS
 from clpt.scene.motion import Deformation, Keys, Shutter
-from clpt.scene.params import Kind, Param, defaults, params
+from clpt.scene.params import Kind, defaults, params
+from clpt.scene.roles import Param
 from clpt.spectral_exr import SpectralImage
 from tests.together.builds import FORMS as FORMS_OF_PROGRAMS
 from tests.together.builds import Way
@@ -92,12 +103,14 @@ class Drawer:
         names = [
             name
             for name, param in declared.items()
-            if name not in {**own, **given} and name not in UNDRAWN and param.form not in GEOMETRY
+            if name not in {**own, **given}
+            and name not in UNDRAWN
+            and param.role.name not in GEOMETRY
         ]
         chosen = self.some(names, MOST_GIVEN)
         self.depth += 1
         for name, param in declared.items():
-            needed = param.form in NEEDED and defaults(cls)[name] is None
+            needed = param.role.name in NEEDED and defaults(cls)[name] is None
             if name in chosen or (needed and name not in {**own, **given}):
                 own[name] = self.value(cls, name, param)
         self.depth -= 1
@@ -109,7 +122,7 @@ class Drawer:
         if name in NAMED:
             return self.one(NAMED[name])
         default = defaults(cls)[name]
-        return (FORMS[param.form] if param.role == "host" else ROLES[param.role])(
+        return (FORMS if param.role.place == "host" else ROLES)[param.role.name](
             self, param, default
         )
 
@@ -172,15 +185,15 @@ def _number(self: Drawer, param: Param, default: Any) -> float:
 
 
 def _spectrum(self: Drawer, param: Param, default: Any) -> Any:
-    least = 1.0 if param.role == "index" else max(param.low, 0.0)
+    least = 1.0 if param.role is roles.INDEX else max(param.low, 0.0)
     most = min(param.high, 2.0)
     a, b, c = least, 0.5 * (least + most), most
     values: list[Any] = [default, b, (a, b, c), spectra.Tabulated(BANDS, [a, b, c, b], "hold"), c]
-    if param.role != "index" and not param.positive:
+    if param.role is not roles.INDEX and not param.positive:
         values.append(0.0)
-    if param.role == "index":
+    if param.role is roles.INDEX:
         values += ["bk7", "gold", spectra.Cauchy(1.5, 0.005)]
-    if param.role == "emission":
+    if param.role is roles.EMISSION:
         values += ["d50", spectra.Blackbody(3000.0), spectra.Lines([550.0], [1.0])]
     return self.one(values)
 
@@ -428,7 +441,7 @@ def _cloud(self: Drawer) -> dict[str, Any]:
 
 def _sky(self: Drawer) -> dict[str, Any]:
     """One of two skies, as each takes seconds."""
-    given = [n for n, p in params(lights.Sky).items() if p.role == "real" and "scale" not in n]
+    given = [n for n, p in params(lights.Sky).items() if p.role is roles.REAL and "scale" not in n]
     usual = defaults(lights.Sky)
     low = {"sun_elevation": -5.0, "altitude": 3000.0}
     return {**{name: usual[name] for name in given}, **self.one([{}, low]), "ground": 0.2}

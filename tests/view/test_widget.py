@@ -15,9 +15,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from clpt import device, load
+from clpt import Renderer, device, load
 from clpt.errors import ClptError
-from clpt.render.renderer import Renderer
 from clpt.scene import Scene
 
 pytest.importorskip("anywidget", reason="the extra clpt[notebook] is not installed")

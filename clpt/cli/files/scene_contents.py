@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -10,7 +9,7 @@ from typing import Any
 
 from ...geometry.triangles import triangulate
 from ...scene import Scene, framing, materials, shapes, textures
-from ...scene.params import Kind
+from ...scene.params import Kind, fields_of
 
 DIGITS = 4  # of bounds that people read
 OF_FILES = ("scenes", "variables", "asset")  # what some formats tell besides
@@ -110,8 +109,7 @@ def _nested(things: Iterable[Kind]) -> Iterator[Kind]:
     """Yield the kinds within things: materials, lights and the textures in them."""
     for thing in things:
         yield thing
-        values = [getattr(thing, field.name) for field in dataclasses.fields(thing)]
-        yield from _nested(value for value in values if isinstance(value, Kind))
+        yield from _nested(value for value in fields_of(thing).values() if isinstance(value, Kind))
 
 
 def _by_kind(things: Iterable[Kind], base: type[Kind]) -> dict[str, int]:
@@ -124,5 +122,5 @@ def _film(scene: Scene) -> dict[str, Any]:
     size = dict(zip(("width", "height"), film.size, strict=True))
     whole = {} if film.crop is None else {"crop": [*film.crop], "of": [film.width, film.height]}
     usual = {"bands": 0, "alpha": False, "layers": (), "output_space": "rec709"}
-    unusual = {k: getattr(film, k) for k, usual in usual.items() if getattr(film, k) != usual}
+    unusual = {k: given for k, given in fields_of(film).items() if k in usual and given != usual[k]}
     return {**size, **whole, "mode": film.mode, "filter": film.filter.kind, **unusual}

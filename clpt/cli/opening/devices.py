@@ -1,4 +1,4 @@
-"""Devices of this machine, and the processes that compile for them."""
+"""Devices of this machine."""
 
 from __future__ import annotations
 
@@ -18,13 +18,6 @@ def choose_devices(machine: Machine) -> list[dev.Device]:
     if which is not None and dev.names_several(which):
         return dev.choose_all(which, profiling=profiling, threads=threads)
     return [dev.choose(which, profiling=profiling, threads=threads)]
-
-
-def kill_compilers(devices: list[dev.Device]) -> None:
-    """End the processes that compile for devices: a process that ends must not wait for them."""
-    for on in devices:
-        if on.compilers is not None:
-            on.compilers.kill()
 
 
 @contextmanager

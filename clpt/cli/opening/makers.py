@@ -17,7 +17,7 @@ from ..options.workers import Workers
 from ..printing.display import Display
 from ..printing.names import device_names
 from ..process.stopping import prompt
-from .devices import ending_at_limit, kill_compilers
+from .devices import ending_at_limit
 
 if TYPE_CHECKING:  # one device has no use for what several need
     from distributed import Client
@@ -86,7 +86,7 @@ class DeviceMaker(Maker):
 
     def stop(self) -> None:
         """End the processes that compile."""
-        kill_compilers(self.devices)
+        dev.kill_compilers()
 
 
 class ClusterMaker(Maker):

@@ -11,7 +11,7 @@ from ...choices import AUTO
 from ...denoise.needs import prepared
 from ...scene import Scene, kinds, viewpoint
 from ...scene.integrators import NO_AOV, Auto
-from ...scene.params import Kind, params
+from ...scene.params import Kind, fields_of, params
 from .changes import SceneChanges, Transport
 from .composition import Composition
 
@@ -53,7 +53,7 @@ def _integrator(how: Any, transport: Transport) -> Any:
         value = vars(transport)[name]
         if value is None:
             continue
-        if not hasattr(how, name):
+        if name not in params(type(how)):
             message = f"the integrator {how.kind} has no {what}"
             raise click.BadParameter(message, param_hint=f"--{name.replace('_', '-')}")
         how = dataclasses.replace(how, **{name: value})
@@ -66,8 +66,7 @@ def _of_kind(name: str, old: Kind) -> Any:
     if name not in known:
         message = NO_AOV if name == "aov" else f"{name!r} is none of {', '.join(known)}"
         raise click.BadParameter(message, param_hint="--integrator")
-    shared = params(known[name]).keys() & params(type(old)).keys()
-    given = {key: getattr(old, key) for key in shared}
+    given = {key: value for key, value in fields_of(old).items() if key in params(known[name])}
     if name == "vcm" and "light_paths" in given:  # a whole number, 1 or more
         number = given.pop("light_paths")
         given |= {} if number == AUTO else {"light_paths": max(round(number), 1)}

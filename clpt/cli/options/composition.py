@@ -68,7 +68,9 @@ class CameraType(click.ParamType):
 
     name = "AZ,EL[,DIST]|NAME"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> Orbit | str:
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Orbit | str:
         if isinstance(value, Orbit):
             return value
         text = str(value).strip()
@@ -96,7 +98,9 @@ class CropType(click.ParamType):
 
     name = "X0:X1,Y0:Y1"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[Span, Span]:
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[Span, Span]:
         if isinstance(value, tuple):
             return value
         number = r"(?:(\d{1,9}(?:\.\d{1,9})?)(%?))?"
@@ -115,7 +119,7 @@ class CropType(click.ParamType):
         return Span(*ends[:2]), Span(*ends[2:])
 
 
-def _named(ctx: click.Context, _: Any, value: Orbit | str | None) -> Orbit | None:
+def _named(ctx: click.Context, _: click.Parameter, value: Orbit | str | None) -> Orbit | None:
     """Keep an orbit; a name is the scene's variable `camera`, as loaders know it."""
     if not isinstance(value, str):
         return value

@@ -19,7 +19,7 @@ class Bytes(click.ParamType):
 
     name = "SIZE"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         form, text = r"(\d{1,15}(?:\.\d+)?)\s*([KMGT]?)i?B?", str(value).strip()
         match = re.fullmatch(form, text, re.IGNORECASE)
         if match is None:
@@ -30,7 +30,7 @@ class Bytes(click.ParamType):
 def _limit(name: str) -> Callable[[Any, Any, Any], None]:
     """Return what makes the value of an option a limit of all loads of the command."""
 
-    def set_limit(_: Any, __: Any, value: Any) -> None:
+    def set_limit(_: click.Context, __: click.Parameter, value: Any) -> None:
         budget.set_usual(dataclasses.replace(budget.usual, **{name: value}))
 
     return set_limit

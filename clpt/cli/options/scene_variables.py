@@ -15,7 +15,7 @@ RESERVED = (
 )  # parameters of clpt.load that are no variables
 
 
-def _parse(_: Any, __: Any, definitions: Iterable[str]) -> dict[str, Any]:
+def _parse(_: click.Context, __: click.Parameter, definitions: Iterable[str]) -> dict[str, Any]:
     """Return NAME=VALUE options as a dictionary. Raises click.BadParameter."""
     pairs = [definition.partition("=") for definition in definitions]
     wrong = next((name for name, equals, _ in pairs if not (name and equals)), None)

@@ -21,7 +21,9 @@ class Size(click.ParamType):
 
     name = "WxH"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[int, int]:
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, int]:
         found = re.fullmatch(r"(\d{1,9})x(\d{1,9})", str(value).strip().lower())
         if not found:
             self.fail(f"{value!r} does not look like 640x480", param, ctx)
@@ -87,7 +89,7 @@ class SensorName(click.ParamType):
 
     name = "NAME-OR-FILE"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if value in OBSERVERS:
             return value
         from ...spectra import read_sensor  # here: help needs no tables of spectra
@@ -100,7 +102,7 @@ class LightPaths(click.ParamType):
 
     name = "N-OR-AUTO"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         return AUTO if value == AUTO else click.FloatRange(0.0, MOST_LIGHT_PATHS)(value, param, ctx)
 
 
@@ -112,7 +114,7 @@ class Names(click.ParamType):
     def __init__(self, known: Iterable[str]):
         self.known = tuple(known)
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         given = tuple(str(value).split(","))
         for name in given:
             if name not in self.known:
@@ -125,7 +127,7 @@ class White(click.ParamType):
 
     name = "WHITE"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         try:
             numbers = [float(part) for part in str(value).split(",")]
         except ValueError:

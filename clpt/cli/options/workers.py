@@ -20,7 +20,7 @@ class Where(click.ParamType):
 
     name = "ADDRESS"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> str:
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         text = str(value)
         if not re.fullmatch(rf"{LOCAL}[1-9]\d{{0,2}}|tls://.+:\d+", text):
             self.fail(f"{text!r} is neither tls://HOST:PORT nor local:N")

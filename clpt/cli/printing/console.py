@@ -14,7 +14,7 @@ def output_console() -> Console:
     return console if console.is_terminal else Console(width=200)
 
 
-def shown(value: Any) -> Text:
+def shown(value: object) -> Text:
     """Return a value of a table of facts: parts of a list have a line each.
 
     What a file says is no markup, and controls no terminal.
@@ -23,7 +23,7 @@ def shown(value: Any) -> Text:
     return Text("".join(c if c.isprintable() or c == "\n" else "\ufffd" for c in text))
 
 
-def _text(value: Any) -> str:
+def _text(value: object) -> str:
     if value is None or isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, dict):

@@ -29,7 +29,9 @@ class Frames(click.ParamType):
 
     name = "FIRST:LAST"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> range:
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> range:
         found = re.fullmatch(r"(\d{1,9})(?::(\d{1,9}))?(?::(\d{1,9}))?", str(value).strip())
         if not found:
             self.fail(f"{value!r} does not look like 1:240, 1:240:2 or 7", param, ctx)

@@ -29,7 +29,9 @@ class SampleRange(click.ParamType):
 
     name = "FIRST:END"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[int, int]:
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, int]:
         found = re.fullmatch(r"(\d{1,10}):(\d{1,10})", str(value).strip())
         if not found or not int(found[1]) < int(found[2]) <= MOST_SAMPLES:
             self.fail(f"{value!r} is no range of samples such as 0:1024", param, ctx)
@@ -42,7 +44,9 @@ class Duration(click.ParamType):
     name = "TIME"
     least = 1e-6
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> float:
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
         text = str(value).strip().lower()
         number = r"(\d+(?:\.\d+)?)"
         found = re.fullmatch(rf"(?:{number}h)?(?:{number}m)?(?:{number}s?)?", text)
@@ -66,7 +70,7 @@ class Address(click.ParamType):
 
     name = "HOST:PORT"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if not isinstance(value, str):
             return value
         from ... import tev  # here: help needs no numpy

@@ -74,22 +74,7 @@ def _encode(ffmpeg: str, path: Path, frames: Sequence[Path], fps: float) -> None
             start_new_session=True,  # Ctrl-C is for this process
         ) as process,
     ):  # fmt: skip
-        assert process.stdin is not None
-        try:
-            for frame in frames:
-                pixels = _read(frame)
-                if pixels.shape[:2] != (height, width):
-                    raise SceneError("frames of a video have one size", file=frame)
-                process.stdin.write(pixels.tobytes())
-                if stopped:
-                    break
-            process.stdin.close()
-        except BrokenPipeError:  # it ended, and says why
-            with suppress(OSError):
-                process.stdin.close()
-        except BaseException:
-            process.kill()
-            raise
+        _feed(process, frames, (height, width), stopped)
         while process.poll() is None and not stopped:
             time.sleep(LOOK)
         if stopped:
@@ -100,6 +85,31 @@ def _encode(ffmpeg: str, path: Path, frames: Sequence[Path], fps: float) -> None
             said.seek(0)
             lines = said.read().decode("utf-8", "replace").strip().splitlines()
             raise OSError(lines[-1] if lines else f"ffmpeg ended with status {process.returncode}")
+
+
+def _feed(
+    process: subprocess.Popen[bytes],
+    frames: Sequence[Path],
+    size: tuple[int, int],
+    stopped: Sequence[int],
+) -> None:
+    """Give ffmpeg the pixels of frames, until a signal has come; it ends if they cannot be read."""
+    assert process.stdin is not None
+    try:
+        for frame in frames:
+            pixels = _read(frame)
+            if pixels.shape[:2] != size:
+                raise SceneError("frames of a video have one size", file=frame)
+            process.stdin.write(pixels.tobytes())
+            if stopped:
+                break
+        process.stdin.close()
+    except BrokenPipeError:  # it ended, and says why
+        with suppress(OSError):
+            process.stdin.close()
+    except BaseException:
+        process.kill()
+        raise
 
 
 def _read(path: Path) -> np.ndarray:

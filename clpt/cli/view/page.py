@@ -12,6 +12,7 @@ from typing import Any
 
 import click
 
+from ... import device as dev
 from ...cluster.multi_renderer import MultiRenderer
 from ...formats import locate
 from ...scene import Scene
@@ -22,7 +23,6 @@ from ...view.saving import Folder
 from ...view.session import Session, Source
 from ...view.views import load as load_view
 from ..files import outputs, targets
-from ..opening.devices import kill_compilers
 from ..opening.scenes import Opened, open_scene
 from ..opening.workers import connected
 from ..options.grading import Grading
@@ -140,7 +140,7 @@ def _attend(session: Session, opened: Opened) -> int:
     if session.error is not None:
         raise session.error
     status = STATUS + stopped[0]
-    kill_compilers(opened.devices[:1])
+    dev.kill_compilers()
     if not session.close(CLOSE_SECONDS):
         os._exit(status)  # a driver compiles; nothing else ends it
     return status

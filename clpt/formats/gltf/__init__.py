@@ -57,16 +57,13 @@ def load(path: Path, missing: Missing = "error", /, **variables: Any) -> Scene:
     missing: see clpt.load. Raises SceneError with the JSON path of what is wrong.
     """
     if "shutter" in variables:
-        length = _seconds(path, variables["shutter"], "shutter")
+        length = _seconds(path, variables.pop("shutter"), "shutter")
         if not 0.0 <= length < float("inf"):
             raise SceneError(f"the shutter {length:g} s must be from zero", file=path)
-        time = _seconds(path, variables.get("time", 0.0))
-        others = {name: value for name, value in variables.items() if name != "shutter"}
+        time = _seconds(path, variables.pop("time", 0.0))
         if length > 0.0:
-            return motion.between(
-                lambda t: load(path, missing, **{**others, "time": t}), time, length
-            )
-        variables = {**others, "time": time}
+            return motion.between(lambda t: load(path, missing, **variables, time=t), time, length)
+        variables["time"] = time
     document, graph = _open(path, variables, missing)
     chosen = cameras.chosen(graph, _text(variables.get("camera")))
     shapes = meshes.shapes(graph)
@@ -146,7 +143,7 @@ def _check_extensions(document: Document) -> None:
             document.warn(f"extension {name} is not supported and left out")
 
 
-def _text(value: Any) -> str | None:
+def _text(value: object) -> str | None:
     return None if value is None else str(value)
 
 

@@ -54,7 +54,9 @@ class Element:
         """Warn of what is left out, once for each text."""
         self.document.warn(f"{self.json_path(key)}: {message}")
 
-    def integer(self, key: str, default: Any = REQUIRED, low: int = 0, high: int = LARGEST) -> int:
+    def integer(
+        self, key: str, default: object = REQUIRED, low: int = 0, high: int = LARGEST
+    ) -> int:
         """Return a whole number in [low, high]."""
         value = self._get(key, default)
         if value is default:
@@ -68,7 +70,7 @@ class Element:
         return value
 
     def number(
-        self, key: str, default: Any = REQUIRED, low: float = -math.inf, high: float = math.inf
+        self, key: str, default: object = REQUIRED, low: float = -math.inf, high: float = math.inf
     ) -> float:
         """Return a finite number in [low, high]."""
         value = self._get(key, default)
@@ -78,7 +80,7 @@ class Element:
         self,
         key: str,
         count: int | None = None,
-        default: Any = REQUIRED,
+        default: object = REQUIRED,
         low: float = -math.inf,
         high: float = math.inf,
     ) -> tuple[float, ...]:
@@ -90,7 +92,7 @@ class Element:
             raise self.error(f"must be {count or 'a list of'} numbers, not {_shown(value)}", key)
         return tuple(self._number(v, f"{key}[{i}]", low, high) for i, v in enumerate(value))
 
-    def text(self, key: str, default: Any = REQUIRED, choices: Iterable[str] = ()) -> str:
+    def text(self, key: str, default: object = REQUIRED, choices: Iterable[str] = ()) -> str:
         """Return a text, one of `choices` where some are given."""
         value = self._get(key, default)
         if value is default:
@@ -139,7 +141,7 @@ class Element:
         values = self.value.get(key, [])
         return [Element(self.document, f"{path}[{i}]", value) for i, value in enumerate(values)]
 
-    def index(self, key: str, table: str, default: Any = REQUIRED) -> int:
+    def index(self, key: str, table: str, default: object = REQUIRED) -> int:
         """Return an index into one of the document's lists, such as "accessors"."""
         value = self.integer(key, default)
         return value if value is default else self._in_table(value, key, table)
@@ -164,13 +166,13 @@ class Element:
         extensions = self.child("extensions")
         return None if extensions is None else extensions.child(name)
 
-    def _get(self, key: str, default: Any) -> Any:
+    def _get(self, key: str, default: object) -> Any:
         value = self.value.get(key, default)
         if value is REQUIRED:
             raise self.error(f"{key!r} is missing")
         return value
 
-    def _number(self, value: Any, key: str, low: float, high: float) -> float:
+    def _number(self, value: object, key: str, low: float, high: float) -> float:
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise self.error(f"must be a number, not {_shown(value)}", key)
         if abs(value) > 1e38:  # beyond what single precision holds; JSON's 1e999 is infinity
@@ -212,7 +214,7 @@ class Document:
         """Return an object of one of the lists at the top, such as meshes[2]."""
         return Element(self, f"{table}[{index}]", self.root.value[table][index])
 
-    def once(self, key: Any, make: Callable[[], T]) -> T:
+    def once(self, key: object, make: Callable[[], T]) -> T:
         """Return make(), called once for each key."""
         if key not in self._made:
             self._made[key] = make()
@@ -339,7 +341,7 @@ def _data(element: Element, key: str, uri: str) -> bytes:
         raise element.error("is a data URI with broken base64", key) from None
 
 
-def _shown(value: Any) -> str:
+def _shown(value: object) -> str:
     """A value in a message: short, on one line."""
     text = json.dumps(value) if not isinstance(value, int) or abs(value) < 10**40 else "that"
     return text if len(text) <= 60 else text[:56] + " ..."

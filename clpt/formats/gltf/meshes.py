@@ -17,7 +17,7 @@ from clpt.formats.gltf.document import Element
 from clpt.formats.gltf.geometry import Geometry
 from clpt.formats.gltf.nodes import Graph, compose
 from clpt.formats.gltf.primitives import geometry
-from clpt.formats.meshes.mesh import checked
+from clpt.formats.meshes.mesh import Arrays, checked
 from clpt.formats.meshes.triangles import TANGENTS
 from clpt.scene.lights import Area
 from clpt.scene.materials import Material, NormalMap
@@ -174,16 +174,15 @@ def _mesh(owner: Element, primitive: Element, made: Geometry) -> Mesh | None:
     surface = _surface(primitive, colours is not None)
     uvs, second = _uvs(primitive, made, surface)
     name = owner.text("name", "")
-    values = checked(
-        primitive.document.file,
-        name or primitive.path,
+    given = Arrays(
         arrays["POSITION"],
         made.faces,
         arrays.get("NORMAL"),
         uvs,
-        primitive.document.warnings,
         _attributes(colours, second, surface, len(arrays["POSITION"])) | _tangents(arrays, surface),
     )
+    document = primitive.document
+    values = checked(document.file, name or primitive.path, given, document.warnings)
     values["tangents"] = values["attributes"].pop(TANGENTS, None)
     if not len(values["faces"]):
         return None

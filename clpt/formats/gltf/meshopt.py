@@ -85,8 +85,7 @@ def _groups(
     groups = -(-count // GROUP)
     where, bits = np.zeros((stride, groups), np.int64), np.zeros((stride, groups), np.int8)
     values = stream.tolist()
-    sentinels = {n: _sentinels(stream, n) for n in (1, 2, 4)}
-    at = 1
+    sentinels, at = {n: _sentinels(stream, n) for n in (1, 2, 4)}, 1
     for first in range(0, groups, block // GROUP):
         here = min(block // GROUP, groups - first)
         control = values[at : at + stride // 4] if version else ()

@@ -99,54 +99,61 @@ def has_area(mesh: Mesh) -> bool:
     return False
 
 
-def checked(
-    path: Path | None,
-    name: str,
-    vertices: NDArray[Any],
-    faces: NDArray[Any],
-    normals: NDArray[Any] | None,
-    uvs: NDArray[Any] | None,
-    warnings: list[str],
-    attributes: Mapping[str, NDArray[Any]] | None = None,
-) -> dict[str, Any]:
-    """Return a mesh's arrays without unused vertices; `warnings` get what else was left out.
+@dataclass(frozen=True)
+class Arrays:
+    """The arrays of a mesh in a file: vertices (n, 3), faces (m, 3), normals (n, 3), uvs (n, 2).
 
-    Triangles without an area stay: lowering leaves them out. attributes: further arrays (n, width),
-    one row a vertex, or a face where face_ begins the name.
-
-    Raises SceneError for indices out of range and vertices that are not finite.
+    attributes: further ones (n, width), one row a vertex, or a face where face_ begins the name.
     """
-    where = name or None
-    if len(faces) and (faces.min() < 0 or faces.max() >= len(vertices)):
-        bad = int(np.argmax(((faces < 0) | (faces >= len(vertices))).any(axis=1)))
-        message = f"triangle {bad} names a vertex outside 0 to {len(vertices) - 1}"
-        raise SceneError(message, file=path, where=where)
-    with np.errstate(over="ignore", invalid="ignore"):
-        points = np.ascontiguousarray(vertices, np.float32)
-        finite = np.isfinite(points).all(axis=1)
+
+    vertices: NDArray[Any]
+    faces: NDArray[Any]
+    normals: NDArray[Any] | None = None
+    uvs: NDArray[Any] | None = None
+    attributes: Mapping[str, NDArray[Any]] | None = None
+
+
+def _fault(faces: NDArray[Any], finite: NDArray[np.bool_]) -> str:
+    """Say which triangle has no vertices; finite (n,): of each vertex whether it is."""
+    if len(faces) and (faces.min() < 0 or faces.max() >= len(finite)):
+        bad = int(np.argmax(((faces < 0) | (faces >= len(finite))).any(axis=1)))
+        return f"triangle {bad} names a vertex outside 0 to {len(finite) - 1}"
     good = np.take(finite, faces.reshape(-1)).reshape(-1, 3).all(axis=1)
     if not good.all():
-        message = f"triangle {int(np.argmin(good))} has a vertex that is not a finite number"
-        raise SceneError(message, file=path, where=where)
+        return f"triangle {int(np.argmin(good))} has a vertex that is not a finite number"
+    return ""
+
+
+def checked(path: Path | None, name: str, given: Arrays, warnings: list[str]) -> dict[str, Any]:
+    """Return a mesh's arrays without unused vertices; `warnings` get what else was left out.
+
+    Triangles without an area stay: lowering leaves them out. Raises SceneError for indices out of
+    range and vertices that are not finite.
+    """
+    faces = given.faces
+    with np.errstate(over="ignore", invalid="ignore"):
+        points = np.ascontiguousarray(given.vertices, np.float32)
+        finite = np.asarray(np.isfinite(points).all(axis=1))
+    if fault := _fault(faces, finite):
+        raise SceneError(fault, file=path, where=name or None)
     used = np.zeros(len(points), bool)
     used[faces.reshape(-1)] = True
-    arrays: dict[str, Any] = {"vertices": points, "normals": normals, "uvs": uvs}
-    own = dict(attributes or {})
+    arrays: dict[str, Any] = {"vertices": points, "normals": given.normals, "uvs": given.uvs}
+    own = dict(given.attributes or {})
     if not used.all():
         arrays = {key: None if a is None else a[used] for key, a in arrays.items()}
         own = {k: a if k.startswith("face_") else a[used] for k, a in own.items()}
         faces = (np.cumsum(used) - 1)[faces]
-    normals, uvs = arrays["normals"], arrays["uvs"]
-    if normals is not None:
+    if (normals := arrays["normals"]) is not None:
         arrays["normals"] = _usable_normals(arrays["vertices"], faces, normals)
-    if uvs is not None and not np.isfinite(uvs).all():
+    if (uvs := arrays["uvs"]) is not None and not np.isfinite(uvs).all():
         warnings.append(f"{name or 'mesh'}: left out texture coordinates that are not finite")
         arrays["uvs"] = None
     whole = {**arrays, "faces": np.ascontiguousarray(faces, np.uint32)}
     held = [a for a in (*whole.values(), *own.values()) if a is not None]
     budget.take(sum(a.nbytes for a in held), f"the mesh {name!r}" if name else "a mesh", path)
     budget.take_parts(1, "meshes", path)
-    return whole if attributes is None else {**whole, "attributes": own}
+    return whole if given.attributes is None else {**whole, "attributes": own}
 
 
 def _meshes(path: Path, made: Triangles, materials: bool, warnings: list[str]) -> list[Mesh]:
@@ -161,7 +168,8 @@ def _meshes(path: Path, made: Triangles, materials: bool, warnings: list[str]) -
 
 def _plain(path: Path, made: Triangles, materials: bool, warnings: list[str]) -> Mesh | None:
     name, own = made.name or path.name, attributes(made)
-    arrays = checked(path, name, made.vertices, made.faces, made.normals, made.uvs, warnings, own)
+    given = Arrays(made.vertices, made.faces, made.normals, made.uvs, own)
+    arrays = checked(path, name, given, warnings)
     if not len(arrays["faces"]):
         return None
     material = _coloured(own) if materials else GREY
@@ -221,9 +229,8 @@ def _obj(path: Path, library: mtl.Library | None, warnings: list[str]) -> list[M
         label = contents.materials[part.material] if part.material >= 0 else ""
         own = _vertex_colours(part.colours, scale, warnings)
         name = label if label and len(parts) > 1 else path.name
-        arrays = checked(
-            path, name, part.vertices, part.faces, part.normals, part.uvs, warnings, own
-        )
+        given = Arrays(part.vertices, part.faces, part.normals, part.uvs, own)
+        arrays = checked(path, name, given, warnings)
         material, emission = _coloured(own) if library is not None else GREY, None
         if library is not None and label:
             if (known := library.known(label)) is None:
@@ -236,12 +243,16 @@ def _obj(path: Path, library: mtl.Library | None, warnings: list[str]) -> list[M
     if bare := sum(part.bare for part in parts):
         warnings.append(f"{bare} triangles have no texture coordinates; (0, 0) stands for them")
     if unknown:
-        names = ", ".join(map(repr, unknown[:MOST_TOLD]))
-        more = f" and {len(unknown) - MOST_TOLD} more" if len(unknown) > MOST_TOLD else ""
-        warnings.append(f"no library holds the material {names}{more}; grey stands for it")
+        warnings.append(f"no library holds the material {_some(unknown)}; grey stands for it")
     if library is not None:
         warnings += library.warnings()
     return made
+
+
+def _some(names: list[str]) -> str:
+    """The first names of a list, and how many more there are."""
+    more = f" and {len(names) - MOST_TOLD} more" if len(names) > MOST_TOLD else ""
+    return ", ".join(map(repr, names[:MOST_TOLD])) + more
 
 
 def _is_image(texture: Texture) -> bool:

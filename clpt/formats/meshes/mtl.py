@@ -39,6 +39,7 @@ from clpt.scene.materials import (
     parts,
 )
 from clpt.scene.textures import Bitmap, Product
+from clpt.scene.values import Textured
 from clpt.spectra import Spectrum, Tabulated
 
 WHITE, BLACK, UNSAID = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0), (0.6, 0.6, 0.6)
@@ -225,7 +226,7 @@ class _Maker:
                 self.remark(f"illum {model} is glass where Ni is above 1, which it is not")
         if model in (0, 1):
             self.used.add("map_ks")
-            gloss: Any = BLACK
+            gloss: Textured = BLACK
         else:
             mirrors = model in (*MIRRORS, 5)
             gloss = self.reflectance("ks", "map_ks", WHITE if mirrors else BLACK)
@@ -243,6 +244,10 @@ class _Maker:
                 int_ior=self.index(COAT),
                 name=self.name,
             )
+        return self.glossy(diffuse, gloss)
+
+    def glossy(self, diffuse: Textured, gloss: Textured) -> Material:
+        """Return a material with a highlight, as wide as Ns says."""
         alpha = self.alpha()
         if diffuse == BLACK:
             return RoughConductor(
@@ -290,7 +295,7 @@ class _Maker:
         passed = self.reflectance("tf", None, WHITE)
         return Dielectric(int_ior=index, ext_ior=1.0, specular_transmittance=passed, name=self.name)
 
-    def mirror(self, diffuse: Any, gloss: Any) -> Material:
+    def mirror(self, diffuse: Textured, gloss: Textured) -> Material:
         """Return Kd scattered and Ks mirrored; what exceeds 1 in sum is taken off Kd."""
         if diffuse == BLACK:
             return Conductor(specular_reflectance=gloss, name=self.name)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from clpt import budget, input_files, text
 from clpt.arrays import Bytes, Floats32, Integers
@@ -373,7 +373,7 @@ def _cut(plain: Bytes, lines: _Lines, own: Integers) -> bytes:
     return b"".join([view[a:b] for a, b in zip(begins, ends, strict=True)])
 
 
-def _parsed(cut: bytes, letters: bytes, dtype: Any, count: int) -> NDArray[Any] | None:
+def _parsed(cut: bytes, letters: bytes, dtype: DTypeLike, count: int) -> NDArray[Any] | None:
     """Return all numbers of a text; None where it does not hold `count` of them alone."""
     if not count:
         return np.zeros(0, dtype)

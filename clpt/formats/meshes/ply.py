@@ -6,6 +6,7 @@ photogrammetry has them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -158,6 +159,6 @@ def _plain(table: dict[str, Any]) -> dict[str, NDArray[Any]]:
     return {name: values for name, values in table.items() if isinstance(values, np.ndarray)}
 
 
-def _columns(table: dict[str, Any], names: Any) -> NDArray[np.float32]:
+def _columns(table: dict[str, Any], names: Sequence[str]) -> NDArray[np.float32]:
     with np.errstate(over="ignore", invalid="ignore"):
         return np.stack([np.asarray(table[name], np.float32) for name in names], axis=1)

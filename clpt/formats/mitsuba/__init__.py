@@ -23,6 +23,7 @@ from clpt.formats.mitsuba.spectra import texture
 from clpt.formats.mitsuba.xml import Document, Element, parse
 from clpt.scene import Scene, integrators
 from clpt.scene.framing import framing_camera, world_bounds
+from clpt.scene.integrators import Film, Integrator
 from clpt.scene.media import Medium
 from clpt.scene.shapes import Instance, Shape
 
@@ -65,6 +66,15 @@ def _parts(shape: Shape) -> tuple[Shape, ...]:
     return shape.group.shapes if isinstance(shape, Instance) else (shape,)
 
 
+def _with_layers(film: Film, how: Integrator, props: Properties, context: Context) -> Film:
+    """A film with the layers of the file's aovs, if the integrator can have any."""
+    if context.layers and isinstance(how, integrators.HAVE_LAYERS):
+        return replace(film, layers=(*context.layers,))
+    if context.layers:
+        context.warn(props.element, f"the integrator {how.kind} has no layers: aovs are left out")
+    return film
+
+
 def _scene(path: Path, document: Document, context: Context) -> Scene:
     props = Properties(document.root, context)
     shapes = shapes_of(props.objects("shape"), context)
@@ -87,17 +97,13 @@ def _scene(path: Path, document: Document, context: Context) -> Scene:
     camera = framing_camera(shapes) if first is None else first.camera
     how = _default() if integrator is None else sensors.integrator(integrator, context)
     film = sensors.default_film() if first is None else first.film
-    if context.layers and isinstance(how, integrators.HAVE_LAYERS):
-        film = replace(film, layers=(*context.layers,))
-    elif context.layers:
-        context.warn(props.element, f"the integrator {how.kind} has no layers: aovs are left out")
     return Scene(
         camera=camera,
         shapes=shapes,
         lights=lights,
         integrator=how,
         sampler=integrators.Sobol(),
-        film=film,
+        film=_with_layers(film, how, props, context),
         spp=4 if first is None else first.spp,
         seed=0 if first is None else first.seed,
         name=path.stem,

@@ -28,7 +28,7 @@ from clpt.formats.mitsuba.spectra import (
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene import materials
 from clpt.scene.materials import Material
-from clpt.scene.params import params
+from clpt.scene.params import defaults, params
 from clpt.scene.textures import Bitmap, Product, Texture
 from clpt.spectra import Constant, RGBUnbounded, Spectrum
 
@@ -214,13 +214,12 @@ def _polarizing(share: float) -> Callable[[Properties], Parameters]:
 def _grating(props: Properties) -> Parameters:
     """Ours, see docs/mitsuba_plugins.md: names are those of clpt.scene.materials.Grating."""
     kind = materials.Grating
-    declared = params(kind)
+    declared, usual = params(kind), defaults(kind)
     given: Parameters = {
-        name: props.text(name, getattr(kind, name), declared[name].choices)
-        for name in ("mode", "profile")
+        name: props.text(name, usual[name], declared[name].choices) for name in ("mode", "profile")
     }
     for name in ("period", "angle", "depth", "fill"):
-        given[name] = real(props, name, getattr(kind, name))
+        given[name] = real(props, name, usual[name])
     given["orders"] = float(props.integer("orders", int(kind.orders)))
     child = props.take("efficiencies")
     if child is not None:

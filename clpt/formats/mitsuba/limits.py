@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from clpt.formats.mitsuba.properties import Properties
-from clpt.scene.params import ROUNDING, Param, params
+from clpt.scene.params import params
+from clpt.scene.roles import INDEX, ROUNDING, Param
 from clpt.spectra import RGB, Constant, RGBIlluminant, RGBUnbounded, Tabulated
 
 COLOURS = (RGB, RGBUnbounded, RGBIlluminant)
@@ -27,7 +28,7 @@ def within(cls: type, values: dict[str, Any], props: Properties) -> dict[str, An
             made[name] = _bent(values[name], param)
             if made[name] is not values[name]:
                 limits = f"{param.low:g} to {param.high:g}"
-                meant = "its size counts" if param.role == "index" else "it is clamped"
+                meant = "its size counts" if param.role is INDEX else "it is clamped"
                 props.context.warn(props.element, f"{name} is outside {limits}; {meant}")
     return made
 
@@ -57,5 +58,5 @@ def _numbers(values: Any, param: Param) -> list[float] | None:
     given = np.asarray(values, np.float64)
     if ((given >= param.low - ROUNDING) & (given <= param.high + ROUNDING)).all():
         return None
-    made = np.abs(given) if param.role == "index" else np.clip(given, param.low, param.high)
+    made = np.abs(given) if param.role is INDEX else np.clip(given, param.low, param.high)
     return [float(value) for value in made]

@@ -131,12 +131,12 @@ def _on_grid(
     """A medium whose density is on a grid, and perhaps its albedo, or the share of its phases."""
     beside = [one for one in (tint, share) if one is not None]
     made = dict(given)
-    colours = made.get("colour_grid")
+    colours = made.get("color_grid")
     if beside:
         found = grids.together(made["density"], *beside, *([] if colours is None else [colours]))
         made["density"] = found[0]
         if colours is not None:
-            made["colour_grid"] = found[-1]
+            made["color_grid"] = found[-1]
         tint = None if tint is None else found[1]
         share = None if share is None else found[len(beside)]
     if tint is not None:
@@ -216,7 +216,7 @@ def _heterogeneous(props: Properties) -> Medium:
     given = {
         "sigma_t": medium.sigma_t if sigma_t is None else factor,
         "density": density,
-        "colour_grid": colours,
+        "color_grid": colours,
     }
     return _on_grid(medium, given, tint, share, **more)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -78,7 +78,7 @@ class Context:
             raise element.error(f"there is no object with the id {name!r}")
         return self.ids[name]
 
-    def once(self, element: Element, make: Any) -> Any:
+    def once(self, element: Element, make: Callable[[Element], Any]) -> Any:
         """Return make(element), the same object for every reference to the element.
 
         Raises SceneError where it refers to itself, or is nested too deep.

@@ -83,7 +83,8 @@ def read(path: Path, index: int) -> tuple[Mesh, bool, list[str]]:
     wide = "<u8" if n_vertices > 0xFFFFFFFF else "<u4"
     faces = stream.array(n_faces, 3, wide)
     warnings: list[str] = []
-    arrays = mesh.checked(path, name, vertices, faces, normals, uvs, warnings, own)
+    given = mesh.Arrays(vertices, faces, normals, uvs, own)
+    arrays = mesh.checked(path, name, given, warnings)
     if not len(arrays["faces"]):
         raise SceneError("holds no triangles", file=path)
     return Mesh(name=name, **arrays), bool(flags & FLAT), warnings

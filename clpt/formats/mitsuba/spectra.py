@@ -24,6 +24,7 @@ from clpt.formats.mitsuba.properties import (
     unknown,
 )
 from clpt.formats.mitsuba.xml import Element
+from clpt.scene.roles import COEFFICIENT, EMISSION, FACTOR, INDEX, REFLECTANCE, Spectral
 from clpt.scene.textures import ATTRIBUTES, Bitmap, Checkerboard, MeshAttribute, Product, Texture
 from clpt.spectra import (
     LED,
@@ -38,6 +39,7 @@ from clpt.spectra import (
     Spectrum,
     Tabulated,
 )
+from clpt.spectra.spectrum import Outside
 
 LUMINANCE = (0.212671, 0.715160, 0.072169)  # of Rec. 709, as Mitsuba has it
 VOLUMES = ("constvolume", "gridvolume")
@@ -46,30 +48,30 @@ TOP_DOWN = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
 
 def reflectance(props: Properties, name: str, default: float) -> Any:
     """Take a reflectance: a number, a colour, a spectrum or a texture."""
-    return _take(props, name, "reflectance", default)
+    return _take(props, name, REFLECTANCE, default)
 
 
 def emission(props: Properties, name: str, *, textured: bool = False) -> Any:
     """Take an emitted spectrum, D65 where none is given."""
-    value = _take(props, name, "emission", RGBIlluminant(1.0, 1.0, 1.0))
+    value = _take(props, name, EMISSION, RGBIlluminant(1.0, 1.0, 1.0))
     if isinstance(value, Texture) and not textured:
         raise props.element.error(f"{name!r} cannot be a texture")
     return value
 
 
-def index(props: Properties, name: str, default: Any) -> Any:
+def index(props: Properties, name: str, default: object) -> Any:
     """Take an optical constant of a conductor: a number, a colour, a spectrum or a texture."""
-    return _take(props, name, "index", default)
+    return _take(props, name, INDEX, default)
 
 
-def factor(props: Properties, name: str, default: Any) -> Any:
+def factor(props: Properties, name: str, default: object) -> Any:
     """Take a spectrum without limits: a number, a colour, a spectrum or a texture."""
-    return _take(props, name, "factor", default)
+    return _take(props, name, FACTOR, default)
 
 
 def coefficient(props: Properties, name: str, default: float = 0.0) -> Any:
     """Take a coefficient of a medium [1/m]: a number, a colour or a spectrum."""
-    value = _take(props, name, "coefficient", default)
+    value = _take(props, name, COEFFICIENT, default)
     if isinstance(value, Texture):
         raise props.element.error(f"{name!r} cannot be a texture")
     if type(value) is RGBUnbounded and max(value.r, value.g, value.b) <= 1.0:
@@ -84,7 +86,7 @@ def ior(props: Properties, name: str, default: str) -> Any:
         return spectra.glass(default, dispersion=False)
     if child.tag == "spectrum":
         with child.locating():
-            return _spectrum(child, "index", props, name)
+            return _spectrum(child, INDEX, props, name)
     if child.tag == "string":
         with child.locating():
             return spectra.glass(child.attribute("value"), dispersion=False)
@@ -98,7 +100,7 @@ def real(props: Properties, name: str, default: float) -> float | Texture:
         return default
     target = props.context.resolve(child)
     with target.locating():
-        made = _value(target, "factor", props, name)
+        made = _value(target, FACTOR, props, name)
     if isinstance(made, Constant):
         return made.value
     if isinstance(made, RGBUnbounded):
@@ -110,7 +112,7 @@ def real(props: Properties, name: str, default: float) -> float | Texture:
     return made
 
 
-def _take(props: Properties, name: str, role: str, default: Any) -> Any:
+def _take(props: Properties, name: str, role: Spectral, default: object) -> Any:
     child = props.take(name)
     if child is None:
         return default
@@ -119,7 +121,7 @@ def _take(props: Properties, name: str, role: str, default: Any) -> Any:
         return _value(target, role, props, name)
 
 
-def _value(element: Element, role: str, props: Properties, name: str) -> Any:
+def _value(element: Element, role: Spectral, props: Properties, name: str) -> Any:
     """Make a colour, a spectrum or a texture; Mitsuba writes the last two alike."""
     if element.tag == "volume":
         return _volume(element, role, props.context)
@@ -130,7 +132,7 @@ def _value(element: Element, role: str, props: Properties, name: str) -> Any:
     return _spectrum(element, role, props, name)
 
 
-def _held(element: Element, role: str, context: Context) -> Any:
+def _held(element: Element, role: Spectral, context: Context) -> Any:
     """Make the value of the volume that a <texture type="volume"> holds."""
     outer = Properties(element, context)
     child = outer.take("volume")
@@ -143,7 +145,7 @@ def _held(element: Element, role: str, context: Context) -> Any:
     return _volume(volume, role, context)
 
 
-def _volume(element: Element, role: str, context: Context) -> Any:
+def _volume(element: Element, role: Spectral, context: Context) -> Any:
     """Make the value of a constant volume."""
     if element.type == "gridvolume":
         raise element.error("a grid cannot stand here: only that of a medium is read")
@@ -156,23 +158,23 @@ def _volume(element: Element, role: str, context: Context) -> Any:
     return 1.0 if value is None else _spectrum(context.resolve(value), role, props, "value")
 
 
-def _spectrum(child: Element, role: str, props: Properties, name: str) -> Any:
+def _spectrum(child: Element, role: Spectral, props: Properties, name: str) -> Any:
     """Make a number, a colour or a spectrum; what lies beyond limits is left to `within`."""
     if child.tag in ("float", "integer"):
         value = number(child)
-        return colour(role, [value] * 3) if role == "emission" else value
+        return colour(role, [value] * 3) if role is EMISSION else value
     if child.tag in ("rgb", "srgb"):
         return colour(role, _colour(child))
     if child.tag not in ("spectrum", "texture"):
         raise child.error("must be a number, a colour, a spectrum or a texture")
     if child.type:
         return _plugin(child, role, props)
-    outside: Any = "hold" if role in ("index", "coefficient") else "zero"
+    outside: Outside = "hold" if role.measured else "zero"
     if "filename" in child.attributes:
         path = props.context.document.find_file(child, child.attributes["filename"])
-        if role == "index":
+        if role is INDEX:
             return spectra.read_index(path, "k" if name == "k" else "eta")
-        if role == "coefficient":
+        if role is COEFFICIENT:
             return spectra.read_absorption(path)
         return spectra.read_table(path, outside)
     text = child.attribute("value")
@@ -238,7 +240,7 @@ def _d65(props: Properties) -> Any:
     child = props.take("color")
     rgb = _colour(child) if child is not None else [1.0, 1.0, 1.0]
     scale = props.number("scale", 1.0)
-    return colour("emission", [scale * value for value in rgb])
+    return colour(EMISSION, [scale * value for value in rgb])
 
 
 def _srgb(props: Properties) -> Spectrum:
@@ -330,13 +332,13 @@ PLUGINS: dict[str, Callable[[Properties], Any]] = {
 }
 
 
-def _plugin(child: Element, role: str, outer: Properties) -> Any:
+def _plugin(child: Element, role: Spectral, outer: Properties) -> Any:
     if child.type not in PLUGINS:
         raise unknown(child, PLUGINS)
     props = Properties(child, outer.context)
     made = PLUGINS[child.type](props)
     props.finish()
-    if role == "reflectance" and type(made) is RGBUnbounded:
+    if role is REFLECTANCE and type(made) is RGBUnbounded:
         return made.r, made.g, made.b
     return made
 

@@ -1,6 +1,6 @@
 """Forms of parameters in scene.json: how each is read, written, and described.
 
-FORMS has an entry for each role and for each form of a host parameter (`clpt.scene.params`).
+FORMS has an entry for each role (`clpt.scene.roles`), by its name.
 """
 
 from __future__ import annotations
@@ -20,9 +20,14 @@ from clpt.formats.native.cursor import Cursor
 from clpt.formats.native.json_schema import NUMBER, NUMBERS, STRING, TRIPLE, Schema, ref
 from clpt.formats.native.spectra import kind_name
 from clpt.formats.native.transforms import matrix
+from clpt.measured import Measurement, MerlTable
 from clpt.scene import kinds
-from clpt.scene.params import ORDERS, SPECTRUM_ROLES, Kind, Param
-from clpt.scene.shapes import SMOOTH
+from clpt.scene.materials import Layer, Material
+from clpt.scene.media import Medium
+from clpt.scene.motion import Deformation
+from clpt.scene.params import Kind
+from clpt.scene.roles import FACTOR, ORDERS, REFLECTANCE, SPECTRA, Param, Spectral
+from clpt.scene.shapes import SMOOTH, Group
 from clpt.scene.textures import ATTRIBUTES, Texture
 from clpt.spectra.spaces import TEMPERATURES
 
@@ -46,15 +51,15 @@ class Writer(Protocol):
     """A writer of the parts of a scene that a parameter can hold or refer to."""
 
     def kind(self, value: Kind) -> Any: ...
-    def layer(self, value: Any) -> Any: ...
-    def material(self, value: Any) -> Any: ...
-    def deformation(self, value: Any) -> Any: ...
-    def medium(self, value: Any) -> Any: ...
-    def group(self, value: Any) -> Any: ...
+    def layer(self, value: Layer) -> Any: ...
+    def material(self, value: Material) -> Any: ...
+    def deformation(self, value: Deformation) -> Any: ...
+    def medium(self, value: Medium) -> Any: ...
+    def group(self, value: Group) -> Any: ...
     def image(self, value: Any) -> Any: ...
     def volume(self, value: Any) -> Any: ...
-    def measurement(self, value: Any) -> Any: ...
-    def merl(self, value: Any) -> Any: ...
+    def measurement(self, value: Measurement) -> Any: ...
+    def merl(self, value: MerlTable) -> Any: ...
 
 
 def plain(value: Any) -> Any:
@@ -79,7 +84,7 @@ class Form:
 
 def form_of(param: Param) -> Form:
     """Return the form of a parameter."""
-    return FORMS[param.form or param.role]
+    return FORMS[param.role.name]
 
 
 def read(cursor: Cursor, param: Param, reader: Reader) -> Any:
@@ -120,9 +125,9 @@ def _of_cursor(
     return Form(words, schema, lambda cursor, _: read(cursor))
 
 
-def _spectrum(role: str) -> Form:
+def _spectrum(role: Spectral) -> Form:
     return Form(
-        role,
+        role.name,
         lambda param: ref(f"spectrum_{_limits_of(param)}"),
         lambda cursor, _: json_spectra.read(cursor, role),
         # a default may be given as a number or three
@@ -136,7 +141,8 @@ def _spectrum(role: str) -> Form:
 
 def _limits_of(param: Param) -> str:
     """The role whose limits a spectrum has."""
-    return "factor" if param.role == "reflectance" and math.isinf(param.high) else param.role
+    limited = param.role is not REFLECTANCE or math.isfinite(param.high)
+    return (param.role if limited else FACTOR).name
 
 
 def _rows(width: int, item: str = "number") -> Form:
@@ -261,7 +267,7 @@ NAME_OF_MATERIAL: Schema = {**STRING, "description": "a name in the scene's mate
 
 FORMS: dict[str, Form] = {
     # roles
-    **{role: _spectrum(role) for role in SPECTRUM_ROLES},
+    **{role.name: _spectrum(role) for role in SPECTRA},
     "flag": _of_cursor("true or false", BOOLEAN, lambda cursor: cursor.value),
     "choice": Form(
         _choice_words,

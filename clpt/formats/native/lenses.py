@@ -11,6 +11,7 @@ from clpt.formats.native.json_schema import NUMBER, NUMBERS, STRING, Schema, obj
 from clpt.formats.native.spectra import find_file
 from clpt.lenses import Coat, Prescription, Surface
 from clpt.lenses.glasses import by_number
+from clpt.scene.roles import INDEX
 from clpt.spectra import Constant, Spectrum
 
 WORDS = (
@@ -65,13 +66,13 @@ def _glass(cursor: Cursor) -> Spectrum:
     if isinstance(cursor.value, list) and len(cursor.value) == 2:
         with cursor.locating():
             return by_number(*cursor.numbers(2))
-    found = json_spectra.read(cursor, "index")
+    found = json_spectra.read(cursor, INDEX)
     return Constant(found) if isinstance(found, (int, float)) else spectra.index(found)
 
 
 def _coat(cursor: Cursor) -> Coat:
     cursor.check_keys("film", ("index", "thickness"), ("index", "thickness"))
-    found = json_spectra.read(cursor.at("index"), "index")
+    found = json_spectra.read(cursor.at("index"), INDEX)
     index = Constant(found) if isinstance(found, (int, float)) else spectra.index(found)
     return Coat(index, cursor.at("thickness").number())
 
@@ -80,18 +81,19 @@ def write(lens: Prescription | str) -> Any:
     """Return what stands for a lens in JSON, such that `read` gives it back."""
     if isinstance(lens, str):
         return lens
-    texts = {k: getattr(lens, k) for k in ("name", "source") if getattr(lens, k)}
-    return {**texts, "surfaces": [_written(surface) for surface in lens.surfaces]}
+    texts = {"name": lens.name, "source": lens.source}
+    told = {key: text for key, text in texts.items() if text}
+    return {**told, "surfaces": [_written(surface) for surface in lens.surfaces]}
 
 
 def _written(surface: Surface) -> dict[str, Any]:
     made: dict[str, Any] = {k: getattr(surface, k) for k in LENGTHS}
-    made["glass"] = json_spectra.write(surface.glass, "index")
+    made["glass"] = json_spectra.write(surface.glass, INDEX)
     if surface.aspheric:
         made["aspheric"] = list(surface.aspheric)
     if surface.coating:
         made["coating"] = [
-            {"index": json_spectra.write(film.index, "index"), "thickness": film.thickness}
+            {"index": json_spectra.write(film.index, INDEX), "thickness": film.thickness}
             for film in surface.coating
         ]
     if surface.stop:

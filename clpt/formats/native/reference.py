@@ -11,7 +11,6 @@ import json
 import sys
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -247,7 +246,7 @@ def _table(cls: type[Kind]) -> str:
     return "\n".join(rows) + "\n"
 
 
-def _shown(value: Any) -> str:
+def _shown(value: object) -> str:
     if value is None:
         return "-"
     if isinstance(value, np.ndarray):

@@ -8,6 +8,7 @@ from clpt import spectra
 from clpt.formats.native import spectra as json_spectra
 from clpt.formats.native.cursor import Cursor
 from clpt.formats.native.spectra import find_file, kind_name
+from clpt.scene.roles import REFLECTANCE
 from clpt.spectra import Constant, Donaldson, Fluorophore, Reradiation, Spectrum
 
 RERADIATIONS: dict[str, type[Reradiation]] = {"fluorophore": Fluorophore, "donaldson": Donaldson}
@@ -38,7 +39,7 @@ def read(cursor: Cursor) -> Reradiation | None:
 
 
 def _spectrum(cursor: Cursor) -> Spectrum:
-    value = json_spectra.read(cursor, "reflectance")
+    value = json_spectra.read(cursor, REFLECTANCE)
     return Constant(value) if isinstance(value, float) else value
 
 
@@ -47,8 +48,8 @@ def write(value: Reradiation | None) -> Any:
     if isinstance(value, Fluorophore):
         return {
             "type": "fluorophore",
-            "absorption": json_spectra.write(value.absorption, "reflectance"),
-            "emission": json_spectra.write(value.emission, "reflectance"),
+            "absorption": json_spectra.write(value.absorption, REFLECTANCE),
+            "emission": json_spectra.write(value.emission, REFLECTANCE),
             "quantum_yield": value.quantum_yield,
         }
     if isinstance(value, Donaldson):

@@ -27,8 +27,9 @@ from clpt.formats.native.json_schema import (
 from clpt.formats.native.reradiation import RERADIATIONS
 from clpt.formats.native.shape_files import FILES
 from clpt.formats.native.spectra import HEX, HEX_ROLES, SPECTRA
-from clpt.scene import KINDS, integrators, materials
-from clpt.scene.params import SPECTRUM_ROLES, Kind, Param, defaults, params
+from clpt.scene import KINDS, integrators, materials, roles
+from clpt.scene.params import Kind, defaults, params
+from clpt.scene.roles import Param, Role
 
 ANY_OF_SCALE = {"anyOf": [NUMBER, TRIPLE]}
 
@@ -36,7 +37,7 @@ ANY_OF_SCALE = {"anyOf": [NUMBER, TRIPLE]}
 def schema() -> Schema:
     """Return the JSON Schema (draft 2020-12) of a scene.json."""
     defs: Schema = {category: _category(category) for category in KINDS}
-    defs |= {f"spectrum_{role}": _spectrum(role) for role in SPECTRUM_ROLES}
+    defs |= {f"spectrum_{role.name}": _spectrum(role) for role in roles.SPECTRA}
     defs["reradiation"] = _reradiation()
     defs |= {
         "spectrum": _typed_spectra(),
@@ -46,7 +47,7 @@ def schema() -> Schema:
         "shutter": motion.SHUTTER_SCHEMA,
         "transform": _transform(),
     }
-    film, defs["layer"] = _untyped(integrators.Film), _untyped(materials.Layer)
+    defs["layer"] = _untyped(materials.Layer)
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "clpt scene",
@@ -54,31 +55,36 @@ def schema() -> Schema:
         "type": "object",
         "additionalProperties": False,
         "required": ["camera"],
-        "properties": {
-            "$schema": STRING,
-            "name": STRING,
-            "camera": ref("camera"),
-            "film": film,
-            "integrator": ref("integrator"),
-            "sampler": ref("sampler"),
-            "materials": {"type": "object", "additionalProperties": ref("material")},
-            "media": {"type": "object", "additionalProperties": ref("medium")},
-            "groups": {
-                "type": "object",
-                "additionalProperties": {"type": "array", "items": ref("shape")},
-                "description": "shapes that instances place together",
-            },
-            "shapes": {"type": "array", "items": ref("shape")},
-            "lights": {"type": "array", "items": ref("light")},
-            "spp": {"type": "integer", "minimum": 1, "description": "samples of a pixel"},
-            "noise": {
-                "type": "number",
-                "exclusiveMinimum": 0,
-                "description": "below which a pixel gets no more samples",
-            },
-            "seed": {"type": "integer", "description": "of the random numbers"},
-        },
+        "properties": _properties(),
         "$defs": defs,
+    }
+
+
+def _properties() -> Schema:
+    """The entries of a scene."""
+    return {
+        "$schema": STRING,
+        "name": STRING,
+        "camera": ref("camera"),
+        "film": _untyped(integrators.Film),
+        "integrator": ref("integrator"),
+        "sampler": ref("sampler"),
+        "materials": {"type": "object", "additionalProperties": ref("material")},
+        "media": {"type": "object", "additionalProperties": ref("medium")},
+        "groups": {
+            "type": "object",
+            "additionalProperties": {"type": "array", "items": ref("shape")},
+            "description": "shapes that instances place together",
+        },
+        "shapes": {"type": "array", "items": ref("shape")},
+        "lights": {"type": "array", "items": ref("light")},
+        "spp": {"type": "integer", "minimum": 1, "description": "samples of a pixel"},
+        "noise": {
+            "type": "number",
+            "exclusiveMinimum": 0,
+            "description": "below which a pixel gets no more samples",
+        },
+        "seed": {"type": "integer", "description": "of the random numbers"},
     }
 
 
@@ -114,10 +120,8 @@ def _parameter(param: Param, default: Any) -> Schema:
     """The values of a parameter, with its description and its default."""
     doc = f"{param.doc} [{param.unit}]" if param.unit else param.doc
     shown = forms.plain(default)
-    has_default = isinstance(shown, (bool, int, float, str, list)) and param.form not in (
-        "volume",
-        "media",
-    )
+    has_default = isinstance(shown, (bool, int, float, str, list))
+    has_default &= param.role.name not in ("volume", "media")
     return {
         "description": doc,
         **({"default": shown} if has_default else {}),
@@ -125,18 +129,22 @@ def _parameter(param: Param, default: Any) -> Schema:
     }
 
 
-def _spectrum(role: str) -> Schema:
-    number: Schema = NUMBER if role in ("factor", "quantity") else {**NUMBER, "minimum": 0}
+# of a number in the place of a spectrum, where it is not any from 0
+LIMITS: dict[Role, Schema] = {
+    roles.FACTOR: {}, roles.QUANTITY: {}, roles.REFLECTANCE: {"minimum": 0, "maximum": 1},
+}  # fmt: skip
+NAMES: dict[Role, Schema] = {
+    roles.EMISSION: {"enum": list(spectra.illuminants()), "description": "an illuminant"},
+    roles.INDEX: {"enum": list(spectra.glasses()), "description": "a glass or liquid"},
+}
+
+
+def _spectrum(role: Role) -> Schema:
+    number: Schema = {**NUMBER, **LIMITS.get(role, {"minimum": 0})}
     one_of = [number, {**TRIPLE, "description": "linear Rec. 709"}, ref("spectrum")]
     if role in HEX_ROLES:
         one_of.append({**STRING, "pattern": f"^{HEX}$", "description": "a colour in sRGB"})
-    if role == "reflectance":
-        number["maximum"] = 1
-    elif role == "emission":
-        one_of.append({"enum": list(spectra.illuminants()), "description": "an illuminant"})
-    elif role == "index":
-        one_of.append({"enum": list(spectra.glasses()), "description": "a glass or liquid"})
-    return {"anyOf": one_of}
+    return {"anyOf": [*one_of, *([NAMES[role]] if role in NAMES else [])]}
 
 
 def _typed_spectra() -> Schema:

@@ -9,6 +9,7 @@ from clpt.formats.native import spectra as json_spectra
 from clpt.formats.native.cursor import Cursor
 from clpt.formats.native.json_schema import NUMBER, STRING, Schema, object_of, ref, rows
 from clpt.formats.native.spectra import find_file
+from clpt.scene.roles import Spectral
 from clpt.spectra import Sensor, Spectrum
 from clpt.spectra.sensors import OBSERVERS
 
@@ -38,8 +39,11 @@ def read(cursor: Cursor) -> Any:
         return Sensor(curves, matrix)
 
 
+CURVE = Spectral("curve", colour=None)  # of a sensor, over the wavelength
+
+
 def _curve(cursor: Cursor) -> Spectrum:
-    value = json_spectra.read(cursor, "curve")
+    value = json_spectra.read(cursor, CURVE)
     return value if isinstance(value, Spectrum) else spectra.Constant(value)
 
 
@@ -48,7 +52,7 @@ def write(sensor: Sensor | str) -> Any:
     if isinstance(sensor, str):
         return sensor
     written: dict[str, Any] = {
-        "curves": [json_spectra.write(curve, "curve") for curve in sensor.curves]
+        "curves": [json_spectra.write(curve, CURVE) for curve in sensor.curves]
     }
     return written if sensor.matrix is None else {**written, "matrix": sensor.matrix}
 

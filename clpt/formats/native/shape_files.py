@@ -75,7 +75,7 @@ FILES: dict[type[Kind], ShapeFile] = {
 }
 
 
-def in_file(cls: type[Kind], name: str, value: Any) -> bool:
+def in_file(cls: type[Kind], name: str, value: object) -> bool:
     """Return whether a shape's file holds a parameter; the word `smooth` is not in a file."""
     return name in FILES[cls].replaces and not isinstance(value, str)
 
@@ -119,8 +119,8 @@ def checked_arrays(cursor: Cursor, shape: shapes.Mesh, warnings: list[str]) -> s
     """Check the arrays of a mesh that is given in the JSON itself."""
     if shape.vertices is None or shape.faces is None:
         raise cursor.error("a mesh needs a 'file', or 'vertices' and 'faces'")
-    for name in ("normals", "uvs", "tangents"):
-        values = getattr(shape, name)
+    given = {"normals": shape.normals, "uvs": shape.uvs, "tangents": shape.tangents}
+    for name, values in given.items():
         is_array = values is not None and not isinstance(values, str)
         if is_array and len(values) != len(shape.vertices):
             raise cursor.at(name).error(f"must be one for each of {len(shape.vertices)} vertices")
@@ -129,16 +129,14 @@ def checked_arrays(cursor: Cursor, shape: shapes.Mesh, warnings: list[str]) -> s
         if len(values) != count:
             raise cursor.at("attributes").at(name).error(f"must be {count} rows")
     with cursor.locating():
-        arrays = mesh.checked(
-            None,
-            "",
+        made = mesh.Arrays(
             shape.vertices,
             shape.faces.astype(np.int64),
             None if isinstance(shape.normals, str) else shape.normals,
             shape.uvs,
-            warnings,
             _with_tangents(shape),
         )
+        arrays = mesh.checked(None, "", made, warnings)
         if shape.tangents is not None:
             arrays["tangents"] = arrays["attributes"].pop(TANGENTS)
     if isinstance(shape.normals, str):

@@ -9,19 +9,22 @@ from __future__ import annotations
 
 import dataclasses
 import re
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
 
 from clpt import images, input_files, spectra
 from clpt.errors import UnknownKindError
-from clpt.formats.colour import COLOURS, colour
+from clpt.formats.colour import colour
 from clpt.formats.native.cursor import Cursor
 from clpt.scene.integrators import NO_AOV
+from clpt.scene.roles import COEFFICIENT, EMISSION, FACTOR, INDEX, REFLECTANCE, Spectral
 from clpt.spectra import Spectrum
+from clpt.spectra.spectrum import Outside
 
 HEX = r"#([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})"
-HEX_ROLES = ("reflectance", "emission", "factor")  # those of colours
+HEX_ROLES = (REFLECTANCE, EMISSION, FACTOR)  # those of colours
 SPECTRA: dict[str, type[Spectrum]] = {
     "constant": spectra.Constant,
     "tabulated": spectra.Tabulated,
@@ -37,28 +40,28 @@ SPECTRA: dict[str, type[Spectrum]] = {
 }
 
 
-def read(cursor: Cursor, role: str) -> Any:
+def read(cursor: Cursor, role: Spectral) -> Any:
     """Return the value of a parameter of a role; the name of a glass stays a name."""
     with cursor.locating():
         return _read(cursor, role)
 
 
-def _read(cursor: Cursor, role: str) -> Any:
+def _read(cursor: Cursor, role: Spectral) -> Any:
     value = cursor.value
     if isinstance(value, str) and value.startswith("#") and role in HEX_ROLES:
         return colour(role, _hex(cursor))
-    if isinstance(value, str) and role == "index":
+    if isinstance(value, str) and role is INDEX:
         if value.lower() not in spectra.glasses():
             raise UnknownKindError("glass", value, spectra.glasses(), **cursor.location())
         return value
-    if isinstance(value, str) and role == "emission":
+    if isinstance(value, str) and role is EMISSION:
         return spectra.illuminant(value)
-    if isinstance(value, list):
+    if isinstance(value, list) and role.colour is not None:
         return colour(role, cursor.numbers(3))
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return cursor.number()
     cursor.expect(dict, "a number, [r, g, b] or a spectrum")
-    outside: Any = "hold" if role in ("index", "coefficient", "quantity") else "zero"
+    outside: Outside = "hold" if role.measured else "zero"
     if "file" in value:
         return _from_file(cursor, role, outside)
     if "values" in value and "type" not in value:
@@ -80,13 +83,13 @@ def _hex(cursor: Cursor) -> tuple[float, ...]:
     return tuple(float(part) for part in images.srgb_to_linear(codes / np.float32(255.0)))
 
 
-def _from_file(cursor: Cursor, role: str, outside: Any) -> Spectrum:
+def _from_file(cursor: Cursor, role: Spectral, outside: Outside) -> Spectrum:
     cursor.check_keys("spectrum", ("file",))
     path = find_file(cursor.at("file"))
-    if role == "index":
+    if role is INDEX:
         name = str(cursor.path[-1])  # of the parameter: eta, k, ext_k, ...
         return spectra.read_index(path, "k" if name.split("_")[-1] == "k" else "eta")
-    if role == "coefficient":
+    if role is COEFFICIENT:
         return spectra.read_absorption(path)
     if path.suffix.lower() == ".bfc":
         return spectra.read_bispectral(path)[0]
@@ -114,20 +117,20 @@ def _typed(cursor: Cursor) -> Spectrum:
         raise cursor.error(f"does not make a spectrum: {error}") from None
 
 
-def write(spectrum: Spectrum | str, role: str) -> Any:
+def write(spectrum: Spectrum | str, role: Spectral) -> Any:
     """Return what stands for a spectrum in JSON, such that `read` gives it back."""
     if isinstance(spectrum, str):
         return spectrum
-    if isinstance(spectrum, spectra.Constant) and role != "emission":
+    if isinstance(spectrum, spectra.Constant) and role is not EMISSION:
         return spectrum.value
     fields = dataclasses.asdict(spectrum)  # type: ignore[call-overload]
-    if type(spectrum) is COLOURS.get(role):
+    if type(spectrum) is role.colour:
         return list(fields.values())
     kind = next(name for name, cls in SPECTRA.items() if type(spectrum) is cls)
     return {"type": kind, **fields}
 
 
-def kind_name(cursor: Cursor, category: str, known: Any) -> str:
+def kind_name(cursor: Cursor, category: str, known: Collection[str]) -> str:
     """Return the `type` of an object. Raises SceneError, UnknownKindError."""
     if "type" not in cursor.expect(dict):
         raise cursor.error("needs the key 'type'")

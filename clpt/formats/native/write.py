@@ -24,7 +24,7 @@ from clpt.formats.native.shape_files import MESH_ARRAYS, in_file
 from clpt.scene import Scene, kinds, materials, shapes
 from clpt.scene.media import Medium
 from clpt.scene.motion import Deformation
-from clpt.scene.params import Kind, defaults, params
+from clpt.scene.params import Kind, defaults, fields_of, params
 
 MANY = 16  # from so many instances in a row on, a file holds their matrices
 NUMBERS = re.compile(r"\[\s+([^\[\]{}\"]*?)\s+\]")
@@ -142,9 +142,9 @@ class _Writer:
         written: dict[str, Any] = {"type": thing.kind}
         if cls in self.array_files:
             written["file"] = self.array_files[cls](thing)
-        default = defaults(cls)
+        default, values = defaults(cls), fields_of(thing)
         for name, param in params(cls).items():
-            given = getattr(thing, name)
+            given = values[name]
             if "file" in written and in_file(cls, name, given):
                 continue
             value = forms.write(given, param, self)
@@ -275,7 +275,7 @@ class _Writer:
 
     def mesh(self, mesh: shapes.Mesh) -> str:
         """Write a mesh's arrays, unless another shape shares them; return the file's name."""
-        key = tuple(id(getattr(mesh, name)) for name in MESH_ARRAYS)
+        key = tuple(id(fields_of(mesh)[name]) for name in MESH_ARRAYS)
         if key not in self.files:
             name = self.file_name(mesh.name or "mesh", "ply")
             output_files.write(self.path.parent / name, _ply(mesh))
@@ -304,11 +304,9 @@ def _shared(scene: Scene) -> set[int]:
             waiting += thing.shapes
         if isinstance(thing, Kind):
             usual = defaults(type(thing))
-            waiting += [
-                given
-                for name in params(type(thing))
-                if (given := getattr(thing, name)) is not usual[name]
-            ]
+            given = fields_of(thing)
+            names = params(type(thing))
+            waiting += [given[name] for name in names if given[name] is not usual[name]]
     return {one for one, count in counts.items() if count > 1}
 
 
@@ -323,7 +321,7 @@ def unused_name(name: str, used: Container[str]) -> str:
 
 def _on_host(thing: Kind) -> Kind:
     """Return a thing whose arrays on a device are copied to the host. Raises SceneError."""
-    named = {name: getattr(thing, name) for name in params(type(thing))}
+    named = fields_of(thing)
     on_device = {name: value for name, value in named.items() if hasattr(value, "context")}
     for name, value in on_device.items():
         if not hasattr(value, "get"):

@@ -24,10 +24,10 @@ from clpt.formats.pbrt.textures import textured
 from clpt.scene.lights import Light
 from clpt.scene.materials import Diffuse, Mask, Material, Null, TwoSided
 from clpt.scene.media import Medium
-from clpt.scene.params import Kind
-from clpt.scene.params import params as declared_params
+from clpt.scene.params import Kind, fields_of
+from clpt.scene.roles import REAL
 from clpt.scene.shapes import Curves, Group, Instance, Shape
-from clpt.scene.textures import MeshAttribute, Product
+from clpt.scene.textures import MeshAttribute, Product, Texture
 
 Progress = Callable[[float, str], None]
 SHARES = "face_power"  # the attribute of a mesh whose parts shine unequally
@@ -82,7 +82,7 @@ def _make_all(definitions: list[Definition], progress: Progress | None) -> list[
 
 def _shape(definition: Definition, form: Geometry | None) -> Shape | None:
     params, state = definition.params, definition.state
-    opacity = textured(params, "alpha", "real", state, 1.0)
+    opacity = textured(params, "alpha", REAL, state, 1.0)
     _warn_of_unused(params, state)
     if form is None:
         state.warn(params, "left out, since it has no area")
@@ -217,13 +217,13 @@ def _warn_of_unused(params: Parameters, state: State) -> None:
         state.warn(parameter, f"is not known here and is left out{hint}")
 
 
-def _has_texture(thing: Any) -> bool:
+def _has_texture(thing: object) -> bool:
     """Whether a material or light, or one inside it, has a texture."""
-    if getattr(thing, "is_texture", False):
+    if isinstance(thing, Texture):
         return True
     if not isinstance(thing, Kind):
         return False
-    return any(_has_texture(getattr(thing, name)) for name in declared_params(type(thing)))
+    return any(map(_has_texture, fields_of(thing).values()))
 
 
 def deduplicated(warnings: Sequence[str]) -> list[str]:

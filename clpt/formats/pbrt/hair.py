@@ -12,16 +12,17 @@ from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.state import State
 from clpt.formats.pbrt.textures import textured
 from clpt.scene.materials import Hair, Material, pigment
+from clpt.scene.roles import FACTOR, REAL, REFLECTANCE
 
 DARKEST = 1e-4  # a colour of hair; black would need an absorption without limit
 
 
 def hair(params: Parameters, state: State) -> Material:
     """Make pbrt's `hair`. Raises SceneError."""
-    around = textured(params, "beta_n", "real", state, 0.3)
+    around = textured(params, "beta_n", REAL, state, 0.3)
     return Hair(
         sigma_a=_absorption(params, state, around),
-        longitudinal_roughness=textured(params, "beta_m", "real", state, 0.3),
+        longitudinal_roughness=textured(params, "beta_m", REAL, state, 0.3),
         azimuthal_roughness=around,
         scale_tilt=params.one("alpha", "float", 2.0),
         eta=params.one("eta", "float", 1.55),
@@ -30,8 +31,8 @@ def hair(params: Parameters, state: State) -> Material:
 
 def _absorption(params: Parameters, state: State, around: Any) -> Any:
     """Take the absorption, the colour of many fibres, or the concentrations of pigments."""
-    given = textured(params, "sigma_a", "factor", state)
-    colour = textured(params, "reflectance", "reflectance", state)
+    given = textured(params, "sigma_a", FACTOR, state)
+    colour = textured(params, "reflectance", REFLECTANCE, state)
     names = [name for name in ("eumelanin", "pheomelanin") if name in params]
     if (given is not None) + (colour is not None) + bool(names) > 1:
         raise SceneError("give one of 'sigma_a', 'reflectance' and pigments")

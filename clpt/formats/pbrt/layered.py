@@ -24,7 +24,9 @@ from clpt.formats.pbrt.textures import textured
 from clpt.scene import materials
 from clpt.scene.materials import Material
 from clpt.scene.media import HenyeyGreenstein, Homogeneous, Isotropic
+from clpt.scene.roles import COEFFICIENT, INDEX, REAL, REFLECTANCE
 from clpt.scene.textures import Texture
+from clpt.scene.values import IndexLike, Textured, TexturedNumber
 
 THICKNESS = 0.01  # of pbrt's coats, in mean free paths
 
@@ -34,8 +36,8 @@ def both(made: Material) -> Material:
 
 
 def coated_diffuse(params: Parameters, state: State) -> Material:
-    eta = spectrum(params, "eta", "index", state, 1.5)
-    base = textured(params, "reflectance", "reflectance", state, 0.5)
+    eta = spectrum(params, "eta", INDEX, state, 1.5)
+    base = textured(params, "reflectance", REFLECTANCE, state, 0.5)
     thickness = coat(params, state)
     if thickness > 0.0:
         looks = coated_albedo.under_coat(index_at_550(eta), thickness)
@@ -46,19 +48,24 @@ def coated_diffuse(params: Parameters, state: State) -> Material:
 
 def coat(params: Parameters, state: State) -> float:
     """Take what a coat is made of: its thickness. What scatters in it is left out, warned of."""
-    albedo = textured(params, "albedo", "reflectance", state, 0.0)
+    albedo = textured(params, "albedo", REFLECTANCE, state, 0.0)
     params.ignore("g", "maxdepth", "nsamples")
     if isinstance(albedo, Texture) or np.any(map_values(albedo, abs)):
         state.warn(params, "'albedo' of the coat is taken as 0: it absorbs and does not scatter")
-    thickness = textured(params, "thickness", "real", state, THICKNESS)
+    thickness = textured(params, "thickness", REAL, state, THICKNESS)
     if isinstance(thickness, Texture):
         state.warn(params, f"'thickness' cannot vary over the surface; {THICKNESS} is taken")
         return THICKNESS
     return thickness
 
 
-def plastic(base: Any, eta: Any, alpha: Any) -> Material:
-    given = {"diffuse_reflectance": base, "int_ior": eta, "ext_ior": 1.0, "nonlinear": True}
+def plastic(base: Textured, eta: IndexLike, alpha: TexturedNumber) -> Material:
+    given: dict[str, Any] = {
+        "diffuse_reflectance": base,
+        "int_ior": eta,
+        "ext_ior": 1.0,
+        "nonlinear": True,
+    }
     if smooth(alpha):
         return both(materials.Plastic(**given))
     return both(materials.RoughPlastic(alpha=rough(alpha), **given))
@@ -75,7 +82,7 @@ def subsurface(params: Parameters, state: State) -> Material:
     Light sources off shapes, which a path inside cannot meet, and a reflectance from a texture ask
     for the second: light leaves where it came in.
     """
-    eta = spectrum(params, "eta", "index", state, 1.33)
+    eta = spectrum(params, "eta", INDEX, state, 1.33)
     alpha_u, alpha_v = alphas(params, state)
     if body(params, state) is not None:
         given = {"int_ior": eta, "ext_ior": 1.0}
@@ -99,7 +106,7 @@ def body(params: Parameters, state: State) -> Homogeneous | None:
     scattering, absorption, reflectance, g = _given(params, state)
     scale, mfp = (
         params.one("scale", "float", 1.0),
-        spectrum(params, "mfp", "coefficient", state, 1.0),
+        spectrum(params, "mfp", COEFFICIENT, state, 1.0),
     )
     if not state.shared.walks or isinstance(reflectance, Texture):
         return None
@@ -107,7 +114,7 @@ def body(params: Parameters, state: State) -> Homogeneous | None:
     if reflectance is None:
         scattering, absorption = (_coefficient(one) for one in (scattering, absorption))
         return Homogeneous(sigma_a=absorption, sigma_s=scattering, scale=scale, phase=phase)
-    eta = spectrum(params, "eta", "index", state, 1.33)
+    eta = spectrum(params, "eta", INDEX, state, 1.33)
     inner = map_values(reflectance, coated_albedo.from_body_reflectance(index_at_550(eta)))
     path = map_values(mfp, lambda v: scale * np.asarray(v))
     return Homogeneous.from_albedo(inner, path, g=g)
@@ -123,9 +130,9 @@ def _given(params: Parameters, state: State) -> tuple[Any, Any, Any, float]:
     """Scattering, absorption, reflectance and g, of one of the four ways to say them."""
     params.ignore("scale", "mfp")
     medium, g = params.one("name", "string", ""), params.one("g", "float", 0.0)
-    scattering = textured(params, "sigma_s", "coefficient", state)
-    absorption = textured(params, "sigma_a", "coefficient", state)
-    reflectance = textured(params, "reflectance", "reflectance", state)
+    scattering = textured(params, "sigma_s", COEFFICIENT, state)
+    absorption = textured(params, "sigma_a", COEFFICIENT, state)
+    reflectance = textured(params, "reflectance", REFLECTANCE, state)
     if medium:
         if medium not in coated_albedo.MEDIA:
             raise UnknownKindError("medium", medium, coated_albedo.MEDIA)

@@ -22,6 +22,7 @@ from clpt.formats.pbrt.spectra import spectrum
 from clpt.formats.pbrt.state import State
 from clpt.scene import lights
 from clpt.scene.lights import Light
+from clpt.scene.roles import EMISSION
 from clpt.scene.textures import Bitmap
 from clpt.spectra import RGBIlluminant, luminance, scaled
 
@@ -48,7 +49,7 @@ def area_light(kind: str, params: Parameters, state: State, area: float = 0.0) -
     with params.locating():
         two_sided = params.one("twosided", "bool", False)
         file = params.one("filename", "string", "")
-        given = spectrum(params, "L", "emission", state)
+        given = spectrum(params, "L", EMISSION, state)
         if file and given is not None:
             raise SceneError("give either 'L' or 'filename', not both")
         image = _image(file, state) if file else None
@@ -77,7 +78,7 @@ def _power_scale(params: Parameters, per_unit: float) -> float:
 
 
 def _intensity(params: Parameters, state: State, per_unit: float) -> Any:
-    return _bright(spectrum(params, "I", "emission", state), _power_scale(params, per_unit))
+    return _bright(spectrum(params, "I", EMISSION, state), _power_scale(params, per_unit))
 
 
 def _from_to(params: Parameters, state: State) -> tuple[np.ndarray, np.ndarray]:
@@ -123,14 +124,14 @@ def _distant(params: Parameters, state: State) -> Light:
     _, direction = _from_to(params, state)
     scale, lux = params.one("scale", "float", 1.0), params.one("illuminance", "float", -1.0)
     irradiance = _bright(
-        spectrum(params, "L", "emission", state), scale * lux if lux > 0.0 else scale
+        spectrum(params, "L", EMISSION, state), scale * lux if lux > 0.0 else scale
     )
     return lights.Directional(direction=tuple(direction.tolist()), irradiance=irradiance)
 
 
 def _infinite(params: Parameters, state: State) -> Light:
     scale, lux = params.one("scale", "float", 1.0), params.one("illuminance", "float", -1.0)
-    given = spectrum(params, "L", "emission", state)
+    given = spectrum(params, "L", EMISSION, state)
     file = params.one("filename", "string", "")
     if params.several("portal", "point3") is not None:
         state.warn(params, "'portal' only guides sampling in pbrt's way; all directions shine here")

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from clpt import images
+from clpt.scene.params import fields_of
 from clpt.scene.textures import Bitmap, Checkerboard, Mix, Product, Texture
 from clpt.spectra import RGB, Constant, RGBUnbounded, Spectrum, Tabulated, cie
 
@@ -35,7 +36,8 @@ def map_values(value: Any, function: Callable[[Any], Any], *, bytes_stay: bool =
         return Mix(first=float(function(0.0)), second=float(function(1.0)), amount=value)
     if isinstance(value, Texture):
         names = ENDS[type(value)]
-        ends = [map_values(getattr(value, name), function, bytes_stay=bytes_stay) for name in names]
+        given = fields_of(value)
+        ends = [map_values(given[name], function, bytes_stay=bytes_stay) for name in names]
         return replace(value, **dict(zip(names, ends, strict=True)))
     return float(function(value))
 

@@ -21,6 +21,8 @@ from clpt.formats.pbrt.state import State
 from clpt.formats.pbrt.textures import normals, textured
 from clpt.scene import materials
 from clpt.scene.materials import Material
+from clpt.scene.params import fields_of
+from clpt.scene.roles import INDEX, REAL, REFLECTANCE
 from clpt.scene.textures import Product, Texture
 
 PLAIN: dict[str, Any] = {
@@ -49,7 +51,7 @@ def material(kind: str, params: Parameters, state: State, name: str = "") -> Mat
 
 def _bumped(made: Material, params: Parameters, state: State) -> Material:
     """The material with the relief of its "displacement" or its "normalmap"."""
-    height = textured(params, "displacement", "real", state)
+    height = textured(params, "displacement", REAL, state)
     file = params.one("normalmap", "string", "")
     if isinstance(height, Texture) and file:
         raise SceneError("give either 'displacement' or 'normalmap', not both")
@@ -61,14 +63,14 @@ def _bumped(made: Material, params: Parameters, state: State) -> Material:
 
 
 def _diffuse(params: Parameters, state: State) -> Material:
-    reflectance = textured(params, "reflectance", "reflectance", state, 0.5)
+    reflectance = textured(params, "reflectance", REFLECTANCE, state, 0.5)
     return both(materials.Diffuse(reflectance=reflectance))
 
 
 def _diffuse_transmission(params: Parameters, state: State) -> Material:
     scale = params.one("scale", "float", 1.0)
     shares = {
-        name: _times(textured(params, name, "reflectance", state, 0.25), scale)
+        name: _times(textured(params, name, REFLECTANCE, state, 0.25), scale)
         for name in ("reflectance", "transmittance")
     }
     return materials.DiffuseTransmission(**shares)
@@ -92,9 +94,9 @@ def _conductor(params: Parameters, state: State) -> Material:
 
 def _metal(params: Parameters, state: State, prefix: str) -> dict[str, Any]:
     """Take eta and k, or a reflectance at normal incidence: eta = 1, k = 2 sqrt(r / (1 - r))."""
-    eta = textured(params, f"{prefix}eta", "index", state)
-    k = textured(params, f"{prefix}k", "index", state)
-    reflectance = textured(params, "reflectance", "reflectance", state)
+    eta = textured(params, f"{prefix}eta", INDEX, state)
+    k = textured(params, f"{prefix}k", INDEX, state)
+    reflectance = textured(params, "reflectance", REFLECTANCE, state)
     if reflectance is None:
         copper = {part: named(f"metal-Cu-{part}") for part in ("eta", "k")}
         return {"eta": copper["eta"] if eta is None else eta, "k": copper["k"] if k is None else k}
@@ -114,7 +116,7 @@ def _extinction(r: Any) -> Any:
 
 
 def _coated_conductor(params: Parameters, state: State) -> Material:
-    ior = spectrum(params, "interface.eta", "index", state, 1.5)
+    ior = spectrum(params, "interface.eta", INDEX, state, 1.5)
     outer = isotropic(alphas(params, state, "interface."), params, state)
     alpha_u, alpha_v = alphas(params, state, "conductor.")
     return both(
@@ -129,7 +131,7 @@ def _coated_conductor(params: Parameters, state: State) -> Material:
 
 
 def _dielectric(params: Parameters, state: State) -> Material:
-    eta = spectrum(params, "eta", "index", state, 1.5)
+    eta = spectrum(params, "eta", INDEX, state, 1.5)
     alpha_u, alpha_v = alphas(params, state)
     if smooth(alpha_u, alpha_v):
         return materials.Dielectric(int_ior=eta, ext_ior=1.0)
@@ -137,9 +139,7 @@ def _dielectric(params: Parameters, state: State) -> Material:
 
 
 def _thin_dielectric(params: Parameters, state: State) -> Material:
-    return materials.ThinDielectric(
-        int_ior=spectrum(params, "eta", "index", state, 1.5), ext_ior=1.0
-    )
+    return materials.ThinDielectric(int_ior=spectrum(params, "eta", INDEX, state, 1.5), ext_ior=1.0)
 
 
 def _mix(params: Parameters, state: State) -> Material:
@@ -147,7 +147,7 @@ def _mix(params: Parameters, state: State) -> Material:
     if len(names) != 2:
         raise SceneError(f"'materials' must be two names of materials, not {len(names)}")
     first, second = (state.named_material(name, params) for name in names)
-    weight = textured(params, "amount", "real", state, 0.5)
+    weight = textured(params, "amount", REAL, state, 0.5)
     made = materials.Blend(first=first, second=second, weight=weight)
     kinds = list(materials.parts(made))
     if any(part.transmits for part in kinds) and materials.TwoSided in map(type, kinds):
@@ -162,8 +162,8 @@ def _one_sided(made: Material) -> Material:
         return _one_sided(made.front)
     inner: dict[str, Any] = {
         name: _one_sided(part)
-        for name in ("material", "first", "second")
-        if isinstance(part := getattr(made, name, None), Material)
+        for name, part in fields_of(made).items()
+        if name in ("material", "first", "second") and isinstance(part, Material)
     }
     return replace(made, **inner) if inner else made
 

@@ -14,6 +14,7 @@ from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.spectra import spectrum
 from clpt.formats.pbrt.state import Definition, State, nearest
 from clpt.scene.media import Cloud, Grid, HenyeyGreenstein, Homogeneous, Isotropic, Medium
+from clpt.scene.roles import COEFFICIENT, EMISSION
 from clpt.scene.volumes import Volume
 from clpt.spectra import Constant, RGBUnbounded, scaled
 
@@ -66,7 +67,7 @@ def _made(name: str, definition: Definition) -> Medium:
 
 def _light(params: Parameters, state: State) -> Any:
     """Read the emission of a homogeneous medium."""
-    light = spectrum(params, "Le", "emission", state, Constant(0.0))
+    light = spectrum(params, "Le", EMISSION, state, Constant(0.0))
     return scaled(light, params.one("Lescale", "float", 1.0))
 
 
@@ -107,7 +108,7 @@ def _grid(kind: str, params: Parameters, state: State) -> dict[str, Any]:
             params.ignore("Lescale")
         return {"density": listed, "temperature": _kelvin(heat, params), **BLACK_BODY}
     params.ignore(*HEAT)
-    light = spectrum(params, "Le", "emission", state, Constant(0.0))
+    light = spectrum(params, "Le", EMISSION, state, Constant(0.0))
     return {"density": listed, "emission": light,
             "emission_grid": _listed(params, "Lescale", state)}  # fmt: skip
 
@@ -128,7 +129,7 @@ def _coloured(params: Parameters, state: State) -> dict[str, Any]:
     albedo = scatters / np.maximum(extinction, 1e-30)
     return {
         "density": Volume(density, found.to_world),
-        "colour_grid": None if colours is None else Volume(colours, found.to_world),
+        "color_grid": None if colours is None else Volume(colours, found.to_world),
         "sigma_t": sigma_t,
         "albedo_grid": Volume(np.clip(albedo, 0.0, 1.0).astype(np.float32), found.to_world),
         "albedo_with_density": True,  # as pbrt interpolates sigma_s
@@ -169,14 +170,14 @@ def _coefficients(params: Parameters, state: State, grid: bool) -> tuple[Any, An
     if grid:
         one = Constant(1.0)
         return (
-            spectrum(params, "sigma_a", "coefficient", state, one),
-            spectrum(params, "sigma_s", "coefficient", state, one),
+            spectrum(params, "sigma_a", COEFFICIENT, state, one),
+            spectrum(params, "sigma_s", COEFFICIENT, state, one),
         )
     preset = params.one("preset", "string", "")
     if preset and preset not in coated_albedo.MEDIA:
         raise UnknownKindError("preset", preset, coated_albedo.MEDIA)
     scatters, absorbs = (RGBUnbounded(*rgb) for rgb in coated_albedo.MEDIA[preset or MILK])
     return (
-        spectrum(params, "sigma_a", "coefficient", state, absorbs),
-        spectrum(params, "sigma_s", "coefficient", state, scatters),
+        spectrum(params, "sigma_a", COEFFICIENT, state, absorbs),
+        spectrum(params, "sigma_s", COEFFICIENT, state, scatters),
     )

@@ -145,7 +145,7 @@ class Parameters(Located):
             raise parameter.error(f"must be of the type {' or '.join(types)}, not {parameter.type}")
         return parameter
 
-    def one(self, name: str, type: str, default: Any) -> Any:
+    def one(self, name: str, type: str, default: object) -> Any:
         """Take one value, or `default`: a float, int, bool, str, or an array (2,) or (3,)."""
         parameter = self.find(name, type)
         if parameter is None:

@@ -11,6 +11,7 @@ from clpt.formats.pbrt.map_values import map_values
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.state import State
 from clpt.formats.pbrt.textures import textured
+from clpt.scene.roles import REAL
 from clpt.scene.textures import Texture
 
 SMOOTH = 1e-3  # alpha below which pbrt takes a surface for smooth
@@ -19,8 +20,8 @@ SMOOTHEST = 1e-4
 
 def alphas(params: Parameters, state: State, prefix: str = "") -> tuple[Any, Any]:
     """Take the roughness along and across, as alpha; pbrt remaps one by its square root."""
-    even = textured(params, f"{prefix}roughness", "real", state, 0.0)
-    u, v = (textured(params, f"{prefix}{axis}roughness", "real", state, even) for axis in "uv")
+    even = textured(params, f"{prefix}roughness", REAL, state, 0.0)
+    u, v = (textured(params, f"{prefix}{axis}roughness", REAL, state, even) for axis in "uv")
     remap = params.one("remaproughness", "bool", True)
     alpha_u = _alpha(u, remap)
     return alpha_u, alpha_u if v is u or v == u else _alpha(v, remap)

@@ -23,6 +23,7 @@ from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.state import Definition, State
 from clpt.formats.pbrt.textures import textured
 from clpt.scene import shapes, subdivision
+from clpt.scene.roles import REAL
 from clpt.scene.shapes import Shape
 from clpt.scene.textures import Bitmap
 
@@ -133,7 +134,7 @@ def _mesh(
 ) -> Geometry | None:
     """A mesh whose triangles turn their front to where the normals point, if it has any."""
     warnings = list(warnings)
-    arrays = mesh.checked(None, "", points, faces, normals, uvs, warnings)
+    arrays = mesh.checked(None, "", mesh.Arrays(points, faces, normals, uvs), warnings)
     if not len(arrays["faces"]):
         return None
     for name in ("vertices", "normals", "uvs"):
@@ -203,7 +204,7 @@ def displaced(made: Geometry, params: Parameters, state: State) -> Geometry:
     edge, scale = params.above_zero("edgelength", 1.0), params.above_zero("uvscale", 1.0)
     if "displacement" not in params:
         return made
-    heights = textured(params, "displacement", "real", state, 0.0)
+    heights = textured(params, "displacement", REAL, state, 0.0)
     uv = isinstance(heights, Bitmap) and heights.mapping == "uv"
     if not uv or made.parts["uvs"] is None:
         reason = "it is no image by uv" if not uv else "the mesh has no uv"
@@ -222,7 +223,7 @@ def _loop(params: Parameters, state: State) -> Geometry | None:
     params.ignore("scheme")
     if not 0 <= levels <= DEEPEST:
         raise SceneError(f"'levels' must be 0 to {DEEPEST}, not {levels}")
-    arrays = mesh.checked(None, "", points, faces.reshape(-1, 3), None, None, [])
+    arrays = mesh.checked(None, "", mesh.Arrays(points, faces.reshape(-1, 3)), [])
     if not len(arrays["faces"]):
         return None
     coarse = arrays["vertices"].astype(np.float64), arrays["faces"].astype(np.int64)

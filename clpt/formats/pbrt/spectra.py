@@ -17,6 +17,7 @@ from clpt.errors import SceneError, UnknownKindError
 from clpt.formats.colour import colour
 from clpt.formats.pbrt.params import Parameter, Parameters
 from clpt.formats.pbrt.state import State
+from clpt.scene.roles import EMISSION, REFLECTANCE, Spectral
 from clpt.spectra import (
     Blackbody,
     Spectrum,
@@ -40,13 +41,16 @@ GLASSES = {  # what pbrt's tables hold, which is not always what their name says
     "glass-F10": "n-sf10",
     "glass-F11": "sf11",
 }
+TEXTURE = Spectral("texture", colour=None)  # what textures are made of
 
 
-def spectrum(params: Parameters, name: str, role: str, state: State, default: Any = None) -> Any:
+def spectrum(
+    params: Parameters, name: str, role: Spectral, state: State, default: object = None
+) -> Any:
     """Take a number or a spectrum in the role of a parameter of ours; `default` where not given.
 
-    role: "reflectance", "index", "coefficient", "texture" (what a texture is made of), "emission",
-    which then has luminance 1, or that of its colour. Raises SceneError with the location.
+    role: TEXTURE for what a texture is made of. An emission gets luminance 1, or that of its
+    colour. Raises SceneError with the location.
     """
     given = params.find(name, "float", *SPECTRUM_TYPES)
     if given is None:
@@ -55,7 +59,7 @@ def spectrum(params: Parameters, name: str, role: str, state: State, default: An
         return value_of(given, role, state)
 
 
-def value_of(given: Parameter, role: str, state: State) -> Any:
+def value_of(given: Parameter, role: Spectral, state: State) -> Any:
     """Return the value in a role of a parameter whose type is "float" or among SPECTRUM_TYPES."""
     if given.type == "float":
         return given.numbers(1)[0]
@@ -67,7 +71,7 @@ def value_of(given: Parameter, role: str, state: State) -> Any:
         made = _named(given.text(), role, state)
     else:
         made = _pairs(given.numbers(), role)
-    return _of_luminance_one(made) if role == "emission" else made
+    return _of_luminance_one(made) if role is EMISSION else made
 
 
 def to_rec709(rgb: Any, space: str, *, light: bool) -> Any:
@@ -84,32 +88,32 @@ def to_rec709(rgb: Any, space: str, *, light: bool) -> Any:
     return np.asarray(rgb, np.float64) @ matrix.T if space != "srgb" else np.asarray(rgb)
 
 
-def _rgb(given: Parameter, role: str, state: State) -> Any:
+def _rgb(given: Parameter, role: Spectral, state: State) -> Any:
     rgb = given.numbers(3)
     if min(rgb) < 0.0:
         raise SceneError("a colour cannot be negative")
-    if role == "reflectance" and max(rgb) > 1.0:
+    if role is REFLECTANCE and max(rgb) > 1.0:
         raise SceneError("a colour that is reflected cannot exceed 1")
-    ours = to_rec709(rgb, state.colour_space, light=role == "emission")
-    clipped = np.clip(ours, 0.0, 1.0 if role == "reflectance" else None)
+    ours = to_rec709(rgb, state.colour_space, light=role is EMISSION)
+    clipped = np.clip(ours, 0.0, 1.0 if role is REFLECTANCE else None)
     if np.abs(clipped - ours).max() > CUT:
         state.warn(given, "this colour lies outside Rec. 709, and what exceeds that is cut off")
     made = tuple(clipped.tolist())
-    return made if role == "texture" else colour(role, made)
+    return colour(role, made)
 
 
-def _pairs(values: list[float], role: str) -> Tabulated:
+def _pairs(values: list[float], role: Spectral) -> Tabulated:
     if len(values) % 2 or not values:
         raise SceneError("a spectrum is pairs of a wavelength [nm] and a value")
     return Tabulated(values[0::2], values[1::2], _outside(role))
 
 
-def _outside(role: str) -> Any:
+def _outside(role: Spectral) -> Any:
     """An index goes on as it ends; whatever is reflected or emitted is zero beyond, as in pbrt."""
-    return "hold" if role in ("index", "coefficient") else "zero"
+    return "hold" if role.measured else "zero"
 
 
-def _named(text: str, role: str, state: State) -> Spectrum:
+def _named(text: str, role: Spectral, state: State) -> Spectrum:
     known = named(text)
     if known is not None:
         return known

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from copy import copy
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -53,7 +53,7 @@ class Shared:
     missing: Missing = "error"
     walks: bool = False  # light walks at random in bodies: no light is too small to be met
 
-    def once(self, key: Any, source: Parameters | Parameter, make: Callable[[], Any]) -> Any:
+    def once(self, key: object, source: Parameters | Parameter, make: Callable[[], Any]) -> Any:
         """Return make(), called once for each key. Raises SceneError where it needs itself."""
         if key not in self.made:
             self.made[key] = None
@@ -157,7 +157,7 @@ class State:
         return made
 
 
-def nearest(name: str, known: Any) -> str:
+def nearest(name: str, known: Iterable[str]) -> str:
     """Return the end of a message about an unknown name: the nearest known ones."""
     near = difflib.get_close_matches(name[:LONGEST_NAME], sorted(known), n=3, cutoff=0.5)
     return "; did you mean " + " or ".join(map(repr, near)) + "?" if near else ""

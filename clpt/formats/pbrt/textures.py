@@ -19,9 +19,10 @@ from clpt.errors import SceneError, UnknownKindError
 from clpt.formats.missing import EVEN, GREY
 from clpt.formats.pbrt.map_values import map_values
 from clpt.formats.pbrt.params import Parameters
-from clpt.formats.pbrt.spectra import SPECTRUM_TYPES, spectrum, value_of
+from clpt.formats.pbrt.spectra import SPECTRUM_TYPES, TEXTURE, spectrum, value_of
 from clpt.formats.pbrt.state import Definition, State
 from clpt.images import Stored
+from clpt.scene.roles import REAL, Role, Spectral
 from clpt.scene.textures import (
     MAPPINGS,
     MOST_OCTAVES,
@@ -43,18 +44,21 @@ FLOATS = (".exr", ".hdr", ".pfm")  # whose numbers are no colours where a float 
 FILTERS = {"point": "nearest", "bilinear": "bilinear", "trilinear": "trilinear", "ewa": "trilinear"}
 
 
-def textured(params: Parameters, name: str, role: str, state: State, default: Any = None) -> Any:
-    """Take a value or a texture in a role of ours; a "real" is a number or a float texture.
+def textured(
+    params: Parameters, name: str, role: Role, state: State, default: object = None
+) -> Any:
+    """Take a value or a texture in a role of ours; REAL is a number or a float texture.
 
     A texture is made once for all parameters that name it. Raises SceneError with the location.
     """
-    form = "float" if role == "real" else "spectrum"
+    form = "float" if role is REAL else "spectrum"
     given = params.find(name, "texture", "float", *(SPECTRUM_TYPES if form == "spectrum" else ()))
     if given is None:
         return default
     if given.type != "texture":
+        used = role if isinstance(role, Spectral) else TEXTURE  # a number is one in any
         with given.locating():
-            return value_of(given, role, state)
+            return value_of(given, used, state)
     definition = state.texture(form, given.text(), given)
     return state.shared.once(definition, given, lambda: _texture(form, definition))
 
@@ -77,18 +81,18 @@ def normals(file: str, state: State) -> Bitmap:
 
 
 def _argument(form: str, params: Parameters, name: str, state: State, default: float) -> Any:
-    return textured(params, name, "real" if form == "float" else "texture", state, default)
+    return textured(params, name, REAL if form == "float" else TEXTURE, state, default)
 
 
 def _constant(form: str, params: Parameters, state: State) -> Any:
     if form == "float":
         return params.one("value", "float", 1.0)
-    return spectrum(params, "value", "texture", state, 1.0)
+    return spectrum(params, "value", TEXTURE, state, 1.0)
 
 
 def _scale(form: str, params: Parameters, state: State) -> Any:
     first = _argument(form, params, "tex", state, 1.0)
-    second = textured(params, "scale", "real", state, 1.0)
+    second = textured(params, "scale", REAL, state, 1.0)
     if not isinstance(first, Texture) and not isinstance(second, Texture):
         return map_values(first, lambda v: v * second)
     return first if second == 1.0 else Product(first=first, second=second)
@@ -98,7 +102,7 @@ def _mix(form: str, params: Parameters, state: State) -> Any:
     return Mix(
         first=_argument(form, params, "tex1", state, 0.0),
         second=_argument(form, params, "tex2", state, 1.0),
-        amount=textured(params, "amount", "real", state, 0.5),
+        amount=textured(params, "amount", REAL, state, 0.5),
     )
 
 
@@ -116,7 +120,7 @@ def _bilerp(form: str, params: Parameters, state: State) -> Any:
     def corner(name: str, default: float) -> Any:
         if form == "float":
             return [params.one(name, "float", default)]
-        value = spectrum(params, name, "texture", state, default)
+        value = spectrum(params, name, TEXTURE, state, default)
         if isinstance(value, Spectrum):
             value = value.to_rgb("unbounded")
         return np.broadcast_to(value, 3).tolist()

@@ -16,6 +16,7 @@ from clpt.errors import SceneError
 from clpt.render.analysis import lens
 from clpt.scene.cameras import Camera, Lens, Matrix, Orthographic, Perspective, Spherical, ThinLens
 from clpt.scene.motion import Shutter
+from clpt.scene.params import fields_of
 from clpt.spectra import Constant, Spectrum
 
 CONNECTED = ("perspective", "thin_lens")  # cameras that a point can be joined to
@@ -26,7 +27,8 @@ def dispersive_glasses(camera: Camera) -> tuple[Spectrum, ...]:
     """Return the indices of a camera's glasses that differ between wavelengths, each once."""
     if isinstance(camera, Lens):
         return lens.glasses(camera)
-    index = spectra.index(getattr(camera, "glass", Constant(1.0)))
+    glass: Any = camera.glass if isinstance(camera, ThinLens) else Constant(1.0)
+    index = spectra.index(glass)
     return () if isinstance(index, Constant) else (index,)
 
 
@@ -98,7 +100,7 @@ def _matrix(camera: Camera, name: str) -> NDArray[np.float64]:
     """A 4x4 matrix of a camera that has an inverse."""
     where = f"{camera.kind}.{name}"
     try:
-        matrix = np.asarray(getattr(camera, name), np.float64)
+        matrix = np.asarray(fields_of(camera)[name], np.float64)
     except (TypeError, ValueError):
         matrix = np.zeros(0)
     if matrix.shape != (4, 4):
@@ -141,7 +143,7 @@ def _pinhole(camera: Perspective, width: int, height: int) -> dict[str, Any]:
 
 def _thin_lens(camera: ThinLens, width: int, height: int) -> dict[str, Any]:
     names = ("aperture_radius", "focus_distance", "focal_length")
-    values = {name: getattr(camera, name) for name in names}
+    values = {name: fields_of(camera)[name] for name in names}
     glass = dispersive_glasses(camera)
     power = float(glass[0].sample(DESIGN_WAVELENGTH)) - 1.0 if glass else 1.0
     if power < 1e-3:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -30,6 +30,7 @@ from clpt.render.analysis.index import SceneIndex
 from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.scene.params import fields_of
 from clpt.scene.shapes import Shape
+from clpt.scene.textures import Texture
 
 LEAST_RADIUS = 1e-12  # of a sphere around a scene [m]
 SWEPT_CELLS = 4  # of the hull of what moves, see `instancing.hull_points`
@@ -124,16 +125,23 @@ class Geometry:
         return (low + high) / 2, max(float(np.linalg.norm(high - low)) / 2, LEAST_RADIUS)
 
 
+def _divided(placed: Iterable[Placed]) -> tuple[list[Placed], list[Placed]]:
+    """Divide shapes into those of triangles and others; the latter, with many in one, come last."""
+    meshes: list[Placed] = []
+    others: list[Placed] = []
+    many = list(shape_records.ONE_OF)
+    for one in placed:
+        (others if one.shape.kind in shape_records.ANALYTIC else meshes).append(one)
+    others.sort(key=lambda one: one.shape.kind in many and 1 + many.index(one.shape.kind))
+    return meshes, others
+
+
 def assembled(index: SceneIndex, cache: LoweringCache) -> Geometry:
     """Return the shapes of a scene as rays meet them.
 
     Raises SceneError for a shape that makes no sense, and for more triangles than a tree can hold.
     """
-    kinds = shape_records.ANALYTIC
-    meshes = [one for one in index.placed if one.shape.kind not in kinds]
-    others = [one for one in index.placed if one.shape.kind in kinds]
-    many = list(shape_records.ONE_OF)
-    others.sort(key=lambda one: one.shape.kind in many and 1 + many.index(one.shape.kind))
+    meshes, others = _divided(index.placed)
     single = [one for one in others if one.shape.kind not in shape_records.ONE_OF]
     builder = _Builder(cache, len(single), index.motions)
     for one in meshes:
@@ -143,7 +151,10 @@ def assembled(index: SceneIndex, cache: LoweringCache) -> Geometry:
     first_analytic = len(builder.rows)
     for one in others:
         builder.add(one)
-    boxes = [builder.around(one, np.array([analytic.bounds(one.shape)])) for one in single]
+    boxes = [np.zeros((0, 2, 3), np.float32)]
+    boxes += [builder.around(one, np.array([analytic.bounds(one.shape)])) for one in single]
+    many_boxes = zip(others[len(single) :], builder.many, strict=True)
+    boxes += [builder.around(one, own) for one, own in many_boxes]
     vertices, faces, tags = builder.concatenated()
     return Geometry(
         rows=tuple(builder.rows),
@@ -152,16 +163,7 @@ def assembled(index: SceneIndex, cache: LoweringCache) -> Geometry:
         vertices=vertices,
         faces=faces,
         tags=tags,
-        boxes=np.concatenate(
-            [
-                np.zeros((0, 2, 3), np.float32),
-                *boxes,
-                *(
-                    builder.around(one, own)
-                    for one, own in zip(others[len(single) :], builder.many, strict=True)
-                ),
-            ]
-        ),
+        boxes=np.concatenate(boxes),
         instances=instances,
         emitters=tuple(builder.emitters),
         world_vertices=world_vertices,
@@ -208,7 +210,7 @@ class _Builder:
 
         times: at which the vertices have rows, for what belongs to something that deforms.
         """
-        shape: Any = one.shape
+        shape = one.shape
         row = np.zeros((), SHAPE.dtype)
         row["number"], row["light"] = one.number, -1
         self.owners.append((row, shape, self.vertex_count, self.face_count))
@@ -227,7 +229,7 @@ class _Builder:
             count = len(times) if _in_triangles(shape) else 1
             self.emitters.append(Emitter(shape, len(self.rows), *corners, keys=max(count, 1)))
             values = fields_of(shape.emission).values()
-            self.uvs |= any(getattr(value, "is_texture", False) for value in values)
+            self.uvs |= any(isinstance(value, Texture) for value in values)
         self.rows.append(row)
         self.stored.append(stored)
 
@@ -238,7 +240,7 @@ class _Builder:
         return self.motions.swept(one.number, boxes)
 
     def _add_balls(
-        self, shape: Any, row: np.ndarray, times: tuple[float, ...] | None
+        self, shape: Shape, row: np.ndarray, times: tuple[float, ...] | None
     ) -> tuple[Any, Stored]:
         """Append the boxes of many spheres; return the spheres as they are at first, and all.
 
@@ -255,7 +257,7 @@ class _Builder:
         self.many.append(spheres.boxes([balls]))
         return balls, Stored(many=balls)
 
-    def _add_curves(self, shape: Any, row: np.ndarray) -> Stored:
+    def _add_curves(self, shape: Shape, row: np.ndarray) -> Stored:
         """Append the boxes of a shape's pieces."""
         row["prim"] = self.single_count + sum(map(len, self.many))
         found = self.cache(strands.pieces, shape, by=shapes.geometry(shape))
@@ -263,7 +265,7 @@ class _Builder:
         return Stored(many=found)
 
     def _add_triangles(
-        self, shape: Any, row: np.ndarray, times: Sequence[float]
+        self, shape: Shape, row: np.ndarray, times: Sequence[float]
     ) -> tuple[tuple[Any, Any, Any], Stored]:
         """Append a shape's triangles; return their vertices, faces and uvs, and what is stored."""
         by = shapes.geometry(shape)
@@ -279,7 +281,7 @@ class _Builder:
         row["flags"] |= SHAPE_BITS["normals"] if normals is not None else 0
         row["flags"] |= SHAPE_BITS["uvs"] if uvs is not None else 0
         self.normals |= normals is not None
-        if getattr(shape, "tangents", None) is not None and not times:
+        if shape.tangents is not None and not times:
             row["flags"] |= SHAPE_BITS["tangents"]
             own = (*shapes.geometry(shape), shape.tangents)
             along = self.cache(triangles.tangents, shape, by=own)

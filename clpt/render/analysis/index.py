@@ -17,7 +17,7 @@ from clpt.scene import materials as mt
 from clpt.scene.cameras import Lens
 from clpt.scene.integrators import Auto, Direct, ParticleTracer, Path, Vcm
 from clpt.scene.layers import LAYERS
-from clpt.scene.media import PHASE_LEAVES, Grid, Lattice, Medium
+from clpt.scene.media import PHASE_LEAVES, Grid, Lattice, Medium, Mixture
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.shapes import Shape
 
@@ -89,27 +89,27 @@ class SceneIndex:
     @property
     def free_panes(self) -> bool:
         """Whether there is thin glass that is no step of a path."""
-        free = getattr(self.scene.integrator, "free_panes", False)
-        return free and any(cls.is_pane for cls in self.leaves)
+        return self.scene.integrator.free_panes and any(cls.is_pane for cls in self.leaves)
 
     @property
     def grids(self) -> GridFeatures:
         """Features of the media whose density is on a grid."""
         media, emitting = self.media, self.emitting
+        grids = [medium for medium in media if isinstance(medium, Grid)]
         return GridFeatures(
             present=any(isinstance(medium, Lattice) for medium in media),
             emissive=any(isinstance(medium, Lattice) for medium in emitting),
-            hot=any(getattr(one, "temperature", None) is not None for one in emitting),
-            tinted=any(getattr(one, "albedo_grid", None) is not None for one in media),
-            coloured=any(getattr(one, "colour_grid", None) is not None for one in media),
-            mixed=max((len(getattr(one, "parts", ())) for one in media), default=0),
-            bytes=any(isinstance(one, Grid) and one.bits == 8 for one in media),
+            hot=any(one.temperature is not None for one in emitting if isinstance(one, Grid)),
+            tinted=any(one.albedo_grid is not None for one in grids),
+            coloured=any(one.color_grid is not None for one in grids),
+            mixed=max((len(one.parts) for one in media if isinstance(one, Mixture)), default=0),
+            bytes=any(one.bits == 8 for one in grids),
         )
 
     @property
     def dyed(self) -> bool:
         """Whether some medium has a dye that gives out light."""
-        return self.spectral and any(getattr(medium, "glows", False) for medium in self.media)
+        return self.spectral and any(medium.glows for medium in self.media)
 
     @property
     def nested(self) -> bool:
@@ -137,7 +137,7 @@ class SceneIndex:
     @property
     def balanced(self) -> float:
         """Light paths for each camera sample that are weighed against it; 0: there are none."""
-        wanted: float = getattr(self.scene.integrator, "light_paths", 0)
+        wanted: Any = self.scene.integrator.light_paths
         return wanted if (self.joined or self.merged) and self.lights_reach else 0
 
     @property
@@ -146,7 +146,7 @@ class SceneIndex:
         camera, integrator, before = self.scene.camera, self.scene.integrator, self.lit_before
         wanted = isinstance(camera, Lens) and camera.ghosts > 0.0
         ghosts = isinstance(camera, Lens) and (wanted if before is None else before)
-        alone = isinstance(integrator, (Path, Direct)) and not getattr(integrator, "guiding", False)
+        alone = isinstance(integrator, (Path, Direct)) and not integrator.guiding
         return ghosts and alone and not self.light_layers and not self.emitting
 
     @property
@@ -158,7 +158,7 @@ class SceneIndex:
     def may_have_light_paths(self) -> bool:
         """Whether paths start at lights, if they can."""
         given = self.scene.integrator
-        wanted = bool(getattr(given, "light_paths", 0))
+        wanted = bool(given.light_paths)
         return isinstance(given, Auto | ParticleTracer) or wanted
 
     @property
@@ -180,8 +180,7 @@ class SceneIndex:
     @property
     def guided(self) -> bool:
         """Whether directions of the camera's paths are learned from light paths."""
-        wanted: bool = getattr(self.scene.integrator, "guiding", False)
-        return wanted and not self.weighed and not self.has_media
+        return self.scene.integrator.guiding and not self.weighed and not self.has_media
 
     @property
     def shifts(self) -> bool:
@@ -240,7 +239,7 @@ class SceneIndex:
         return self.mode == "spectral"
 
 
-def any_of(material: Any, classes: Any) -> bool:
+def any_of(material: mt.Material, classes: type | tuple[type, ...]) -> bool:
     """Return whether a material, or one inside it, is of these classes."""
     return any(isinstance(part, classes) for part in mt.parts(material))
 

@@ -29,7 +29,7 @@ class LoweringCache:
         self._made: dict[Any, tuple[Any, Any]] = {}
 
     def __call__(
-        self, make: Callable[..., Made], *given: Any, by: tuple[Any, ...] | None = None
+        self, make: Callable[..., Made], *given: object, by: tuple[Any, ...] | None = None
     ) -> Made:
         """Return make(*given); the same object as before for what was given before.
 
@@ -47,7 +47,7 @@ class LoweringCache:
         self._former = {}
 
 
-def _mark(given: Any) -> Any:
+def _mark(given: object) -> Any:
     """Return the key of an argument; memory of a device has a new one each time.
 
     Kernels may have written there since.
@@ -57,7 +57,7 @@ def _mark(given: Any) -> Any:
     return object() if on_device(given) else (id(given),)
 
 
-def version(image: Any) -> Any:
+def version(image: object) -> Any:
     """Return what an image is known by: of a file its name, its time and its size."""
     if not isinstance(image, (str, Path)):
         return image

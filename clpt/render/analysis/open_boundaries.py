@@ -61,9 +61,9 @@ def _insides(shape: Shape) -> Iterator[Any]:
         yield shape.interior
         return
     for part in mt.parts(shape.material):
-        absorbs = getattr(part, "absorption", CLEAR)
-        if absorbs != CLEAR and not getattr(part, "thin", False):
-            yield absorbs
+        thin = isinstance(part, mt.GltfSurface) and part.thin
+        if part.absorption != CLEAR and not thin:
+            yield part.absorption
 
 
 def _own_hole(shape: Shape, cached: Callable[..., Any] | None) -> float:
@@ -89,7 +89,7 @@ def _hole(index: SceneIndex, inside: Any, cached: Callable[..., Any] | None) -> 
     faces: list[NDArray[Any]] = []
     first = 0
     for sign, shape in around:
-        if on_device(getattr(shape, "vertices", None)):
+        if isinstance(shape, Mesh) and on_device(shape.vertices):
             return 0.0
         own, triangles = triangles_of(shape, cached)
         points.append(np.asarray(own, np.float64))

@@ -214,7 +214,7 @@ def boundaries(
 
 def stands_still(scene: Scene) -> bool:
     """Whether no shape of a scene of `boundaries` moves or deforms."""
-    moving = ((one.motion, getattr(one, "deformation", None)) for one in scene.shapes)
+    moving = ((one.motion, one.deformation) for one in scene.shapes)
     return all(keys is None and points is None for keys, points in moving)
 
 
@@ -232,9 +232,9 @@ def _moment(scene: Scene, time: float | None) -> float:
     return (scene.camera.shutter or AT_ONCE).open if time is None else time
 
 
-def _then(shape: Any, time: float) -> Any:
+def _then(shape: Shape, time: float) -> Shape:
     """A shape whose points are where they are at a time, before what its keys do."""
-    return shape if getattr(shape, "deformation", None) is None else at_time(shape, time)
+    return shape if shape.deformation is None else at_time(shape, time)
 
 
 def _swept_box(

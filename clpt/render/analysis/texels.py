@@ -9,24 +9,25 @@ import numpy as np
 from clpt import spectra
 from clpt.arrays import Floats32
 from clpt.errors import SceneError
+from clpt.scene.roles import REAL, REFLECTANCE, Role
 from clpt.spectra import Tabulated
 from clpt.spectral_exr import SpectralImage
 
 FAR = 1000.0  # bands: how far beyond its ends a spectral image's bands are numbered
 
 
-def texels(image: Floats32, role: str, spectral: bool) -> Floats32:
+def texels(image: Floats32, role: Role, spectral: bool) -> Floats32:
     """Return what stands in `texels` for an image of `pixels`, row by row from the top.
 
-    (h * w, 4): rgb, or sigmoid coefficients and a factor where `spectral`; (h * w,) for "real".
+    (h * w, 4): rgb, or sigmoid coefficients and a factor where `spectral`; (h * w,) for REAL.
     """
-    if role == "real":
+    if role is REAL:
         return image.reshape(-1)
     colours = np.broadcast_to(image, (*image.shape[:2], 3)).reshape(-1, 3)
     made = np.ones((len(colours), 4), np.float32)
     if not spectral:
-        np.clip(colours, 0.0, 1.0 if role == "reflectance" else None, out=made[:, :3])
-    elif role == "reflectance":
+        np.clip(colours, 0.0, 1.0 if role is REFLECTANCE else None, out=made[:, :3])
+    elif role is REFLECTANCE:
         distinct, which = _palette(np.clip(colours, 0.0, 1.0))
         made[:, :3] = spectra.uplift(distinct)[which]
     else:

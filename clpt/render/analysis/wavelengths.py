@@ -21,7 +21,10 @@ from clpt.render.analysis.colour import sensor
 from clpt.render.analysis.index import SceneIndex
 from clpt.scene.integrators import Film
 from clpt.scene.materials import Material
-from clpt.scene.params import params
+from clpt.scene.media import Dyed, Reradiating
+from clpt.scene.params import fields_of, params
+from clpt.scene.roles import EMISSION
+from clpt.scene.textures import Texture
 from clpt.spectra import RGB, RGBIlluminant, Spectrum
 from clpt.spectra.reradiation import Reradiation
 from clpt.spectra.spectrum import d65, gridded
@@ -133,20 +136,19 @@ def _glow(index: SceneIndex, nodes: Floats) -> Callable[[Spectrum], Floats]:
     cells = int(np.ceil((film.lambda_max - film.lambda_min) / STEP - 1e-9))
     into = np.linspace(film.lambda_min, film.lambda_max, cells + 1)
     found = {id(m): m for shape in index.shapes for m in _fluorescent(shape.material)}
-    for medium in (part for one in index.media for part in getattr(one, "parts", (one,))):
-        given = [getattr(one, "reradiation", None) for one in medium.phase.leaves]
-        found |= {id(m): m for m in (*given, getattr(medium, "dye", None)) if m is not None}
+    for medium in (part for one in index.media for part in one.parts):
+        given = [one.reradiation for one in medium.phase.leaves if isinstance(one, Reradiating)]
+        given += [medium.dye] if isinstance(medium, Dyed) else []
+        found |= {id(m): m for m in given if m is not None}
     whole = np.zeros((len(nodes), len(into)))
     for matrix in found.values():
         whole += (into[1] - into[0]) * matrix.sample(nodes[:, None], into[None, :])
     return lambda light: whole @ gridded(light, into)
 
 
-def _fluorescent(material: Any) -> Iterator[Reradiation]:
+def _fluorescent(material: object) -> Iterator[Reradiation]:
     """Yield the reradiation matrices of a material and of those inside it."""
-    declared = params(type(material)) if isinstance(material, Material) else {}
-    for name in declared:
-        value = getattr(material, name)
+    for value in fields_of(material).values() if isinstance(material, Material) else ():
         if isinstance(value, Reradiation):
             yield value
         elif isinstance(value, Material):
@@ -165,18 +167,18 @@ def emissions(index: SceneIndex) -> Iterator[Spectrum]:
         if source is None:
             continue
         declared = params(type(source))
-        if "image" in declared and declared["image"].role == "host":
+        if "image" in declared and declared["image"].role.place == "host":
             yield _mean(source.image, f"{source.kind}.image")
         for name, param in declared.items():
-            if param.role == "emission":
-                yield _emitted(getattr(source, name))
+            if param.role is EMISSION:
+                yield _emitted(fields_of(source)[name])
     yield from (medium.light for medium in index.emitting if medium.light is not None)
 
 
 def _emitted(value: Any) -> Spectrum:
     """An emission as a spectrum, of a texture its mean."""
-    if getattr(value, "is_texture", False):
-        return _mean(getattr(value, "image", None), f"{value.kind}.image")
+    if isinstance(value, Texture):
+        return _mean(fields_of(value).get("image"), f"{value.kind}.image")
     return RGBIlluminant(value.r, value.g, value.b) if isinstance(value, RGB) else value
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from clpt.render.codegen import signatures
@@ -210,7 +210,7 @@ def _cases(shading: list[_Call]) -> list[str]:
     return ["switch (kind) {", *cases, "}"]
 
 
-def _asked(passes: list[list[object]]) -> str:
+def _asked(passes: Sequence[Sequence[object]]) -> str:
     """The condition for those kinds of paths that have something."""
     having = [i for i, found in enumerate(passes) if any(found)]
     if len(having) in (0, len(passes)):

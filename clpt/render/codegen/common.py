@@ -6,7 +6,7 @@ kind's flags reach: `common.cl`. Shading calls `common_<name>` in both.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from clpt.render.codegen import flags
@@ -16,9 +16,9 @@ from clpt.scene.scatterer import Scatterer
 
 @dataclass(frozen=True)
 class Common:
-    """A function: type, name, parameters as a pair of type and name, and which kinds call it."""
+    """A function: its type, name and parameters (types and names), and which kinds call it."""
 
-    type: str
+    returns: str
     name: str
     parameters: tuple[tuple[str, str], ...]
     calls: Callable[[Features, type[Scatterer]], object]
@@ -62,30 +62,29 @@ FUNCTIONS = (
 )
 
 
-def shared(features: Features) -> list[Common]:
-    """Return the functions that several kinds of a scene call."""
-    return [one for one in FUNCTIONS if one.shared(features)]
+def shared(features: Features, lanes: int) -> list[Common]:
+    """Return the functions that several kinds of a scene call: none in one lane, as on GPUs."""
+    return [one for one in FUNCTIONS if lanes > 1 and one.shared(features)]
 
 
-def calls_text(features: Features | None = None) -> str:
-    """Return what shading calls: functions of the part, or, without features, its own."""
-    elsewhere = shared(features) if features else []
+def calls_text(elsewhere: Sequence[Common] = ()) -> str:
+    """Return what shading calls: functions of the part, where they are `elsewhere`, or its own."""
     rows = []
     for one in FUNCTIONS:
         if one in elsewhere:
             declared = ", ".join(f"{type_}{name}" for type_, name in one.parameters)
-            rows.append(f"{one.type} loop_{one.name}({declared});")
+            rows.append(f"{one.returns} loop_{one.name}({declared});")
         called = f"loop_{one.name}" if one in elsewhere else one.name
         rows.append(f"#define common_{one.name} {called}")
     return "\n".join([*rows, ""])
 
 
-def part_text(features: Features) -> str:
+def part_text(functions: Sequence[Common]) -> str:
     """Return the functions of the part."""
     rows = []
-    for one in shared(features):
+    for one in functions:
         declared = ", ".join(f"{type_}{name}" for type_, name in one.parameters)
         passed = ", ".join(name for _, name in one.parameters)
-        rows.append(f"COMMON({one.type}, {one.name})({declared})")
+        rows.append(f"COMMON({one.returns}, {one.name})({declared})")
         rows.append(f"{{\n    return {one.name}({passed});\n}}")
     return "\n".join([*rows, ""])

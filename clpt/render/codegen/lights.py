@@ -138,29 +138,31 @@ def _sides_text(features: Features) -> str:
     return function(head, f"return front | ({mode} == {BOTH});")
 
 
+def _pick_text(features: Features) -> list[str]:
+    """Choose a row of `lights`, by the tree or by power."""
+    number = "FEW_LIGHTS ? &u.x : &pick"
+    if not features.lights.tree:
+        return [f"integer row = light_pick(scene, {number}, u.y);"]
+    picked = f"light_tree_pick(scene, p, hemisphere, {number}, u.y, &pmf)"
+    return ["real pmf;", f"integer row = {picked};"]
+
+
 def _sample_text(features: Features) -> str:
     """`light_sample`: a light that is chosen by `pick`, and a direction to it."""
     others, surfaces = others_of(features), surfaces_of(features)
-    kinds, moving, weighed = (
-        [*others, *surfaces],
-        features.motion.lights,
-        features.transport.balanced,
-    )
+    kinds, moving = [*others, *surfaces], features.motion.lights
+    weighed = features.transport.balanced
     head = (
         "LightSample light_sample(Scene scene, vec3 p, vec3 hemisphere, real pick, vec2 u, "
         "Wavelengths lambdas)"
     )
     if not kinds:
         return function(head, "return light_sample_nothing();")
-    number = "FEW_LIGHTS ? &u.x : &pick"
-    if features.lights.tree:
-        rows = [
-            "real pmf;",
-            f"integer row = light_tree_pick(scene, p, hemisphere, {number}, u.y, &pmf);",
-        ]
-    else:
-        rows = [f"integer row = light_pick(scene, {number}, u.y);"]
-    rows += ["LightRow l = light_at(scene, row);", "LightSample s = light_sample_nothing();"]
+    rows = [
+        *_pick_text(features),
+        "LightRow l = light_at(scene, row);",
+        "LightSample s = light_sample_nothing();",
+    ]
     if moving:
         rows += [
             "Motion motion = motion_of_light(scene, row, l);",

@@ -8,35 +8,25 @@ holds a flag or a choice that is the same in the whole scene.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 from clpt.layout import row_words
 from clpt.render.codegen.dispatch import Case, choose, function, indented
 from clpt.render.contract.features import Features
 from clpt.render.contract.parameter_words import (
     NORMAL_MAP_WORDS,
-    ORDERS_WORDS,
-    SPECTRAL,
     SPECTRUM_WORDS,
+    array_size,
+    lane_type,
     words,
 )
-from clpt.scene.params import Kind, Param, device_params
+from clpt.scene import roles
+from clpt.scene.params import Kind, device_params
+from clpt.scene.roles import Param, Role
 
+CONSTANT = frozenset({"constant"})  # where nothing is known of a scene
 _LOADED = "(Scene scene, integer at, TexturePoint point, Wavelengths lambdas)"
-
-
-def lane_type(param: Param) -> str:
-    """Return the parameter's type in a kind's struct."""
-    if param.role in SPECTRAL:
-        return "Spectrum"
-    given = {"real": "real", "orders": "real", "layers": "Layers"}
-    given |= {"angular": "AngularTable", "measurement": "Measurement", "merl": "MerlTable"}
-    return given.get(param.role, "integer")
-
-
-def array_size(param: Param) -> int:
-    """Return how many values of `lane_type` a parameter has in a kind's struct."""
-    return ORDERS_WORDS if param.role == "orders" else 1
 
 
 def struct_text(cls: type[Kind], sources: Mapping[str, frozenset[str]] | None = None) -> str:
@@ -86,8 +76,8 @@ def load_text(
         if array_size(param) > 1:
             rows += [f"r.{name}[{i}] = {word};" for i, word in enumerate(own)]
         else:
-            at, texel = f"row + {first}", stochastic and param.linear
-            rows += _member(f"r.{name}", param, own, at, sources.get(name), texel)
+            present, texel = sources.get(name) or CONSTANT, stochastic and param.linear
+            rows += _member(f"r.{name}", _Read(param, own, f"row + {first}", present, texel))
     before = ""
     if cls.tints:
         before = value_text(
@@ -118,42 +108,86 @@ def _luminance(cls: type[Kind]) -> list[str]:
     ]
 
 
-def _member(
-    target: str,
-    param: Param,
-    given: Sequence[str],
-    at: str,
-    sources: frozenset[str] | None,
-    texel: bool = False,
-) -> list[str]:
-    """Set a member from the sources that occur; a lane's word after the value says from which.
+@dataclass(frozen=True)
+class _Read:
+    """A member to be read: its parameter, the words of its row, and where they are.
 
-    given: its words, which are at `at`; texel: of an image a random texel is read.
+    sources: those that occur; texel: of an image a random texel is read.
     """
-    form, present = lane_type(param), sources or frozenset({"constant"})
-    if form == "integer":
-        numbers = [source for source in present if source.isdigit()]
-        held = f"(integer)({numbers[0]})" if len(numbers) == len(present) == 1 else None
-        return [f"{target} = {held or f'as_integer({given[0]})'};"]
-    if form == "Layers":
-        loaded = f"layers_load(scene, {at}, point, lambdas)"
-        return [f"{target} = {loaded if 'layers' in present else 'layers_none()'};"]
-    if form == "AngularTable":
-        return [f"{target} = angular_load(scene, {at}, lambdas);"]
-    if form == "Measurement":
-        return [f"{target} = measurement_load(scene, {at}, lambdas);"]
-    if form == "MerlTable":
-        return [f"{target} = merl_load_table(scene, {at}, lambdas);"]
+
+    param: Param
+    words: Sequence[str]
+    at: str
+    sources: frozenset[str]
+    texel: bool = False
+
+
+def _number(read: _Read) -> str:
+    numbers = [source for source in read.sources if source.isdigit()]
+    held = len(numbers) == len(read.sources) == 1
+    return f"(integer)({numbers[0]})" if held else f"as_integer({read.words[0]})"
+
+
+def _layers(read: _Read) -> str:
+    there = "layers" in read.sources
+    return f"layers_load(scene, {read.at}, point, lambdas)" if there else "layers_none()"
+
+
+def _table(read: _Read) -> str:
+    return f"{TABLES[read.param.role].load}(scene, {read.at}, lambdas)"
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table that a member refers to: the function that finds it, and the files that read it.
+
+    counted: where all tables of a scene have the same counts at their heads, texts have them.
+    """
+
+    load: str
+    file: str
+    load_file: str
+    counted: bool = True
+
+
+TABLES: dict[Role, Table] = {
+    roles.ANGULAR: Table(
+        "angular_load", "optics/angular_table.cl", "optics/angular_load.cl", counted=False
+    ),
+    roles.MEASUREMENT: Table(
+        "measurement_load", "optics/measurement.cl", "optics/measurement_load.cl"
+    ),
+    roles.MERL: Table("merl_load_table", "optics/merl_table.cl", "optics/merl_load.cl"),
+}
+# how a member is read that is neither a spectrum nor a number
+LOADS: dict[Role, Callable[[_Read], str]] = {
+    roles.FLAG: _number,
+    roles.CHOICE: _number,
+    roles.LAYERS: _layers,
+    **dict.fromkeys(TABLES, _table),
+}
+
+
+def _member(target: str, read: _Read) -> list[str]:
+    """Set a member from the sources that occur."""
+    if read.param.role in LOADS:
+        return [f"{target} = {LOADS[read.param.role](read)};"]
+    return _value(target, read)
+
+
+def _value(target: str, read: _Read) -> list[str]:
+    """Set a spectrum or a number; a lane's word after the value says from which source."""
+    form, present = lane_type(read.param), read.sources
     if present == {"none"}:
         return [f"{target} = {'spectrum_of(0.0f)' if form == 'Spectrum' else '(real)(0.0f)'};"]
-    *own, source = given
+    *own, source = read.words
     whole = f"v4({', '.join(own)})" if form == "Spectrum" else own[0]
     if present == {"grey"}:
         return [f"{target} = spectrum_grey({whole});"]
     if present & {"none", "grey"}:
         present |= {"constant"}
     constant, table = f"spectrum_constant({whole}, lambdas)", f"spectrum_table(scene, {whole}"
-    looked_up = "texel" if texel else param.role
+    looked_up = "texel" if read.texel else read.param.role.name
     texture = f"{form.lower()}_texture_{looked_up}(scene, as_integer({source}), point, lambdas)"
     loads = {
         "constant": ("", constant if form == "Spectrum" else whole),
@@ -171,20 +205,21 @@ def value_text(
     """Return `name(scene, at, point, lambdas)`, which loads a single parameter from `table`."""
     form = lane_type(param)
     read, given = row_words(f"scene.{table}", "at", words(param))
-    rows = [*read, f"{form} value;", *_member("value", param, given, "at", sources)]
+    member = _Read(param, given, "at", sources or CONSTANT)
+    rows = [*read, f"{form} value;", *_member("value", member)]
     return function(f"{form} {name}{_LOADED}", *rows, "return value;")
 
 
 def emission_text(sources: frozenset[str]) -> str:
     """Return `emission_load(scene, at, point, lambdas)`: five words of `light_params`."""
-    emission = Param("emission", "", textured=True)
+    emission = Param(roles.EMISSION, textured=True)
     return value_text("emission_load", emission, sources, "light_params")
 
 
 def factor_text(sources: frozenset[str]) -> str:
     """Return `factor_load(scene, at, point, lambdas)`: five words of `light_params`."""
     return value_text(
-        "factor_load", Param("reflectance", "", textured=True), sources, "light_params"
+        "factor_load", Param(roles.REFLECTANCE, textured=True), sources, "light_params"
     )
 
 
@@ -195,7 +230,7 @@ def medium_text(sources: Mapping[str, frozenset[str]]) -> str:
     MEDIUM_SCATTERING words behind it, where there is "light" `medium_light` what stands
     MEDIUM_LIGHT words before it.
     """
-    coefficient = Param("coefficient", "")
+    coefficient = Param(roles.COEFFICIENT)
     head = f"#define MEDIUM_SCATTERING {SPECTRUM_WORDS}\n" if "scattering" in sources else ""
     head += f"#define MEDIUM_LIGHT {1 + SPECTRUM_WORDS}\n" if "light" in sources else ""
     return head + "".join(
@@ -217,10 +252,10 @@ def virtual_files(features: Features) -> dict[str, str]:
     weights = features.materials.sources_of("mixture").get("weight")
     bodies = features.materials.sources_of("body").get("index")
     maps = features.materials.sources_of("perturbation").get("value")
-    real = Param("real", "", textured=True)
+    real = Param(roles.REAL, textured=True)
     return {
         "generated/medium_coefficients.cl": medium_text(_medium_sources(features)),
-        "generated/body_index.cl": value_text("body_index", Param("index", ""), bodies),
+        "generated/body_index.cl": value_text("body_index", Param(roles.INDEX), bodies),
         "generated/mixture.cl": value_text("mixture_weight", real, weights, "mixtures"),
         "generated/normal_map.cl": f"#define NORMAL_MAP_WORDS {NORMAL_MAP_WORDS}\n"
         + value_text("normal_map_real", real, maps),

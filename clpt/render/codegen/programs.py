@@ -105,7 +105,7 @@ def _shading(
             "generated/bsdf.cl": stages.bsdf_text(features, cls),
         }
         if part:
-            own["generated/common.cl"] = common.calls_text(features)
+            own["generated/common.cl"] = common.calls_text(common.shared(features, lanes))
         if cls.is_phase:
             own["generated/shading_frame.cl"] = ("path/phase_frame.cl",)
         if cls.source is not None:
@@ -146,8 +146,10 @@ def loop_sources(
         made |= _stages(own, layout, lanes, interleaved, part=True)
         stages_ = bounce.order(own, layout, lanes, interleaved)
         used |= dict.fromkeys(stage.program for stage in stages_)
-    if common.shared(features):
-        made["common"] = _common(features, layout, lanes)
+    if shared := common.shared(features, lanes):
+        own_files = _shared(features, layout)
+        own_files["generated/common_part.cl"] = common.part_text(shared)
+        made["common"] = _source("common", own_files, _defines(features, lanes), lanes)
         used["common"] = None
     files = {
         **_shared(features, layout),
@@ -158,15 +160,6 @@ def loop_sources(
     loop = _source("loop", files, _defines(features, lanes), lanes)
     parts = {name: made[name].with_private(name) for name in used}
     return {**parts, "loop": loop.with_private("loop")}
-
-
-def _common(features: Features, layout: str, lanes: int) -> device.Source:
-    """The part of a loop that several kinds of materials call."""
-    files = {
-        **_shared(features, layout),
-        "generated/common_part.cl": common.part_text(features),
-    }
-    return _source("common", files, flags.of_scene(features), lanes)
 
 
 def _alone(features: Features, layout: str, *names: str) -> dict[str, device.Source]:
@@ -180,7 +173,7 @@ def _static(texts: dict[str, device.Source]) -> dict[str, device.Source]:
 
 
 def _defines(features: Features, lanes: int) -> flags.Defines:
-    """What is the same for all programs of a scene; lanes: paths that a work-item shades."""
+    """Return what all programs of a scene define; lanes: paths that a work-item shades."""
     return {**flags.of_scene(features), "SLAB_BLOCK": SLAB_BLOCK if lanes == 1 else 0}
 
 

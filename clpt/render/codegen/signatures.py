@@ -69,7 +69,7 @@ def scene_text(unused: Container[str] = (), features: Features | None = None) ->
         for name, (element, doc) in TABLES.items()
     ]
     slab_sets = [
-        f"{record.name.lower()} = {{{name}, SLAB_STEP({record.snake_name.upper()}_STEP, stride)}}"
+        f"{record.name.lower()} = {{{name}, SLAB_STEP({record.step}, stride)}}"
         for record, name in zip(SLABS, SLAB_ARGS, strict=False)
     ]
     return "\n".join(

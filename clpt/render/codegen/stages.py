@@ -16,7 +16,8 @@ from clpt.render.contract.features import (
     MaterialFeatures,
 )
 from clpt.render.contract.parameter_words import MIXTURE, row_words, words
-from clpt.scene.params import MEASURED, device_params, interior_params
+from clpt.scene.params import device_params, interior_params
+from clpt.scene.roles import Role
 from clpt.scene.scatterer import Scatterer
 
 
@@ -183,10 +184,6 @@ def _pane_text(features: Features, cls: type[Scatterer]) -> list[str]:
     ]
 
 
-# of the roles whose values are tables: what kernels read of them
-TABLES = {"angular": "angular_table", "measurement": "measurement", "merl": "merl_table"}
-
-
 def functions_text(cls: type[Scatterer], mode: str, features: Features | None = None) -> str:
     """Return a kind's struct and functions, with what its boundary needs.
 
@@ -195,23 +192,23 @@ def functions_text(cls: type[Scatterer], mode: str, features: Features | None = 
     loaded = features.materials if features else MaterialFeatures()
     own, layer = loaded.sources_of(cls.kind), loaded.sources_of("layer")
     boundary = thin_films.boundary_text(cls, mode, own, layer)
-    roles = {param.role for param in device_params(cls).values()}
-    for role, table in TABLES.items():
-        if role in roles:
-            boundary += _counts_text(role, own.get("data", frozenset()))
-            boundary += f'#include "optics/{table}.cl"\n'
-            boundary += f'#include "optics/{role}_load.cl"\n' if features else ""
+    used = {param.role for param in device_params(cls).values()}
+    for role, table in parameters.TABLES.items():
+        if role in used:
+            boundary += _counts_text(role, own.get("data", frozenset())) if table.counted else ""
+            boundary += f'#include "{table.file}"\n'
+            boundary += f'#include "{table.load_file}"\n' if features else ""
     struct, declared = parameters.struct_text(cls, own), _declared_text(cls)
     return f'{boundary}{struct}{declared}#include "{cls.folder}/{cls.kind}.cl"\n'
 
 
-def _counts_text(role: str, sources: frozenset[str]) -> str:
+def _counts_text(role: Role, sources: frozenset[str]) -> str:
     """Define the counts at the head of a measurement, where all of a scene have the same."""
-    if role not in MEASURED or len(sources) != 1:
+    if len(sources) != 1:
         return ""
     _, *counts = next(iter(sources)).split()
     chosen = " : ".join(f"(i) == {i} ? {count}" for i, count in enumerate(counts))
-    return f"#define {role.upper()}_COUNT(t, i) ((integer)({chosen} : 0))\n"
+    return f"#define {role.name.upper()}_COUNT(t, i) ((integer)({chosen} : 0))\n"
 
 
 def _declared_text(cls: type[Scatterer]) -> str:

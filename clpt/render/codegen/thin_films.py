@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from clpt.render.codegen.parameters import load_text, struct_text, value_text
 from clpt.render.contract.parameter_words import FILM_COSINES, row_words
+from clpt.scene import roles
 from clpt.scene.materials import Layer
 from clpt.scene.params import Kind, params
 
@@ -19,7 +20,7 @@ def boundary_text(cls: type[Kind], mode: str, sources: Sources, layer: Sources) 
 
     sources: of the kind's parameters; layer: of those of the layers in the scene.
     """
-    coated = [name for name, param in params(cls).items() if param.role == "layers"]
+    coated = [name for name, param in params(cls).items() if param.role is roles.LAYERS]
     if not coated:
         return ""
     if not any("layers" in sources.get(name, ()) for name in coated):

@@ -6,7 +6,8 @@ from clpt.geometry import shape_records
 from clpt.layout import Record
 from clpt.scene.lights import KINDS as LIGHTS
 from clpt.scene.lights import Light
-from clpt.scene.params import Param, params
+from clpt.scene.params import params
+from clpt.scene.roles import REAL, HostForm, Param
 
 _BANDS = {  # of an image of spectra
     "bands": ("integer", "values in a texel"),
@@ -72,7 +73,11 @@ _RADIANCE = ("integer", "first word of the emission parameter in `light_params`"
 _SCALE = ("real", "what the image's values were divided by")
 _FACTOR = ("integer", "first word of its factor in `light_params`")
 
-OF_HOST = ("text", "keys", "optional_number")  # forms of parameters that are for the host alone
+OF_HOST: tuple[HostForm, ...] = (
+    "text",
+    "keys",
+    "optional_number",
+)  # forms of parameters that are for the host alone
 
 PROJECTED_RECORDS: dict[str, Record] = {
     "projector": Record(
@@ -118,14 +123,14 @@ def declared_record(cls: type[Light]) -> Record:
 
 def _members(name: str, param: Param) -> dict[str, str]:
     """The members of a parameter by name, with their types."""
-    if param.role == "host":
-        placement = {member: type_ for member, (type_, _) in _PLACEMENT.items()}
-        forms = {"vector": {name: "vec3"}, "direction": {name: "vec3"}, "matrix4": placement}
-        forms |= {form: {} for form in OF_HOST}
-        if param.form not in forms:
-            raise TypeError(f"a light cannot declare {name!r} as a host parameter of this form")
-        return forms[param.form]
-    return {name: "real" if param.role == "real" else "integer"}
+    placement = {member: type_ for member, (type_, _) in _PLACEMENT.items()}
+    forms = {"vector": {name: "vec3"}, "direction": {name: "vec3"}, "matrix4": placement}
+    forms |= {form: {} for form in OF_HOST}
+    if param.role.place != "host":
+        return {name: "real" if param.role is REAL else "integer"}
+    if param.role.name not in forms:
+        raise TypeError(f"a light cannot declare {name!r} as a host parameter of this form")
+    return forms[param.role.name]
 
 
 # Lights whose rows the lowering computes; those of all other kinds follow from their declaration.

@@ -13,7 +13,8 @@ from clpt.errors import SceneError
 from clpt.geometry import shapes
 from clpt.scene import Scene
 from clpt.scene.motion import Deformation, Shutter, placement, through
-from clpt.scene.shapes import Curves, Group, Instance, Mesh, Spheres
+from clpt.scene.params import fields_of
+from clpt.scene.shapes import Curves, Group, Instance, Mesh, Shape, Spheres
 
 POINTS = ((Mesh, "vertices"), (Curves, "points"), (Spheres, "centers"))
 
@@ -31,8 +32,10 @@ def between(former: Scene, scene: Scene) -> tuple[Scene, list[str]]:
     if not isinstance(shutter, Shutter) or not shutter.close > shutter.open:
         message = "motion needs a time for which the shutter is open: camera.shutter"
         raise SceneError(message, where="camera.shutter")
-    for name in ("shapes", "lights"):
-        counts = [len(getattr(one, name)) for one in (former, scene)]
+    for name, *counts in (
+        ("shapes", len(former.shapes), len(scene.shapes)),
+        ("lights", len(former.lights), len(scene.lights)),
+    ):
         if counts[0] != counts[1]:
             message = (
                 f"motion needs what is in both scenes: there were {counts[0]}, now {counts[1]}"
@@ -52,7 +55,7 @@ class _Way:
         self.times, self.warnings = times, list[str]()
         self.groups: dict[tuple[int, int], Group] = {}
 
-    def shape(self, old: Any, new: Any) -> Any:
+    def shape(self, old: Shape, new: Shape) -> Shape:
         """A shape that moves, and whose points do."""
         if old is new:
             return new
@@ -73,13 +76,13 @@ class _Way:
             self.groups[key] = replace(new, shapes=inner)
         return self.groups[key]
 
-    def deformed(self, old: Any, new: Any) -> Any:
+    def deformed(self, old: Shape, new: Shape) -> Shape:
         """A shape with keys of its points, if these are others than before."""
         kind, name = next((x for x in POINTS if isinstance(new, x[0])), (None, ""))
         if kind is None or not isinstance(old, kind) or new.deformation is not None:
             return new
-        was, now = getattr(old, name), getattr(new, name)
-        if was is now and getattr(old, "radii", None) is getattr(new, "radii", None):
+        was, now = fields_of(old), fields_of(new)
+        if was[name] is now[name] and was.get("radii") is now.get("radii"):
             return new
         first, last = (_points(one, name) for one in (old, new))
         if np.array_equal(first, last):
@@ -89,10 +92,11 @@ class _Way:
             why = "emits light" if shines else f"had {len(first)} of them"
             self.warnings.append(f"{shapes.where(new)}: its {name} do not move, as it {why}")
             return new
-        normals = [getattr(one, "normals", None) for one in (old, new)]
+        normals = [one.normals for one in (old, new)]
         given = all(n is not None and not isinstance(n, str) for n in normals)
         turned = np.stack([np.asarray(on_host(n)) for n in normals]) if given else None
-        return replace(new, deformation=Deformation(self.times, [first, last], turned))
+        keys: dict[str, Any] = {"deformation": Deformation(self.times, [first, last], turned)}
+        return replace(new, **keys)
 
     def moved(self, old: Any, new: Any, name: str) -> Any:
         """A thing with keys of its transform, if it is elsewhere than before."""
@@ -108,9 +112,9 @@ class _Way:
             return new
 
 
-def _points(shape: Any, name: str) -> NDArray[np.float32]:
+def _points(shape: Shape, name: str) -> NDArray[np.float32]:
     """The points of a shape on the host, of spheres with the radii (n, 4)."""
-    points = np.asarray(on_host(getattr(shape, name)), np.float32)
+    points = np.asarray(on_host(fields_of(shape)[name]), np.float32)
     if not isinstance(shape, Spheres) or points.ndim != 2 or points.shape[1] != 3:
         return points
     radii = np.asarray(on_host(shape.radii), np.float32)
@@ -119,5 +123,5 @@ def _points(shape: Any, name: str) -> NDArray[np.float32]:
 
 def _read(thing: Any) -> Any:
     """A thing whose transform is on the host."""
-    matrix = getattr(thing, "to_world", None)
+    matrix = fields_of(thing).get("to_world")
     return thing if matrix is None else replace(thing, to_world=on_host(matrix))

@@ -49,7 +49,7 @@ class _Ranges:
     """
 
     row: NDArray[Any]
-    shape: Any
+    shape: Shape
     vertices: tuple[int, int]
     faces: tuple[int, int]
     mirrored: bool = False
@@ -163,7 +163,7 @@ class Moving:
         return backwards[::-1]
 
     def _plan_shape(
-        self, ranges: _Ranges, old: Any, new: Any, device_matrix: Location | None
+        self, ranges: _Ranges, old: Shape, new: Shape, device_matrix: Location | None
     ) -> list[Action]:
         """Return the actions that move a shape. Raises CannotMove."""
         name = _name(new)
@@ -173,11 +173,12 @@ class Moving:
             if device_matrix:
                 raise CannotMove(f"{name} is no triangles, and its transform is on the device")
             return self._plan_analytic(ranges, new)
-        if getattr(ranges.shape, "tangents", None) is not None:
+        if ranges.shape.tangents is not None:
             raise CannotMove(f"{name} has tangents of its own, which lie in the world")
         count = ranges.vertices[1]
+        given, before = fields_of(new), fields_of(old)
         for field_name in ("vertices", "normals"):
-            values = getattr(new, field_name, None)
+            values = given.get(field_name)
             if on_device(values):
                 self._locate(values, (count, 3), f"the {field_name} of {name}")
         matrix, points = transforms.IDENTITY, None
@@ -187,16 +188,16 @@ class Moving:
                 raise CannotMove(f"the transform of {name} mirrors it")
         elif isinstance(new, Instance):
             raise CannotMove(f"{name} is copied, not shared, and its transform is on the device")
-        if getattr(new, "vertices", None) is not getattr(old, "vertices", None):
+        if given.get("vertices") is not before.get("vertices"):
             if not ranges.whole:
                 raise CannotMove(f"{name} has triangles without an area")
-            if not on_device(new.vertices):
+            if not on_device(given["vertices"]):
                 points = triangles.points(new)
                 if len(points) != count:
                     raise CannotMove(f"{name} has {len(points)} vertices, and had {count}")
         return [lambda: self._move_vertices(ranges, new, points, matrix, device_matrix)]
 
-    def _plan_analytic(self, ranges: _Ranges, new: Any) -> list[Action]:
+    def _plan_analytic(self, ranges: _Ranges, new: Shape) -> list[Action]:
         """Return the actions that move an analytic shape. Raises CannotMove if its kind changes."""
         shape = ranges.shape if isinstance(new, Instance) else new
         matrix = shapes.placement(new) @ ranges.own
@@ -205,7 +206,7 @@ class Moving:
             raise CannotMove(f"the transform of {_name(new)} makes triangles of it")
         if isinstance(shape, Spheres):
             act = self._spheres.plan(ranges.row, shape, matrix)
-        elif isinstance(shape, Curves):
+        elif isinstance(in_world, Curves):
             act = self._plan_curves(ranges, in_world)
         else:
             act = self._plan_single(ranges, in_world)
@@ -233,10 +234,11 @@ class Moving:
 
         return act
 
-    def _plan_curves(self, ranges: _Ranges, shape: Any) -> Callable[[Boxes], None]:
+    def _plan_curves(self, ranges: _Ranges, shape: Curves) -> Callable[[Boxes], None]:
         """Return the action that gives curves other pieces, as many as before, and other boxes."""
         owners = self.target.lowered.owners
-        lowered: Any = next(owner for row, owner, _, _ in owners if row is ranges.row)
+        lowered = next(owner for row, owner, _, _ in owners if row is ranges.row)
+        assert isinstance(lowered, Curves)
         pieces, prim = strands.pieces(shape, cut_as=lowered), int(ranges.row["prim"])
         box = strands.boxes(pieces)
         words = self.target.lowered.tables["geometry"]
@@ -290,14 +292,13 @@ class Moving:
                 target.stream.after(getattr(new.to_world, "events", ()))
             device_matrix = device_matrix or self._upload_matrix(ranges, matrix)
             self._run("vertices", ranges, self._local(ranges, "vertices"), device_matrix)
-        if ranges.row["flags"] & _NORMALS:
-            if triangles.smooth(ranges.shape):
-                self._smooth(ranges)
-            else:
-                device_matrix = device_matrix or self._upload_matrix(ranges, matrix)
-                side = -1.0 if ranges.shape.flip_normals else 1.0
-                source = self._local(ranges, "normals")
-                self._run("normals", ranges, source, device_matrix, side=side)
+        if ranges.row["flags"] & _NORMALS and triangles.smooth(ranges.shape):
+            self._smooth(ranges)
+        elif ranges.row["flags"] & _NORMALS:
+            device_matrix = device_matrix or self._upload_matrix(ranges, matrix)
+            side = -1.0 if ranges.shape.flip_normals else 1.0
+            source = self._local(ranges, "normals")
+            self._run("normals", ranges, source, device_matrix, side=side)
         target.moved_tables |= {"vertices", "normals"}
         self._moved.add("triangles")
 
@@ -321,11 +322,12 @@ class Moving:
     def _local(self, ranges: _Ranges, name: str) -> Location:
         """Return where vertices or normals of a shape are on the device, before its transform."""
         shape = ranges.shape
-        values = getattr(shape, name, None)
+        given = fields_of(shape)
+        values = given.get(name)
         if on_device(values):
             self.target.stream.after(getattr(values, "events", ()))
             return self._locate(values, (ranges.vertices[1], 3), name)
-        vertices = getattr(shape, "vertices", None)
+        vertices = given.get("vertices")
         if ranges.local is None or ranges.local[0] is not vertices:
             ranges.local = vertices, {}
         buffers = ranges.local[1]
@@ -382,11 +384,12 @@ class Moving:
         self._moved.clear()
 
 
-def _check_fields(old: Any, new: Any) -> None:
+def _check_fields(old: Shape, new: object) -> None:
     """Raise CannotMove if more than what moves differs between two shapes."""
     if not isinstance(new, Shape) or type(old) is not type(new):
         raise CannotMove(f"{_name(old)} becomes something else")
-    changed = {name for name, value in fields_of(new).items() if value is not getattr(old, name)}
+    before = fields_of(old)
+    changed = {name for name, value in fields_of(new).items() if value is not before[name]}
     if changed - _MOVABLE:
         raise CannotMove(f"{_name(new)} has another {' and '.join(sorted(changed - _MOVABLE))}")
 

@@ -35,7 +35,9 @@ class MovingSpheres:
         self._sources: dict[int, cl.Buffer] = {}
         self._common: dict[int, NDArray[np.uint32]] = {}  # by their first word in `geometry`
 
-    def plan(self, row: Any, shape: Spheres, matrix: transforms.Matrix) -> Callable[[Boxes], None]:
+    def plan(
+        self, row: NDArray[np.void], shape: Spheres, matrix: transforms.Matrix
+    ) -> Callable[[Boxes], None]:
         """Return what enqueues a move of spheres, given the boxes of all shapes.
 
         row: theirs in `shapes`; shape: as it will be; matrix: its transform to the world.
@@ -60,7 +62,7 @@ class MovingSpheres:
 
     def _move(
         self,
-        row: Any,
+        row: NDArray[np.void],
         matrix: transforms.Matrix,
         common: NDArray[np.uint32],
         centers: Any,
@@ -90,7 +92,7 @@ class MovingSpheres:
             self.scene.stream.write(self.scene.tables["geometry"], common, 4 * first)
             self._common[first] = common
 
-    def _count(self, row: Any) -> int:
+    def _count(self, row: NDArray[np.void]) -> int:
         """Return the number of spheres that a row of `shapes` stands for."""
         lowered = self.scene.lowered
         rows = lowered.tables["shapes"].view(SHAPE.dtype)

@@ -17,7 +17,7 @@ from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera, Lens
 from clpt.scene.materials import CLEAR, COMPOSITES, Material
-from clpt.scene.params import params
+from clpt.scene.params import fields_of
 
 
 def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> Callable[[], None] | str:
@@ -90,7 +90,7 @@ def _pairs(former: Scene, scene: Scene) -> list[tuple[Any, Any]] | None:
     return [(old, new) for old, new in changed if not isinstance(old, COMPOSITES)]
 
 
-def _pair(old: Any, new: Any, pairs: Replacements) -> bool:
+def _pair(old: Material, new: Material, pairs: Replacements) -> bool:
     """Note which material replaces which; return whether they may differ in values only."""
     if id(old) in pairs:
         return pairs[id(old)][1] is new
@@ -100,11 +100,12 @@ def _pair(old: Any, new: Any, pairs: Replacements) -> bool:
     if type(old) is not type(new):
         return False
     if not isinstance(old, COMPOSITES):
-        absorb = [getattr(one, "absorption", CLEAR) != CLEAR for one in (old, new)]
+        absorb = [one.absorption != CLEAR for one in (old, new)]
         traits = [(one.transmits, one.uses_tangents) for one in (old, new)]
         return absorb[0] == absorb[1] and traits[0] == traits[1]
-    for name in params(type(old)):
-        a, b = getattr(old, name), getattr(new, name)
+    others = fields_of(new)
+    for name, a in fields_of(old).items():
+        b = others[name]
         if isinstance(a, Material) and isinstance(b, Material):
             if not _pair(a, b, pairs):
                 return False

@@ -78,11 +78,11 @@ def edit_scene(
             raise SceneError(f"a {shape.kind} has none", where=f"vertices[{key!r}]")
         new = fresh_view(points) if on_device(points) else np.asarray(points).view()
         edit.change(shape, field, new)
-        if getattr(shape, "deformation", None) is not None:
+        if shape.deformation is not None:
             edit.change(shape, "deformation", None)
-        if getattr(shape, "normals", None) is not None:  # which belong to the former vertices
+        if shape.normals is not None:  # which belong to the former vertices
             edit.change(shape, "normals", SMOOTH)
-        if getattr(shape, "tangents", None) is not None:
+        if shape.tangents is not None:
             edit.change(shape, "tangents", None)
     return edit.edited_scene(), edit.replacements()
 
@@ -156,7 +156,7 @@ class _Edit:
         """Let a field of a shape have another value."""
         self.changes.setdefault(id(shape), {})[name] = value
 
-    def replace(self, old: Any, new: Any) -> None:
+    def replace(self, old: object, new: object) -> None:
         """Replace an object by another, wherever it stands."""
         self.edited[id(old)] = old, new
 

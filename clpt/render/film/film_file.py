@@ -185,7 +185,7 @@ def _header_of(saved: SavedFilm) -> dict[str, Any]:
     }
 
 
-def _header_of_part(saved: SavedFilm, compression: Any) -> dict[str, Any]:
+def _header_of_part(saved: SavedFilm, compression: object) -> dict[str, Any]:
     """Return the header that every part has: parts of one file have one display window."""
     height, width = saved.film.words.shape[-2:]
     window = np.zeros(2, np.int32), np.array([width - 1, height - 1], np.int32)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pyopencl as cl
+from numpy.typing import DTypeLike
 from pyopencl.array import Array
 
 from clpt import device
@@ -72,7 +73,7 @@ class Resolve:
         film: Array,
         into: Array | cl.MemoryObject | None = None,
         *,
-        dtype: Any = None,
+        dtype: DTypeLike | None = None,
         exposure: float = 0.0,
         tone: str = "none",
         srgb: bool | None = None,
@@ -133,7 +134,7 @@ class Resolve:
             self._bound[kernel] = self.program.kernel(kernel).bind(**named)
         return self._bound[kernel]
 
-    def _target(self, film: Array, into: Any, dtype: Any) -> _Target:
+    def _target(self, film: Array, into: Any, dtype: DTypeLike | None) -> _Target:
         """Return the memory for a picture. Raises DeviceError, which says what would fit."""
         wanted = None if dtype is None else np.dtype(dtype)
         if wanted is not None and wanted not in (BYTES, FLOATS):

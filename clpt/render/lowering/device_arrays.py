@@ -10,6 +10,7 @@ import pyopencl.array as cl_array
 
 from clpt.arrays import on_device
 from clpt.errors import SceneError
+from clpt.scene.params import fields_of
 
 # What shapes have of arrays: numbers in a row (0: the array is flat), and their type.
 COLUMNS: dict[str, tuple[int, type]] = {
@@ -23,7 +24,7 @@ COLUMNS: dict[str, tuple[int, type]] = {
 }
 
 
-def is_table(values: Any, kind: str) -> bool:
+def is_table(values: object, kind: str) -> bool:
     """Return whether values are an array on a device as a table is, of words of a numpy kind."""
     return (
         isinstance(values, cl_array.Array)
@@ -72,10 +73,10 @@ def as_array(values: Any, name: str, queue: cl.CommandQueue, where: str) -> Any:
 
 def readable(shape: Any, queue: cl.CommandQueue, where: str) -> dict[str, Any]:
     """Return those fields of a shape that `shaped` makes other objects of."""
-    fields = {name: getattr(shape, name) for name in COLUMNS if hasattr(shape, name)}
+    fields = {name: value for name, value in fields_of(shape).items() if name in COLUMNS}
     made = {name: as_array(values, name, queue, where) for name, values in fields.items()}
     changed = {name: values for name, values in made.items() if values is not fields[name]}
-    given = getattr(shape, "attributes", {})
+    given = shape.attributes
     own = {name: as_array(values, name, queue, where) for name, values in given.items()}
     if any(own[name] is not given[name] for name in given):
         changed["attributes"] = own

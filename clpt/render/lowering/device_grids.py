@@ -6,7 +6,7 @@ They lie on a device, or are those of clouds, which are worked out there.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import pyopencl.array as cl_array
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from clpt.records import BRICK_SIZES
 from clpt.render.lowering.tables import TableStore
 from clpt.scene.media import ON_POINTS, Cloud, Grid
+from clpt.scene.params import fields_of
 
 POINT_WORDS = BRICK_SIZES["words"]
 
@@ -47,8 +48,8 @@ def stays_there(medium: Grid) -> bool:
 
     They do if it is float32 on a device, z fastest, in 16 bits a point, without colours or light.
     """
-    density: Any = medium.density
-    more = [getattr(medium, name) for name in ON_POINTS]
+    density = medium.density
+    more = [fields_of(medium)[name] for name in ON_POINTS]
     plain = medium.bits == 16 and medium.light is None and all(one is None for one in more)
     return plain and (
         isinstance(density, cl_array.Array)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,15 +16,25 @@ from clpt.render.contract.features.materials import Sources
 from clpt.render.contract.parameter_words import (
     LAYERS_WORDS,
     ORDERS_WORDS,
-    REAL_WORDS,
-    SPECTRUM_WORDS,
+    words,
 )
 from clpt.render.lowering.spectra import thin_films
 from clpt.render.lowering.spectra.spectra_table import SpectraTable
 from clpt.render.lowering.tables import TableStore, as_words
 from clpt.render.lowering.textures.bitmaps import Images
 from clpt.render.lowering.textures.textures import TextureTable
-from clpt.scene.params import Kind, device_params, interior_params, params, place_of
+from clpt.scene import roles
+from clpt.scene.materials import Material
+from clpt.scene.params import (
+    Kind,
+    Texture,
+    device_params,
+    fields_of,
+    interior_params,
+    params,
+    place_of,
+)
+from clpt.scene.roles import Param, Role, Spectral
 from clpt.spectra import RGB, Constant, Sensor, Tabulated
 
 BLACK = (Constant(0.0), RGB(0.0, 0.0, 0.0))
@@ -104,7 +115,7 @@ class Encoder:
         sources = []
         for kind in (old, new):
             self._sources = _no_sources()
-            words = self.kind_words(kind)
+            made = self.kind_words(kind)
             sources.append(self._sources)
         self._sources = kept
         if sources[0] != sources[1] or sizes != self.store.sizes:
@@ -113,26 +124,22 @@ class Encoder:
         rows = [self._rows.pop(key)[0] for key in owned]
         for key, row in zip(owned, rows, strict=True):
             self._rows[id(new), key[1], key[2]] = row, new
-        return [(row, words) for row in rows]
+        return [(row, made) for row in rows]
 
     def kind_words(self, kind: Kind) -> Words:
         """Return the words of what the kernels read of a kind."""
-        words: list[Words] = []
+        made: list[Words] = []
         read = {**device_params(type(kind)), **interior_params(type(kind))}
+        values = fields_of(kind)
         for name, param in read.items():
-            if param.role == "layers":
-                value, source = self._layers_words(kind)
-            elif param.role == "angular":
-                value, source = self.spectra.angular_words(kind)
-            else:
-                given = getattr(kind, name)
-                self._note_reach(given, place_of(kind, name))
-                value, source = self.param_words(given, param.role, param.choices)
-                if param.lobe and given in (0.0, *BLACK):
-                    source = "none"
-            words.append(value)
+            given = values[name]
+            self._note_reach(given, place_of(kind, name))
+            value, source = self.param_words(given, param, kind)
+            if param.lobe and given in (0.0, *BLACK):
+                source = "none"
+            made.append(value)
             self._sources[kind.kind][name].add(source)
-        return np.concatenate(words) if words else np.zeros(1, np.uint32)
+        return np.concatenate(made) if made else np.zeros(1, np.uint32)
 
     def _note_reach(self, value: Any, where: str) -> None:
         """Note a table that the film does not reach."""
@@ -144,48 +151,36 @@ class Encoder:
             )
 
     def param_words(
-        self, value: Any, role: str, choices: tuple[str, ...] = ()
+        self, value: object, param: Param, owner: Kind | None = None
     ) -> tuple[Words, str]:
-        """Return the words of one parameter and where its value comes from."""
-        if getattr(value, "is_texture", False):
-            value = self.textures.folded(value, role)
-        if getattr(value, "is_texture", False):
-            words = np.zeros(REAL_WORDS if role == "real" else SPECTRUM_WORDS, np.uint32)
-            words[-1] = 1 + self.textures.row(value, role)
-            return words, "texture"
-        if role in ("flag", "choice"):
-            number = choices.index(value) if choices else int(value)
-            return np.array([number], np.uint32), str(number)
-        if role == "real":
-            plain = value.value if isinstance(value, Constant) else value
-            return np.array([as_words([plain])[0], 0], np.uint32), "constant"
-        if role == "orders":
-            beyond = (ORDERS_WORDS - len(value)) // 2
-            return as_words(np.pad(value, beyond)), "constant"
-        if role == "measurement":
-            return self.spectra.measurement_words(value)
-        if role == "merl":
-            return self.spectra.merl_words(value)
-        if role == "reradiation":
-            return self.spectra.reradiation_words(value)
-        return self.spectra.words(value, role)
+        """Return the words of one parameter and where its value comes from.
 
-    def named_words(self, kind: str, name: str, value: Any, role: str) -> tuple[Words, str]:
+        owner: the kind that it belongs to, if any.
+        """
+        if isinstance(value, Texture):
+            value = self.textures.folded(value, param.role)
+        if isinstance(value, Texture):
+            made = np.zeros(words(param), np.uint32)
+            made[-1] = 1 + self.textures.row(value, param.role)
+            return made, "texture"
+        return ENCODINGS[param.role](self, value, param, owner)
+
+    def named_words(self, kind: str, name: str, value: object, role: Role) -> tuple[Words, str]:
         """Return the words of a value that belongs to no kind, and note its source by a name."""
-        words, source = self.param_words(value, role)
+        made, source = self.param_words(value, Param(role))
         self._sources[kind][name].add(source)
-        return words, source
+        return made, source
 
-    def emission_words(self, value: Any) -> Words:
+    def emission_words(self, value: object) -> Words:
         """Return the five words that `emission_load` reads: a spectrum or a texture."""
-        return self.named_words("emission", "value", value, "emission")[0]
+        return self.named_words("emission", "value", value, roles.EMISSION)[0]
 
-    def factor_words(self, value: Any) -> Words:
+    def factor_words(self, value: object) -> Words:
         """Return the five words that `factor_load` reads: a reflectance, perhaps a texture."""
-        return self.named_words("factor", "value", value, "reflectance")[0]
+        return self.named_words("factor", "value", value, roles.REFLECTANCE)[0]
 
-    def _layers_words(self, material: Any) -> tuple[Words, str]:
-        """The two words of a material's thin films, and "constant" if there are none.
+    def layers_words(self, material: Material) -> tuple[Words, str]:
+        """Return the two words of a material's thin films, and "constant" if there are none.
 
         In spectral mode they are a row for each layer; in RGB mode a table of colours.
         """
@@ -199,10 +194,48 @@ class Encoder:
                     self._note_reach(getattr(layer, name), place_of(layer, name))
             colours = thin_films.film_colours(material)
             table = self.store.append_floats("spectra", colours)
-            profile, _ = self.named_words("layer", "profile", thin_films.profile(material), "real")
+            profile, _ = self.named_words(
+                "layer", "profile", thin_films.profile(material), roles.REAL
+            )
             rows = np.array([table, colours.shape[1], *profile], np.uint32)
         first = self.store.append("materials", rows)
         return np.array([first, len(material.layers)], np.uint32), "layers"
+
+
+def _spectrum(encoder: Encoder, value: Any, param: Param, owner: object) -> tuple[Words, str]:
+    assert isinstance(param.role, Spectral)
+    return encoder.spectra.words(value, param.role)
+
+
+def _number(encoder: Encoder, value: Any, param: Param, owner: object) -> tuple[Words, str]:
+    number = param.choices.index(value) if param.choices else int(value)
+    return np.array([number], np.uint32), str(number)
+
+
+def _real(encoder: Encoder, value: Any, param: Param, owner: object) -> tuple[Words, str]:
+    plain = value.value if isinstance(value, Constant) else value
+    return np.array([as_words([plain])[0], 0], np.uint32), "constant"
+
+
+def _orders(encoder: Encoder, value: Any, param: Param, owner: object) -> tuple[Words, str]:
+    beyond = (ORDERS_WORDS - len(value)) // 2
+    return as_words(np.pad(value, beyond)), "constant"
+
+
+Encoding = Callable[[Encoder, Any, Param, Any], tuple[Words, str]]
+# how a value that is no texture becomes words
+ENCODINGS: dict[Role, Encoding] = {
+    **dict.fromkeys(roles.SPECTRA, _spectrum),
+    roles.REAL: _real,
+    roles.FLAG: _number,
+    roles.CHOICE: _number,
+    roles.ORDERS_OF_LIGHT: _orders,
+    roles.LAYERS: lambda encoder, value, _, owner: encoder.layers_words(owner),
+    roles.ANGULAR: lambda encoder, value, _, owner: encoder.spectra.angular_words(owner),
+    roles.MEASUREMENT: lambda encoder, value, *_: encoder.spectra.measurement_words(value),
+    roles.MERL: lambda encoder, value, *_: encoder.spectra.merl_words(value),
+    roles.RERADIATION: lambda encoder, value, *_: encoder.spectra.reradiation_words(value),
+}
 
 
 def _no_sources() -> dict[str, dict[str, set[str]]]:

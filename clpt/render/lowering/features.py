@@ -38,7 +38,7 @@ def of_camera(index: SceneIndex) -> CameraFeatures:
         kind=camera.kind,
         disperses=index.spectral and bool(dispersive_glasses(camera)),
         losses=isinstance(camera, Lens) and camera.reflects,
-        ghosts=index.lit_ghosts or getattr(camera, "ghosts", 0.0) > 0.0,
+        ghosts=index.lit_ghosts or (isinstance(camera, Lens) and camera.ghosts > 0.0),
     )
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Floats32
 from clpt.geometry import analytic, shape_records, strands
 from clpt.records import SHAPE, SHAPE_BITS
 from clpt.render.analysis.geometry import Geometry, Stored
@@ -25,7 +26,7 @@ def lower_geometry(
     spheres_move: whether many spheres in one shape move by themselves.
     """
     store, rows = encoder.store, []
-    curves: list[tuple[np.ndarray, Shape, strands.Pieces]] = []
+    curves: list[tuple[np.ndarray, Shape, Floats32]] = []
     for (given, shape, _, _), stored in zip(geometry.owners, geometry.stored, strict=True):
         row = given.copy()
         front, back, two_sided = materials.sides(shape)
@@ -66,9 +67,7 @@ def _store_balls(
         store.append("geometry", np.array([first], np.int32).view(np.uint32))
 
 
-def _store_pieces(
-    curves: Sequence[tuple[np.ndarray, Shape, strands.Pieces]], store: TableStore
-) -> None:
+def _store_pieces(curves: Sequence[tuple[np.ndarray, Shape, Floats32]], store: TableStore) -> None:
     """Append the pieces of all curves to `spheres`, and where they are to `geometry`."""
     member = analytic.member("curve", "first")
     for row, shape, found in curves:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -70,13 +69,13 @@ def _materials(shapes: Iterable[Shape]) -> tuple[dict[int, int], list[mt.Materia
 
 def _groups(index: SceneIndex, geometry: Geometry, lights: LightRows) -> list[str]:
     """The group of each row of `lights`."""
-    lamps: Any = index.scene.lights
+    lamps = index.scene.lights
     groups = [lamps[i].group or REST for i in row_order(lamps)]
     groups += [REST] * (next(iter(lights.first), len(lights.rows)) - len(groups))  # of media
     ends = (*lights.first, len(lights.rows))[1:]
     for emitter, first, end in zip(geometry.emitters, lights.first, ends, strict=True):
-        emission: Any = emitter.shape.emission
-        groups += [emission.group or REST] * (end - first)
+        emission = emitter.shape.emission
+        groups += [(emission.group if emission else "") or REST] * (end - first)
     return groups
 
 

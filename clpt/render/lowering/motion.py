@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ STEP = MOTION_SIZES["step"]
 
 def track(keys: Keys | None) -> NDArray[np.float32]:
     """Return the track of keys, or of what does not move: see kernels/tracing/motion.cl."""
-    times: Any = (0.0, 1.0) if keys is None else keys.times
+    times: Sequence[float] = (0.0, 1.0) if keys is None else keys.times
     matrices: Any = np.stack([np.eye(4)] * 2) if keys is None else keys.transforms
     words = np.zeros(1 + STEP * (len(times) - 1), np.float32)
     words[:1] = np.array([len(times) - 1], np.int32).view(np.float32)

@@ -25,7 +25,7 @@ from clpt.render.analysis.index import SceneIndex
 from clpt.render.analysis.lights.sources import Sources
 from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.render.analysis.wavelengths import Density, density, emissions
-from clpt.render.contract.features import Features, SpectraFeatures
+from clpt.render.contract.features import Features, GeometryFeatures, SpectraFeatures
 from clpt.render.contract.layer_names import LayerNames
 from clpt.render.contract.parameter_words import row_words
 from clpt.render.lowering import features as needs
@@ -42,14 +42,15 @@ from clpt.render.lowering.media.body_words import BodyWords
 from clpt.render.lowering.media.light_media import light_media_words
 from clpt.render.lowering.media.medium_words import MediumWords, medium_aims
 from clpt.render.lowering.motion import lower_motion
-from clpt.render.lowering.settings import DEEPEST, Found, settings_of
+from clpt.render.lowering.settings import Found, settings_of
 from clpt.render.lowering.textures.attributes import lower_attributes
 from clpt.scene import Scene
 from clpt.scene import materials as mt
-from clpt.scene.integrators import Film, Integrator
+from clpt.scene.integrators import DEEPEST, Film, Integrator
 from clpt.scene.lights import Point
 from clpt.scene.media import Lattice
 from clpt.scene.params import Kind, params
+from clpt.scene.roles import INDEX
 from clpt.scene.shapes import Mesh, Shape
 
 TREE_FROM = 16  # lights from which a tree chooses among them, see bench/lights.py
@@ -133,46 +134,31 @@ def encode(found: Analysis, cache: LoweringCache, texture_budget: int | None = N
     ends = film.lambda_min, film.lambda_max
     wavelengths = density(index) if index.spectral else Density(*ends)
     encoder = Encoder(index.mode, *ends, sensor(film), wavelengths, texture_budget, cache)
-    filters.lower_filter(film.filter, encoder.store, index.splatting)
-    materials = _begin_materials(index, encoder)
-    moves = spheres_move(index)
-    geometry = lower_geometry(found.geometry, encoder, materials, spheres_move=moves)
-    media = MediumWords(index, encoder, materials, found.sealed, found.sources.glows)
-    lights = _lower_lights(index, encoder, geometry, found.sources, media)
-    near = _lower_medium_aims(index, encoder, lights)
-    camera = _lower_bodies(found, geometry, encoder, materials, media)
-    profile = _lower_profile(index, encoder)
-    density_row, tabulated = _lower_density(index, encoder, wavelengths)
-    first_aim = encoder.store.append_floats("distributions", targets := found.aims)
-    lower_attributes(geometry.owners, encoder.textures, cache, geometry.single_count, geometry.keys)
-    encoder.store.append("shapes", shape_words(geometry.rows))
-    glass_rows = _lower_camera(index, encoder)
-    ambient_row = _lower_ambient(index, encoder)
+    surfaces = _encode_surfaces(found, encoder)
+    rows = _encode_views(found, encoder, wavelengths, surfaces.geometry)
+    geometry, lights = surfaces.geometry, surfaces.lights
     warnings = (
         *_warnings(index), *found.warnings, *sorted(encoder.warnings), *geometry.warnings,
         *encoder.textures.finish(),
     )  # fmt: skip
-    motion = needs.of_motion(index, geometry, _lower_motion(found, lights, encoder))
-    spectra = SpectraFeatures(index.mode, encoder.spectra.samples, encoder.spectra.step, tabulated)
+    motion_row = _lower_motion(found, lights, encoder)
     names, layers = lower_names(index, geometry, lights, encoder.store)
-    textures = needs.of_textures(encoder)
-    shaped = needs.of_geometry(index, geometry, materials, textures)
-    if shaped.tangents and geometry.tangents:
-        shaped = replace(shaped, vertex_tangents=_lower_tangents(geometry, encoder))
     features = Features(
         camera=needs.of_camera(index),
         film=needs.of_film(index, layers),
-        transport=needs.of_transport(index, profile, aimed=len(targets) > 0),
+        transport=needs.of_transport(index, rows.profile, aimed=len(found.aims) > 0),
         lights=needs.of_lights(lights),
-        media=needs.of_media(index, materials, near, sealed=bool(found.sealed)),
-        motion=motion,
-        geometry=shaped,
-        textures=textures,
-        spectra=spectra,
-        materials=needs.of_materials(index, encoder, materials),
+        media=needs.of_media(index, surfaces.materials, surfaces.near, sealed=bool(found.sealed)),
+        motion=needs.of_motion(index, geometry, motion_row),
+        geometry=_geometry_features(index, encoder, surfaces),
+        textures=needs.of_textures(encoder),
+        spectra=SpectraFeatures(
+            index.mode, encoder.spectra.samples, encoder.spectra.step, rows.tabulated
+        ),
+        materials=needs.of_materials(index, encoder, surfaces.materials),
     )
-    aims, disperses = (first_aim, len(targets)), features.dispersion
-    own = Found(density_row, ambient_row, aims, camera, disperses, layers)
+    aims, around, disperses = (rows.aims, len(found.aims)), surfaces.around, features.dispersion
+    own = Found(rows.density, rows.ambient, aims, around, disperses, layers)
     settings = settings_of(index, geometry, lights, wavelengths, found.sphere, own)
     cache.settle()
     tables = encoder.store.arrays()
@@ -189,7 +175,7 @@ def encode(found: Analysis, cache: LoweringCache, texture_budget: int | None = N
         zero_copy=_zero_copy_tables(index, geometry),
         owners=geometry.owners,
         layer_names=names,
-        glass_rows=glass_rows,
+        glass_rows=rows.glasses,
         warnings=warnings,
         integrator=index.scene.integrator,
         reason=found.reason,
@@ -198,6 +184,77 @@ def encode(found: Analysis, cache: LoweringCache, texture_budget: int | None = N
         cache=cache,
         device_grids=tuple(encoder.store.device_grids),
     )
+
+
+@dataclass(frozen=True)
+class _Surfaces:
+    """Shapes, their materials and media, and lights, whose words are in the tables.
+
+    near: how many lamps flights through media end at; around: what is at the camera, see `Found`.
+    """
+
+    geometry: Geometry
+    materials: MaterialWords
+    lights: LightRows
+    near: int
+    around: tuple[int, int]
+
+
+def _encode_surfaces(found: Analysis, encoder: Encoder) -> _Surfaces:
+    """Append shapes, materials, media and lights."""
+    index = found.index
+    filters.lower_filter(index.scene.film.filter, encoder.store, index.splatting)
+    materials = _begin_materials(index, encoder)
+    moves = spheres_move(index)
+    geometry = lower_geometry(found.geometry, encoder, materials, spheres_move=moves)
+    media = MediumWords(index, encoder, materials, found.sealed, found.sources.glows)
+    lights = _lower_lights(index, encoder, geometry, found.sources, media)
+    near = _lower_medium_aims(index, encoder, lights)
+    around = _lower_bodies(found, geometry, encoder, materials, media)
+    return _Surfaces(geometry, materials, lights, near, around)
+
+
+@dataclass(frozen=True)
+class _Views:
+    """Where the words begin of what paths and pixels look up.
+
+    profile: of the filter, 0 for none; density: of wavelengths, if it is tabulated; aims: of light
+    paths; glasses: rows in `spectra` of the camera's; ambient: 0 for none.
+    """
+
+    profile: int
+    density: int
+    tabulated: bool
+    aims: int
+    glasses: tuple[int, ...]
+    ambient: int
+
+
+def _encode_views(
+    found: Analysis, encoder: Encoder, wavelengths: Density, geometry: Geometry
+) -> _Views:
+    """Append what the film, the camera and the integrator ask for, and the rows of shapes."""
+    index, store = found.index, encoder.store
+    profile = _lower_profile(index, encoder)
+    density_row, tabulated = _lower_density(index, encoder, wavelengths)
+    aims = store.append_floats("distributions", found.aims)
+    counts = geometry.single_count, geometry.keys
+    lower_attributes(geometry.owners, encoder.textures, encoder.cache, *counts)
+    store.append("shapes", shape_words(geometry.rows))
+    glasses = _lower_camera(index, encoder)
+    ambient = _lower_ambient(index, encoder)
+    return _Views(profile, density_row, tabulated, aims, glasses, ambient)
+
+
+def _geometry_features(
+    index: SceneIndex, encoder: Encoder, surfaces: _Surfaces
+) -> GeometryFeatures:
+    """Return what the scene has of geometry; append its tangents, if materials ask for them."""
+    textures = needs.of_textures(encoder)
+    made = needs.of_geometry(index, surfaces.geometry, surfaces.materials, textures)
+    if made.tangents and surfaces.geometry.tangents:
+        made = replace(made, vertex_tangents=_lower_tangents(surfaces.geometry, encoder))
+    return made
 
 
 def _lower_motion(found: Analysis, lights: LightRows, encoder: Encoder) -> int:
@@ -319,8 +376,8 @@ def _lower_camera(index: SceneIndex, encoder: Encoder) -> tuple[int, ...]:
 
 def _lower_ambient(index: SceneIndex, encoder: Encoder) -> int:
     """Append the ambient light of an integrator; return its first word, 0 if there is none."""
-    ambient = getattr(index.scene.integrator, "ambient", 0.0)
-    if not ambient:
+    ambient = index.scene.integrator.ambient
+    if ambient is None:
         return 0
     return encoder.store.append("light_params", encoder.emission_words(ambient))
 
@@ -335,9 +392,9 @@ def _warnings(index: SceneIndex) -> list[str]:
         warnings.append("in rgb mode glass does not disperse: ask for the spectral mode")
     if index.motions:
         warnings += _of_motion(index)
-    if getattr(scene.integrator, "light_paths", 0):
+    if scene.integrator.light_paths:
         warnings += _left_to_the_camera(index)
-    depth = getattr(scene.integrator, "max_depth", -1)
+    depth = scene.integrator.max_depth
     if depth > DEEPEST:
         warnings.append(f"integrator.max_depth: {depth} counts as {DEEPEST}, the longest path")
     if index.spectral and not film.bands and not _sees(film):
@@ -349,7 +406,7 @@ def _warnings(index: SceneIndex) -> list[str]:
         warnings.append("no light in the scene, so the picture is black: add one to `lights`")
     if film.mode == "rgb" and mt.Fluorescent in index.leaves:
         warnings.append("in rgb mode fluorescent paint has its colour under D65, at most white")
-    if film.mode == "rgb" and any(getattr(medium, "glows", False) for medium in index.media):
+    if film.mode == "rgb" and any(medium.glows for medium in index.media):
         warnings.append("in rgb mode dyes in media only absorb: ask for the spectral mode")
     return warnings
 
@@ -357,7 +414,7 @@ def _warnings(index: SceneIndex) -> list[str]:
 def _disperses(shape: Shape) -> bool:
     """Whether a shape refracts wavelengths differently, in the spectral mode."""
     return any(
-        param.role == "index" and not isinstance(spectra.index(vars(part)[name]), spectra.Constant)
+        param.role is INDEX and not isinstance(spectra.index(vars(part)[name]), spectra.Constant)
         for part in mt.parts(shape.material)
         if part.refracts
         for name, param in params(type(part)).items()
@@ -368,9 +425,8 @@ def _of_motion(index: SceneIndex) -> list[str]:
     """Return warnings of grids of media that stay where a shape moves."""
     warnings: list[str] = []
     for i in index.motions.shapes:
-        shape: Any = index.scene.shapes[i]
-        inner = getattr(getattr(shape, "group", None), "shapes", (shape,))
-        if any(isinstance(one, Lattice) for s in inner for one in (s.interior, s.exterior)):
+        shape = index.scene.shapes[i]
+        if any(isinstance(one, Lattice) for s in shape.members for one in (s.interior, s.exterior)):
             warnings.append(
                 f"{shapes.where(shape)}.motion: its boundary moves, the grid of its medium stays"
             )
@@ -381,14 +437,14 @@ def _left_to_the_camera(index: SceneIndex) -> list[str]:
     """Return warnings of light that only paths from the camera find, not light paths or photons."""
     scene, integrator = index.scene, index.scene.integrator
     kind, warnings = integrator.kind, []
-    if getattr(integrator, "light_tracing", True) and not index.joined:
+    if integrator.light_tracing and not index.joined:
         names = " and ".join(cameras.CONNECTED)
         reason = f"a {scene.camera.kind} camera cannot be joined to a point"
         if scene.camera.kind in cameras.CONNECTED:
             reason = "its glass disperses"
         name = "light_tracing" if kind == "vcm" else "light_paths"
         warnings.append(f"{kind}.{name}: left aside, as {reason}; {names} can, without such glass")
-    if getattr(integrator, "merging", False) and not index.merged:
+    if integrator.merging and not index.merged:
         reason = f"a path needs {photons.FIRST + 1} surfaces"
         if not index.lights_reach:
             reason = index.lit_media

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,13 +18,12 @@ from clpt.render.contract.features import LayerFeatures
 from clpt.render.lowering import guides
 from clpt.render.lowering.lights.light_level import light_level
 from clpt.render.lowering.lights.lights import LightRows
+from clpt.scene.integrators import DEEPEST, Vcm
 from clpt.spectra.cie import tanh_ends
 
 LARGEST = 62  # exponent of 4 of a unit of areas, which is float32
 ORDINARY_SIZE = 10  # exponent of 2 of the radius of a scene [m], up and down
 MOST_SAMPLE_BITS = 16  # of a zsobol pixel's part of its sequence
-DEEPEST = 4000  # path state has 12 bits for the depth
-DEPTHS = {"direct": 2}  # of integrators without the parameter
 
 
 @dataclass(frozen=True)
@@ -58,23 +56,9 @@ def settings_of(
 
     density: of wavelengths; sphere: centre and radius of one around the scene [m].
     """
-    scene, film, integrator = index.scene, index.scene.film, index.scene.integrator
     settings = np.zeros((), SETTINGS.dtype)
-    width, height = film.size
-    settings["width"], settings["height"] = width, height
-    settings["crop_x"], settings["crop_y"] = (0, 0) if film.crop is None else film.crop[:2]
-    settings["film_width"], settings["film_height"] = film.width, film.height
-    margin = settings["margin"] = 0 if index.light_paths else index.filter_reach
-    settings["tiles_x"] = -(-(width + 2 * margin) // 4)
-    settings["padded_pixels"] = 16 * settings["tiles_x"] * -(-(height + 2 * margin) // 4)
-    settings["seed"] = scene.seed % 2**32
-    settings["sample_bits"] = min((max(scene.spp, 1) - 1).bit_length(), MOST_SAMPLE_BITS)
-    depth: int = DEPTHS.get(integrator.kind, 0) or getattr(integrator, "max_depth", -1)
-    settings["max_depth"] = DEEPEST if depth < 0 else min(depth, DEEPEST)
-    settings["rr_depth"] = min(getattr(integrator, "rr_depth", DEEPEST), DEEPEST)
-    settings["hide_lights"] = getattr(integrator, "hide_lights", False)
-    settings["alpha"] = index.alpha
-    settings["light_paths"] = index.weighed
+    _set_film(settings, index)
+    _set_paths(settings, index)
     if index.merged:
         _set_photons(settings, index, geometry, sphere[1], found.disperses)
     if index.guided:
@@ -91,19 +75,42 @@ def settings_of(
     settings["analytic_count"] = len(geometry.boxes)
     settings["single_count"] = geometry.single_count
     settings["shape_count"] = len(geometry.rows)
-    settings["lambda_min"], settings["lambda_max"] = film.lambda_min, film.lambda_max
     settings["tanh_min"], settings["tanh_max"] = tanh_ends(density.lo, density.hi)
-    settings["bands"] = film.bands
     settings["density"] = found.density_row
-    matrix, scale = (
-        output_matrix(film, index.mode),
-        film_scale(film, light_level(index, lights, sphere)),
-    )
-    settings["film_scale"] = scale
+    film = index.scene.film
+    matrix = output_matrix(film, index.mode)
+    scale = settings["film_scale"] = film_scale(film, light_level(index, lights, sphere))
     settings["to_first"], settings["to_second"], settings["to_third"] = matrix / scale
     settings["center"], settings["scene_radius"] = sphere
     _set_layers(settings, found.layers)
     return settings
+
+
+def _set_film(settings: NDArray[np.void], index: SceneIndex) -> None:
+    """Write the size of the film, and which of its pixels and wavelengths are rendered."""
+    film = index.scene.film
+    width, height = film.size
+    settings["width"], settings["height"] = width, height
+    settings["crop_x"], settings["crop_y"] = (0, 0) if film.crop is None else film.crop[:2]
+    settings["film_width"], settings["film_height"] = film.width, film.height
+    margin = settings["margin"] = 0 if index.light_paths else index.filter_reach
+    settings["tiles_x"] = -(-(width + 2 * margin) // 4)
+    settings["padded_pixels"] = 16 * settings["tiles_x"] * -(-(height + 2 * margin) // 4)
+    settings["alpha"] = index.alpha
+    settings["lambda_min"], settings["lambda_max"] = film.lambda_min, film.lambda_max
+    settings["bands"] = film.bands
+
+
+def _set_paths(settings: NDArray[np.void], index: SceneIndex) -> None:
+    """Write what the sampler and the integrator say of paths."""
+    scene, integrator = index.scene, index.scene.integrator
+    settings["seed"] = scene.seed % 2**32
+    settings["sample_bits"] = min((max(scene.spp, 1) - 1).bit_length(), MOST_SAMPLE_BITS)
+    depth = integrator.max_depth
+    settings["max_depth"] = DEEPEST if depth < 0 else min(depth, DEEPEST)
+    settings["rr_depth"] = min(integrator.rr_depth, DEEPEST)
+    settings["hide_lights"] = integrator.hide_lights
+    settings["light_paths"] = index.weighed
 
 
 def _set_layers(settings: NDArray[np.void], layers: LayerFeatures) -> None:
@@ -137,7 +144,8 @@ def _set_photons(
 ) -> None:
     """Write what merging needs; the wavefront adds how many light paths leave photons."""
     scene = index.scene
-    integrator: Any = scene.integrator
+    integrator = scene.integrator
+    assert isinstance(integrator, Vcm)
     size = scene.film.width, scene.film.height
     settings["max_depth"] = min(int(settings["max_depth"]), photons.DEEPEST)
     settings["radius"] = integrator.radius or photons.first_radius(

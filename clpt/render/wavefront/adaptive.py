@@ -26,10 +26,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.arrays import Floats
+from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
 from clpt.render.contract.features import Features
-from clpt.render.wavefront.cells import Cells
 from clpt.render.wavefront.light_rounds import LightRounds
 from clpt.render.wavefront.noise_meter import NoiseMeter, divide
 from clpt.render.wavefront.tracer import OnBatch, Selection, Tracer
@@ -229,7 +228,7 @@ class Adaptive:
         """The number of samples at the next look: a power of two, as Sobol points are best."""
         return 1 << math.ceil(math.log2(max(LEAST, 1.5 * self._level)))
 
-    def _sample(self, ends: Cells, on_batch: OnBatch) -> bool:
+    def _sample(self, ends: Integers, on_batch: OnBatch) -> bool:
         """Add samples to every cell up to its end; return whether it was not stopped."""
         behind = (self.next < ends) & (self._pixels > 0)
         for first in np.unique(self.next[behind]):
@@ -286,7 +285,7 @@ class Adaptive:
         self.wavefront.refresh()
 
 
-def _partners(pixels: Cells, across: int) -> Cells:
+def _partners(pixels: Integers, across: int) -> Integers:
     """Return the cell that decides about each cell: of the other colour, with pixels.
 
     pixels: of each cell. In a film of one pixel there is none: its cell is its own partner, and its

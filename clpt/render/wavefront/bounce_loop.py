@@ -69,20 +69,30 @@ class Kernels:
             self.programs[name] = make()
             self.seconds += time.perf_counter() - start
 
-    def bind(self, program: str, name: str, **more: Any) -> device.BoundKernel:
+    def bind(self, program: str, name: str, **more: object) -> device.BoundKernel:
         """Return a kernel of a program with its arguments, by the names in its signature."""
         kernel = self.programs[program].kernel(name)
         arguments = {**self.arguments(), **more}
         return kernel.bind(**{a.name: arguments[a.name] for a in kernel.arguments})
 
 
+@dataclass(frozen=True)
+class Ending:
+    """The way in which a run of a bounce loop ends that is stopped.
+
+    leave: raised, it lets the run leave its paths in flight, where the device runs the loop and
+    sees it: then on_batch must raise; None: nothing does. seconds: in which it is to end [s], None
+    for what suits the device.
+    """
+
+    leave: device.Flag | None = None
+    seconds: float | None = None
+
+
 class BounceLoop:
     """The bounce loop of one kind of paths in a scene.
 
-    which: of `Features.passes`; per_sample: how many of its paths are traced for a sample;
-    leave: raised, it lets `run` leave its paths in flight, where the device runs the loop and sees
-    it: then on_batch must raise; None: nothing does. cancel_seconds: in which a run is to end that
-    is stopped [s], None for what suits the device.
+    which: of `Features.passes`; per_sample: how many of its paths are traced for a sample.
     """
 
     def __init__(
@@ -93,13 +103,12 @@ class BounceLoop:
         timings: Timings,
         looped: bool,
         which: int,
-        leave: device.Flag | None,
-        cancel_seconds: float | None = None,
+        ending: Ending,
     ):
         self.kernels, self.scene, self.paths, self.timings = kernels, scene, paths, timings
         self.device, self.stream, self.looped = scene.device, scene.stream, looped
         self.lanes = self.device.lanes
-        self._which, self._leave = which, leave
+        self._which, self._leave = which, ending.leave
         self._first = 0  # path that the last run began with
         self.is_last = which == len(scene.lowered.features.passes) - 1
         self.per_sample = 1 if self.is_last else float(scene.lowered.settings["light_paths"]) or 1
@@ -107,7 +116,7 @@ class BounceLoop:
         self._share = strategy.loop_share(self.device)
         self._stages: list[Step] | None = None
         self._loop: device.BoundKernel | None = None
-        self._cancel_seconds = cancel_seconds
+        self._cancel_seconds = ending.seconds
         self._bounces = self._most_bounces()
 
     @property

@@ -8,11 +8,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Integers
 from clpt.render.wavefront import work_list
 
 SIDE = 16  # pixels of a square's side, a multiple of four
-
-Cells = NDArray[np.int64]  # a number of each cell, a square's two colours after each other
 
 
 class CellGrid:
@@ -26,6 +25,6 @@ class CellGrid:
         x, y = work_list.pixels(settings)
         self.inside = work_list.inside(settings)
         self.across, down = (-(-int(settings[name]) // SIDE) for name in ("width", "height"))
-        self.cell: Cells = 2 * (y // SIDE * self.across + x // SIDE) + (x + y) % 2
+        self.cell: Integers = 2 * (y // SIDE * self.across + x // SIDE) + (x + y) % 2
         count = 2 * self.across * down
-        self.pixels: Cells = np.bincount(self.cell[self.inside], minlength=count)
+        self.pixels: Integers = np.bincount(self.cell[self.inside], minlength=count)

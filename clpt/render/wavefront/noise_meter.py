@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from clpt.arrays import Floats
 from clpt.render.codegen import programs
@@ -104,7 +104,7 @@ class NoiseMeter:
         return np.moveaxis(sums.astype(float), 2, 0)
 
 
-def divide(a: Any, b: Any) -> Floats:
+def divide(a: ArrayLike, b: ArrayLike) -> Floats:
     """Return a / b, and 0 where b is 0."""
-    a, b = np.broadcast_arrays(a, b)
-    return np.divide(a, b, out=np.zeros(a.shape), where=b > 0.0)
+    over, under = np.broadcast_arrays(np.asarray(a), np.asarray(b))
+    return np.divide(over, under, out=np.zeros(over.shape), where=under > 0.0)

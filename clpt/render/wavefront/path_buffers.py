@@ -11,10 +11,12 @@ import pyopencl as cl
 from numpy.typing import NDArray
 
 from clpt import device
+from clpt.arrays import Integers
 from clpt.device.buffers import Buffers
 from clpt.errors import MemoryBudgetError
 from clpt.layout import SLAB_BLOCK, Record
 from clpt.records import COUNTER_NUMBERS, PATH, PATH_BITS, SLABS
+from clpt.render.lowering.scene import Lowered
 from clpt.render.wavefront import queues, work_list
 from clpt.render.wavefront.cells import CellGrid
 
@@ -102,11 +104,10 @@ def divide_film(
 class PathBuffers:
     """The state of the paths in flight on a device.
 
-    settings: those of the lowered scene, of which this is a copy, with the numbers of slots and
-    planes and the seed of the samples; pixels: how many have samples, with those around the
-    picture; blocks: slots beyond those of the paths, see kernels/path/queue.cl; footprint: words of
-    what a slot sums around its pixel, see kernels/film/splatting.cl; in_blocks: whether slabs are,
-    see kernels/core/slab.cl.
+    settings: a copy of those of the lowered scene, with the numbers of slots and planes and the
+    seed of the samples; pixels: how many have samples, with those around the picture; blocks: slots
+    beyond those of the paths, see kernels/path/queue.cl; in_blocks: whether slabs are, see
+    kernels/core/slab.cl.
 
     Raises MemoryBudgetError.
     """
@@ -115,12 +116,10 @@ class PathBuffers:
         self,
         stream: device.Stream,
         buffers: Buffers,
-        settings: NDArray[np.void],
+        lowered: Lowered,
         slots: Slots,
         blocks: int,
         queued: bool,
-        kinds: int,
-        footprint: int,
         in_blocks: bool,
     ):
         self.stream, self.buffers, self._in_blocks = stream, buffers, in_blocks
@@ -128,14 +127,14 @@ class PathBuffers:
         self._stride = -(-(slots.total + blocks) // SLAB_BLOCK) * SLAB_BLOCK
         if not in_blocks:
             self._stride += PADDING
-        self.settings = self._with_slots(settings)
+        self.settings = self._with_slots(lowered.settings)
         self._fixed: dict[str, Any] = {"stride": self._stride, "slots": self.slots}
         for record in SLABS:
             name, size = f"{record.name.lower()}_words", 4 * record.step * self._stride
             buffer = buffers.allocate(name, size, "lower the number of slots")
             stream.fill(buffer, 0, 0, size)
             self._fixed[name] = buffer
-        if footprint:
+        if footprint := lowered.features.footprint_words:
             size = 4 * footprint * self.slots
             buffer = buffers.allocate("the footprints", size, "lower the number of slots")
             stream.fill(buffer, 0, 0, size)
@@ -146,7 +145,7 @@ class PathBuffers:
         self.pixels = len(sampled)
         every_pixel = work_list.table(self.settings, sampled)
         self._fixed["work_list"] = buffers.upload("the work list", every_pixel)
-        self.queue = self.new_queue(queued, kinds)
+        self.queue = self.new_queue(queued, len(lowered.features.materials.kinds))
 
     @property
     def arguments(self) -> dict[str, Any]:
@@ -163,9 +162,7 @@ class PathBuffers:
         sizes = queues.sizes(self.slots, kinds, queued)
         return {name: self.buffers.allocate("the queues", 4 * n) for name, n in sizes.items()}
 
-    def set_work_list(
-        self, padded_pixels: work_list.PixelIndices, ends: work_list.PixelIndices | None = None
-    ) -> None:
+    def set_work_list(self, padded_pixels: Integers, ends: Integers | None = None) -> None:
         """Enqueue that slots sample these pixels from now on, each up to its own end."""
         table = work_list.table(self.settings, padded_pixels, ends)
         self.stream.write(self._fixed["work_list"], table)

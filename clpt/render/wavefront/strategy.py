@@ -32,6 +32,9 @@ class Tuning:
     cancel_seconds: float | None = None
 
 
+UNTUNED = Tuning()
+
+
 @dataclass(frozen=True)
 class Strategy:
     """The way in which kernels trace and shade the paths of a scene.

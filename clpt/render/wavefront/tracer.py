@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from clpt.render.wavefront.cells import Cells
+from clpt.arrays import Integers
 from clpt.render.wavefront.wavefront import Wavefront
 
 OnBatch = Callable[[Any], bool]
@@ -28,7 +28,7 @@ class Selection:
 
     paths: Paths
     pixels: int
-    ends: Cells | None = None
+    ends: Integers | None = None
 
     def prepare(self, wavefront: Wavefront) -> None:
         """Enqueue that the wavefront samples these pixels, until `use_all_pixels`."""

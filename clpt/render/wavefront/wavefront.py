@@ -22,14 +22,14 @@ from clpt.render.codegen import programs
 from clpt.render.contract.features import Features
 from clpt.render.lowering.scene import Lowered
 from clpt.render.wavefront import strategy
-from clpt.render.wavefront.bounce_loop import BounceLoop, Kernels, Step
+from clpt.render.wavefront.bounce_loop import BounceLoop, Ending, Kernels, Step
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.render.wavefront.film import Film
 from clpt.render.wavefront.film_state import SAMPLES_WORD
 from clpt.render.wavefront.guide import Guide
 from clpt.render.wavefront.path_buffers import COUNTERS, PathBuffers, divide_film
 from clpt.render.wavefront.photons import Photons
-from clpt.render.wavefront.strategy import Strategy, Tuning
+from clpt.render.wavefront.strategy import UNTUNED, Strategy, Tuning
 
 TURN_SAMPLES = 16  # of a pixel, that each kind of paths takes at a turn; a small film gets more
 TURN_PATHS = 1 << 20
@@ -67,25 +67,16 @@ class Wavefront:
     Raises MemoryBudgetError, KernelBuildError, DeviceError.
     """
 
-    def __init__(
-        self,
-        scene: DeviceScene,
-        paths: PathBuffers,
-        looped: bool,
-        tuning: Tuning,
-    ):
+    def __init__(self, scene: DeviceScene, paths: PathBuffers, looped: bool, tuning: Tuning):
         self.device, self.stream, self.buffers = scene.device, scene.stream, scene.buffers
         self.scene, self.paths, self.looped = scene, paths, looped
         self._tuning, self.lanes = tuning, self.device.lanes
         self.timings = Timings(self.device.queue)
         features = self.features
         self.film = film = Film(self.stream, self.buffers, paths.settings, features)
-        photons = (
-            Photons(self.stream, self.buffers, paths.settings)
-            if features.transport.merged
-            else None
-        )
-        guide = None
+        photons, guide = None, None
+        if features.transport.merged:
+            photons = Photons(self.stream, self.buffers, paths.settings)
         if features.transport.guided:
             guide = Guide(self.stream, self.buffers, paths.settings, paths.pixels)
         self.photons, self.guide = photons, guide
@@ -104,7 +95,7 @@ class Wavefront:
         self.loops = [
             BounceLoop(
                 self.kernels, scene, paths, self.timings, looped, which,
-                None if guide and which == 0 else self.leave, tuning.cancel_seconds,
+                Ending(None if guide and which == 0 else self.leave, tuning.cancel_seconds),
             )
             for which in range(len(features.passes))
         ]  # fmt: skip
@@ -117,27 +108,21 @@ class Wavefront:
         cls,
         on: device.Device,
         lowered: Lowered,
+        tuning: Tuning = UNTUNED,
         *,
-        layout: str | None = None,
         slots: int | None = None,
-        queued: bool | None = None,
         looped: bool | None = None,
         tree_quality: bvh.Quality = "high",
         halves: bool = False,
-        cancel_seconds: float | None = None,
     ) -> Wavefront:
         """Return a wavefront of a lowered scene, which others may render too.
 
-        layout: of the trees over triangles, a name in clpt.bvh.LAYOUTS; slots: paths in flight;
-        queued: whether slots are queued by material before they are shaded; looped: whether a
-        kernel on the device runs all bounces. Each is chosen to suit the device and the scene where
-        it is None. tree_quality: see clpt.bvh.build; halves: whether even and odd samples are kept
-        apart, as they are for the layer `variance`. cancel_seconds: in which `render_samples` is to
-        end that is stopped [s].
+        slots: paths in flight; looped: whether a kernel on the device runs all bounces. Each is
+        chosen to suit the device where it is None. tree_quality: see clpt.bvh.build; halves:
+        whether even and odd samples are kept apart, as they are for the layer `variance`.
 
         Raises as `Wavefront` does, SceneError for a layout that cannot hold the scene.
         """
-        tuning = Tuning(layout, queued, cancel_seconds)
         chosen = strategy.choose(on, lowered, tuning)
         if looped is None:
             looped = strategy.use_loop(on)
@@ -147,8 +132,7 @@ class Wavefront:
             )
             device.compile_ahead(on, texts, "loop")
         stream, buffers = device.Stream(on.queue), device.Buffers(on)
-        settings, kinds = lowered.settings, len(lowered.features.materials.kinds)
-        padded_pixels = int(settings["padded_pixels"])
+        padded_pixels = int(lowered.settings["padded_pixels"])
         footprint = lowered.features.footprint_words
         halves = halves or "variance" in lowered.features.film.layers.names
         divided = divide_film(
@@ -158,8 +142,7 @@ class Wavefront:
         share = strategy.loop_share(on)
         blocks = -(-divided.total // share) * on.lanes if share > on.lanes else 0  # one each
         in_flight = PathBuffers(
-            stream, buffers, settings, divided, blocks, chosen.queued, kinds, footprint,
-            in_blocks=on.lanes == 1,
+            stream, buffers, lowered, divided, blocks, chosen.queued, in_blocks=on.lanes == 1
         )
         return cls(scene, in_flight, looped, tuning)
 
@@ -233,7 +216,7 @@ class Wavefront:
             loop.bind_again()
 
     def auxiliary_kernel(
-        self, texts: dict[str, device.Source], name: str, **more: Any
+        self, texts: dict[str, device.Source], name: str, **more: object
     ) -> device.BoundKernel:
         """Return a kernel beside the bounce, of the program of its name, with its own arguments."""
         self.kernels.build(texts)

@@ -1,23 +1,26 @@
-"""The work list: which pixels of the film each slot of a plane samples, in what order, how far."""
+"""The work list: which pixels of the film each slot of a plane samples, in what order, how far.
+
+Indices of pixels are of padded ones, in the order of 4x4 tiles, see kernels/film/film.cl.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Integers
+
 FOREVER = np.iinfo(np.int32).max  # an end that no sample reaches
 
-PixelIndices = NDArray[np.int64]  # of padded pixels, in the order of 4x4 tiles, see film/film.cl
 
-
-def pixels(settings: NDArray[np.void]) -> tuple[PixelIndices, PixelIndices]:
+def pixels(settings: NDArray[np.void]) -> tuple[Integers, Integers]:
     """Return x and y in the picture of every padded pixel, (padded_pixels,) each."""
     index, margin = np.arange(int(settings["padded_pixels"])), int(settings["margin"])
     row, column = np.divmod(index >> 4, int(settings["tiles_x"]))
     return column * 4 + (index & 3) - margin, row * 4 + (index >> 2 & 3) - margin
 
 
-def inside(settings: NDArray[np.void]) -> PixelIndices:
+def inside(settings: NDArray[np.void]) -> Integers:
     """Return the pixels in the picture, ascending: its sides need not be multiples of four."""
     return _within(settings, 0)
 
@@ -30,12 +33,12 @@ def picture(settings: NDArray[np.void], stored: NDArray[np.uint32]) -> NDArray[n
     return rows[margin : margin + height, margin : margin + width]
 
 
-def sampled(settings: NDArray[np.void]) -> PixelIndices:
+def sampled(settings: NDArray[np.void]) -> Integers:
     """Return the pixels that have samples, ascending: those of the picture and its margin."""
     return _within(settings, int(settings["margin"]))
 
 
-def _within(settings: NDArray[np.void], margin: int) -> PixelIndices:
+def _within(settings: NDArray[np.void], margin: int) -> Integers:
     """The pixels in the picture and in so many around it."""
     x, y = pixels(settings)
     width, height = int(settings["width"]), int(settings["height"])
@@ -44,7 +47,7 @@ def _within(settings: NDArray[np.void], margin: int) -> PixelIndices:
 
 
 def table(
-    settings: NDArray[np.void], order: PixelIndices, ends: PixelIndices | None = None
+    settings: NDArray[np.void], order: Integers, ends: Integers | None = None
 ) -> NDArray[np.uint32]:
     """Deal pixels in turn to the slots of a plane; return `work_list` of kernels/film/film.cl.
 

@@ -99,7 +99,7 @@ def test_scenes_are_chosen(read, build):
     assert corners(read(made, scene="0").shapes[0])[0, 0, 2] == 0
     with pytest.raises(SceneError, match="no scene 'x'; it has: 0, other"):
         read(made, scene="x")
-    with pytest.raises(SceneError, match="no variable 'spp'; known: time, animation"):
+    with pytest.raises(SceneError, match="no variable 'spp'; known: animation, camera"):
         read(made, spp="4")
 
 

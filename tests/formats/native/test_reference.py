@@ -9,7 +9,8 @@ from typing import get_args
 from clpt import scene
 from clpt.formats.native import forms, reference
 from clpt.scene import KINDS, integrators, materials
-from clpt.scene.params import HostForm, params, shorthands
+from clpt.scene.params import params, shorthands
+from clpt.scene.roles import HostForm
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -29,8 +30,8 @@ def test_every_form_is_read_and_written():
         for name, param in {**params(cls), **shorthands(cls)}.items()
     ]
     assert set(get_args(HostForm)) < forms.FORMS.keys()
-    assert not [(cls, name) for cls, name, p in declared if p.role == "host" and not p.form]
-    unused = forms.FORMS.keys() - {param.form or param.role for *_, param in declared}
+    assert not [(cls, name) for cls, name, p in declared if p.role.name == "host"]
+    unused = forms.FORMS.keys() - {param.role.name for *_, param in declared}
     assert unused <= {"host", "numbers"}, "only a kind of a user's own may need these"
 
 

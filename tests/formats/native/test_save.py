@@ -26,7 +26,8 @@ from clpt.scene import (
     textures,
 )
 from clpt.scene.motion import Deformation, Keys, Shutter
-from clpt.scene.params import Kind, Param, defaults, params
+from clpt.scene.params import Kind, defaults, params
+from clpt.scene.roles import Param
 from clpt.spectra import reradiation
 
 RNG = np.random.default_rng(5)
@@ -107,7 +108,7 @@ VALUES: dict[str, Any] = {
 
 def other(param: Param, default: Any) -> Any:
     """A value of a parameter that is not its default."""
-    form = param.form or param.role
+    form = param.role.name
     if form in ("flag", "boolean"):
         return not default
     if form == "choice":

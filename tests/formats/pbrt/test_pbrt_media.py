@@ -68,7 +68,7 @@ def test_rgb_grid(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.sigma_t.to_rgb("unbounded"), 8.0)
     found, warnings = read(tmp_path, given + "[3 2 1 4 3 9]")
     assert not warnings
-    extinction = found.density[..., None] * found.colour_grid * found.sigma_t.to_rgb("unbounded")
+    extinction = found.density[..., None] * found.color_grid * found.sigma_t.to_rgb("unbounded")
     np.testing.assert_allclose(extinction[1:3, 1, 1], [[4, 4, 4], [8, 8, 15]], rtol=1e-6)
     scattered = (extinction * found.albedo_grid)[1:3, 1, 1]
     np.testing.assert_allclose(scattered, [[1, 2, 3], [4, 5, 6]], rtol=1e-6)

@@ -8,6 +8,7 @@ import pytest
 from clpt import spectra
 from clpt.errors import SceneError
 from clpt.formats.pbrt.spectra import named, names, spectrum, to_rec709
+from clpt.scene.roles import NAMED
 from clpt.spectra import cie, scaled
 from tests.formats.pbrt.directives import params, state
 
@@ -15,7 +16,7 @@ from tests.formats.pbrt.directives import params, state
 def take(role, *value, space="srgb", folder=None):
     at = state() if folder is None else state(folder)
     at.colour_space = space
-    return spectrum(params(x=value), "x", role, at)
+    return spectrum(params(x=value), "x", NAMED[role], at)
 
 
 def luminance(made):
@@ -43,9 +44,9 @@ def test_colour_spaces(space, theirs):
 def test_colours_beyond_rec709_are_told():
     at = state()
     at.colour_space = "rec2020"
-    dull = spectrum(params(x=("rgb", 0.5, 0.4, 0.4)), "x", "reflectance", at)
+    dull = spectrum(params(x=("rgb", 0.5, 0.4, 0.4)), "x", NAMED["reflectance"], at)
     assert not at.shared.warnings and dull == pytest.approx((0.57, 0.39, 0.4), abs=0.02)
-    green = spectrum(params(x=("rgb", 0.0, 0.9, 0.0)), "x", "reflectance", at)
+    green = spectrum(params(x=("rgb", 0.0, 0.9, 0.0)), "x", NAMED["reflectance"], at)
     assert green[0] == 0.0 and "Rec. 709" in at.shared.warnings[0]
 
 

@@ -12,6 +12,7 @@ from clpt.errors import SceneError
 from clpt.formats.pbrt.map_values import map_values
 from clpt.formats.pbrt.textures import textured
 from clpt.scene.pixels import pixels
+from clpt.scene.roles import REAL, REFLECTANCE
 from clpt.scene.textures import Bitmap, Checkerboard, Checkers, Dots, Mix, Noise, Product
 from tests.formats.pbrt.directives import define, params, state
 
@@ -21,7 +22,7 @@ STORED = np.array([[0, 255], [128, 64]], np.uint8)
 def make(kind, values="spectrum", folder=None, **given):
     at = state() if folder is None else state(folder)
     define(at, values, "t", kind, **given)
-    role = "real" if values == "float" else "reflectance"
+    role = REAL if values == "float" else REFLECTANCE
     made = textured(params(x=("texture", "t")), "x", role, at)
     return made, at.shared.warnings
 
@@ -61,8 +62,8 @@ def test_mix_and_scale_nest():
     define(at, "float", "amount", "checkerboard")
     define(at, "spectrum", "mix", "mix", tex1=("rgb", 1, 0, 0), amount=("texture", "amount"))
     define(at, "spectrum", "t", "scale", tex=("texture", "mix"), scale=("float", 0.5))
-    made = textured(params(x=("texture", "t")), "x", "reflectance", at)
-    again = textured(params(x=("texture", "t")), "x", "reflectance", at)
+    made = textured(params(x=("texture", "t")), "x", REFLECTANCE, at)
+    again = textured(params(x=("texture", "t")), "x", REFLECTANCE, at)
     assert made is again
     assert isinstance(made, Product) and made.second.value == 0.5
     assert isinstance(made.first, Mix) and isinstance(made.first.amount, Checkerboard)
@@ -112,7 +113,7 @@ def test_numbers_between_texels_are_alpha_or_a_mean(tmp_path):
             "imagemap", "float", tmp_path, filename=("string", path.name), **given
         )
         assert not warnings
-        return float(pixels(made, "real")[0, 0, 0])
+        return float(pixels(made, REAL)[0, 0, 0])
 
     linear = srgb(np.array([200, 100, 50, 128]) / 255.0)
     for filter in ("bilinear", "trilinear"):
@@ -166,7 +167,7 @@ def test_patterns_are_placed_by_the_texture_space():
     at.ctm = transforms.translate([1.0, 2.0, 3.0]) @ transforms.scale([2.0, 2.0, 2.0])
     given = {"octaves": ("integer", 3), "roughness": ("float", 0.7)}
     define(at, "float", "t", "wrinkled", **given)
-    made = textured(params(x=("texture", "t")), "x", "real", at)
+    made = textured(params(x=("texture", "t")), "x", REAL, at)
     assert (made.pattern, made.octaves, made.roughness) == ("wrinkled", 3, 0.7)
     assert made.to_texture @ [3.0, 2.0, 3.0, 1.0] == pytest.approx([1.0, 0.0, 0.0, 1.0])
     assert not at.shared.warnings
@@ -220,4 +221,4 @@ def test_a_texture_of_the_other_kind_is_not_found():
     at = state()
     define(at, "float", "t", "constant")
     with pytest.raises(SceneError, match="no spectrum texture 't'"):
-        textured(params(x=("texture", "t")), "x", "reflectance", at)
+        textured(params(x=("texture", "t")), "x", REFLECTANCE, at)

@@ -173,7 +173,7 @@ def test_a_film_of_a_medium_is_saved(phase, scenes: Path, tmp_path: Path):
     scene = dataclasses.replace(box(scenes, {}, {}, None), shapes=[fog], lights=[SKY])
     with clpt.Renderer(scene) as renderer:
         renderer.save_state(tmp_path / "a.film")
-        kernels = renderer.origin().kernels
+        kernels = renderer._origin().kernels
     assert film_file.read(tmp_path / "a.film").origin.kernels == kernels
 
 

@@ -109,7 +109,7 @@ def test_colours_of_extinction(mode: str) -> None:
     """exp(-optical depth) with colours on the grid, in RGB and for each wavelength, both ways."""
     colours = np.random.default_rng(7).random((*RANDOM.shape, 3)) ** 2
     medium = media.Grid(
-        density=3.0 * RANDOM, colour_grid=colours, to_world=TURNED, sigma_t=2.0, albedo=0.5
+        density=3.0 * RANDOM, color_grid=colours, to_world=TURNED, sigma_t=2.0, albedo=0.5
     )
     start, middle = np.array([0.07, 0.11, 5.0]), np.array([0.15, 0.02, 0.0])
     ends = start, 2.0 * middle - start
@@ -137,19 +137,19 @@ def test_even_colours_are_one_colour() -> None:
     """Colours that are the same everywhere are those of the medium; both furnaces are white."""
     share = np.broadcast_to(CHROMATIC / 3.0, (*RANDOM.shape, 3))
     given = {"density": 2.0 * RANDOM, "to_world": TURNED}
-    coloured = media.Grid(**given, sigma_t=3.0, albedo=0.8, colour_grid=share)
+    coloured = media.Grid(**given, sigma_t=3.0, albedo=0.8, color_grid=share)
     pictures = [
         exposures(scene_of(one), 16, 64).mean(axis=(1, 2), keepdims=True)
         for one in (coloured, media.Grid(**given, sigma_t=CHROMATIC, albedo=0.8))
     ]
     assert_agree(*pictures, "colours on the grid, and one colour", 2e-4)
     colours = np.random.default_rng(8).random((*RANDOM.shape, 3))
-    white = media.Grid(**given, sigma_s=4.0, colour_grid=colours)
+    white = media.Grid(**given, sigma_s=4.0, color_grid=colours)
     scene = scene_of(white)
     scene.lights = [Constant(radiance=1.0), scene.lights[1]]
     assert_mean(exposures(scene, 8, 128), 1.0, WITHIN)
     with pytest.raises(SceneError, match="up to 1"):
-        media.Grid(**given, colour_grid=2.0 * colours)
+        media.Grid(**given, color_grid=2.0 * colours)
 
 
 @pytest.mark.parametrize(

@@ -117,7 +117,7 @@ def test_beside_other_grids() -> None:
     """The same where other media of the scene have colours and light on their grids."""
     colours = np.full((*RANDOM.shape, 3), 0.5)
     other = grid(
-        RANDOM, sigma_t=2.0, albedo_grid=colours, colour_grid=colours,
+        RANDOM, sigma_t=2.0, albedo_grid=colours, color_grid=colours,
         temperature=np.full(RANDOM.shape, 1500.0), brightness=1e-6,
     )  # fmt: skip
     mixture = media.Mixture(parts=(SMOKE, DARK, MIST))

@@ -13,6 +13,7 @@ from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Path
 from clpt.scene.lights import Area, Constant
 from clpt.scene.params import params
+from clpt.scene.roles import INDEX
 from clpt.scene.shapes import Rectangle, Sphere
 from clpt.spectra import Spectrum, Tabulated
 from tests.pictures.builders import BLACK, UP
@@ -67,7 +68,7 @@ def ball(
 
 def bending(kind: type[materials.Material]) -> str | None:
     """The parameter that bends light; None of a kind that has none. A metal's may be textured."""
-    indices = [name for name, p in params(kind).items() if p.role == "index" and not p.textured]
+    indices = [name for name, p in params(kind).items() if p.role is INDEX and not p.textured]
     return indices[0] if indices else None
 
 

@@ -11,11 +11,11 @@ from clpt import device, spectra
 from clpt import scene as sc
 from clpt.render.codegen import parameters, programs
 from clpt.render.lowering.scene import Lowered, lower
-from clpt.scene import Film, Scene, textures
+from clpt.scene import Film, Scene, roles, textures
 from clpt.scene import materials as m
 from clpt.scene.cameras import Perspective
 from clpt.scene.lights import Area, Constant, Point
-from clpt.scene.params import SPECTRUM_ROLES, device_params
+from clpt.scene.params import device_params
 from clpt.scene.shapes import Cube, Rectangle, Sphere
 from clpt.spectra import Fluorophore, Tabulated
 
@@ -39,9 +39,9 @@ def textured(cls: type[m.Material]) -> m.Material:
     for name, param in device_params(cls).items():
         if param.textured:
             given[name] = board
-        elif param.role == "reradiation":
+        elif param.role is roles.RERADIATION:
             given[name] = Fluorophore(GREY, GREY, 0.1)
-        elif param.role in SPECTRUM_ROLES:
+        elif param.role in roles.SPECTRA:
             given[name] = GREY
     return cls(**given)
 

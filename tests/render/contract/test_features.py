@@ -18,12 +18,13 @@ from clpt.render.contract.features import (
 from clpt.render.contract.features.macros import said
 from clpt.scene import materials
 from clpt.scene.params import device_params
+from clpt.scene.roles import INDEX
 
 INDICES = [
     (cls, name)
     for cls in materials.LEAVES
     for name, param in device_params(cls).items()
-    if param.role == "index"
+    if param.role is INDEX
 ]
 
 

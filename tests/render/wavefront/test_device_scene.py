@@ -12,6 +12,7 @@ import clpt
 from clpt import device
 from clpt.render.editing import parameter_patch, rebuild
 from clpt.render.lowering.scene import lower
+from clpt.render.wavefront.strategy import Tuning
 from clpt.render.wavefront.wavefront import Wavefront
 from clpt.scene import Scene
 from clpt.scene.materials import Diffuse
@@ -51,8 +52,8 @@ def test_nobody_can_write_to_a_lowered_scene(cornell: Scene) -> None:
 def test_two_wavefronts_share_a_lowered_scene(cornell: Scene) -> None:
     """With other slots, layouts and seeds, while one of them is edited and rebuilt."""
     on, lowered = device.choose(), lower(cornell)
-    one = Wavefront.create(on, lowered, layout="wide8", looped=False)
-    other = Wavefront.create(on, lowered, layout="binary", slots=64, looped=False)
+    one = Wavefront.create(on, lowered, Tuning(layout="wide8"), looped=False)
+    other = Wavefront.create(on, lowered, Tuning(layout="binary"), slots=64, looped=False)
     assert one.scene.lowered is other.scene.lowered is lowered
     assert one.paths.slots != other.paths.slots
     first, second = picture(one), picture(other)
@@ -78,5 +79,5 @@ def test_two_wavefronts_share_a_lowered_scene(cornell: Scene) -> None:
     if isinstance(write, str):
         write = rebuild.prepare(other, lower(edited, former=other.scene.lowered))
     write()
-    new = Wavefront.create(on, lower(edited), layout="binary", slots=64, looped=False)
+    new = Wavefront.create(on, lower(edited), Tuning(layout="binary"), slots=64, looped=False)
     np.testing.assert_array_equal(picture(other), picture(new))

@@ -73,7 +73,7 @@ kernel void probe(SLAB_ARGS, global const uint *queue, uint entry, uint end, uin
 
 
 def laid(record: Record, words: np.ndarray, lanes: int) -> np.ndarray:
-    """Words (words, slots) as they lie in a slab: in blocks (blocks, step, SLAB_BLOCK), or as is."""
+    """Words (words, slots) as they lie in a slab: blocks (blocks, step, SLAB_BLOCK), or as is."""
     if lanes > 1:
         return words
     filled = np.zeros((record.step, words.shape[1]), words.dtype)

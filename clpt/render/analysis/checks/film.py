@@ -16,9 +16,9 @@ def check_film(scene: Scene) -> None:
     """Raise SceneError for a film that is too large, or asks for what the scene cannot give."""
     film = scene.film
     if film.mode == "rgb":
-        for name, plain in (("sensor", "cie1931"), ("bands", 0)):
-            if getattr(film, name) != plain:
-                raise SceneError("needs the mode spectral, not rgb", where=f"film.{name}")
+        asks = {"sensor": film.sensor != "cie1931", "bands": film.bands != 0}
+        for name in (name for name, asked in asks.items() if asked):
+            raise SceneError("needs the mode spectral, not rgb", where=f"film.{name}")
     width, height = film.size
     if width * height > LARGEST:
         raise SceneError(f"{width}x{height} are more than {LARGEST >> 20} Mi pixels", where="film")

@@ -10,7 +10,7 @@ from typing import Any
 from clpt import spectra
 from clpt.errors import SceneError
 from clpt.scene.integrators import Film
-from clpt.scene.params import Kind, Texture, params, place_of
+from clpt.scene.params import Kind, Texture, fields_of, params, place_of
 from clpt.spectra import Spectrum
 from clpt.spectra.spectrum import extremes
 
@@ -19,8 +19,9 @@ def check_indices(kinds: Iterable[Kind], film: Film) -> None:
     """Raise SceneError for an index of some kind that is 0 at a wavelength of the film."""
     for kind in kinds:
         cls: Any = type(kind)
+        given = fields_of(kind)
         for name in _indices(cls):
-            value = getattr(kind, name)
+            value = given[name]
             if not isinstance(value, Texture):
                 check_index(value, film, place_of(kind, name))
 

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 from numpy.typing import ArrayLike
 
 from clpt.errors import SceneError
 from clpt.render.analysis.checks.textures import check_image, check_textures
 from clpt.render.analysis.lights import image_lights, light_power
 from clpt.render.contract.light_records import RECORDS
+from clpt.scene import roles
 from clpt.scene.lights import CubeMap, Envmap, Goniometric, Light, Projector, Sky, Spot
-from clpt.scene.params import Texture, params
+from clpt.scene.params import Texture, fields_of, params
+from clpt.scene.roles import Role
 
 
 def check_light(lamp: Light) -> None:
@@ -22,14 +27,10 @@ def check_light(lamp: Light) -> None:
         raise SceneError(message, where=f"{lamp.kind}.image")
     if isinstance(lamp, Envmap):
         check_image(lamp.image, "envmap.image", emissive=True)
+    given = fields_of(lamp)
     for name, param in params(type(lamp)).items():
-        value, where = getattr(lamp, name), f"{lamp.kind}.{name}"
-        if param.form == "matrix4":
-            _check_matrix(lamp, value, where)
-        elif param.role == "host" and param.form == "direction":
-            light_power.unit(value, where)
-        elif param.role == "host" and param.form == "vector":
-            light_power.three(value, where)
+        if param.role in PLACES:
+            PLACES[param.role](lamp, given[name], f"{lamp.kind}.{name}")
 
 
 def _check_matrix(lamp: Light, value: ArrayLike, where: str) -> None:
@@ -40,3 +41,11 @@ def _check_matrix(lamp: Light, value: ArrayLike, where: str) -> None:
         light_power.unsheared(value, where)
     else:
         light_power.placement(value, where)
+
+
+# the rules of where a light is and shines to, by the role of the parameter
+PLACES: dict[Role, Callable[[Light, Any, str], object]] = {
+    roles.host("matrix4"): _check_matrix,
+    roles.host("direction"): lambda _, value, where: light_power.unit(value, where),
+    roles.host("vector"): lambda _, value, where: light_power.three(value, where),
+}

@@ -7,7 +7,7 @@ from clpt.render.analysis.checks.indices import check_indices
 from clpt.render.analysis.checks.textures import check_textures
 from clpt.scene.integrators import Film
 from clpt.scene.materials import Blend, BumpMap, Layer, Mask, Material, NormalMap, TwoSided, parts
-from clpt.scene.params import Texture
+from clpt.scene.params import Texture, fields_of
 
 Maps = tuple[tuple[type[Material], bool], ...]
 
@@ -20,10 +20,9 @@ def check_material(material: Material, film: Film) -> None:
         _check_maps(material, (), False)
     for part in made:
         check_textures(part)
-        layers = getattr(part, "layers", ())
-        check_indices((part, *layers), film)
-        if layers and film.mode == "rgb":
-            _check_layers(part, layers)
+        check_indices((part, *part.layers), film)
+        if part.layers and film.mode == "rgb":
+            _check_layers(part, part.layers)
 
 
 def _check_sides(made: list[Material]) -> None:
@@ -62,7 +61,7 @@ def _check_layers(material: Material, layers: tuple[Layer, ...]) -> None:
     """Raise SceneError for layers that need the mode spectral."""
     instead = 'or render in the mode "spectral"'
     for name in ("eta", "k"):
-        if isinstance(getattr(material, name, None), Texture):
+        if isinstance(fields_of(material).get(name), Texture):
             message = f"{material.kind}.{name} cannot be a texture below layers in RGB mode; "
             raise SceneError(f"{message}give a spectrum, {instead}")
     if len({id(one.profile) for one in layers if isinstance(one.profile, Texture)}) > 1:

@@ -6,7 +6,8 @@ import numpy as np
 
 from clpt import spectral_exr
 from clpt.errors import SceneError
-from clpt.scene.params import Kind, params
+from clpt.scene.params import Kind, fields_of, params
+from clpt.scene.roles import EMISSION, FACTOR, REFLECTANCE
 from clpt.scene.textures import Bitmap, Placed, Product, Solid, Texture
 from clpt.spectral_exr import SpectralImage
 
@@ -16,10 +17,10 @@ def check_textures(kind: Kind) -> None:
 
     What a file holds is not looked at.
     """
+    given = fields_of(kind)
     for name, param in params(type(kind)).items():
-        value = getattr(kind, name)
-        if isinstance(value, (Texture, tuple)):
-            _check(value, param.role == "emission")
+        if isinstance(given[name], (Texture, tuple)):
+            _check(given[name], param.role is EMISSION)
 
 
 def check_image(image: object, where: str, *, emissive: bool) -> None:
@@ -38,9 +39,10 @@ def _check(value: object, light: bool) -> None:
         _check_place(value)
         if isinstance(value, Bitmap):
             check_image(value.image, "bitmap.image", emissive=light)
+        given = fields_of(value)
         for name, param in params(type(value)).items():
-            shines = light and param.role in ("factor", "reflectance") and name != _factor(value)
-            _check(getattr(value, name), shines)
+            shines = light and param.role in (FACTOR, REFLECTANCE) and name != _factor(value)
+            _check(given[name], shines)
 
 
 def _check_place(texture: Texture) -> None:

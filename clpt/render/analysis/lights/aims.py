@@ -5,15 +5,16 @@ from __future__ import annotations
 import heapq
 from collections.abc import Callable, Collection, Iterator
 from itertools import count
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Floats
 from clpt.geometry import shape_records
 from clpt.render.analysis.geometry import Geometry
 from clpt.render.analysis.index import SceneIndex
 from clpt.scene import materials as mt
+from clpt.scene.params import fields_of
 
 AIMED = 0.7  # share of the light paths that aim
 MOST = 32  # spheres
@@ -27,8 +28,7 @@ PRICE = 1e-3  # of a sphere, over the area of all: what gains less is not cut
 PAD = 1.01  # radius over that of what is inside
 ROUNDING = 4e-6  # of the scene's coordinates, added to a radius
 
-# (n, 10): three corners of a triangle, and how far around it a piece reaches [m]
-Pieces = NDArray[np.float64]
+# Pieces are (n, 10): three corners of a triangle, and how far around it a piece reaches [m].
 
 
 def aims(index: SceneIndex, geometry: Geometry, scene_radius: float) -> NDArray[np.float32]:
@@ -71,8 +71,9 @@ def _roughness(material: mt.Material) -> float:
     if isinstance(material, (mt.RoughDielectric, mt.RoughConductor, mt.CoatedConductor)):
         values = material.alpha_u, material.alpha_v
         return min((v for v in values if isinstance(v, (int, float))), default=1.0)
-    shares = [getattr(material, n, 0.0) for n in ("metallic", "spec_trans", "transmission")]
-    roughness = getattr(material, "roughness", 1.0)
+    given = fields_of(material)
+    shares = [given.get(name, 0.0) for name in ("metallic", "spec_trans", "transmission")]
+    roughness = given.get("roughness", 1.0)
     if not isinstance(roughness, (int, float)) or all(share == 0.0 for share in shares):
         return 1.0
     return roughness**2
@@ -82,7 +83,7 @@ def sharp_pieces(
     geometry: Geometry,
     moving: Collection[int] = (),
     wanted: Callable[[mt.Material], bool] = is_sharp,
-) -> Iterator[Pieces]:
+) -> Iterator[Floats]:
     """Yield what every sharp shape consists of, in the world: a row for each triangle or ball.
 
     moving: the numbers of shapes that move, of which the boxes of their ways are taken; wanted:
@@ -92,7 +93,6 @@ def sharp_pieces(
     ends = [*(face for _, _, _, face in own[1:]), len(geometry.faces)]
     firsts = len(geometry.faces) - sum(placed.triangles) + np.cumsum((0, *placed.triangles))[:-1]
     boxes = geometry.boxes.astype(np.float64)
-    shape: Any
     for i, ((row, shape, _, face), end) in enumerate(zip(own, ends, strict=True)):
         if not wanted(shape.material):
             continue
@@ -102,7 +102,7 @@ def sharp_pieces(
             behind = own[i + 1][0]["prim"] if i + 1 < len(own) else len(boxes)
             own_boxes = boxes[first : int(behind) if many else first + 1]
             still = int(row["number"]) not in moving
-            still &= getattr(shape, "deformation", None) is None
+            still &= shape.deformation is None
             yield _fewer(_in_boxes(own_boxes, still and "sphere" in shape.kind))
         elif end > face:
             pieces = _of_triangles(geometry, face, end)
@@ -110,24 +110,24 @@ def sharp_pieces(
             yield _fewer(pieces if prototype < 0 else _placed(geometry, pieces, prototype, moving))
 
 
-def _pieces(middles: NDArray[np.float64], reach: NDArray[np.float64]) -> Pieces:
+def _pieces(middles: NDArray[np.float64], reach: NDArray[np.float64]) -> Floats:
     """Pieces within a distance (n,) of points (n, 3)."""
     return np.hstack([middles, middles, middles, reach[:, None]])
 
 
-def _in_boxes(boxes: NDArray[np.float64], round_: bool) -> Pieces:
+def _in_boxes(boxes: NDArray[np.float64], round_: bool) -> Floats:
     """Return a piece around each of boxes (n, 2, 3); round_: a sphere fills each."""
     half = (boxes[:, 1] - boxes[:, 0]) / 2
     return _pieces(boxes.mean(axis=1), half.max(axis=1) if round_ else np.linalg.norm(half, axis=1))
 
 
-def _of_triangles(geometry: Geometry, face: int, end: int) -> Pieces:
+def _of_triangles(geometry: Geometry, face: int, end: int) -> Floats:
     """Return triangles as pieces; coordinates as `vertices` has them."""
     corners = geometry.vertices[geometry.faces[face:end]].astype(np.float64)
     return np.hstack([corners.reshape(-1, 9), np.zeros((len(corners), 1))])
 
 
-def _placed(geometry: Geometry, pieces: Pieces, prototype: int, moving: Collection[int]) -> Pieces:
+def _placed(geometry: Geometry, pieces: Floats, prototype: int, moving: Collection[int]) -> Floats:
     """Return a piece around each instance of a prototype, given the pieces of the prototype."""
     own = geometry.instances.prototypes == prototype
     rows = geometry.instances.rows[own]
@@ -141,18 +141,18 @@ def _placed(geometry: Geometry, pieces: Pieces, prototype: int, moving: Collecti
     return placed
 
 
-def _corners(pieces: Pieces) -> list[NDArray[np.float64]]:
+def _corners(pieces: Floats) -> list[NDArray[np.float64]]:
     """The three corners, (n, 3) each; numpy is slow along short axes."""
     return np.split(pieces[:, :9], 3, axis=1)
 
 
-def _ends(pieces: Pieces) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _ends(pieces: Floats) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The lowest and highest coordinates (n, 3) of pieces."""
     (a, b, c), reach = _corners(pieces), pieces[:, 9:]
     return np.minimum(np.minimum(a, b), c) - reach, np.maximum(np.maximum(a, b), c) + reach
 
 
-def _around(pieces: Pieces) -> NDArray[np.float64]:
+def _around(pieces: Floats) -> NDArray[np.float64]:
     """Centre and radius (4,) of a sphere around pieces: about the middle of their box."""
     lows, highs = _ends(pieces)
     centre = (lows.min(axis=0) + highs.max(axis=0)) / 2
@@ -160,7 +160,7 @@ def _around(pieces: Pieces) -> NDArray[np.float64]:
     return np.append(centre, max((np.sqrt(square) + pieces[:, 9]).max() for square in away))
 
 
-def _cut(pieces: Pieces) -> tuple[tuple[Pieces, ...], bool]:
+def _cut(pieces: Floats) -> tuple[tuple[Floats, ...], bool]:
     """Return pieces in two parts, and whether there is a wide gap between these.
 
     They are cut at a wide gap along an axis, else where the longest axis is halved.
@@ -183,7 +183,7 @@ def _cut(pieces: Pieces) -> tuple[tuple[Pieces, ...], bool]:
     return (pieces[low], pieces[~low]), False
 
 
-def _fewer(pieces: Pieces) -> Pieces:
+def _fewer(pieces: Floats) -> Floats:
     """Return one piece around all in each cell of a grid, where there are more than cells."""
     if len(pieces) <= CELLS**3:
         return pieces
@@ -201,7 +201,7 @@ def _fewer(pieces: Pieces) -> Pieces:
 class _Cluster:
     """Some pieces, the sphere around them, and the clusters that they are cut into."""
 
-    def __init__(self, pieces: Pieces):
+    def __init__(self, pieces: Floats):
         self.sphere = _around(pieces)
         self.area = float(self.sphere[3] ** 2)
         self.halves, self.gap = _cut(pieces) if len(pieces) > 1 else ((), False)
@@ -222,7 +222,7 @@ class _Cluster:
         return whole, [self.sphere]
 
 
-def _spheres(pieces: Pieces) -> NDArray[np.float64]:
+def _spheres(pieces: Floats) -> NDArray[np.float64]:
     """Spheres (k, 4) around pieces, at most MOST, whose disks have little area together."""
     root, number = _Cluster(pieces), count()
     leaves: list[tuple[bool, float, int, _Cluster]] = []

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt.arrays import Floats
+from clpt.arrays import Array, Floats
 
 Directions = Callable[[ArrayLike, ArrayLike], Floats]  # unit (..., 3) of rows and columns 0 to 1
 
@@ -78,14 +78,23 @@ def of(
     sphere = (np.pi / per, 2.0 * np.pi / columns)
     row, column = angles or (sphere if grids == 1 else (np.pi / 2.0 / per,) * 2)
     step = max(block_rows // FINER, 1) * row, max(block_columns // FINER, 1) * column
-    lit = np.empty((SIDE * SIDE + 1, bands * strips))
-    for index in range(SIDE * SIDE):
-        cosine = _cosines(index, toward.reshape(-1, 3), 0.5 * math.hypot(*step))
-        lit[index] = np.bincount(owner.ravel(), fine.ravel() * cosine, bands * strips)
-    lit[-1] = weights.ravel()
-    total = float(weights.sum())
+    lit = _lit(toward.reshape(-1, 3), owner.ravel(), fine.ravel(), weights, math.hypot(*step))
     blocks = np.stack([_chances(each.reshape(bands, strips), weights) for each in lit])
-    return BlockGrid(marginal, conditional, blocks, block_rows, block_columns, total)
+    return BlockGrid(marginal, conditional, blocks, block_rows, block_columns, float(weights.sum()))
+
+
+def _lit(toward: Floats, owner: Array, fine: Floats, weights: Floats, step: float) -> Floats:
+    """Return what each block sends to surfaces of each normal, and at last to all of space.
+
+    toward (n, 3), owner and fine (n,): of parts of blocks, where they are, in which block, and how
+    much they send; step: their size [rad].
+    """
+    lit = np.empty((SIDE * SIDE + 1, weights.size))
+    for index in range(SIDE * SIDE):
+        cosine = _cosines(index, toward, 0.5 * step)
+        lit[index] = np.bincount(owner, fine * cosine, weights.size)
+    lit[-1] = weights.ravel()
+    return lit
 
 
 def _cells(corners: NDArray[Any], rows: NDArray[np.int64]) -> Floats:

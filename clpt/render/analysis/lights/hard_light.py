@@ -8,7 +8,7 @@ in a mirror or through glass.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -26,7 +26,7 @@ from clpt.render.analysis.lights.look import Look
 from clpt.render.analysis.lights.sources import Sources
 from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.scene import materials as mt
-from clpt.scene.integrators import Auto, Integrator, Path, Vcm
+from clpt.scene.integrators import Auto, Integrator, Path, Vcm, shared
 from clpt.scene.lights import CubeMap, Envmap, Sky
 from clpt.scene.shapes import Shape
 
@@ -72,24 +72,22 @@ def decided(lit: Lit, former: Integrator | None = None) -> tuple[SceneIndex, str
     an image light that is broken.
     """
     index = lit.index
-    given: Any = index.scene.integrator
-    if not isinstance(given, Auto) and getattr(given, "light_paths", None) != AUTO:
+    given = index.scene.integrator
+    if not isinstance(given, Auto) and given.light_paths != AUTO:
         return index, ""
     if former is None:
         chosen, reason = _choice(lit)
     else:
         keeps = isinstance(former, Vcm) and isinstance(given, Auto)
-        chosen = former if keeps else Path(light_paths=getattr(former, "light_paths", 0))
+        chosen = former if keeps else Path(light_paths=former.light_paths)
         reason = "as before the scene was edited"
     if index.light_layers and index.scene.noise is not None:
         chosen, reason = Path(light_paths=0), "layers of light have no guides of noise"
     elif "light_groups" in index.layers and isinstance(chosen, Vcm):
         chosen, reason = Path(light_paths=chosen.light_paths), "photons do not know their group"
-    if getattr(given, "guiding", False):
+    if given.guiding:
         chosen, reason = Path(light_paths=0, guiding=True), "directions are guided"
-    shared = ("max_depth", "rr_depth", "hide_lights", "free_panes")
-    own = {name: getattr(given, name) for name in shared if hasattr(given, name)}
-    chosen = replace(chosen, **own)
+    chosen = replace(chosen, **shared(given, chosen))
     return replace(index, scene=replace(index.scene, integrator=chosen)), reason
 
 
@@ -101,8 +99,8 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
         return without, index.lit_media
     if not cameras.is_connected(scene.camera, scene.film.mode):
         return without, "points cannot be joined to this camera"
-    integrator: Any = scene.integrator
-    fewest = FEWEST - getattr(integrator, "free_panes", False)
+    integrator = scene.integrator
+    fewest = FEWEST - index.free_panes  # a pane on the way costs no depth
     if 0 <= integrator.max_depth < fewest:
         return without, "the longest path is too short for a caustic"
     in_fog = _in_fog(lit)
@@ -204,7 +202,7 @@ def _share_seen(index: SceneIndex, geometry: Geometry) -> float:
     return float(solid.sum() / (2.0 * np.pi * (1.0 - math.cos(view.angle))))
 
 
-def _first_with(all_: Iterable[Shape], wanted: Any) -> Shape | None:
+def _first_with(all_: Iterable[Shape], wanted: Callable[[mt.Material], object]) -> Shape | None:
     """The first shape whose material is as wanted; a material is asked once."""
     asked: set[int] = set()
     for shape in all_:
@@ -241,7 +239,7 @@ def _small_rows(lit: Lit) -> Iterator[tuple[str, NDArray[np.float64] | None, flo
         elif isinstance(lamp, Sky):
             small = sky_light.sun_share(lamp, lit.look) >= SUN
         else:
-            small = lamp.reach in ("placed", "distant") and getattr(lamp, "falloff", True)
+            small = lamp.reach in ("placed", "distant") and lamp.falloff
         if small:
             place = None
             if lamp.reach == "placed":

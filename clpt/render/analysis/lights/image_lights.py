@@ -23,6 +23,7 @@ from clpt.render.analysis.lights.look import Look
 from clpt.render.analysis.lowering_cache import version
 from clpt.render.analysis.texels import bands, texels
 from clpt.scene.lights import CubeMap, Envmap, Sky
+from clpt.scene.roles import EMISSION
 from clpt.spectra import Tabulated, luminance
 from clpt.spectral_exr import SpectralImage
 
@@ -112,7 +113,7 @@ def _sphere(given: Any, scale: float, spectral: bool, lo: float, hi: float) -> C
     height, width, _ = image.shape
     if found is None or not spectral:
         corners = _latitude_weights(_brightness(image))[None]
-        values = texels(image.reshape(1, -1, 3), "emission", spectral)
+        values = texels(image.reshape(1, -1, 3), EMISSION, spectral)
         return Content(
             width,
             height,
@@ -134,7 +135,7 @@ def _cube(given: Any, scale: float, spectral: bool) -> Content:
     faces = _faces(given, "cube_map.image", notes) * np.float32(scale)
     image, size = _bordered(faces), faces.shape[1]
     corners = _cube_weights(_brightness(image))
-    values = texels(image.reshape(1, -1, 3), "emission", spectral)
+    values = texels(image.reshape(1, -1, 3), EMISSION, spectral)
     grid = block_grids.of(corners, cube_directions)
     return Content(size, size, values, corners, grid, notes=tuple(notes))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -38,15 +38,18 @@ class Bounds:
     def __len__(self) -> int:
         return len(self.low)
 
+    @property
+    def arrays(self) -> tuple[Any, ...]:
+        """The arrays, in the order of the fields."""
+        return self.low, self.high, self.axis, self.theta_o, self.theta_e, self.both, self.placed
+
     def __getitem__(self, rows: ArrayLike) -> Bounds:
-        return Bounds(*(getattr(self, field.name)[rows] for field in fields(self)))
+        return Bounds(*(array[rows] for array in self.arrays))
 
 
 def concatenated(parts: Sequence[Bounds]) -> Bounds:
     """Return the bounds of all lights, in their order."""
-    return Bounds(
-        *(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Bounds))
-    )
+    return Bounds(*map(np.concatenate, zip(*(part.arrays for part in parts), strict=True)))
 
 
 def of_lamp(lamp: Light) -> Bounds:

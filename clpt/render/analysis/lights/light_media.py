@@ -27,6 +27,7 @@ from clpt.scene import Scene
 from clpt.scene.lights import Light
 from clpt.scene.media import Lattice, Medium
 from clpt.scene.motion import Deformation, Keys
+from clpt.scene.shapes import Shape
 
 POINTS = 6  # of a shape that shines
 BEFORE = 1e-4  # how far before it they are, over its size
@@ -213,8 +214,8 @@ class _Known:
 
 def _around_shape(emitter: Emitter, known: _Known, motions: Motions, number: int) -> Around | None:
     """Return the media that a shape shines into, None if they differ between places or times."""
-    shape: Any = emitter.shape
-    both = getattr(shape.emission, "two_sided", False)
+    shape = emitter.shape
+    both = shape.emission is not None and shape.emission.two_sided
     if known.nested and matter_of(shape) is not None:
         return None
     if not known.nested and _says(shape):
@@ -247,7 +248,7 @@ def _deformed(
         yield replace(emitter, vertices=way.at(time)[0], faces=faces, keys=1), time
 
 
-def _says(shape: Any) -> bool:
+def _says(shape: Shape) -> bool:
     """Whether a shape says itself in which media it stands."""
     return shape.interior is not None or shape.exterior is not None
 

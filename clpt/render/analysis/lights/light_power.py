@@ -13,6 +13,7 @@ from clpt.errors import SceneError
 from clpt.scene import lights
 from clpt.scene.lights import Light, Projector
 from clpt.scene.pixels import pixels
+from clpt.scene.roles import EMISSION, REFLECTANCE
 from clpt.scene.textures import Bitmap, Checkerboard, Dots, MeshAttribute, Mix, Product, Solid
 
 SHEAR = 1e-5  # largest cosine between axes that are at right angles
@@ -43,7 +44,7 @@ def importance(lamp: Light, strength: float, power: float) -> float:
     A small flat light of power P gives an irradiance of P / pi at a metre, so that of a light
     without a place counts pi times.
     """
-    if lamp.reach == "placed" and getattr(lamp, "falloff", True):
+    if lamp.reach == "placed" and lamp.falloff:
         return power
     return np.pi * strength * (np.pi if lamp.reach == "infinite" else 1.0)
 
@@ -51,7 +52,7 @@ def importance(lamp: Light, strength: float, power: float) -> float:
 def brightness(value: Any) -> float:
     """Return the mean over channels, and over a texture, of an emission."""
     if isinstance(value, Bitmap):
-        return float(np.maximum(pixels(value, "emission"), 0.0).mean(dtype=np.float64))
+        return float(np.maximum(pixels(value, EMISSION), 0.0).mean(dtype=np.float64))
     if isinstance(value, Checkerboard):
         return 0.5 * (brightness(value.color0) + brightness(value.color1))
     if isinstance(value, (MeshAttribute, Solid, Dots)):
@@ -74,7 +75,7 @@ def aspect(lamp: Projector) -> float:
     """Return the width of a projector's image over its height."""
     if lamp.aspect > 0.0 or not isinstance(lamp.image, Bitmap):
         return lamp.aspect or 1.0
-    height, width = pixels(lamp.image, "reflectance").shape[:2]
+    height, width = pixels(lamp.image, REFLECTANCE).shape[:2]
     return width / height
 
 

@@ -13,6 +13,7 @@ from clpt.render.analysis.lights import block_grids, image_lights
 from clpt.render.analysis.lights.look import Look
 from clpt.render.analysis.texels import bands, texels
 from clpt.scene.lights import Sky
+from clpt.scene.roles import EMISSION
 from clpt.sky import dome
 from clpt.sky.dome import (
     COLUMNS,
@@ -70,7 +71,7 @@ def _content(
     if spectral:
         (found, number), (disc, _) = bands(images[0], lo, hi), bands(images[1], lo, hi)
     else:
-        found, disc = (texels(colour, "emission", False) for colour in colours)
+        found, disc = (texels(colour, EMISSION, False) for colour in colours)
     half = seen[0].reshape(2, ROWS + 1, -1)
     weights = np.concatenate([half, half[..., -2::-1]], axis=2).astype(np.float64)
     rows = np.clip(np.arange(ROWS + 1), 0.25, ROWS - 0.25) / ROWS

@@ -25,9 +25,10 @@ from clpt.render.analysis.lights.triangle_means import triangle_means
 from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.render.contract.light_records import INFINITE
 from clpt.scene import lights
-from clpt.scene.lights import DirectionalArea, Light
+from clpt.scene.lights import Area, DirectionalArea, Light
 from clpt.scene.media import Medium
-from clpt.scene.params import params
+from clpt.scene.params import fields_of, params
+from clpt.scene.roles import EMISSION
 from clpt.scene.shapes import Shape
 from clpt.scene.textures import MeshAttribute, textures_in
 
@@ -137,8 +138,8 @@ def is_whole(shape: Shape) -> bool:
 
 def emissions_of(lamp: Light) -> dict[str, Any]:
     """Return the values of a light's emission parameters."""
-    declared = params(type(lamp)).items()
-    return {name: getattr(lamp, name) for name, param in declared if param.role == "emission"}
+    given, declared = fields_of(lamp), params(type(lamp)).items()
+    return {name: given[name] for name, param in declared if param.role is EMISSION}
 
 
 def _of_lamp(lamp: Light, scene_radius: float, look: Look) -> Source:
@@ -170,10 +171,11 @@ def _of_bricks(glow: Glow) -> Bounds:
 def _of_emitter(emitter: Emitter, cache: LoweringCache) -> Source:
     """Return the source of a shape that emits."""
     shape = emitter.shape
-    emission: Any = shape.emission  # an area light, of either kind
+    emission = shape.emission
+    assert isinstance(emission, (Area, DirectionalArea))
     along = isinstance(emission, DirectionalArea)
     both = not along and emission.two_sided
-    value = emission.irradiance if along else emission.radiance
+    value = emission.radiance if isinstance(emission, Area) else emission.irradiance
     strength = 1.0 if along else 2.0 * np.pi if both else np.pi
     if is_whole(shape):
         bright = light_power.brightness(value)
@@ -197,7 +199,7 @@ def _of_emitter(emitter: Emitter, cache: LoweringCache) -> Source:
     return Source(power, bounds, power, float(means.max(initial=0.0)))
 
 
-def _face_attributes(shape: Shape, value: Any) -> dict[str, NDArray[np.float32]]:
+def _face_attributes(shape: Shape, value: object) -> dict[str, NDArray[np.float32]]:
     """Return the attributes of a shape's triangles that its emission reads, by their names."""
     names = {one.name for one in textures_in(value) if isinstance(one, MeshAttribute)}
     return {name: triangles.attribute(shape, name) for name in names if triangles.per_face(name)}

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from clpt.arrays import Floats
 from clpt.render.analysis.lights.light_power import brightness
 from clpt.scene.pixels import pixels
-from clpt.scene.textures import Bitmap, Checkerboard, MeshAttribute, Mix, Product
+from clpt.scene.roles import EMISSION
+from clpt.scene.textures import Bitmap, Checkerboard, MeshAttribute, Mix, Product, Texture
 
 LOOKS = 1 << 18  # at a texture, all triangles together
 FEWEST, MOST = 16, 1024  # of them for one triangle
@@ -32,7 +33,7 @@ def triangle_means(
     attributes: the values (m, k) of each triangle, of those that the emission reads by face.
     """
     mean = brightness(value)
-    if not getattr(value, "is_texture", False):
+    if not isinstance(value, Texture):
         return np.full(len(faces), mean)
     corners = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)])
     given = np.tile(corners, (len(faces), 1, 1)) if uvs is None else np.asarray(uvs, float)[faces]
@@ -78,7 +79,7 @@ def looked_up(
 
 def _bitmap(texture: Bitmap, uv: Floats, area: Floats) -> Floats:
     """Looks at an image that is averaged over as many texels as one of them stands for."""
-    level = np.maximum(pixels(texture, "emission"), 0.0).mean(axis=2, dtype=np.float64)
+    level = np.maximum(pixels(texture, EMISSION), 0.0).mean(axis=2, dtype=np.float64)
     texels = area * level.size
     steps = np.ceil(0.5 * np.log2(np.maximum(texels, 1.0))).astype(np.int64)
     found = np.empty(uv.shape[:2])

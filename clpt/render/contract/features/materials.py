@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from clpt.render.contract.features.macros import flag, macro
 from clpt.scene.params import device_params
+from clpt.scene.roles import INDEX
 from clpt.scene.scatterer import Scatterer
 
 Sources = frozenset[tuple[str, str, str]]
@@ -53,7 +54,7 @@ class MaterialFeatures:
             for cls in self.leaves
             if cls.refracts
             for name, param in device_params(cls).items()
-            if param.role == "index"
+            if param.role is INDEX
         )
         return any(cls.disperses for cls in self.leaves) or not self.sources.isdisjoint(indices)
 

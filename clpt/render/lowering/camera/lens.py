@@ -29,7 +29,11 @@ EVEN = 0.1  # part of the ghosts' samples that all pairs share alike
 
 
 def lens_words(
-    camera: Lens, to_world: Any, width: int, height: int, rows: Mapping[Spectrum, int]
+    camera: Lens,
+    to_world: NDArray[np.float64],
+    width: int,
+    height: int,
+    rows: Mapping[Spectrum, int],
 ) -> NDArray[np.float32]:
     """Return the words (n,) float32 of a lens: its record and the tables behind it.
 

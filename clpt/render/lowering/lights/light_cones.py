@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,12 +37,17 @@ class Cones:
         axis = np.tile([0.0, 0.0, 1.0], (count, 1))
         return cls(axis, np.full(count, EMPTY), np.zeros(count), np.zeros(count, bool))
 
+    @property
+    def arrays(self) -> tuple[Any, ...]:
+        """The arrays, in the order of the fields."""
+        return self.axis, self.theta_o, self.theta_e, self.both
+
     def __getitem__(self, rows: ArrayLike) -> Cones:
-        return Cones(*(getattr(self, field.name)[rows] for field in fields(self)))
+        return Cones(*(array[rows] for array in self.arrays))
 
     def __setitem__(self, rows: ArrayLike, others: Cones) -> None:
-        for field in fields(self):
-            getattr(self, field.name)[rows] = getattr(others, field.name)
+        for own, given in zip(self.arrays, others.arrays, strict=True):
+            own[rows] = given
 
 
 def around(cones: Cones, starts: NDArray[np.int64]) -> Cones:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,14 +18,14 @@ from clpt.geometry import analytic, shape_records, shapes, spheres, triangles
 from clpt.records import LIGHT
 from clpt.render.analysis.geometry import Emitter
 from clpt.render.analysis.lights import light_bounds
-from clpt.render.analysis.lights.sources import Sources, is_whole
+from clpt.render.analysis.lights.sources import Source, Sources, is_whole
 from clpt.render.analysis.lowering_cache import content
 from clpt.render.contract.light_records import ALONG, BOTH, FRONT, KINDS, VOLUME
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.lights import light_tree
 from clpt.render.lowering.lights.brick_lights import BrickLights
 from clpt.render.lowering.lights.non_shape_lights import blank_row, lower_lamp
-from clpt.scene.lights import DirectionalArea, Light
+from clpt.scene.lights import Area, DirectionalArea, Light
 
 PLACED_LIGHT_WEIGHT = (
     6  # triangles that a light at a place of its own counts as, where a tree is thought of
@@ -86,27 +85,37 @@ def light_rows(
         weights = _shared(power, infinite)
         same = content(weights)
         rows["pmf"], rows["keep"], rows["alias"] = encoder.cache(alias_table, weights, by=(same,))
-        apart = sum(bool(one.bounds.placed.any()) for one in every)
-        if tree_from is not None and max(len(rows), PLACED_LIGHT_WEIGHT * apart) >= tree_from:
-            bounds = light_bounds.concatenated([one.bounds for one in every])
-            importance = np.concatenate([one.importance for one in every])
-            by = content(importance, *vars(bounds).values())
-            tree = encoder.cache(_tree_words, bounds, importance, by=(by,))
-    kinds = tuple(KINDS[i] for i in sorted({*rows["kind"].tolist()}))  # np.unique loads numpy.ma
+        if tree_from is not None and _count(every, len(rows)) >= tree_from:
+            tree = _tree(every, encoder)
+    shine = (rows["shape"] >= 0) & (rows["emission_mode"] != ALONG)
     return LightRows(
         rows=rows,
         power=power,
         radiance=max((one.radiance for one in every), default=0.0),
         infinite=infinite,
-        kinds=kinds,
+        kinds=tuple(KINDS[i] for i in sorted({*rows["kind"].tolist()})),
         first=sources.first,
         whole=tuple(is_whole(emitter.shape) for emitter in emitters),
-        visible=infinite > 0
-        or bool(((rows["shape"] >= 0) & (rows["emission_mode"] != ALONG)).any()),
+        visible=infinite > 0 or bool(shine.any()),
         two_sided=bool((rows["emission_mode"] == BOTH).any()),
         bounds=tuple(one.bounds for one in every),
         tree=tree,
     )
+
+
+def _count(every: Sequence[Source], rows: int) -> int:
+    """Return how many lights there are; each at a place of its own counts for several."""
+    apart = sum(bool(one.bounds.placed.any()) for one in every)
+    return max(rows, PLACED_LIGHT_WEIGHT * apart)
+
+
+def _tree(every: Sequence[Source], encoder: Encoder) -> NDArray[np.uint32]:
+    """The words of the tree over all lights."""
+    bounds = light_bounds.concatenated([one.bounds for one in every])
+    importance = np.concatenate([one.importance for one in every])
+    by = content(importance, *bounds.arrays)
+    made: NDArray[np.uint32] = encoder.cache(_tree_words, bounds, importance, by=(by,))
+    return made
 
 
 def _tree_words(bounds: light_bounds.Bounds, importance: np.ndarray) -> NDArray[np.uint32]:
@@ -135,9 +144,10 @@ def _brick_rows(bricks: BrickLights, encoder: Encoder) -> np.ndarray:
 def _emitter_rows(emitter: Emitter, encoder: Encoder) -> np.ndarray:
     """The rows of a shape that emits."""
     shape = emitter.shape
-    emission: Any = shape.emission  # an area light, of either kind
+    emission = shape.emission
+    assert isinstance(emission, (Area, DirectionalArea))
     along = isinstance(emission, DirectionalArea)
-    value = emission.irradiance if along else emission.radiance
+    value = emission.radiance if isinstance(emission, Area) else emission.irradiance
     radiance = encoder.store.append("light_params", encoder.emission_words(value))
     kind = "triangle"
     if is_whole(shape):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,9 +17,10 @@ from clpt.render.contract.light_records import RECORDS
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.lights import projected, sky
 from clpt.render.lowering.lights.image_lights import lower_image
-from clpt.scene import lights
+from clpt.scene import lights, roles
 from clpt.scene.lights import Light
-from clpt.scene.params import params
+from clpt.scene.params import fields_of, params
+from clpt.scene.roles import Param, Role
 
 
 def blank_row() -> NDArray[np.uint32]:
@@ -72,20 +74,28 @@ def lower_lamp(lamp: Light, encoder: Encoder) -> Lowered:
 def _declared_members(lamp: Light) -> dict[str, ArrayLike]:
     """The members of a declared light's record but for its emissions, see `declared_record`."""
     members: dict[str, ArrayLike] = {}
+    given = fields_of(lamp)
     for name, param in params(type(lamp)).items():
-        value, where = getattr(lamp, name), f"{lamp.kind}.{name}"
-        if param.form in light_records.OF_HOST:
-            continue
-        if param.form == "matrix4":
-            members |= light_power.placement(value, where)
-        elif param.role == "host":
-            turned = light_power.unit if param.form == "direction" else light_power.three
-            members[name] = turned(value, where)
-        elif param.role == "choice":
-            members[name] = param.choices.index(value)
-        elif param.role != "emission":
-            members[name] = np.radians(value) if param.unit == "degrees" else value
+        value, where = given[name], f"{lamp.kind}.{name}"
+        members |= MEMBERS[param.role](name, value, param, where)
     return members
+
+
+def _number(name: str, value: Any, param: Param, where: str) -> dict[str, ArrayLike]:
+    return {name: np.radians(value) if param.unit == "degrees" else value}
+
+
+# the members of a parameter, by its role
+MEMBERS: dict[Role, Callable[[str, Any, Param, str], dict[str, ArrayLike]]] = {
+    roles.EMISSION: lambda *_: {},
+    roles.REAL: _number,
+    roles.FLAG: _number,
+    roles.CHOICE: lambda name, value, param, _: {name: param.choices.index(value)},
+    roles.host("vector"): lambda name, value, _, where: {name: light_power.three(value, where)},
+    roles.host("direction"): lambda name, value, _, where: {name: light_power.unit(value, where)},
+    roles.host("matrix4"): lambda _, value, __, where: light_power.placement(value, where),
+    **{roles.host(form): lambda *_: {} for form in light_records.OF_HOST},
+}
 
 
 def _computed_members(kind: str, lamp: Light, encoder: Encoder) -> dict[str, ArrayLike]:

@@ -12,12 +12,13 @@ from clpt.render.analysis.lights.light_power import aspect, unsheared
 from clpt.render.lowering.encoder import Encoder
 from clpt.scene.lights import SPOT_EDGES, Goniometric, Light, Projector, Spot
 from clpt.scene.pixels import pixels, spectral_image
-from clpt.scene.textures import Bitmap
+from clpt.scene.roles import REFLECTANCE
+from clpt.scene.textures import Bitmap, Texture
 
 
 def kind_of(lamp: Light) -> str:
     """Return the record of a light: a spot with an image has one of its own."""
-    plain = isinstance(lamp, Spot) and getattr(lamp.image, "is_texture", False)
+    plain = isinstance(lamp, Spot) and isinstance(lamp.image, Texture)
     return "image_spot" if plain else lamp.kind
 
 
@@ -46,8 +47,8 @@ def members(lamp: Light, encoder: Encoder) -> dict[str, ArrayLike]:
 def _image(image: Any, encoder: Encoder) -> dict[str, ArrayLike]:
     """The members of an image whose values are brought below 1, as those of a reflectance are."""
     scale = 1.0
-    if isinstance(image, Bitmap) and spectral_image(image, "reflectance") is None:
-        values = pixels(image, "reflectance")
+    if isinstance(image, Bitmap) and spectral_image(image, REFLECTANCE) is None:
+        values = pixels(image, REFLECTANCE)
         scale = max(float(values.max()), 0.0) or 1.0
         image = dataclasses.replace(image, image=values / np.float32(scale), raw=True)
     return {

@@ -16,10 +16,12 @@ from clpt.render.contract.parameter_words import MIXTURE
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.materials.normal_maps import NormalPerturbation
 from clpt.scene import materials as mt
+from clpt.scene import roles
 from clpt.scene.media import Blend, Phase
-from clpt.scene.params import device_params
+from clpt.scene.params import Kind, device_params, fields_of
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.shapes import Shape
+from clpt.scene.textures import Texture
 
 _NULL, _BLACK = mt.Null(), mt.Diffuse(reflectance=0.0)
 
@@ -79,14 +81,14 @@ class MaterialWords:
         """Return the word of a surface that is not there."""
         return self._leaf(_NULL, _Side(front=True, two_sided=False))
 
-    def _word(self, material: Any, side: _Side) -> int:
+    def _word(self, material: mt.Material, side: _Side) -> int:
         """The word of a material on a side; the same pair has the same word."""
         key = (id(material), side.key)
         if key not in self._words:
             self._words[key] = self._new_word(material, side)
         return self._words[key]
 
-    def _new_word(self, material: Any, side: _Side) -> int:
+    def _new_word(self, material: mt.Material, side: _Side) -> int:
         if isinstance(material, mt.TwoSided):
             chosen = material.front if side.front or material.back is None else material.back
             return self._word(chosen, dataclasses.replace(side, inside=True))
@@ -104,29 +106,32 @@ class MaterialWords:
             material = _NULL
         return self._leaf(material, side)
 
-    def _leaf(self, material: Any, side: _Side) -> int:
+    def _leaf(self, material: Scatterer, side: _Side) -> int:
         before = side.perturbation.words(self._encoder) if self._normal_mapped else None
         row = self._encoder.row(material, "materials", before)
         if row >= 1 << 24:
             raise SceneError("the scene has more than 16 million words of material parameters")
-        self.uvs |= any(map(_has_textures, (material, *getattr(material, "layers", ()))))
+        self.uvs |= _has_textures(material)
         self.tangents |= material.uses_tangents
-        self.absorption |= getattr(material, "absorption", mt.CLEAR) != mt.CLEAR
+        if isinstance(material, mt.Material):
+            self.uvs |= any(map(_has_textures, material.layers))
+            self.absorption |= material.absorption != mt.CLEAR
         if material.transmits:
             self.transmitting.add(material.kind)
         return self._leaves.index(type(material)) << 24 | row
 
-    def _mixture(self, weight: Any, first: Any, second: Any, side: _Side) -> int:
+    def _mixture(self, weight: object, first: mt.Material, second: mt.Material, side: _Side) -> int:
         return self._mixture_of(weight, [self._word(one, side) for one in (first, second)])
 
-    def _mixture_of(self, weight: Any, children: list[int]) -> int:
-        words, source = self._encoder.named_words("mixture", "weight", weight, "real")
+    def _mixture_of(self, weight: object, children: list[int]) -> int:
+        words, source = self._encoder.named_words("mixture", "weight", weight, roles.REAL)
         self.uvs |= source == "texture"
         word = MIXTURE << 24 | self._encoder.store.append("mixtures", [*words, *children])
         self._depths[word] = 1 + max(self._depths.get(child, 0) for child in children)
         return word
 
 
-def _has_textures(kind: Any) -> bool:
-    """Whether a parameter of a kind is a texture."""
-    return any(getattr(getattr(kind, n), "is_texture", False) for n in device_params(type(kind)))
+def _has_textures(kind: Kind) -> bool:
+    """Whether a parameter of a kind is a texture that kernels read."""
+    values = fields_of(kind)
+    return any(isinstance(values[name], Texture) for name in device_params(type(kind)))

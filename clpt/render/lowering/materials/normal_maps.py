@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
 from clpt.arrays import Words
 from clpt.render.contract.parameter_words import NORMAL_MAP_WORDS
 from clpt.render.lowering.encoder import Encoder
+from clpt.scene import roles
 from clpt.scene.materials import BumpMap, NormalMap
 from clpt.scene.textures import Bitmap
 
@@ -56,8 +57,8 @@ class NormalPerturbation:
         return made
 
 
-def _real(value: Any, encoder: Encoder) -> Words:
-    return encoder.named_words("perturbation", "value", value, "real")[0]
+def _real(value: object, encoder: Encoder) -> Words:
+    return encoder.named_words("perturbation", "value", value, roles.REAL)[0]
 
 
 def _flags(outer: Map) -> int:

@@ -16,6 +16,7 @@ from clpt.render.analysis.bodies import BENDS, Matter, matter_of
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.materials.material_words import MaterialWords
 from clpt.render.lowering.media.medium_words import MediumWords
+from clpt.scene import roles
 from clpt.scene.materials import CLEAR
 from clpt.scene.shapes import Shape
 
@@ -60,7 +61,7 @@ class BodyWords:
         for shape in self._shapes:
             index = 0
             if isinstance(shape.material, BENDS):
-                own = encoder.named_words("body", "index", shape.material.int_ior, "index")[0]
+                own = encoder.named_words("body", "index", shape.material.int_ior, roles.INDEX)[0]
                 index = encoder.store.append("materials", own)
             self._media.append(self._medium(shape, encoder, media))
             words.append((self._media[-1], index))
@@ -83,8 +84,8 @@ class BodyWords:
         """The word of the medium in a body, or of what its material absorbs."""
         if shape.interior is not None:
             return media.word(shape.interior)
-        absorbs = getattr(shape.material, "absorption", CLEAR)
+        absorbs = shape.material.absorption
         if absorbs == CLEAR:
             return 0
-        words = encoder.named_words("medium", "absorption", absorbs, "coefficient")[0]
+        words = encoder.named_words("medium", "absorption", absorbs, roles.COEFFICIENT)[0]
         return 1 + encoder.store.append("materials", words)

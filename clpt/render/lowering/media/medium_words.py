@@ -20,7 +20,9 @@ from clpt.render.lowering.lights.brick_lights import BrickLights
 from clpt.render.lowering.lights.lights import LightRows
 from clpt.render.lowering.materials.material_words import MaterialWords
 from clpt.render.lowering.tables import as_words
+from clpt.scene import roles
 from clpt.scene.media import Dyed, Grid, Lattice, Medium, Mixture, Phase
+from clpt.scene.params import fields_of
 from clpt.scene.shapes import Shape
 from clpt.spectra import Constant, Spectrum
 
@@ -90,7 +92,7 @@ class MediumWords:
         rows = []
         if self._index.emitting:
             light = medium.light or Constant(0.0)
-            rows.append(self._encoder.named_words("medium", "light", light, "emission")[0])
+            rows.append(self._encoder.named_words("medium", "light", light, roles.EMISSION)[0])
         rows += self._part_words(phases, (absorbs, scatters))
         mixture = self._mixture_words(medium)
         word = MEDIUM_BITS["flies"] | (MEDIUM_BITS["sealed"] if medium in self._sealed else 0)
@@ -99,7 +101,7 @@ class MediumWords:
         if isinstance(medium, Lattice):
             rows.append(grids.row(medium, self._encoder))
             word |= MEDIUM_BITS["grid"]
-            word |= MEDIUM_BITS["bytes"] if getattr(medium, "bits", 16) == 8 else 0
+            word |= MEDIUM_BITS["bytes"] if isinstance(medium, Grid) and medium.bits == 8 else 0
         before = 2 + (SPECTRUM_WORDS if self._index.emitting else 0)
         word |= before + self._encoder.store.size("materials")
         if isinstance(medium, Lattice) and self._index.grids.emissive:
@@ -107,7 +109,7 @@ class MediumWords:
         if isinstance(medium, Lattice) and self._index.grids.tinted:
             rows.append(self._tint(medium, "albedo_grid"))
         if isinstance(medium, Lattice) and self._index.grids.coloured:
-            rows.append(self._tint(medium, "colour_grid"))
+            rows.append(self._tint(medium, "color_grid"))
         rows += mixture
         self._encoder.store.append("materials", np.concatenate(rows))
         return word
@@ -119,7 +121,7 @@ class MediumWords:
         first = self._materials.phase(phases[0]) if phases else 0
         words = [np.array([first], np.uint32)]
         for name, value in zip(("absorption", "scattering"), coefficients, strict=True):
-            words.append(self._encoder.named_words("medium", name, value, "coefficient")[0])
+            words.append(self._encoder.named_words("medium", name, value, roles.COEFFICIENT)[0])
         return words
 
     def _mixture_words(self, medium: Medium) -> list[Words]:
@@ -145,7 +147,7 @@ class MediumWords:
         It is negative for an albedo that is trilinear apart from the density, see
         `Grid.albedo_with_density`. name: of the medium's field that has the colours.
         """
-        colours = getattr(medium, name, None)
+        colours = fields_of(medium).get(name)
         if not isinstance(medium, Grid) or colours is None:
             return np.zeros(1, np.uint32)
         given = (medium.density, colours, self._index.spectral)

@@ -20,6 +20,8 @@ from clpt.render.contract.parameter_words import (
 )
 from clpt.render.lowering.spectra import measurements, reradiation
 from clpt.render.lowering.tables import TableStore, as_words
+from clpt.scene import media
+from clpt.scene.roles import EMISSION, Spectral
 from clpt.spectra import (
     RGB,
     Constant,
@@ -30,20 +32,11 @@ from clpt.spectra import (
     Tabulated,
     observer,
 )
-from clpt.spectra.spectrum import Role, d65, gridded, primaries
+from clpt.spectra.spectrum import d65, gridded, primaries
 
 STEP = 1.0  # [nm] at most, between the nodes of tabulated spectra
 FEWEST = 100  # cells between the nodes, however narrow the film's range is
 ONE = 1e4  # sigmoid coefficient at which it is 1 in float32
-# How a spectrum is turned to rgb, by the role of the parameter (see clpt.spectra.spectrum).
-RGB_ROLES: dict[str, Role] = {
-    "reflectance": "reflectance",
-    "emission": "emission",
-    "index": "unbounded",
-    "factor": "unbounded",
-    "coefficient": "unbounded",
-    "quantity": "unbounded",
-}
 
 
 @lru_cache(maxsize=1 << 16)
@@ -133,22 +126,20 @@ class SpectraTable:
         """Whether the points of a table overlap with the film's range."""
         return table.lambdas[0] <= self.lambda_max and table.lambdas[-1] >= self.lambda_min
 
-    def words(self, value: Spectrum | str, role: str) -> tuple[Words, str]:
+    def words(self, value: Spectrum | str, role: Spectral) -> tuple[Words, str]:
         """Return the five words of a spectrum and its source: "constant" or "table".
 
         An index or a quantity without colour is "grey", so that kernels see it.
-        role: one of SPECTRUM_ROLES in clpt.scene.params; an index may be a glass's name.
+        role: of the parameter; an index may be a glass's name.
         """
-        if isinstance(value, str) or role in ("index", "coefficient", "quantity"):
+        if isinstance(value, str) or role.measured:
             value = spectra.index(value)
-        if role == "emission" and isinstance(value, RGB):
+        if role is EMISSION and isinstance(value, RGB):
             value = RGBIlluminant(value.r, value.g, value.b)
         words = np.zeros(SPECTRUM_WORDS, np.uint32)
-        given = (
-            "grey" if role in ("index", "quantity") and isinstance(value, Constant) else "constant"
-        )
+        given = "grey" if role.grey and isinstance(value, Constant) else "constant"
         if not self.spectral:
-            words[:3] = as_words(value.to_rgb(RGB_ROLES[role]))
+            words[:3] = as_words(value.to_rgb(role.meaning))
             return words, given
         if isinstance(value, Constant):
             words[:4] = as_words([0.0, 0.0, ONE, value.value])
@@ -167,7 +158,7 @@ class SpectraTable:
         words[4] = np.int32(-1 - self.row(spectrum)).view(np.uint32)
         return words
 
-    def angular_words(self, kind: Any) -> tuple[Words, str]:
+    def angular_words(self, kind: media.Tabulated) -> tuple[Words, str]:
         """Return the words of a table over cosines, and its source.
 
         The source is "row", or "rows" where it depends on the wavelength; see

@@ -17,16 +17,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import spectra
+from clpt.arrays import Array
 from clpt.render.contract.parameter_words import FILM_COSINES
 from clpt.scene.materials import Layer
 from clpt.scene.params import Kind, params
-from clpt.spectra import cie
+from clpt.scene.textures import Texture
+from clpt.spectra import Spectrum, cie
 from clpt.spectra.spectrum import d65
 
 THICKNESS_STEP = 4.0  # [nm] of the table, where a texture varies the thickness
 MOST_ROWS = 1024
 
-Array = NDArray[Any]
 _ZERO = spectra.Constant(0.0)
 
 
@@ -103,7 +104,7 @@ def film_shares(
 
 
 def _textured(layer: Layer) -> bool:
-    return getattr(layer.profile, "is_texture", False)
+    return isinstance(layer.profile, Texture)
 
 
 def profile(material: Kind) -> Any:
@@ -112,7 +113,7 @@ def profile(material: Kind) -> Any:
     return next((layer.profile for layer in layers if _textured(layer)), 1.0)
 
 
-def _complex(eta: Any, k: Any, lambdas: Array) -> Array:
+def _complex(eta: Spectrum | str, k: Spectrum | str, lambdas: Array) -> Array:
     """A complex index at the wavelengths."""
     n, extinction = (spectra.index(value).sample(lambdas) for value in (eta, k))
     return n + 1j * extinction

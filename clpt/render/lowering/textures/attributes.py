@@ -1,8 +1,9 @@
 """Attributes of meshes per vertex or face: the table `attributes`.
 
 It begins with a directory of zeros, for what has no attributes. A mesh has a directory of its own:
-per (name, role) that textures ask for, where its values would begin for vertex or face 0 of the
-scene, and how many words each takes. A colour takes four words, as a texel does, a number one.
+per (name, role, channel) that textures ask for, where its values would begin for vertex or face 0
+of the scene, and how many words each takes. A colour takes four words, as a texel does, a number
+one.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from clpt.render.analysis.geometry import Owner
 from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.render.analysis.texels import texels
 from clpt.render.lowering.textures.textures import TextureTable
+from clpt.scene.roles import REAL, Role
 from clpt.scene.shapes import Shape
 from clpt.scene.textures import attributes_in
 
@@ -46,14 +48,14 @@ def lower_attributes(
         if not names:
             continue
         directory = np.zeros((count, 2), np.int32)
-        for (name, role), number in textures.attributes.items():
+        for (name, role, channel), number in textures.attributes.items():
             if name in names:
-                words = 1 if role.startswith("real") else COLOUR_WORDS
+                words = 1 if role is REAL else COLOUR_WORDS
                 first = first_face if per_face(name) else first_vertex
                 if shape.kind in shape_records.ONE_OF:
                     first = int(row["prim"]) - single_count
-                given = (shape, name, role, textures.spectra.spectral)
-                value = getattr(shape, "attributes", {})[name]
+                given = (shape, name, role, channel, textures.spectra.spectral)
+                value = shape.attributes[name]
                 own = (*shapes.geometry(shape), value, *given[1:])
                 made = cache(_words, *given, by=own)
                 if keys and first_vertex in keys and not per_face(name):
@@ -63,10 +65,9 @@ def lower_attributes(
         row["attributes"] = store.append("attributes", directory.view(np.uint32))
 
 
-def _words(shape: Shape, name: str, role: str, spectral: bool) -> np.ndarray:
+def _words(shape: Shape, name: str, role: Role, channel: str, spectral: bool) -> np.ndarray:
     values: np.ndarray = triangles.attribute(shape, name)
-    role, _, channel = role.partition(".")
-    if role == "real" and values.shape[1] == 3:
+    if role is REAL and values.shape[1] == 3:
         values = (
             values[:, "rgb".index(channel), None] if channel else spectra.luminance(values)[:, None]
         )

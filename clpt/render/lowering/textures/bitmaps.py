@@ -30,6 +30,7 @@ from clpt.render.analysis.texels import texels
 from clpt.render.contract.texture_records import KINDS, MIPS
 from clpt.render.lowering.tables import TableStore
 from clpt.scene.pixels import channel, spectral_image
+from clpt.scene.roles import EMISSION, REAL, REFLECTANCE, Role
 from clpt.scene.textures import Bitmap
 
 NODES = np.array([400.0, 550.0, 700.0])  # [nm] of packed spectra, as in spectral_read.cl
@@ -116,7 +117,7 @@ class _Image:
     """An image in one role, and the rows of `textures` that show it."""
 
     texture: Bitmap
-    role: str
+    role: Role
     pixels: _Pixels
     rows: list[np.ndarray] = field(default_factory=list)
     halvings: int = 0
@@ -149,12 +150,12 @@ class Images:
         self._placed: list[tuple[int, _Packed]] = []  # the first word of each in the table
         self._spectra: dict[bool, _Spectra] = defaultdict(_Spectra)
 
-    def add(self, texture: Bitmap, role: str, row: np.ndarray) -> None:
+    def add(self, texture: Bitmap, role: Role, row: np.ndarray) -> None:
         """Ask for an image; where it lies will be written into the texture's row.
 
         Raises SceneError for what is no image.
         """
-        channel_of = role == "real" and texture.channel
+        channel_of = role is REAL and texture.channel
         levels = has_levels(texture, role)
         key: Any = (identity(texture), texture.raw, role, channel_of, levels)
         if key not in self._wanted:
@@ -172,43 +173,46 @@ class Images:
         wanted, self._wanted = list(self._wanted.values()), {}
         notes = [*_left_out(wanted), *self._fit(wanted)]
         for image in wanted:
-            form = image.form
-            bytes_ = _packs(form, image, self.spectral)
-            texture, halvings = image.texture, image.halvings
-            by = (
-                version(texture.image),
-                texture.raw,
-                image.role,
-                texture.channel,
-                halvings,
-                self.spectral,
-                image.has_levels,
-            )
-            packed: _Packed = self.cache(Images._words, self, image, by=by)
-            height, width = packed.size
-            kind = "packed_bitmap" if bytes_ else "bitmap"
-            if image.has_levels:
-                kind = next(name for name, level in MIPS.items() if level == kind)
-            if store.size("images") + packed.words.size > LARGEST:
-                raise SceneError("all images together have too many texels", where="bitmap.image")
-            curved = form.encoded and not image.texture.raw and not _is_alpha(image)
-            for row in image.rows:
-                row["kind"], row["width"], row["height"] = KINDS.index(kind), width, height
-                row["decode"] = self._decode(curved, store) if bytes_ else 0
-            first = store.append("images", packed.words)
-            self._placed.append((first, packed))
-            for row in image.rows:
-                row["first"] = first
-            if packed.levels is not None:
-                table = np.add(packed.levels, (first, 0, 0)).astype(np.uint32)
-                at = store.append("textures", table.reshape(-1))
-                for row in image.rows:
-                    row["levels"], row["table"] = len(table), at
-            roles.add((kind, image.role))
+            roles.add((self._put(image, store), image.role.name))
         for image in wanted:
             image.pixels.let_go()
         self._spectra.clear()
         return notes
+
+    def _put(self, image: _Image, store: TableStore) -> str:
+        """Put an image into the tables, and where it is into its rows; return its kind."""
+        packed = self._packed(image)
+        height, width = packed.size
+        bytes_ = _packs(image.form, image, self.spectral)
+        kind = "packed_bitmap" if bytes_ else "bitmap"
+        if image.has_levels:
+            kind = next(name for name, level in MIPS.items() if level == kind)
+        if store.size("images") + packed.words.size > LARGEST:
+            raise SceneError("all images together have too many texels", where="bitmap.image")
+        curved = image.form.encoded and not image.texture.raw and not _is_alpha(image)
+        for row in image.rows:
+            row["kind"], row["width"], row["height"] = KINDS.index(kind), width, height
+            row["decode"] = self._decode(curved, store) if bytes_ else 0
+        first = store.append("images", packed.words)
+        self._placed.append((first, packed))
+        for row in image.rows:
+            row["first"] = first
+        if packed.levels is not None:
+            table = np.add(packed.levels, (first, 0, 0)).astype(np.uint32)
+            at = store.append("textures", table.reshape(-1))
+            for row in image.rows:
+                row["levels"], row["table"] = len(table), at
+        return kind
+
+    def _packed(self, image: _Image) -> _Packed:
+        """The words of an image, as they were made before if nothing differs."""
+        texture = image.texture
+        by = (
+            *(version(texture.image), texture.raw, image.role, texture.channel),
+            *(image.halvings, self.spectral, image.has_levels),
+        )
+        made: _Packed = self.cache(Images._words, self, image, by=by)
+        return made
 
     def joined(self, table: Words) -> None:
         """Keep the words of the images as parts of the table that they have been joined to."""
@@ -233,7 +237,7 @@ class Images:
     def _level(self, image: _Image, values: NDArray[Any], curved: bool, packs: bool) -> _Packed:
         """The words of one size of an image; curved, packs: of its bytes."""
         texture, role, size = image.texture, image.role, values.shape[:2]
-        if role == "real" and packs:
+        if role is REAL and packs:
             number = "rgba".find(texture.channel) if values.shape[2] > 1 else 0
             if texture.channel == "a" and values.shape[2] < 4:
                 return _Packed(np.full(1, 0xFFFFFFFF, np.uint32), (1, 1))
@@ -244,14 +248,14 @@ class Images:
             made = self._spectra[curved].packed(codes, curved) if self.spectral else codes
             return _Packed(made, size)
         decoded = Stored(values, curved).decoded()
-        if role == "real":
+        if role is REAL:
             numbers = np.nan_to_num(channel(decoded, texture.channel).astype(np.float32))
             return _Packed(numbers.reshape(-1).view(np.uint32), size)
         colours = texels(np.nan_to_num(decoded[..., :3]), role, self.spectral)
         colours = colours if self.spectral else colours[:, :3]
         return _Packed(np.ascontiguousarray(colours).reshape(-1).view(np.uint32), size)
 
-    def _read(self, image: Any) -> _Pixels:
+    def _read(self, image: object) -> _Pixels:
         """The pixels of an image; a file is decoded once."""
         if isinstance(image, (str, Path)):
             return self.cache(_Pixels, str(image), by=(version(image),))
@@ -286,9 +290,9 @@ def identity(texture: Bitmap) -> Any:
     return str(image) if isinstance(image, (str, Path)) else id(image)
 
 
-def has_levels(texture: Bitmap, role: str) -> bool:
+def has_levels(texture: Bitmap, role: Role) -> bool:
     """Return whether an image has smaller copies in a role: lights are sampled by the image."""
-    return texture.filter == "trilinear" and role != "emission"
+    return texture.filter == "trilinear" and role is not EMISSION
 
 
 @cache
@@ -297,7 +301,7 @@ def _pool(process: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(min(THREADS, os.cpu_count() or 1), "clpt-images")
 
 
-def _array(image: Any) -> Stored:
+def _array(image: object) -> Stored:
     values = np.asarray(on_host(image))
     values = values[..., None] if values.ndim == 2 else values
     if values.dtype != np.uint8 and values.dtype.kind != "f":
@@ -316,16 +320,16 @@ def _shaped(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def _is_alpha(image: _Image) -> bool:
-    return image.role == "real" and image.texture.channel == "a"
+    return image.role is REAL and image.texture.channel == "a"
 
 
 def _packs(form: _Form, image: _Image, spectral: bool) -> bool:
     """Whether bytes stay bytes."""
     if not form.bytes:
         return False
-    if image.role == "real":
+    if image.role is REAL:
         return form.shape[2] == 1 or image.texture.channel != "luminance"
-    return not spectral or image.role == "reflectance"
+    return not spectral or image.role is REFLECTANCE
 
 
 def _size(image: _Image, spectral: bool) -> int:
@@ -333,7 +337,7 @@ def _size(image: _Image, spectral: bool) -> int:
     form = image.form
     height, width = (max(1, -(-n >> image.halvings)) for n in form.shape[:2])
     packed = _packs(form, image, spectral)
-    if image.role == "real":
+    if image.role is REAL:
         texel = 1 if packed else 4
     elif packed:
         texel = 8 if spectral else 4

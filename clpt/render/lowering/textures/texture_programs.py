@@ -19,25 +19,26 @@ from clpt.render.contract.parameter_words import SPECTRUM_WORDS
 from clpt.render.contract.texture_records import END, OPERANDS, OPERATIONS
 from clpt.render.lowering.spectra.spectra_table import SpectraTable
 from clpt.render.lowering.tables import TableStore
+from clpt.scene.roles import EMISSION, FACTOR, INDEX, REAL, REFLECTANCE, Role, Spectral
 from clpt.scene.textures import Bitmap, Checkerboard, MeshAttribute, Mix, Product, Texture
 from clpt.spectra import RGB, Constant, RGBIlluminant, RGBUnbounded, Spectrum, Tabulated, cie
 from clpt.spectra.spectrum import d65, primaries
 
 Code = list[tuple[int, int]]
-Lower = Callable[[Texture, str], int]
+Lower = Callable[[Texture, Role], int]
 
 
-def is_composite(value: Any) -> bool:
+def is_composite(value: object) -> bool:
     """Whether a value is a texture that combines others."""
     if isinstance(value, Checkerboard):
         return any(_textured(colour) for colour in (value.color0, value.color1))
     return isinstance(value, (Product, Mix))
 
 
-def folded(value: Any, role: str) -> Any:
+def folded(value: Any, role: Role) -> Any:
     """Return a value, with constants that meet each other put together where that is exact.
 
-    In the role "real" all constants are numbers; else those that are the same at all wavelengths.
+    In the role REAL all constants are numbers; else those that are the same at all wavelengths.
     """
     if isinstance(value, Checkerboard) and is_composite(value):
         pattern = Checkerboard(color0=0.0, color1=1.0, to_uv=value.to_uv)
@@ -46,26 +47,26 @@ def folded(value: Any, role: str) -> Any:
         return _product(folded(value.first, role), folded(value.second, role), role, value.rgb)
     if isinstance(value, Mix):
         first, second = folded(value.first, role), folded(value.second, role)
-        amount = folded(value.amount, "real")
-        a, b, t = _number(first, role), _number(second, role), _number(amount, "real")
+        amount = folded(value.amount, REAL)
+        a, b, t = _number(first, role), _number(second, role), _number(amount, REAL)
         if t in (0.0, 1.0):
             end, number = (second, b) if t else (first, a)
-            return end if role != "real" or number is None else Constant(number)
-        if a is not None and b is not None and t is not None and role != "emission":
+            return end if role is not REAL or number is None else Constant(number)
+        if a is not None and b is not None and t is not None and role is not EMISSION:
             return Constant(a + (b - a) * t)
         return Mix(first=first, second=second, amount=amount if t is None else t)
     return value
 
 
-def _product(a: Any, b: Any, role: str, rgb: bool) -> Any:
+def _product(a: Any, b: Any, role: Role, rgb: bool) -> Any:
     if not _textured(a) and _textured(b):
         a, b = b, a  # so that light comes from the texture, and the constant is its factor
     x, y = _number(a, role), _number(b, role)
     if x is not None and y is not None:
-        return RGBIlluminant(*[x * y] * 3) if role == "emission" else Constant(x * y)
+        return RGBIlluminant(*[x * y] * 3) if role is EMISSION else Constant(x * y)
     if y == 1.0 and _textured(a):
         return a
-    if x == 1.0 and role != "emission":
+    if x == 1.0 and role is not EMISSION:
         return b
     return Product(first=a, second=b, rgb=rgb)
 
@@ -75,20 +76,21 @@ class _Scaled(Product):
     """A spectrum times a number."""
 
 
-def separated(value: Any, role: str) -> Any:
+def separated(value: Any, role: Role) -> Any:
     """Return a value in which products of colours in RGB are sums of three products of numbers.
 
     Each of `primaries` has its channel as the factor. A program adds by mixing: half and half, the
     sum with the third, so the first two are times four and the third times two.
     """
     if isinstance(value, Mix):
-        parts = {name: separated(getattr(value, name), role) for name in ("first", "second")}
-        return replace(value, **parts)
+        return replace(
+            value, first=separated(value.first, role), second=separated(value.second, role)
+        )
     if not isinstance(value, Product):
         return value
-    light = role == "emission"
+    light = role is EMISSION
     if not value.rgb:
-        factor = separated(value.second, "reflectance" if light else role)
+        factor = separated(value.second, REFLECTANCE if light else role)
         return replace(value, first=separated(value.first, role), second=factor)
     red, green, blue = (
         _scaled(_primary(i, times, light), _factors(value, i)) for i, times in enumerate((4, 4, 2))
@@ -115,7 +117,7 @@ def _scaled(spectrum: Spectrum, factors: list[Any]) -> Any:
 def _factors(value: Any, number: int) -> list[Any]:
     """Return factors whose product is a channel of a product of colours.
 
-    They are numbers, and textures in the role "real". number: of the channel, 0 to 2.
+    They are numbers, and textures in the role REAL. number: of the channel, 0 to 2.
     """
     if isinstance(value, Product):
         return [*_factors(value.first, number), *_factors(value.second, number)]
@@ -132,23 +134,23 @@ def _joint(factors: list[Any]) -> Any:
     return reduce(lambda a, b: Product(first=a, second=b), factors)
 
 
-def _number(value: Any, role: str) -> float | None:
+def _number(value: Any, role: Role) -> float | None:
     """The number that a constant is."""
     if isinstance(value, (int, float)):
         return float(value)
     if isinstance(value, Constant):
         return float(value.value)
-    if role == "real" and not _textured(value):
+    if role is REAL and not _textured(value):
         return float(spectra.luminance(value.to_rgb("unbounded")))
     return None
 
 
-def _textured(value: Any) -> bool:
+def _textured(value: object) -> bool:
     return isinstance(value, Texture)
 
 
 def program(
-    value: Texture, role: str, store: TableStore, spectra_: SpectraTable, lower: Lower
+    value: Texture, role: Role, store: TableStore, spectra_: SpectraTable, lower: Lower
 ) -> tuple[Words, int]:
     """Return the instructions of a composite in a role, and how many values they stack.
 
@@ -163,7 +165,7 @@ def program(
 class _Writer:
     """Writes one program."""
 
-    def __init__(self, role: str, store: TableStore, spectra_: SpectraTable, lower: Lower):
+    def __init__(self, role: Role, store: TableStore, spectra_: SpectraTable, lower: Lower):
         self.role, self.store, self.spectra, self.lower = role, store, spectra_, lower
 
     def code(self, value: Any, use: str) -> tuple[Code, int]:
@@ -171,7 +173,7 @@ class _Writer:
         if isinstance(value, _Scaled):
             return self._joined([(value.first, use)], (value.second, "real"), "multiply")
         if isinstance(value, Product):
-            second = "factor" if use == "own" and self.role == "emission" else use
+            second = "factor" if use == "own" and self.role is EMISSION else use
             return self._joined([(value.first, use)], (value.second, second), "multiply")
         if isinstance(value, Mix):
             return self._joined(
@@ -195,22 +197,22 @@ class _Writer:
         return [*made, (operand | OPERATIONS[operation], argument)], depth
 
     def _operand(self, value: Any, use: str) -> tuple[int, int]:
-        role = {"own": self.role, "factor": "reflectance"}.get(use, use)
+        role = {"own": self.role, "factor": REFLECTANCE, "real": REAL}[use]
         if _textured(value):
             # of a program for a number every operand is one
             name = "own" if role == self.role else use
             return OPERANDS.index(name), self.lower(value, role)
         number = _number(value, role)
-        if number is not None and role != "emission":
+        if number is not None and role is not EMISSION:
             word = np.float32(number).view(np.uint32)
             return OPERANDS.index("number"), int(word)
         return OPERANDS.index("constant"), self.store.append("textures", self._words(value, role))
 
-    def _words(self, value: Any, role: str) -> Words:
+    def _words(self, value: Any, role: Role) -> Words:
         """A colour or spectrum as five words; colours may exceed one; emitted numbers are D65."""
-        if role == "emission" and isinstance(value, Constant):
+        if role is EMISSION and isinstance(value, Constant):
             value = RGBIlluminant(*[value.value] * 3)
-        if role in ("reflectance", "index") and type(value) in (RGB, RGBUnbounded):
+        if role in (REFLECTANCE, INDEX) and type(value) in (RGB, RGBUnbounded):
             rgb = (value.r, value.g, value.b)
             words = np.zeros(SPECTRUM_WORDS, np.float32)
             if self.spectra.spectral:
@@ -220,4 +222,5 @@ class _Writer:
             return words.view(np.uint32)
         if type(value) is RGBUnbounded:
             value = RGB(value.r, value.g, value.b)
-        return self.spectra.words(value, "factor" if role == "reflectance" else role)[0]
+        assert isinstance(role, Spectral)
+        return self.spectra.words(value, FACTOR if role is REFLECTANCE else role)[0]

@@ -23,6 +23,7 @@ from clpt.render.lowering.textures.bitmaps import Images, has_levels, identity
 from clpt.render.lowering.textures.texture_programs import folded, is_composite, program, separated
 from clpt.scene.params import params
 from clpt.scene.pixels import spectral_image
+from clpt.scene.roles import EMISSION, REAL, REFLECTANCE, Role, Spectral
 from clpt.scene.textures import (
     MAPPINGS,
     PATTERNS,
@@ -47,34 +48,35 @@ LARGEST = 2**31 - 1  # floats in `texels` that an index reaches
 class TextureTable:
     """The rows of `textures`, and what textures ask of images and meshes.
 
-    roles: the (kind, role) pairs that occur; attributes: the index in directories by (name, role);
-    mappings: whether a texture makes its own uv; depth: the most values that a program stacks.
+    roles: the (kind, role) pairs that occur; attributes: the index in directories by (name, role,
+    channel); mappings: whether a texture makes its own uv; depth: the most values that a program
+    stacks.
     """
 
     def __init__(self, store: TableStore, spectra: SpectraTable, images: Images):
         self.store, self.spectra, self.images = store, spectra, images
         self.roles: set[tuple[str, str]] = set()
-        self.attributes: dict[tuple[str, str], int] = {}
+        self.attributes: dict[tuple[str, Role, str], int] = {}
         self.mappings = False
         self.depth = 0
-        self._rows: dict[tuple[Any, str], int] = {}
-        self._folded: dict[tuple[int, str], Any] = {}
+        self._rows: dict[tuple[Any, Role], int] = {}
+        self._folded: dict[tuple[int, Role], Any] = {}
         self._alive: list[Any] = []  # textures that are known by identity
 
-    def folded(self, texture: Texture, role: str) -> Any:
+    def folded(self, texture: Texture, role: Role) -> Any:
         """Return a texture with its constants put together, see `texture_programs.folded`."""
         key = id(texture), role
         if key not in self._folded:
             made = folded(texture, role)
-            spectral = self.spectra.spectral and role in ("reflectance", "emission")
+            spectral = self.spectra.spectral and role in (REFLECTANCE, EMISSION)
             self._folded[key] = separated(made, role) if spectral else made
             self._alive.append(texture)
         return self._folded[key]
 
-    def row(self, texture: Texture, role: str) -> int:
+    def row(self, texture: Texture, role: Role) -> int:
         """Put a texture in a role into the tables; return the first word of its row in `textures`.
 
-        role: "reflectance", "emission", "index", "factor" or "real". A composite must be `folded`.
+        A composite must be `folded`.
         The same texture in the same role is put in once. Raises SceneError for an image or a uv
         transform that cannot be used.
         """
@@ -90,12 +92,12 @@ class TextureTable:
         """Put the images into the tables, when all of them are known; return warnings."""
         return self.images.finish(self.store, self.roles)
 
-    def attribute(self, name: str, role: str) -> int:
+    def attribute(self, name: str, role: Role, channel: str = "") -> int:
         """Return the index of a mesh attribute in the directories of `attributes`.
 
-        role: as in `row`; for a channel of a colour "real.r", "real.g" or "real.b".
+        role: as in `row`; channel: of a colour, for a number: "r", "g" or "b", "" for luminance.
         """
-        return self.attributes.setdefault((name, role), len(self.attributes))
+        return self.attributes.setdefault((name, role, channel), len(self.attributes))
 
     def append_row(self, kind: str, members: dict[str, Any]) -> tuple[int, np.ndarray]:
         """Append a row; return its first word, and the row, which may still be written to."""
@@ -105,16 +107,16 @@ class TextureTable:
             words[name] = value
         return self.store.append("textures", words.view(np.uint32)), words
 
-    def _append(self, texture: Texture, role: str) -> int:
+    def _append(self, texture: Texture, role: Role) -> int:
         if isinstance(texture, Bitmap):
             return _bitmap(texture, role, self)
         if is_composite(texture):
-            self.roles.add(("program", role))
+            self.roles.add(("program", role.name))
             words, depth = program(texture, role, self.store, self.spectra, self.row)
             self.depth = max(self.depth, depth)
             return self.store.append("textures", [PROGRAM, *words])
         kind, members = MEMBERS[type(texture)](texture, role, self)
-        self.roles.add((kind, role))
+        self.roles.add((kind, role.name))
         return self.append_row(kind, members)[0]
 
     def _append_blank(self) -> None:
@@ -130,7 +132,7 @@ def _identity(texture: Texture) -> Any:
     It has the parameters of a bitmap, else the id of the object.
     """
     if isinstance(texture, Bitmap):
-        values = (getattr(texture, name) for name in ("raw", "filter", "wrap", "wrap_v", "channel"))
+        values = texture.raw, texture.filter, texture.wrap, texture.wrap_v, texture.channel
         to_texture = np.asarray(texture.to_texture).tobytes()
         placed = (texture.to_uv.tobytes(), texture.mapping, to_texture)
         return (identity(texture), *values, *placed)
@@ -153,7 +155,7 @@ def _second_uv(table: TextureTable) -> int:
     """Append where a mesh's second set of uv stands, in as many words as a place in the world."""
     words = np.zeros(12, np.uint32)
     for i, name in enumerate(SECOND_UV):
-        words[i] = table.attribute(name, "real")
+        words[i] = table.attribute(name, REAL)
     return table.store.append("textures", words)
 
 
@@ -164,12 +166,12 @@ def _transform(texture: Placed | Solid, table: TextureTable) -> int:
 
 
 def _checkerboard(
-    texture: Checkerboard, role: str, table: TextureTable
+    texture: Checkerboard, role: Role, table: TextureTable
 ) -> tuple[str, dict[str, Any]]:
     members = _uv(texture, table)
-    for name in ("color0", "color1"):
-        value = getattr(texture, name)
-        if role == "real":
+    colours: dict[str, Any] = {"color0": texture.color0, "color1": texture.color1}
+    for name, value in colours.items():
+        if not isinstance(role, Spectral):
             words = np.zeros(SPECTRUM_WORDS, np.float32)
             words[0] = luminance(value.to_rgb("unbounded"))
             members[name] = table.store.append("textures", words.view(np.uint32))
@@ -178,7 +180,7 @@ def _checkerboard(
     return texture.kind, members
 
 
-def _bitmap(texture: Bitmap, role: str, table: TextureTable) -> int:
+def _bitmap(texture: Bitmap, role: Role, table: TextureTable) -> int:
     """Append a bitmap's row; unless it is one of spectra, its image comes when all are known."""
     filters, smooth = params(Bitmap)["filter"].choices, texture.filter == "trilinear"
     members = {
@@ -187,7 +189,9 @@ def _bitmap(texture: Bitmap, role: str, table: TextureTable) -> int:
         "wrap_u": WRAPS.index(texture.wrap),
         "wrap_v": WRAPS.index(texture.wrap_v or texture.wrap),
     }
-    spectral = spectral_image(texture, role) if table.spectra.spectral and role != "real" else None
+    spectral = (
+        spectral_image(texture, role) if table.spectra.spectral and role is not REAL else None
+    )
     if spectral is None:
         kind = "mip_bitmap" if has_levels(texture, role) else "bitmap"
         at, row = table.append_row(kind, members)
@@ -196,7 +200,7 @@ def _bitmap(texture: Bitmap, role: str, table: TextureTable) -> int:
     values, number = bands(spectral, *table.spectra.range)
     if table.store.size("texels") + values.size > LARGEST:
         raise SceneError("all images together have too many texels", where="bitmap.image")
-    table.roles.add(("spectral_bitmap", role))
+    table.roles.add(("spectral_bitmap", role.name))
     more = {
         "width": spectral.values.shape[1],
         "height": spectral.values.shape[0],
@@ -208,22 +212,22 @@ def _bitmap(texture: Bitmap, role: str, table: TextureTable) -> int:
 
 
 def _mesh_attribute(
-    texture: MeshAttribute, role: str, table: TextureTable
+    texture: MeshAttribute, role: Role, table: TextureTable
 ) -> tuple[str, dict[str, Any]]:
-    channel = f".{texture.channel}" if role == "real" and texture.channel != "luminance" else ""
-    number = table.attribute(texture.name, role + channel)
+    channel = texture.channel if role is REAL and texture.channel != "luminance" else ""
+    number = table.attribute(texture.name, role, channel)
     return texture.kind, {"number": number, "per_face": per_face(texture.name)}
 
 
-def _dots(texture: Dots, role: str, table: TextureTable) -> tuple[str, dict[str, Any]]:
+def _dots(texture: Dots, role: Role, table: TextureTable) -> tuple[str, dict[str, Any]]:
     return texture.kind, _uv(texture, table)
 
 
-def _checkers(texture: Checkers, role: str, table: TextureTable) -> tuple[str, dict[str, Any]]:
+def _checkers(texture: Checkers, role: Role, table: TextureTable) -> tuple[str, dict[str, Any]]:
     return texture.kind, {"transform": _transform(texture, table)}
 
 
-def _noise(texture: Noise, role: str, table: TextureTable) -> tuple[str, dict[str, Any]]:
+def _noise(texture: Noise, role: Role, table: TextureTable) -> tuple[str, dict[str, Any]]:
     return texture.kind, {
         "transform": _transform(texture, table),
         "pattern": PATTERNS.index(texture.pattern),
@@ -232,17 +236,20 @@ def _noise(texture: Noise, role: str, table: TextureTable) -> tuple[str, dict[st
     }
 
 
-def _marble(texture: Marble, role: str, table: TextureTable) -> tuple[str, dict[str, Any]]:
-    if role == "real":
+def _marble(texture: Marble, role: Role, table: TextureTable) -> tuple[str, dict[str, Any]]:
+    if role is REAL:
         words = np.zeros((len(noise.MARBLE), SPECTRUM_WORDS), np.float32)
         words[:, 0] = luminance(noise.MARBLE)
     else:
-        made = [table.spectra.words(RGB(*rgb), "reflectance")[0] for rgb in noise.MARBLE]
+        made = [table.spectra.words(RGB(*rgb), REFLECTANCE)[0] for rgb in noise.MARBLE]
         words = np.array(made).view(np.float32)
     return texture.kind, {
         "transform": _transform(texture, table),
         "colours": table.store.append("textures", words.view(np.uint32)),
-        **{n: getattr(texture, n) for n in ("octaves", "roughness", "scale", "variation")},
+        "octaves": texture.octaves,
+        "roughness": texture.roughness,
+        "scale": texture.scale,
+        "variation": texture.variation,
     }
 
 

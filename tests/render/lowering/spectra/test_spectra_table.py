@@ -11,6 +11,7 @@ from clpt.errors import SceneError
 from clpt.render.lowering.scene import lower
 from clpt.scene import Film, Scene, cameras, integrators, lights, materials
 from clpt.scene.params import params
+from clpt.scene.roles import INDEX
 from clpt.scene.shapes import Sphere
 from clpt.spectra import Cauchy, Tabulated
 
@@ -27,7 +28,7 @@ INDICES = [
     (cls, name)
     for cls in materials.LEAVES
     for name, param in params(cls).items()
-    if param.role == "index" and param.positive
+    if param.role is INDEX and param.positive
 ]
 
 

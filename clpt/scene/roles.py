@@ -1,0 +1,351 @@
+"""Roles of parameters: what a value may be, and what it means.
+
+A role is an object, and tables have an entry for each: `clpt.render.contract.parameter_words` says
+how a value stands in kernels, `clpt.render.lowering.encoder` how it becomes words,
+`clpt.render.codegen.parameters` how kernels load it, `clpt.formats.native.forms` how it is written
+in scene.json, and `clpt.testing.settings` draws one for a test.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol, cast, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from clpt import spectra
+from clpt.errors import SceneError
+from clpt.measured import Measurement, MerlTable
+from clpt.spectra import (
+    RGB,
+    Constant,
+    Reradiation,
+    RGBIlluminant,
+    RGBUnbounded,
+    Spectrum,
+    Tabulated,
+)
+from clpt.spectra.spectrum import Role as Meaning
+from clpt.spectra.spectrum import check_reach, extremes
+
+ORDERS = 8  # highest order of diffraction, see kernels/optics/diffraction.cl
+ROUNDING = 1e-6  # by which a spectrum may be beyond its limits
+LARGEST = float(np.finfo(np.float32).max)  # number of a parameter: kernels have no larger ones
+
+
+@dataclass(frozen=True)
+class Role:
+    """A role of a parameter; this one takes any value.
+
+    name: in kernels and files. place: "row" of what kernels read of a kind; "inside", behind that,
+    of a body; "host" where kernels have nothing of that name. advice: where a number is too large.
+    """
+
+    name: str
+    place: Literal["row", "inside", "host"] = "row"
+    advice: str = ""
+
+    def __str__(self) -> str:
+        return self.name
+
+    def check(self, value: object, param: Param, where: str | None) -> Any:
+        """Return what is meant by a value that is no texture. Raises SceneError."""
+        return value
+
+
+@dataclass(frozen=True)
+class Param:
+    """One parameter: role, documentation, unit, limits."""
+
+    role: Role
+    doc: str = ""
+    unit: str = ""
+    low: float = -math.inf
+    high: float = math.inf
+    choices: tuple[str, ...] = ()
+    optional: bool = False
+    textured: bool = False
+    lobe: bool = False  # 0 leaves a lobe out: kernels are made without it where all have 0
+    positive: bool = False  # it cannot be 0 either, at any wavelength of the film
+    linear: bool = False  # f is linear in it and no pdf knows it: a random texel may stand for it
+
+
+class Real(Role):
+    """A number within its limits."""
+
+    def check(self, value: object, param: Param, where: str | None) -> float:
+        if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
+            raise SceneError(f"must be a number, not {value!r}", where=where)
+        if not math.isfinite(value):
+            raise SceneError(f"must be finite, not {value}", where=where)
+        if abs(value) > LARGEST:
+            raise SceneError(f"{value:g} is beyond {LARGEST:g}, where float32 ends", where=where)
+        if param.positive and value <= 0.0:
+            raise SceneError(f"must be above 0, not {value}", where=where)
+        if not param.low <= value <= param.high:
+            advice = f"; {param.role.advice}" if param.role.advice and value > param.high else ""
+            message = f"{value} is outside [{param.low:g}, {param.high:g}]{advice}"
+            raise SceneError(message, where=where)
+        return float(value)
+
+
+class Flag(Role):
+    """True or false."""
+
+    def check(self, value: object, param: Param, where: str | None) -> bool:
+        if not isinstance(value, (bool, np.bool_)):
+            raise SceneError(f"must be true or false, not {value!r}", where=where)
+        return bool(value)
+
+
+class Choice(Role):
+    """One of the names that the parameter lists."""
+
+    def check(self, value: object, param: Param, where: str | None) -> Any:
+        if value not in param.choices and not (param.optional and value is None):
+            raise SceneError(f"{value!r} is none of {', '.join(param.choices)}", where=where)
+        return value
+
+
+class Orders(Role):
+    """A number for each order of diffraction from -n to n."""
+
+    def check(self, value: object, param: Param, where: str | None) -> tuple[float, ...]:
+        if not isinstance(value, (list, tuple, np.ndarray)):
+            raise SceneError(f"must be a list of numbers, not {value!r}", where=where)
+        if len(value) % 2 == 0 or len(value) > 2 * ORDERS + 1:
+            raise SceneError(
+                f"must be an odd count of numbers, for orders -n to n with n up to {ORDERS}",
+                where=where,
+            )
+        return tuple(REAL.check(v, param, where) for v in value)
+
+
+@runtime_checkable
+class _Part(Protocol):
+    """A part of a scene, as far as a list of layers looks at it."""
+
+    kind: str
+
+
+class Layers(Role):
+    """Thin films, from the outside in."""
+
+    def check(self, value: object, param: Param, where: str | None) -> tuple[Any, ...]:
+        if not isinstance(value, (list, tuple)):
+            raise SceneError(f"must be a list of layers, not {value!r}", where=where)
+        for i, entry in enumerate(value):
+            if not (isinstance(entry, _Part) and entry.kind == "layer"):
+                raise SceneError(f"must be a layer, not {entry!r}", where=f"{where}[{i}]")
+        return tuple(value)
+
+
+@dataclass(frozen=True)
+class Data(Role):
+    """An object of a class, or None; words: what messages call it."""
+
+    cls: type[Any] = object
+    words: str = ""
+
+    def check(self, value: object, param: Param, where: str | None) -> Any:
+        if not isinstance(value, (self.cls, type(None))):
+            raise SceneError(f"must be {self.words}, not {value!r}", where=where)
+        return value
+
+
+@dataclass(frozen=True)
+class Spectral(Role):
+    """A spectrum, or what stands for one: a number, three numbers, perhaps a name.
+
+    meaning: how it is turned to rgb, see `clpt.spectra.spectrum`. colour: what three numbers in a
+    file are, None where they stay three numbers. names: finds the spectrum of a name. measured: it
+    is a quantity of matter, whose tables go on beyond their ends. grey: kernels are told where it
+    has no colour.
+    """
+
+    meaning: Meaning = "unbounded"
+    colour: type[RGB] | type[RGBUnbounded] | None = RGBUnbounded
+    names: Callable[[str], Spectrum] | None = None
+    measured: bool = False
+    grey: bool = False
+
+    def check(self, value: object, param: Param, where: str | None) -> Any:
+        if isinstance(value, str) and self.names is not None:
+            return self._named(value, where)
+        if isinstance(value, Spectrum):
+            self._check_limits(value, param, where)
+            return value
+        if isinstance(value, (list, tuple, np.ndarray)) and len(value) == 3:
+            return self._colour([REAL.check(v, param, where) for v in value], param, where)
+        if isinstance(value, (int, float, np.number)):
+            return self._constant(REAL.check(value, param, where))
+        names = ", a name" if self.names else ""
+        raise SceneError(
+            f"must be a number, three numbers{names} or a spectrum of clpt.spectra, not {value!r}",
+            where=where,
+        )
+
+    def _named(self, name: str, where: str | None) -> Spectrum | str:
+        assert self.names is not None
+        try:
+            return self.names(name)
+        except SceneError as error:
+            raise SceneError(error.message, where=where) from None
+
+    def _colour(self, rgb: list[float], param: Param, where: str | None) -> Spectrum:
+        return RGB(*rgb) if max(rgb) <= 1.0 else RGBUnbounded(*rgb)
+
+    def _constant(self, number: float) -> Spectrum:
+        return Constant(number)
+
+    def _check_limits(self, value: Spectrum, param: Param, where: str | None) -> None:
+        """Raise SceneError for a spectrum beyond its limits, or a table that no film can reach."""
+        if isinstance(value, Tabulated):
+            try:
+                check_reach(value.lambdas[0], value.lambdas[-1])
+            except SceneError as error:
+                raise SceneError(error.message, where=where) from None
+        if math.isinf(param.low) and math.isinf(param.high):
+            return
+        if isinstance(value, RGBUnbounded) and min(value.r, value.g, value.b) < self._least(param):
+            shown = ", ".join(f"{part:g}" for part in (value.r, value.g, value.b))
+            raise SceneError(f"a colour cannot be negative here: {shown}", where=where)
+        for found, at in extremes(spectra.index(value) if self.measured else value):
+            if abs(found) > LARGEST:
+                message = f"{found:g} at {at:g} nm is beyond {LARGEST:g}, where float32 ends"
+                raise SceneError(message, where=where)
+            if not param.low - ROUNDING <= found <= param.high + ROUNDING:
+                limits = f"[{param.low:g}, {param.high:g}]"
+                raise SceneError(f"{found:g} at {at:g} nm is outside {limits}", where=where)
+
+    def _least(self, param: Param) -> float:
+        """The least number of a colour."""
+        return param.low
+
+
+class Index(Spectral):
+    """A refractive index or extinction coefficient; the name of a glass stays a name."""
+
+    def _named(self, name: str, where: str | None) -> str:
+        super()._named(name, where)
+        return name
+
+
+class Emission(Spectral):
+    """An emitted spectrum; a number and a colour are multiples of D65."""
+
+    def _colour(self, rgb: list[float], param: Param, where: str | None) -> Spectrum:
+        return RGB(*rgb)
+
+    def _constant(self, number: float) -> Spectrum:
+        return RGBIlluminant(*[number] * 3)
+
+
+class Factor(Spectral):
+    """A factor without limits."""
+
+    def _colour(self, rgb: list[float], param: Param, where: str | None) -> Spectrum:
+        return RGBUnbounded(*rgb)
+
+
+class Quantity(Factor):
+    """A number that may depend on the wavelength and is no colour."""
+
+    def _colour(self, rgb: list[float], param: Param, where: str | None) -> Spectrum:
+        colour = super()._colour(rgb, param, where)
+        self._check_limits(colour, param, where)
+        return colour
+
+    def _least(self, param: Param) -> float:
+        return 0.0
+
+
+REAL = Real("real")
+FLAG = Flag("flag")
+CHOICE = Choice("choice")
+ORDERS_OF_LIGHT = Orders("orders")
+LAYERS = Layers("layers")
+ANGULAR = Role("angular")
+RERADIATION = Data("reradiation", cls=Reradiation, words="a re-radiation matrix")
+MEASUREMENT = Data("measurement", cls=Measurement, words="a Measurement of clpt.measured")
+MERL = Data("merl", cls=MerlTable, words="a MerlTable of clpt.measured")
+REFLECTANCE = Spectral(
+    "reflectance", advice="colours are 0 to 1, linear", meaning="reflectance", colour=RGB
+)
+EMISSION = Emission("emission", meaning="emission", colour=RGBIlluminant, names=spectra.illuminant)
+INDEX = Index("index", names=spectra.index, measured=True, grey=True)
+FACTOR = Factor("factor")
+COEFFICIENT = Spectral("coefficient", "inside", measured=True)
+QUANTITY = Quantity("quantity", measured=True, grey=True)
+SPECTRA = (REFLECTANCE, EMISSION, INDEX, FACTOR, COEFFICIENT, QUANTITY)
+DEVICE = (
+    *SPECTRA, RERADIATION, REAL, FLAG, CHOICE, ORDERS_OF_LIGHT, LAYERS, ANGULAR, MEASUREMENT, MERL,
+)  # fmt: skip
+NAMED = {role.name: role for role in DEVICE}
+
+
+@dataclass(frozen=True)
+class OptionalReal(Real):
+    """A number within its limits, or None."""
+
+    def check(self, value: object, param: Param, where: str | None) -> Any:
+        return None if value is None else super().check(value, param, where)
+
+
+@dataclass(frozen=True)
+class Vector(Role):
+    """Three numbers; those of a direction cannot all be 0."""
+
+    def check(self, value: object, param: Param, where: str | None) -> Any:
+        try:
+            numbers = np.asarray(cast("ArrayLike", value), np.float64)
+        except (TypeError, ValueError):
+            numbers = np.empty(0)
+        if numbers.shape != (3,) or not np.isfinite(numbers).all():
+            raise SceneError(f"must be three finite numbers, not {value!r}", where=where)
+        if np.abs(numbers).max() > LARGEST:
+            raise SceneError(f"is beyond {LARGEST:g}, where float32 ends", where=where)
+        if self.name == "direction" and not numbers.any():
+            raise SceneError("has no length", where=where)
+        return value
+
+
+@dataclass(frozen=True)
+class Matrix(Role):
+    """A square matrix, or one on a device, whose form is not looked at."""
+
+    def check(self, value: object, param: Param, where: str | None) -> Any:
+        wanted = (3, 3) if self.name == "matrix3" else (4, 4)
+        if hasattr(value, "context"):
+            return value
+        try:
+            shape = np.asarray(cast("ArrayLike", value), np.float64).shape
+        except (TypeError, ValueError) as error:
+            raise SceneError(f"is not a matrix: {error}", where=where) from None
+        if shape != wanted:
+            raise SceneError(f"must be {wanted}, found {shape}", where=where)
+        return value
+
+
+_HOSTS: dict[str, type[Role]] = {
+    "number": Real, "optional_number": OptionalReal, "vector": Vector, "direction": Vector,
+    "matrix3": Matrix, "matrix4": Matrix,
+}  # fmt: skip
+# What a host parameter holds. clpt/formats/native/forms.py reads, writes and describes each form.
+HostForm = Literal[
+    "boolean", "integer", "number", "text", "names", "numbers",
+    "vector", "direction", "matrix3", "matrix4",
+    "material", "medium", "media", "phase", "texture", "filter", "area_light", "group",
+    "rows2", "rows3", "rows4", "grid", "normals", "triangles", "attributes",
+    "number_or_list", "lengths",
+    "image", "volume", "colour_volume", "cube_images", "crop", "sensor", "white_balance",
+    "number_or_auto", "lens", "keys", "deformation", "shutter", "optional_number", "metal", "size",
+]  # fmt: skip
+
+
+def host(form: HostForm | Literal["host"]) -> Role:
+    """Return the role of what only the host needs; "host" where a scene file cannot hold it."""
+    return _HOSTS.get(form, Role)(form, "host")
