@@ -17,7 +17,7 @@ from clpt.render.renderer import Renderer
 from clpt.render.resumable import kernels_digest
 from clpt.scene import Scene
 
-from . import rays, stages, tiles
+from . import rays, tiles
 from .figures import Figure
 from .picture_scenes import BENCHMARK_VERSION, PICTURES, SIZES, picture
 
@@ -71,6 +71,7 @@ def _measure(on: device.Device, plain: device.Device, name: str, size: str, roun
             seconds.append(time.perf_counter() - start)
             films.add(film_digest(renderer))
         image, made_by = renderer.image(), film_class(renderer)
+        layout = str(renderer._device_class()["layout"])
     reference = tiles.references()[name]
     verdict = tiles.compare(image, reference, all_samples)
     wrong = verdict.wrong
@@ -90,7 +91,7 @@ def _measure(on: device.Device, plain: device.Device, name: str, size: str, roun
         "exact": _exact(reference, size, made_by, films),
     }
     figure = Figure(PART, name, UNIT, speeds, name, more)
-    return figure.refuse(f"{wrong}, {first_wrong_stage(on, scene)}") if wrong else figure
+    return figure.refuse(f"{wrong}, {first_wrong_stage(on, scene, layout)}") if wrong else figure
 
 
 def _exact(
@@ -103,18 +104,19 @@ def _exact(
     return set(films) == {known}
 
 
-def first_wrong_stage(on: device.Device, scene: Scene) -> str:
-    """Tell the first stage whose own check finds something wrong on a scene; on: profiling."""
+def first_wrong_stage(on: device.Device, scene: Scene, layout: str) -> str:
+    """Tell whether the rays of a scene are right, by the check of `rays`, which needs a tree.
+
+    on: profiling; layout: of the render's triangles.
+    """
+    layouts = (layout,) if layout in bvh.TREES else bvh.TREES[:1]
     try:
-        for figure in rays.measure(on, scene, 1, bvh.TREES, CHECKED_RAYS):
+        for figure in rays.measure(on, scene, 1, layouts, CHECKED_RAYS):
             if figure.refused:
                 return f"first in intersect: {figure.refused}"
-        for figure in stages.measure(on, scene, 1, ("append",)):
-            if figure.refused:
-                return f"first in {figure.name}: {figure.refused}"
     except ClptError as error:
-        return f"and the check of its stages failed: {error}"
-    return "rays and queues are right: look at generate, shade and accumulate"
+        return f"and the check of its rays failed: {error}"
+    return "its rays are right: look at generate, shade and accumulate"
 
 
 def film_digest(renderer: Renderer) -> str:

@@ -47,7 +47,7 @@ class Painted:
         return SimpleNamespace(scale=1.0, words=np.full(4, self.runs * type(self).drifts))
 
     def _device_class(self) -> dict[str, str]:
-        return {"device": "a device of paint"}
+        return {"device": "a device of paint", "layout": "wide8"}
 
 
 @pytest.fixture
@@ -59,7 +59,7 @@ def painted(monkeypatch: pytest.MonkeyPatch) -> Iterator[type[Painted]]:
 
     monkeypatch.setattr(pictures, "Renderer", Own)
     monkeypatch.setattr(tiles, "references", lambda: dict.fromkeys(PICTURES, RIGHT))
-    monkeypatch.setattr(pictures, "first_wrong_stage", lambda on, scene: "first in append: 7")
+    monkeypatch.setattr(pictures, "first_wrong_stage", lambda *given: "first in intersect: 7")
     monkeypatch.setattr(device.Device, "open", lambda info: None)
     yield Own
 
@@ -99,7 +99,7 @@ def test_a_wrong_picture_has_no_points(painted: type[Painted]) -> None:
     painted.image_of = GREY.copy()
     painted.image_of[:32, :64] = 0.7
     *each, total = measured()
-    assert each[0].refused == "wrong: 12 % of tiles, first in append: 7"
+    assert each[0].refused == "wrong: 12 % of tiles, first in intersect: 7"
     assert each[0].more["points"] == 0.0 and each[0].more["tiles_wrong"] == 0.125
     assert each[0].record()["value"] is None and each[0].record()["rounds"] == []
     assert total.refused.startswith("no score: cornell, atrium")
@@ -146,13 +146,18 @@ def test_pictures_of_clpt_pass(name: str) -> None:
     assert not figure.refused and figure.value > 0.0
 
 
-def test_a_stage_that_is_wrong_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    wrong = Figure("rays", "binary primary closest", "Mrays/s", (1.0,)).refuse("3 not traced")
-    monkeypatch.setattr(pictures.rays, "measure", lambda *given: [wrong])
-    told = pictures.first_wrong_stage(None, None)  # type: ignore[arg-type]
+def test_wrong_rays_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Any] = []
+    found: list[Figure] = []
+
+    def measure(on: Any, scene: Any, rounds: int, layouts: Any, count: int) -> list[Figure]:
+        asked.append(layouts)
+        return found
+
+    monkeypatch.setattr(pictures.rays, "measure", measure)
+    on: Any = None
+    assert "its rays are right" in pictures.first_wrong_stage(on, on, "wide8")
+    found.append(Figure("rays", "wide8 primary closest", "Mrays/s", (1.0,)).refuse("3 not traced"))
+    told = pictures.first_wrong_stage(on, on, "brute")
     assert told == "first in intersect: 3 not traced"
-    monkeypatch.setattr(pictures.rays, "measure", lambda *given: [])
-    wrong = Figure("stages", "append", "Mitems/s", (1.0,)).refuse("9 slots")
-    monkeypatch.setattr(pictures.stages, "measure", lambda *given: [wrong])
-    told = pictures.first_wrong_stage(None, None)  # type: ignore[arg-type]
-    assert told == "first in append: 9 slots"
+    assert asked == [("wide8",), ("binary",)]

@@ -154,6 +154,27 @@ def test_every_device_is_a_process_and_a_card_is_written(
     assert "7,000" in card.read_text(encoding="utf-8")
 
 
+def test_a_device_that_crashes_is_not_the_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    """Its row is recorded; there is nothing to compare or to plot, and the next one follows."""
+    file, before = tmp_path / "records.jsonl", tmp_path / "before.jsonl"
+    good = Figure("rays", "any", "Mrays/s", (1.0,), "box")
+    records.append(before, [{**good.record(), **ABOUT}])
+    crash = Figure(apart.PART, "measuring", "", ()).refuse("it died (SIGSEGV) after it began")
+    each = iter([[({"device": "first"}, crash)], [(ABOUT, good)]])
+    monkeypatch.setattr(apart, "measured", lambda *given: iter(next(each)))
+    two = [*device.devices()[:1]] * 2
+    monkeypatch.setattr(device, "devices", lambda: two)
+    plot = ["--plot", str(tmp_path / "plot.svg"), "--card", str(tmp_path / "card.svg")]
+    compared = ["--compare", str(before), "--json", str(file)]
+    assert run(["bench", "--device", "all", *compared, *plot]) == 3
+    assert "refused: it died (SIGSEGV)" in capsys.readouterr().out
+    crashed, well = records.read(file)
+    assert (crashed["bench"], crashed["device"], crashed["value"]) == ("process", "first", None)
+    assert well["value"] == 1.0
+
+
 def parsed(output: str) -> str:
     """The word that the Phoronix Test Suite takes from the last line with its hint."""
     root = ElementTree.parse(PHORONIX / "results-definition.xml").getroot()

@@ -42,12 +42,13 @@ def _report(console: Console, which: Which, settings: Mapping[str, Any], report:
         records.append(report.target, [{**figure.record(), **about} for figure in known])
     ratios = []
     label = str(about["device"])
-    if report.before is not None:
+    some = any(figure.rounds and not figure.refused for figure in figures)
+    if report.before is not None and some:
         ratios = comparing.against(figures, report.before, label)
         limit = report.fail_below
         _show_ratios(console, ratios, limit)
         failed |= limit is not None and any(ratio.below(limit) for ratio in ratios)
-    if report.plot is not None:
+    if report.plot is not None and some:
         from ..plots import bench as bench_plot
 
         then = {figures.index(one.figure): float(one.then["value"]) for one in ratios}

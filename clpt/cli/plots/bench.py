@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 
 from ...benchmark import PARTS
 from ...benchmark.figures import SECONDS, Figure
+from ...benchmark.pictures import POINTS
 from ...errors import SceneError
 from .pixels import FAINT, FORMATS, INK, LINES, PAPER, save
 
@@ -32,7 +33,8 @@ def write(path: Path, title: str, figures: Sequence[Figure], then: Mapping[int, 
     written.
     """
     check(path)
-    measured = [(i, one) for i, one in enumerate(figures) if one.rounds and not one.refused]
+    good = [(i, one) for i, one in enumerate(figures) if one.rounds and not one.refused]
+    measured = [(i, one) for i, one in good if one.unit != POINTS]  # a panel has one unit
     panels = {
         part: [(i, figure) for i, figure in measured if figure.part == part]
         for part in PARTS
@@ -82,7 +84,7 @@ def _panel(
     axes.set_xlim(low, max(shown) * (30.0 if logarithmic else 1.25))
     axes.set_yticks(range(len(own)), [figure.name for _, figure in own])
     axes.set_ylim(len(own) - 0.4, -0.6)
-    scene = own[0][1].scene
+    scene = own[0][1].scene if len({figure.scene for _, figure in own}) == 1 else ""
     axes.set_title(f"{part}{' of ' if scene else ''}{scene}", loc="left", size=10, color=INK)
     unit = own[0][1].unit
     axes.set_xlabel(f"{unit}, less is better" if unit == SECONDS else unit, color=INK, size=9)
