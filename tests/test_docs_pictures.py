@@ -51,7 +51,7 @@ def test_captions_and_contact_sheet_are_up_to_date():
 
 def test_the_gallery_has_every_scene():
     page = (ROOT / "docs/gallery.md").read_text("utf-8")
-    for picture in ROOT.glob("scenes/*/picture*.png"):
+    for picture in ROOT.glob("scenes/*/picture*.*"):
         name = picture.relative_to(ROOT).as_posix()
         assert f"](../{name})" in page
         assert f"clpt render scenes/{picture.parent.name}" in page
