@@ -78,7 +78,8 @@ def plain(integrator: Integrator) -> tuple[Integrator, str]:
         return integrator, ""
     alone = isinstance(integrator, Path) and integrator.light_paths == 0
     remark = "" if alone else "by paths from the camera alone"
-    return Path(**shared(integrator), light_paths=0), remark
+    path = Path(light_paths=0)
+    return dataclasses.replace(path, **shared(integrator, path)), remark
 
 
 def _differ_by_camera(former: Scene, scene: Scene) -> bool:

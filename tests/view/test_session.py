@@ -24,7 +24,8 @@ from clpt.cli.options.grading import Grading
 from clpt.cluster.multi_renderer import MultiRenderer
 from clpt.errors import SceneError
 from clpt.render.renderer import Renderer
-from clpt.scene import Scene, cameras, lights, shapes
+from clpt.scene import Scene, cameras, integrators, lights, shapes
+from clpt.scene.params import fields_of
 from clpt.view import panels, probe, views
 from clpt.view.commands import COMMANDS, CommandError, Request, parse
 from clpt.view.look import Look
@@ -180,6 +181,28 @@ def test_values_are_those_of_image(opened, audience, on) -> None:
     assert len(told["lambdas"]) == len(told["mean"]) == len(told["error"]) == probe.BANDS
     ask(session, audience, "inspect", x=32, y=0)
     assert "32x24" in audience.answer("error")["text"]
+
+
+@pytest.mark.parametrize(
+    ("given", "remark"),
+    [
+        (integrators.Auto(max_depth=3, hide_lights=True), "by paths from the camera alone"),
+        (
+            integrators.Path(max_depth=3, hide_lights=True, light_paths=1),
+            "by paths from the camera alone",
+        ),
+        (integrators.Path(max_depth=3, hide_lights=True, light_paths=0), ""),
+        (integrators.Vcm(max_depth=3), "by paths from the camera alone"),
+        (integrators.ParticleTracer(max_depth=3), "by paths from the camera alone"),
+    ],
+)
+def test_a_pixel_is_rendered_by_paths_as_long_as_the_picture_s(
+    given: integrators.Integrator, remark: str
+) -> None:
+    integrator, said = probe.plain(given)
+    assert isinstance(integrator, integrators.Path) and said == remark
+    assert (integrator.max_depth, integrator.light_paths) == (3, 0)
+    assert integrator.hide_lights == fields_of(given).get("hide_lights", False)
 
 
 @pytest.mark.slow
