@@ -20,12 +20,13 @@ from clpt.scene import Film, Scene
 from clpt.scene import materials as m
 from clpt.scene.cameras import Lens, Perspective, ThinLens
 from clpt.scene.integrators import Mitchell, ParticleTracer
-from clpt.scene.lights import Area, CubeMap, Directional, Envmap, Point, Projector
+from clpt.scene.lights import Area, CubeMap, Directional, Envmap, Point, Projector, Spot
 from clpt.scene.media import Homogeneous
 from clpt.scene.motion import Deformation
 from clpt.scene.shapes import Cube, Cylinder, Disk, Group, Instance, Mesh, Rectangle, Sphere
 from clpt.scene.shapes import Spheres as Many
 from clpt.scene.textures import Bitmap, Checkers, MeshAttribute, Mix, Product
+from clpt.spectra import Constant as ConstantSpectrum
 from clpt.spectra import Tabulated
 from clpt.spectral_exr import SpectralImage
 from tests.together.strategies import scene_of
@@ -229,3 +230,16 @@ def is_refused(scene: Scene) -> bool:
     except SceneError:
         return True
     return False
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        {"lights": [Spot(power=3000.0, cutoff=0.0)]},
+        {"lights": [Point(lumens=5.0, intensity=ConstantSpectrum(0.0))]},
+        {"shapes": [Sphere(emission=Area(power=5.0, radiance=ConstantSpectrum(0.0)))]},
+    ],
+)
+def test_a_light_that_no_power_makes_bright_is_refused(parts: dict[str, Any]) -> None:
+    with pytest.raises(SceneError, match="its light is 0 whatever its strength"):
+        check(Scene(camera=Perspective(), **parts))

@@ -12,16 +12,26 @@ from clpt.render.analysis.checks.textures import check_image, check_textures
 from clpt.render.analysis.lights import image_lights, light_power
 from clpt.render.contract.light_records import RECORDS
 from clpt.scene import roles
-from clpt.scene.lights import CubeMap, Envmap, Goniometric, Light, Projector, Sky, Spot
+from clpt.scene.lights import (
+    CubeMap,
+    Envmap,
+    Goniometric,
+    Light,
+    Projector,
+    Sky,
+    Spot,
+    with_emission,
+)
 from clpt.scene.params import Texture, fields_of, params
 from clpt.scene.roles import Role
 
 
 def check_light(lamp: Light) -> None:
-    """Raise SceneError for a light that only shapes have, or one without a place or direction."""
+    """Raise SceneError for a light of shapes, or one without a place, direction or power."""
     if lamp.kind not in RECORDS:
         raise SceneError(f"a light of kind {lamp.kind!r} is a shape's `emission`", where="lights")
     check_textures(lamp)
+    with_emission(lamp)  # it refuses a light that is 0 whatever its power
     if isinstance(lamp, (Envmap, CubeMap)) and lamp.image is None:
         message = "an image is needed: a path, or an array (h, w, 3)"
         raise SceneError(message, where=f"{lamp.kind}.image")

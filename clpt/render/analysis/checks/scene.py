@@ -18,6 +18,7 @@ from clpt.render.analysis.checks.textures import check_textures
 from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.scene import Scene, check_parts
 from clpt.scene.integrators import Film, ParticleTracer
+from clpt.scene.lights import with_emission
 from clpt.scene.shapes import Instance, Shape
 
 
@@ -58,6 +59,7 @@ def _check_surfaces(shapes_: list[Shape], film: Film) -> None:
                 check_material(shape.material, film)
             if shape.emission is not None and id(shape.emission) not in seen:
                 check_textures(shape.emission)
+                with_emission(shape.emission, area=1.0)  # of any area it is 0, or it is not
         except SceneError as error:
             raise SceneError(str(error), where=shapes.where(shape)) from None
         seen |= {id(shape.material), id(shape.emission)}
