@@ -76,6 +76,10 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "displacement without uvs": (
         {"shapes": [Mesh(**MESH, displacement=grey())]}, "displacement needs uvs",
     ),
+    "displacement by light": (
+        {"shapes": [Mesh(**MESH, uvs=CORNERS[:, :2], displacement=Bitmap(image=SHINES))]},
+        "mesh.displacement",
+    ),
     "displacement of what deforms": (
         {"shapes": [Mesh(**MESH, uvs=CORNERS[:, :2], displacement=grey(), deformation=MOVES)]},
         "mesh.deformation: a mesh with displacement cannot deform",

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from clpt.errors import SceneError
 from clpt.geometry import analytic, refining, shapes, triangles
+from clpt.render.analysis.checks.textures import check_image
 from clpt.scene.shapes import Curves, Cylinder, Instance, Mesh, Shape, Sphere, Spheres
 from clpt.scene.textures import attributes_in
 
@@ -24,6 +25,8 @@ def check_shapes(things: Iterable[Shape]) -> None:
             triangles.check_deformation(shape)
         if isinstance(shape, Mesh):
             refining.check(shape)
+            if shape.displacement is not None:
+                check_image(shape.displacement.image, "mesh.displacement", emissive=False)
         elif isinstance(shape, (Sphere, Spheres, Cylinder)):
             analytic.check(shape)
         for user, kind in (("material", shape.material), ("emission", shape.emission)):
