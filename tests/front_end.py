@@ -55,14 +55,3 @@ def errors(
         number = int(owner[1]) if owner else number
         found[number].append(row[owner.end() :] if owner else row)
     return ["\n".join(own) for own in found]
-
-
-def compiled(text: str, *flags: str) -> str:
-    """A program in LLVM's language, before it is optimised: without functions that nobody calls."""
-    given = [word for one in (*DRIVERS, "-disable-llvm-passes") for word in ("-Xclang", one)]
-    command = [str(CLANG), *LANGUAGE, *given, "-emit-llvm", "-S", "-w", *flags, "-o", "-", "-"]
-    done = subprocess.run(
-        command, input=text, capture_output=True, text=True, timeout=300, check=False
-    )
-    assert done.returncode == 0, done.stderr[:3000]
-    return done.stdout

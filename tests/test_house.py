@@ -27,7 +27,7 @@ BOUNDS = {
     "aliases of array types outside clpt/arrays.py": 0,
     "rooms in circles of imports": 0,
     "lines of Python": 81_500,
-    "lines of OpenCL": 19_300,
+    "lines of OpenCL": 19_500,
     "words of README.md": 1_200,
     "docstrings that begin with What, Of, How, Those, The same": 0,
     "lines of accumulate of Cornell's box": 256,

@@ -167,10 +167,9 @@ class Auto(Integrator):
 
 
 def shared(integrator: Integrator, other: Integrator) -> dict[str, Any]:
-    """Return the parameters of an integrator that mean the same to another one."""
-    given, known = fields_of(integrator), fields_of(other)
-    names = ("max_depth", "rr_depth", "hide_lights", "free_panes")
-    return {name: given[name] for name in names if name in given and name in known}
+    """Return the parameters of an integrator that another one has too, but how it finds light."""
+    known = fields_of(other).keys() - {"light_paths", "guiding"}
+    return {name: value for name, value in fields_of(integrator).items() if name in known}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 import clpt
 from clpt import device
-from clpt.device import definitions, source
 from clpt.render.codegen import flags, programs
 from clpt.render.contract.features import Features
 from clpt.render.lowering.scene import lower
-from tests.front_end import CLANG, compiled
 
 ROOT = Path(__file__).resolve().parents[3]
-AVX512 = ("-target", "x86_64-linux-gnu", "-mavx2", "-mavx512f", "-mavx512dq", "-mavx512vl")
 
 
 def features_of(name: str, mode: str) -> Features:
@@ -35,47 +31,6 @@ def made(features: Features, lanes: int) -> dict[str, device.Source]:
     programs.loop_sources.cache_clear()
     loop = programs.loop_sources(features, "wide8", lanes)
     return found | {f"loop {name}": text for name, text in loop.items()}
-
-
-@pytest.fixture
-def keep_everything(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
-    """From its call on, texts have all conditions and all definitions."""
-
-    def all_rows(rows, macros):
-        return tuple(row for one in rows for row in (one if isinstance(one, list) else [one]))
-
-    def keep() -> None:
-        monkeypatch.setattr(source, "taken", all_rows)
-        monkeypatch.setattr(source, "paragraphs", definitions.whole)
-
-    return keep
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(CLANG is None, reason="clang is not installed")
-@pytest.mark.parametrize("lanes", [1, 8])
-@pytest.mark.parametrize(
-    ("name", "mode"),
-    [
-        ("scenes/cornell_box/scene.json", "spectral"),
-        ("scenes/glass_caustics/scene.json", "rgb"),
-        ("scenes/god_rays/scene.json", "spectral"),
-        ("tests/scenes/textures.xml", "rgb"),
-        ("tests/scenes/instances.xml", "spectral"),
-    ],
-)
-def test_compilers_get_the_same_program(
-    name: str, mode: str, lanes: int, keep_everything: Callable[[], None]
-) -> None:
-    features = features_of(name, mode)
-    short = made(features, lanes)
-    keep_everything()
-    whole = made(features, lanes)
-    assert short.keys() == whole.keys()
-    for name, text in short.items():
-        assert text.text.count("\n") < whole[name].text.count("\n")
-        one, other = (compiled(found.text, *AVX512) for found in (text, whole[name]))
-        assert one == other, name
 
 
 @pytest.mark.parametrize("lanes", [1, 8, 16])
