@@ -72,7 +72,7 @@ def render(
         scene, camera = _loaded(Path(scene), named), None if named else camera
     check_scene(scene)
     if env is not None:
-        scene = viewpoint.surrounded(scene, os.fspath(env))
+        scene = viewpoint.surrounded(scene, os.fspath(formats.brought(env)))
     spp = checked_samples(scene.spp if spp is None else spp)
     scene = dataclasses.replace(
         scene,

@@ -74,8 +74,8 @@ def remarks(
         )
     if noise_before:
         found.append(
-            "with light paths the limit of noise is for the picture before it is denoised; set "
-            "light_paths to 0 for what is left afterwards"
+            "with light paths the limit of noise is for the picture before it is denoised; with "
+            "light_paths 0 (--light-paths 0) it is for the denoised picture"
         )
     if isinstance(integrator, ParticleTracer):
         found.append("particle_tracer has no layers, so edges in the picture are less sharp")

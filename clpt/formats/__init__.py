@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import importlib
 import itertools
+import os
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
@@ -147,14 +148,22 @@ def locate(path: str | Path, /) -> Path:
             return _inside(path)
         if path.is_file():
             return path
-        own = scenes_folder().parent / path
-        if path.parts[:1] == ("scenes",) and ".." not in path.parts and own.exists():
+        own = brought(path)
+        if own != path:
             return locate(own)
     except SceneError:
         raise
     except (OSError, ValueError) as error:
         raise SceneError(f"cannot be read: {error}", file=path) from None
     raise SceneError(f"there is no such file{_nearest_file(path)}", file=path)
+
+
+def brought(path: str | os.PathLike[str], /) -> Path:
+    """Return the path; of one that begins with `scenes` and is not there, clpt's own if any."""
+    path = Path(path)
+    own = scenes_folder().parent / path
+    mine = path.parts[:1] == ("scenes",) and ".." not in path.parts and os.path.exists(own)
+    return own if mine and not os.path.exists(path) else path
 
 
 def _nearest_file(path: Path) -> str:

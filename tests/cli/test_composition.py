@@ -18,7 +18,7 @@ from clpt.cli.options.applied import changed, composed
 from clpt.cli.options.changes import SceneChanges
 from clpt.cli.options.composition import CameraType, Composition, CropType, Orbit
 from clpt.errors import SceneError
-from clpt.formats import load
+from clpt.formats import brought, load
 from clpt.scene import Film, Scene, cameras, framing, lights, shapes
 from clpt.scene.viewpoint import pose, up_of
 
@@ -141,6 +141,19 @@ def test_a_camera_by_its_name(tmp_path, capsys):
     assert "has no camera 'above'; it has: left, right" in capsys.readouterr().err
     scene.write_text(text.replace('value="11"', 'value="$camera"'))
     assert load(scene, camera="5").film.width == 5  # a variable of the file's own
+
+
+def test_surroundings_that_clpt_brings_are_found_in_any_folder(tmp_path, monkeypatch):
+    scene, sky = load(CORNELL), Path("scenes/poppy_field/sky.exr")
+    monkeypatch.chdir(tmp_path)
+    assert brought(sky) != sky and brought(Path("none.hdr")) == Path("none.hdr")
+    made = composed(scene, Composition(env=sky))
+    assert made.lights[-1].kind == "envmap"
+    with pytest.raises(SceneError):  # a name that no file system takes
+        composed(scene, Composition(env=Path("scenes/poppy_field/" + 300 * "x" + ".hdr")))
+    sky.parent.mkdir(parents=True)
+    sky.touch()
+    assert brought(sky) == sky  # the user's own file comes first
 
 
 @pytest.mark.parametrize(

@@ -48,7 +48,9 @@ def read_scene(
     for warning in scene.warnings:
         shown.note(f"clpt: warning: {warning}")
     if scene.film.filtering != loaded.film.filtering:
-        shown.note("for the denoiser each pixel has its own samples: film.filtering is importance")
+        shown.note(
+            "film.filtering is importance now: for the denoiser each pixel has its own samples"
+        )
     return scene
 
 

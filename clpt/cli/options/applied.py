@@ -9,6 +9,7 @@ import click
 
 from ...choices import AUTO
 from ...denoise.needs import prepared
+from ...formats import brought
 from ...scene import Scene, kinds, viewpoint
 from ...scene.integrators import NO_AOV, Auto
 from ...scene.params import Kind, fields_of, params
@@ -79,7 +80,7 @@ def composed(scene: Scene, composition: Composition) -> Scene:
     if env is None and rotation is not None:
         raise click.BadParameter("there is no --env to turn", param_hint="--env-rotation")
     if env is not None:
-        scene = viewpoint.surrounded(scene, env, rotation or 0.0)
+        scene = viewpoint.surrounded(scene, brought(env), rotation or 0.0)
     if camera is not None:
         seen = viewpoint.orbiting(scene, camera.azimuth, camera.elevation, camera.distance)
         scene = dataclasses.replace(scene, camera=seen)
