@@ -80,10 +80,13 @@ LONGEST_NAME = 80  # characters that are compared
 def nearest(name: str, known: Iterable[str]) -> str:
     """Return the end of a message: the known names that are near a name, or else all of them."""
     known = sorted(known)
-    near = difflib.get_close_matches(name[:LONGEST_NAME], known, n=3, cutoff=0.5)
-    if near:
-        return "; did you mean " + " or ".join(repr(n) for n in near) + "?"
-    return "; known: " + ", ".join(known) if known else ""
+    return did_you_mean(name, known) or ("; known: " + ", ".join(known) if known else "")
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Return the end of a message: the known names that are near a name, "" where there is none."""
+    near = difflib.get_close_matches(name[:LONGEST_NAME], sorted(known), n=3, cutoff=0.5)
+    return "; did you mean " + " or ".join(map(repr, near)) + "?" if near else ""
 
 
 class UnknownKindError(SceneError):

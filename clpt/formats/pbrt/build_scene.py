@@ -11,6 +11,7 @@ from typing import Any, cast
 import numpy as np
 
 from clpt import budget, transforms
+from clpt.errors import did_you_mean
 from clpt.formats.pbrt.curves import joined
 from clpt.formats.pbrt.files import Contents
 from clpt.formats.pbrt.layered import body
@@ -19,7 +20,7 @@ from clpt.formats.pbrt.materials import material
 from clpt.formats.pbrt.media import medium
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.shapes import Geometry, displaced, geometry, with_uvs
-from clpt.formats.pbrt.state import Definition, State, nearest
+from clpt.formats.pbrt.state import Definition, State
 from clpt.formats.pbrt.textures import textured
 from clpt.scene.lights import Light
 from clpt.scene.materials import Diffuse, Mask, Material, Null, TwoSided
@@ -48,7 +49,7 @@ def shapes(contents: Contents, progress: Progress | None) -> list[Shape]:
     result = list(joined(_of(contents.shapes, made)))
     for use in contents.uses:
         if use.kind not in groups:
-            hint = nearest(use.kind, contents.objects)
+            hint = did_you_mean(use.kind, contents.objects)
             raise use.params.error(f"there is no object {use.kind!r}{hint}")
         if groups[use.kind].shapes:
             with use.params.locating():
@@ -213,7 +214,7 @@ def check_options(options: Sequence[Definition]) -> None:
 def _warn_of_unused(params: Parameters, state: State) -> None:
     for parameter in params.unused():
         parameter.used = True
-        hint = nearest(parameter.name, params.asked)
+        hint = did_you_mean(parameter.name, params.asked)
         state.warn(parameter, f"is not known here and is left out{hint}")
 
 

@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import budget, text
-from clpt.errors import SceneError
+from clpt.errors import SceneError, did_you_mean
 from clpt.formats.gzip_file import read_bytes
 from clpt.formats.pbrt.params import ALIASES, TYPES, Parameter
-from clpt.formats.pbrt.state import nearest
 
 WORD = re.compile(rb'(?:[ \t\r\n]+|#[^\n]*)*("[^"\n]*"|[\[\]]|[^ \t\r\n\[\]"#]+)?')
 OLD_TYPES = ("color", "xyz")
@@ -102,7 +101,9 @@ class Lexer:
         if kind in OLD_TYPES:
             raise self.error(f"{where}: the type {kind!r} is {UPGRADE}")
         if kind not in TYPES:
-            raise self.error(f"{where}: unknown type {kind!r} of {name!r}{nearest(kind, TYPES)}")
+            raise self.error(
+                f"{where}: unknown type {kind!r} of {name!r}{did_you_mean(kind, TYPES)}"
+            )
         values = self._values()
         return Parameter(ALIASES.get(kind, kind), name, values, self.path, line, where)
 

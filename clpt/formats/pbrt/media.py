@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from clpt import transforms
-from clpt.errors import UnknownKindError
+from clpt.errors import UnknownKindError, did_you_mean
 from clpt.formats import volumes
 from clpt.formats.pbrt import coated_albedo
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.spectra import spectrum
-from clpt.formats.pbrt.state import Definition, State, nearest
+from clpt.formats.pbrt.state import Definition, State
 from clpt.scene.media import Cloud, Grid, HenyeyGreenstein, Homogeneous, Isotropic, Medium
 from clpt.scene.roles import COEFFICIENT, EMISSION
 from clpt.scene.volumes import Volume
@@ -31,7 +31,7 @@ def medium(name: str, source: Parameters, state: State) -> Medium | None:
         return None
     definition = state.shared.media.get(name)
     if definition is None:
-        hint = nearest(name, state.shared.media)
+        hint = did_you_mean(name, state.shared.media)
         raise source.error(f"there is no medium {name!r}{hint}")
     key, params = ("medium", name), definition.params
     made = state.shared.once(key, params, lambda: [_made(name, definition)])

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from clpt import text, transforms
-from clpt.errors import SceneError, UnknownKindError
+from clpt.errors import SceneError, UnknownKindError, did_you_mean
 from clpt.formats.pbrt.files import Contents
 from clpt.formats.pbrt.lexer import UPGRADE
 from clpt.formats.pbrt.params import Parameters
-from clpt.formats.pbrt.state import TARGETS, Definition, State, nearest
+from clpt.formats.pbrt.state import TARGETS, Definition, State
 from clpt.formats.pbrt.transforms import TransformDirectives
 
 COLOUR_SPACES = ("srgb", "rec2020", "aces2065-1", "dci-p3")
@@ -61,7 +61,7 @@ class _Reader(TransformDirectives):
             return self.lexer.error(f"{name} is {UPGRADE}")
         if name[:1] in '"[]' or not name.isalpha():
             return self.lexer.error(f"expected a directive, found {name[:40]!r}")
-        return self.lexer.error(f"unknown directive {name[:40]!r}{nearest(name, DIRECTIVES)}")
+        return self.lexer.error(f"unknown directive {name[:40]!r}{did_you_mean(name, DIRECTIVES)}")
 
     # Before and after WorldBegin
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +12,7 @@ import numpy as np
 
 from clpt import input_files, transforms
 from clpt.choices import Missing
-from clpt.errors import LONGEST_NAME, SceneError
+from clpt.errors import SceneError, did_you_mean
 from clpt.formats.missing import grey_for
 from clpt.formats.pbrt.params import Parameter, Parameters
 from clpt.scene.materials import Material
@@ -141,23 +140,17 @@ class State:
         definition = self.shared.textures.get((values, name))
         if definition is None:
             names = [known for kind, known in self.shared.textures if kind == values]
-            raise source.error(f"there is no {values} texture {name!r}{nearest(name, names)}")
+            raise source.error(f"there is no {values} texture {name!r}{did_you_mean(name, names)}")
         return definition
 
     def named_material(self, name: str, source: Parameters | Parameter) -> Material:
         """Return the material of a name, made once. Raises SceneError."""
         definition, make = self.shared.materials.get(name), self.shared.make_material
         if definition is None or make is None:
-            hint = nearest(name, self.shared.materials)
+            hint = did_you_mean(name, self.shared.materials)
             raise source.error(f"there is no material {name!r}{hint}")
         kind, params, state = definition.kind, definition.params, definition.state
         made: Material = self.shared.once(
             ("material", name), params, lambda: make(kind, params, state, name)
         )
         return made
-
-
-def nearest(name: str, known: Iterable[str]) -> str:
-    """Return the end of a message about an unknown name: the nearest known ones."""
-    near = difflib.get_close_matches(name[:LONGEST_NAME], sorted(known), n=3, cutoff=0.5)
-    return "; did you mean " + " or ".join(map(repr, near)) + "?" if near else ""

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from clpt import text, transforms
-from clpt.errors import SceneError
+from clpt.errors import SceneError, did_you_mean
 from clpt.formats.pbrt.files import Files
-from clpt.formats.pbrt.state import nearest
 
 
 class TransformDirectives(Files):
@@ -63,7 +62,7 @@ class TransformDirectives(Files):
         name = self.lexer.string("a name")
         systems = self.contents.shared.systems
         if name not in systems:
-            raise SceneError(f"there is no coordinate system {name!r}{nearest(name, systems)}")
+            raise SceneError(f"there is no coordinate system {name!r}{did_you_mean(name, systems)}")
         self._set(*systems[name])
 
     def active_transform(self) -> None:
