@@ -61,8 +61,12 @@ def listening(*started: subprocess.Popen) -> set[tuple[int, int]]:
     family += [child for one in family for child in one.children(recursive=True)]
     found = set()
     for one in family:
-        assert not [c for c in one.net_connections("udp") if c.laddr], "a socket of datagrams"
-        own = [c for c in one.net_connections("tcp") if c.status == psutil.CONN_LISTEN]
+        try:
+            udp, tcp = one.net_connections("udp"), one.net_connections("tcp")
+        except psutil.NoSuchProcess:  # a compiler that has ended since
+            continue
+        assert not [c for c in udp if c.laddr], "a socket of datagrams"
+        own = [c for c in tcp if c.status == psutil.CONN_LISTEN]
         assert all(c.laddr.ip in ("127.0.0.1", "::1") for c in own)
         found |= {(one.pid, c.laddr.port) for c in own}
     return found
