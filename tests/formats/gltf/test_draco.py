@@ -53,9 +53,9 @@ def file_with(tmp_path, metadata):
 
 def test_metadata_are_passed_over(tmp_path):
     path, points = file_with(tmp_path, GOOD)
-    (shape,) = load(path).shapes
-    assert len(shape.mesh.indices) == 4
-    np.testing.assert_allclose(np.sort(shape.mesh.vertices, 0), np.sort(points, 0), atol=1e-3)
+    shape = load(path).shapes[0]
+    assert len(shape.faces) == 4
+    np.testing.assert_allclose(np.sort(shape.vertices, 0), np.sort(points, 0), atol=1e-3)
 
 
 @pytest.mark.parametrize("metadata", [WIDE, MANY, b"\x7f"], ids=["wide", "many", "short"])
