@@ -34,7 +34,9 @@ def run(arguments: Sequence[str]) -> int:
     try:
         status = cli.main(args=list(arguments), prog_name="clpt", standalone_mode=False)
         return status if isinstance(status, int) else 0
-    except (Exception, KeyboardInterrupt) as error:
+    except KeyboardInterrupt as error:
+        return stopping.ended_by(error)
+    except Exception as error:
         interrupt = stopping.interrupt_behind(error)
         if interrupt is not None:
             return stopping.ended_by(interrupt)
