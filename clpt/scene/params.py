@@ -106,7 +106,7 @@ def quantity(default: object, doc: str, low: float = -math.inf, high: float = ma
 
 
 def angular(doc: str) -> Any:
-    """Declare a table over the cosine of an angle; `clpt.scene.media.Tabulated` says of what."""
+    """Declare a table over the cosine of an angle; `clpt.scene.phases.Tabulated` says of what."""
     return _field((1.0, 1.0), Param(roles.ANGULAR, doc))
 
 
