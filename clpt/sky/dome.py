@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from clpt.arrays import Floats
+from clpt.records import SKY_SIZES
 from clpt.scene.lights import Sky
 from clpt.sky import atmosphere, skylight
 from clpt.spectra.air import EARTH, LAMBDAS, SUNLIGHT, Atmosphere
 
 ROWS, COLUMNS = 48, 96  # of cells from the horizon to the zenith, or to the nadir; around
-SUN_ROWS, SUN_COLUMNS = 24, 12  # SKY_SUN_ROWS, SKY_SUN_COLUMNS
+SUN_ROWS, SUN_COLUMNS = SKY_SIZES["sun_rows"], SKY_SIZES["sun_columns"]
 SUN_RADIUS = np.radians(0.2666)  # [rad]
 LOWEST = 1e-3  # of the observer above the ground [km]
 
