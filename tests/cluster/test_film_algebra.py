@@ -156,8 +156,8 @@ def make(request: pytest.FixtureRequest, plan: Plan) -> Iterator[Maker]:
     """Make a renderer of the film, whose samples are taken by one of MAKERS."""
     with ExitStack() as opened:
 
-        def made(name: str, first_sample: int = 0) -> DevicePictures:
-            given: dict[str, Any] = {"halves": plan.halves, "first_sample": first_sample}
+        def made(name: str, first_sample: int = 0, **more: int) -> DevicePictures:
+            given = {"halves": plan.halves, "first_sample": first_sample, **more}
             renderer: DevicePictures
             if name == "device":
                 renderer = clpt.Renderer(plan.scene, **given)
@@ -256,6 +256,7 @@ def test_any_split_is_one_run(maker, make, plan, whole):
         assert renderer.run(samples, lambda p: told.append(p.samples), noise=plan.noise)
     check(renderer, whole)
     assert renderer.samples == sum(plan.splits) and renderer.active == whole.active
+    assert (renderer.active < 1.0) == (plan.noise is not None)
     check_counts(renderer, whole)
     assert told and told == sorted(told)
     shown = renderer.film.get()
@@ -323,8 +324,8 @@ def test_a_saved_film_is_gone_on_with(saving, loading, make, plan, whole, tmp_pa
     assert not renderer.run(10**6, lambda progress: False, noise=little)
     film_file.write(path, renderer._saved_film(held=True))
     assert film_file.read(path).film.taken == ((0, first),)
-    for who, samples in ((loading, second), (saving, third)):
-        renderer = make(who)
+    for who, samples, slots in ((loading, second, 128), (saving, third, 64)):
+        renderer = make(who, slots=slots)
         assert renderer.run(3)
         renderer.load_state(path)
         assert renderer.samples == film_file.read(path).film.taken[-1][1]
