@@ -62,6 +62,10 @@ typedef struct {
 inline Guided guide_at(Scene scene, global const uint *guide, Surface s, vec3 d)
 {
     Guided g;
+    g.row = 0;
+    g.light = 0.0f;
+    g.even = 0.0f;
+    if (scene.settings->guide_paths == 0) return g; /* as a pilot has decided */
     g.row = guide_row(scene, s.p, sel3(dot3(s.n, d) < 0.0f, s.n, neg3(s.n)));
     g.light = gather((global const float *)guide, g.row + GUIDE_BINS - 1);
     real straight = gather((global const float *)guide, guide_straight(scene, g.row));
@@ -88,7 +92,8 @@ inline real guide_density(global const uint *guide, Guided g, vec3 d)
  * that is found in two ways. */
 inline real guide_pdf(global const uint *guide, Guided g, vec3 d, real p)
 {
-    return sel(g.light > 0.0f, 0.5f * (p + guide_density(guide, g, d)), p);
+    mask known = g.light > 0.0f;
+    return any(known) ? sel(known, 0.5f * (p + guide_density(guide, g, d)), p) : p;
 }
 
 /* A direction of the guide. u: its x chooses the part; what is left of it and its y a point in that.
@@ -176,6 +181,7 @@ inline BsdfSample guide_sample(global const uint *guide, Guided g, Bsdf m, Frame
  * [0, 1); beta: the throughput behind. */
 inline mask guide_roulette(Slab path, uint at, Guided g, real brings, real u, mask *next, Spectrum *beta)
 {
+    if (!any(g.light > 0.0f)) return mask_of(0);
     real light = brings * g.light, first = load_path_expected(path, at);
     mask plays = (light > 0.0f) & (first > 0.0f);
     store_path_expected(path, at, *next & (first == 0.0f), light);
