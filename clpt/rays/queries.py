@@ -89,7 +89,7 @@ class Queries:
 
     instanced = False
 
-    def __new__(cls, queue: Any = None, *_: Any, **__: Any) -> Queries:
+    def __new__(cls, queue: object = None, *_: Any, **__: Any) -> Queries:
         if not isinstance(queue, cl.CommandQueue):  # before Python counts the other arguments
             found = f"its first argument is a pyopencl.CommandQueue, not {type(queue).__name__}"
             advice = "clpt.device.choose().queue is one"

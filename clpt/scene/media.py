@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from clpt import spectra
 from clpt.errors import SceneError
@@ -107,7 +107,7 @@ class Homogeneous(Medium):
 
     @classmethod
     def from_albedo(
-        cls, albedo: Any, mean_free_path: Any, g: float = 0.0, **parameters: Any
+        cls, albedo: SpectrumLike, mean_free_path: SpectrumLike, g: float = 0.0, **parameters: Any
     ) -> Homogeneous:
         """Return a medium by how it looks: a thick body of it reflects `albedo` of even light.
 
@@ -359,14 +359,14 @@ class Grid(Lattice, Homogeneous):
         form="volume",
     )
     bits: int = host(16, "of a number of the density on the device: 16 or 8")
-    albedo_grid: Any = host(
+    albedo_grid: NDArray[Any] | Volume | None = host(
         None, "colours (nx, ny, nz, 3) that multiply what is scattered; the rest is absorbed",
         form="colour_volume",
     )  # fmt: skip
     albedo_with_density: bool = host(
         False, "whether what is scattered, density times `albedo_grid`, is trilinear; else each is"
     )
-    color_grid: Any = host(
+    color_grid: NDArray[Any] | Volume | None = host(
         None, "colours (nx, ny, nz, 3) up to 1 that multiply the extinction",
         form="colour_volume",
     )  # fmt: skip
@@ -485,11 +485,11 @@ def _mapped(value: Any, function: Callable[[Any], Any]) -> Spectrum:
     return spectra.Tabulated(WIDEST, function(value.sample(WIDEST)), "hold")
 
 
-def _unbounded(value: Any) -> Any:
+def _unbounded(value: object) -> Any:
     return RGBUnbounded(value.r, value.g, value.b) if isinstance(value, RGB) else value
 
 
-def _single_albedo(reflected: Any, g: float) -> Any:
+def _single_albedo(reflected: ArrayLike, g: float) -> Any:
     """The share that a medium scatters, of which a thick body reflects so much of even light."""
     r = np.clip(np.asarray(reflected, np.float64), 0.0, 1.0)
     b = 1.139 + 1.17 * r

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from clpt import spectra
 from clpt.errors import SceneError
@@ -77,9 +77,9 @@ class Tabulated(Phase):
 
     chromatic = True
 
-    values: Any = angular("how much goes where, over the cosine; a row for each wavelength")
-    cosines: Any = host((), "of each value, from -1 to 1; none: even", form="numbers")
-    wavelengths: Any = host((), "of each row; none: one row is of all", "nm", form="numbers")
+    values: ArrayLike = angular("how much goes where, over the cosine; a row for each wavelength")
+    cosines: ArrayLike = host((), "of each value, from -1 to 1; none: even", form="numbers")
+    wavelengths: ArrayLike = host((), "of each row; none: one row is of all", "nm", form="numbers")
 
     def check(self) -> None:
         """Check the three arrays, and scale the rows."""
@@ -118,9 +118,9 @@ class Tabulated(Phase):
         spectral: the rows are even in wavelength; else they are of the three colours, or there is
         one.
         """
-        values, lambdas = self.values, self.wavelengths
+        values, cosines, lambdas = map(np.asarray, (self.values, self.cosines, self.wavelengths))
         if len(values) == 1:
-            return self.cosines, values, 0.0, 1.0
+            return cosines, values, 0.0, 1.0
         if spectral:
             gaps = np.diff(lambdas)
             step = max(float(gaps.min()), float(lambdas[-1] - lambdas[0]) / (MOST_ROWS - 1))
@@ -129,13 +129,13 @@ class Tabulated(Phase):
             at = np.clip(np.searchsorted(lambdas, even, "right") - 1, 0, len(lambdas) - 2)
             share = ((even - lambdas[at]) / gaps[at])[:, None]
             rows = values[at] * (1.0 - share) + values[at + 1] * share
-            return self.cosines, rows, float(even[0]), float(even[1] - even[0])
+            return cosines, rows, float(even[0]), float(even[1] - even[0])
         colours = [spectra.Tabulated(lambdas, v, "hold").to_rgb("unbounded") for v in values.T]
         rows = np.maximum(np.array(colours, np.float64).T, 0.0)
-        whole = _whole(rows, self.cosines)
-        return self.cosines, rows / whole[:, None], 0.0, 1.0
+        whole = _whole(rows, cosines)
+        return cosines, rows / whole[:, None], 0.0, 1.0
 
-    def _numbers(self, name: str, given: Any) -> NDArray[np.float64]:
+    def _numbers(self, name: str, given: object) -> NDArray[np.float64]:
         try:
             made = np.array(given, np.float64)
         except (TypeError, ValueError):

@@ -116,7 +116,7 @@ def _projector(props: Properties) -> Parameters:
     return {**light, "fov": angle, "to_world": props.placement()}
 
 
-def _aspect(image: Any) -> float:
+def _aspect(image: object) -> float:
     """Width over height of an image; 1 for what is none."""
     if not isinstance(image, Bitmap):
         return 1.0

@@ -183,7 +183,7 @@ def _emitted(value: Any) -> Spectrum:
     return RGBIlluminant(value.r, value.g, value.b) if isinstance(value, RGB) else value
 
 
-def _mean(image: Any, where: str) -> Spectrum:
+def _mean(image: object, where: str) -> Spectrum:
     """The mean light of an image of spectra; any other stands for D65."""
     found = spectral_exr.find(image, emissive=True, where=where)
     if found is None:

@@ -191,7 +191,10 @@ class BounceLoop:
         self._go_on((self._first, self._first), None, lambda _: True)
 
     def _go_on(
-        self, numbers: tuple[int, int], leave: Any, on_batch: Callable[[NDArray[np.uint64]], bool]
+        self,
+        numbers: tuple[int, int],
+        leave: object,
+        on_batch: Callable[[NDArray[np.uint64]], bool],
     ) -> bool:
         """Trace paths of these numbers until none is in flight; see `run`."""
         steps = self._batch()

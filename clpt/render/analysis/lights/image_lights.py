@@ -103,7 +103,7 @@ def mean_radiance(lamp: Envmap | CubeMap, made: Content) -> float:
 
 
 def _sphere(
-    given: Any, scale: float, spectral: bool, lo: float, hi: float, compensated: bool
+    given: object, scale: float, spectral: bool, lo: float, hi: float, compensated: bool
 ) -> Content:
     """An image in latitude and longitude, its spectra from lo to hi [nm].
 
@@ -145,7 +145,7 @@ def _even(corners: NDArray[Any]) -> NDArray[Any]:
     return np.broadcast_to(column, corners.shape)
 
 
-def _cube(given: Any, scale: float, spectral: bool) -> Content:
+def _cube(given: object, scale: float, spectral: bool) -> Content:
     """The faces of a cube, with their borders."""
     notes: list[str] = []
     faces = _faces(given, "cube_map.image", notes) * np.float32(scale)
@@ -181,7 +181,7 @@ def _scaled(image: SpectralImage, scale: float, where: str) -> SpectralImage:
     return dataclasses.replace(image, values=np.maximum(values, np.float32(0.0)))
 
 
-def _loaded(image: Any, where: str, notes: list[str]) -> Floats32:
+def _loaded(image: object, where: str, notes: list[str]) -> Floats32:
     """An image as (h, w, 3) float32 without negative values. Raises SceneError.
 
     notes: gets what its file says that is left out.
@@ -208,7 +208,7 @@ def _loaded(image: Any, where: str, notes: list[str]) -> Floats32:
     return np.maximum(values, np.float32(0.0))
 
 
-def _faces(image: Any, where: str, notes: list[str]) -> Floats32:
+def _faces(image: object, where: str, notes: list[str]) -> Floats32:
     """The six faces of a cube map (6, n, n, 3), in the order of FACES; notes: as of `_loaded`."""
     if isinstance(image, (list, tuple)) or (isinstance(image, np.ndarray) and image.ndim == 4):
         if len(image) != 6:
