@@ -12,7 +12,8 @@ from clpt.errors import SceneError
 from clpt.mie.sizes import Sizes
 from clpt.mie.sphere import spheres
 from clpt.mie.water import water_index
-from clpt.scene.media import Homogeneous, Tabulated
+from clpt.scene.media import Homogeneous
+from clpt.scene.phases import Tabulated
 
 DENSE = 0.1  # share of the volume above which spheres do not scatter on their own
 WATER = "water"

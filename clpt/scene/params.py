@@ -43,6 +43,7 @@ import numpy as np
 from clpt.errors import SceneError, UnusedParameterError
 from clpt.scene import roles
 from clpt.scene.roles import HostForm, Param
+from clpt.scene.shown import shown
 
 MOST_PARTS, MOST_NESTED = 1000, 64  # of a material, texture, light or medium
 
@@ -106,7 +107,7 @@ def quantity(default: object, doc: str, low: float = -math.inf, high: float = ma
 
 
 def angular(doc: str) -> Any:
-    """Declare a table over the cosine of an angle; `clpt.scene.media.Tabulated` says of what."""
+    """Declare a table over the cosine of an angle; `clpt.scene.phases.Tabulated` says of what."""
     return _field((1.0, 1.0), Param(roles.ANGULAR, doc))
 
 
@@ -269,6 +270,9 @@ class Kind(metaclass=KindType):
     is_tree: ClassVar[bool] = True  # its parts become one text in the kernels, each at every use
     _size: ClassVar[tuple[int, int]] = (1, 1)  # of an object: its parts, and how deep they lie
 
+    def __init_subclass__(cls) -> None:
+        cls.__repr__ = Kind.__repr__  # type: ignore[method-assign]  # `dataclass` leaves it then
+
     @classproperty
     def kind(cls) -> str:
         """The name in scene files and kernels: RoughConductor -> rough_conductor."""
@@ -292,6 +296,13 @@ class Kind(metaclass=KindType):
 
     def check(self) -> None:
         """Raise SceneError where the parameters contradict each other."""
+
+    def __repr__(self) -> str:
+        """Return the class, and the parameters that differ from their defaults."""
+        usual = {name: shown(value) for name, value in _usual(type(self)).items()}
+        texts = {name: shown(value) for name, value in fields_of(self).items()}
+        changed = (f"{n}={text}" for n, text in texts.items() if text != usual.get(n, "None"))
+        return f"{type(self).__name__}({', '.join(changed)})"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -335,6 +346,13 @@ def defaults(cls: type) -> dict[str, Any]:
         name: f.default if f.default_factory is dataclasses.MISSING else f.default_factory()
         for name, f in fields.items()
     }
+
+
+@cache
+def _usual(cls: type[Kind]) -> Mapping[str, Any]:
+    """Return the defaults of a kind as its objects have them, but for what must be given."""
+    given = {name: v for name, v in defaults(cls).items() if v is not dataclasses.MISSING}
+    return {name: _checked(v, _declared(cls)[name], cls.kind) for name, v in given.items()}
 
 
 def fields_of(kind: Kind) -> dict[str, Any]:

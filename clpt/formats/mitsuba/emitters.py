@@ -156,11 +156,11 @@ def _constant(props: Properties) -> Parameters:
 
 
 def _envmap(props: Properties) -> Parameters:
-    props.ignore("mis_compensation")
     return {
         "image": props.image(),
         "scale": props.number("scale", 1.0),
         "to_world": props.placement(),
+        "mis_compensation": props.flag("mis_compensation", False),
     }
 
 

@@ -23,7 +23,8 @@ from clpt.formats.pbrt.state import State
 from clpt.formats.pbrt.textures import textured
 from clpt.scene import materials
 from clpt.scene.materials import Material
-from clpt.scene.media import HenyeyGreenstein, Homogeneous, Isotropic
+from clpt.scene.media import Homogeneous
+from clpt.scene.phases import HenyeyGreenstein, Isotropic
 from clpt.scene.roles import COEFFICIENT, INDEX, REAL, REFLECTANCE
 from clpt.scene.textures import Texture
 from clpt.scene.values import IndexLike, Textured, TexturedNumber

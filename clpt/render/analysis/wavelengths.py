@@ -21,8 +21,9 @@ from clpt.render.analysis.colour import sensor
 from clpt.render.analysis.index import SceneIndex
 from clpt.scene.integrators import Film
 from clpt.scene.materials import Material
-from clpt.scene.media import Dyed, Reradiating
+from clpt.scene.media import Dyed
 from clpt.scene.params import fields_of, params
+from clpt.scene.phases import Reradiating
 from clpt.scene.roles import EMISSION
 from clpt.scene.textures import Texture
 from clpt.spectra import RGB, RGBIlluminant, Spectrum

@@ -25,7 +25,8 @@ from clpt.scene.integrators import (
 )
 from clpt.scene.integrators import Path as PathTracing
 from clpt.scene.materials import Dielectric, Null
-from clpt.scene.media import Blend, HenyeyGreenstein, Homogeneous, Isotropic
+from clpt.scene.media import Homogeneous
+from clpt.scene.phases import Blend, HenyeyGreenstein, Isotropic
 from tests.pictures.support import with_film
 
 SKY = lights.Constant()

@@ -62,8 +62,7 @@ def extent(lamp: Envmap | CubeMap, look: Look, share: float) -> float:
     """
     made = content(lamp, look)
     if isinstance(lamp, Envmap):
-        column = _latitude_weights(np.ones((made.height, 1), np.float32))[None, :, :1]
-        even: NDArray[Any] = np.broadcast_to(column, made.corners.shape)
+        even = _even(made.corners)
     else:
         even = _cube_weights(np.ones((6, made.height + 2, made.width + 2), np.float32))
     power, angle = _in_parts(made.corners), _in_parts(even)
@@ -90,7 +89,7 @@ def content(lamp: Envmap | CubeMap, look: Look) -> Content:
     by = version(lamp.image), *given[1:]
     if isinstance(lamp, CubeMap):
         return look.cache(_cube, *given, by=by)
-    ends = look.lo, look.hi
+    ends = look.lo, look.hi, lamp.mis_compensation
     return look.cache(_sphere, *given, *ends, by=(*by, *ends))
 
 
@@ -103,8 +102,13 @@ def mean_radiance(lamp: Envmap | CubeMap, made: Content) -> float:
     return made.grid.total * cell / (4.0 * np.pi)
 
 
-def _sphere(given: Any, scale: float, spectral: bool, lo: float, hi: float) -> Content:
-    """An image in latitude and longitude, its spectra from lo to hi [nm]."""
+def _sphere(
+    given: Any, scale: float, spectral: bool, lo: float, hi: float, compensated: bool
+) -> Content:
+    """An image in latitude and longitude, its spectra from lo to hi [nm].
+
+    compensated: its directions are chosen for what a material's own do not find.
+    """
     where = "envmap.image"
     found = spectral_exr.find(given, emissive=True, where=where)
     notes: list[str] = []
@@ -119,14 +123,26 @@ def _sphere(given: Any, scale: float, spectral: bool, lo: float, hi: float) -> C
             height,
             values,
             corners,
-            block_grids.of(corners, partial(sphere_directions, width)),
+            _sphere_blocks(corners, compensated),
             notes=tuple(notes),
         )
     found = _scaled(found, scale, where)
     corners = _latitude_weights(luminance(image) + UNSEEN * _brightness(found.values))[None]
     values, number = bands(found, lo, hi)
-    grid = block_grids.of(corners, partial(sphere_directions, width))
+    grid = _sphere_blocks(corners, compensated)
     return Content(width, height, values, corners, grid, values.shape[1], number)
+
+
+def _sphere_blocks(corners: NDArray[Any], compensated: bool) -> block_grids.BlockGrid:
+    """The blocks of weights (1, h, w + 1); compensated: as of `_sphere`."""
+    directions = partial(sphere_directions, corners.shape[2] - 1)
+    return block_grids.of(corners, directions, even=_even(corners) if compensated else None)
+
+
+def _even(corners: NDArray[Any]) -> NDArray[Any]:
+    """The weights of a light that is 1 everywhere, of the shape of those of an image."""
+    column = _latitude_weights(np.ones((corners.shape[1], 1), np.float32))[None, :, :1]
+    return np.broadcast_to(column, corners.shape)
 
 
 def _cube(given: Any, scale: float, spectral: bool) -> Content:
