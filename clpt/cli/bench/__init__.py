@@ -49,7 +49,8 @@ from .settings import Report, Subject
 )  # fmt: skip
 @click.option(
     "--card", "card", type=click.Path(path_type=Path),
-    help="Write a card of the pictures' points to an .svg; of several devices the last one's.",
+    help="Write a card of the pictures' points to an .svg or .png; of several devices the last "
+    "one's.",
 )  # fmt: skip
 @click.option(
     "--first-light", "light", type=click.Path(path_type=Path), is_flag=False,

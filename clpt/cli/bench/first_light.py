@@ -8,8 +8,8 @@ from rich.text import Text
 
 from ... import output_files
 from ...benchmark import first_light
-from ...errors import SceneError
 from ..printing.console import output_console
+from .settings import check_writable
 
 WRONG = 3  # the exit status if a check is wrong
 LONGEST = 300.0  # seconds that a check may take without a figure, whatever --limit says
@@ -17,10 +17,7 @@ LONGEST = 300.0  # seconds that a check may take without a figure, whatever --li
 
 def tell_of_first_light(device: str | None, target: Path, limit: float) -> int:
     """Run all checks, print a row of each, write the report; return the exit status."""
-    try:
-        output_files.check_writable(target)
-    except OSError as error:
-        raise SceneError(f"cannot be written: {error}", file=target) from error
+    check_writable(target)
     console = output_console()
     checks = first_light.checks()
     results: list[first_light.Result] = []
