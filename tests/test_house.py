@@ -26,7 +26,7 @@ BOUNDS = {
     ": Any": 250,
     "aliases of array types outside clpt/arrays.py": 0,
     "rooms in circles of imports": 0,
-    "lines of Python": 81_500,
+    "lines of Python": 82_400,
     "lines of OpenCL": 19_500,
     "words of README.md": 1_200,
     "docstrings that begin with What, Of, How, Those, The same": 0,
