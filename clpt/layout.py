@@ -282,7 +282,7 @@ def row_words(table: str, at: str, count: int) -> tuple[list[str], list[str]]:
     if count < 4:
         return [], [f"gather_w({table}, {at} + {i})" for i in range(count)]
     firsts = [*range(0, count - 4, 4), count - 4]
-    rows = [f"vec4 words{first} = gather_w4({table} + {first}, {at});" for first in firsts]
+    rows = [f"vec4 words{first} = row4({table} + {first}, {at});" for first in firsts]
     names = {first + i: f"words{first}.{c}" for first in firsts for i, c in enumerate("xyzw")}
     return rows, [names[i] for i in range(count)]
 

@@ -144,6 +144,11 @@ class BoundKernel:
             raise TypeError(f"kernel {self.kernel.name!r} also takes {', '.join(missing)}")
         self.set_args(**named)
 
+    @property
+    def values(self) -> Mapping[str, Any]:
+        """The arguments by name, as the driver has them."""
+        return self._values
+
     def drop_buffers(self) -> None:
         """Forget the buffers, which the driver keeps until the commands that use them end."""
         self._values.clear()

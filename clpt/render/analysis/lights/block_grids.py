@@ -109,7 +109,7 @@ def _beyond(fine: Floats, area: Floats, cosine: Floats) -> Floats:
     The material's own directions find the rest (Karlik et al. 2019, "MIS Compensation"). No part
     has less than LEAST of its chance, so that nothing is lost where only the light's are drawn.
     """
-    mean = (fine @ cosine) / max(area @ cosine, 1e-300)
+    mean = float(fine @ cosine) / max(float(area @ cosine), 1e-300)
     return np.maximum(fine - DULL * mean * area, LEAST * fine)
 
 
