@@ -13,7 +13,9 @@ import pyopencl as cl
 import pytest
 
 import clpt
-from clpt.device import program
+from clpt import device
+from clpt.benchmark import bandwidth
+from clpt.device import building, compile_limits, native_programs, program
 from clpt.render.wavefront import bounce_loop
 from clpt.render.wavefront.bounce_loop import LEAST_ITEMS
 from clpt.scene import Film, Scene, cameras, integrators, lights, materials, shapes
@@ -225,3 +227,45 @@ def test_nothing_needs_images_or_finish(
     no_images(monkeypatch)
     monkeypatch.setattr(cl.CommandQueue, "finish", lambda _: 1 / 0)
     assert np.array_equal(rendered(scene, BadDevice()), picture)
+    copying = bandwidth.Copying(device.choose(profiling=True))
+    _, complaint = copying.rounds(1 << 12, 1)
+    assert complaint == ""
+
+
+def test_a_compiler_that_takes_minutes_is_named(
+    scene: Scene, picture: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It goes on here; the command line ends."""
+    said: list[str] = []
+    build = native_programs.build
+
+    def slow(context: Any, on: Any, code: Any, options: Any = ()) -> Any:
+        while not said:
+            pass
+        return build(context, on, code, options)
+
+    monkeypatch.setenv(compile_limits.VARIABLE, "0.05")
+    monkeypatch.setattr(compile_limits, "at_limit", said.append)
+    monkeypatch.setattr(native_programs, "build", slow)
+    monkeypatch.setattr(building, "_known", lambda *_: None)
+    assert np.array_equal(rendered(scene, BadDevice()), picture)
+    assert re.match("the driver's compiler has been at the program '.*' for 0 s", said[0])
+
+
+def test_a_compiler_that_refuses_is_one_line(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With our file and line, and where the text was kept."""
+
+    def refuse(context: Any, on: Any, code: Any, options: Any = ()) -> Any:
+        raise driver_error(CODE.BUILD_PROGRAM_FAILURE)
+
+    monkeypatch.setattr(native_programs, "build", refuse)
+    monkeypatch.setattr(building, "_known", lambda *_: None)
+    with pytest.raises(clpt.KernelBuildError, match=r"did not build: .*\.cl") as raised:
+        rendered(scene, BadDevice())
+    assert "\n" not in str(raised.value)
+
+
+def test_no_kernel_asks_for_the_size_of_sub_groups() -> None:
+    """Devices have them of 8, 16, 32 or 64 work-items; nothing hangs on that."""
+    for path in device.kernels_folder().rglob("*.cl"):
+        assert "sub_group" not in path.read_text(encoding="utf-8"), path
