@@ -6,6 +6,8 @@ w = 0, normals go through the inverse transpose.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -20,19 +22,19 @@ LARGE = 1e150  # from where on squares are beyond float64
 SINGULAR_BELOW = 1e-12
 
 
-def translate(offset: ArrayLike) -> Matrix:
-    """Move by `offset` (3,)."""
+def translate(*offset: ArrayLike) -> Matrix:
+    """Move by three numbers, or by one `offset` (3,)."""
     matrix = np.eye(4)
-    matrix[:3, 3] = _triple(offset, "translate")
+    matrix[:3, 3] = _triple(_single(offset), "translate")
     return matrix
 
 
-def scale(factors: ArrayLike) -> Matrix:
-    """Scale by one factor or by three, one an axis."""
-    factors = np.asarray(factors, np.float64)
-    if factors.ndim == 0:
-        factors = np.full(3, factors)
-    return np.diag([*_triple(factors, "scale"), 1.0])
+def scale(*factors: ArrayLike) -> Matrix:
+    """Scale by one factor or by three, one an axis: numbers, or one array (3,)."""
+    values = np.asarray(_single(factors), np.float64)
+    if values.ndim == 0:
+        values = np.full(3, values)
+    return np.diag([*_triple(values, "scale"), 1.0])
 
 
 def rotate(axis: ArrayLike, degrees: float) -> Matrix:
@@ -153,6 +155,11 @@ def is_singular(matrix: ArrayLike) -> bool:
 def flips_handedness(matrix: ArrayLike) -> bool:
     """Whether the transform mirrors space, so that the winding of triangles is reversed."""
     return bool(np.linalg.det(np.asarray(matrix, np.float64)[:3, :3]) < 0.0)
+
+
+def _single(arguments: tuple[ArrayLike, ...]) -> Any:
+    """Return what was given: the argument if it is one, else all of them."""
+    return arguments[0] if len(arguments) == 1 else arguments
 
 
 def _triple(values: ArrayLike, what: str) -> Matrix:

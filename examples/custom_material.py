@@ -3,7 +3,7 @@
 A material is a dataclass with parameters, and OpenCL functions that sample and evaluate it.
 """
 
-import sys
+from argparse import ArgumentParser
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -70,11 +70,13 @@ def scene() -> clpt.Scene:
     above = look_at((-3, 4, 4), (0, 1, 0), (0, 1, 0))
     camera = cameras.Perspective(to_world=look_at((0, 1.4, 7), (0, 1.2, 0), (0, 1, 0)), fov=42)
     things = [*cloths, shapes.Rectangle(to_world=above, emission=lamp)]
-    film, sky = Film(width=384, height=216), lights.Constant(radiance=0.35)
-    return clpt.Scene(camera=camera, shapes=things, lights=[sky], film=film)
+    sky = lights.Constant(radiance=0.35)
+    return clpt.Scene(camera=camera, shapes=things, lights=[sky], film=Film(size=(384, 216)))
 
 
 if __name__ == "__main__":
-    folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
-    clpt.write_image(folder / "custom_material.png", clpt.render(scene(), spp=64), tone="agx")
-    print(f"wrote {folder / 'custom_material.png'}")
+    arguments = ArgumentParser(description=__doc__)
+    arguments.add_argument("folder", type=Path, nargs="?", default=".", help="gets the picture")
+    picture = arguments.parse_args().folder / "custom_material.png"
+    clpt.write_image(picture, clpt.render(scene(), spp=64), tone="agx")
+    print(f"wrote {picture}")

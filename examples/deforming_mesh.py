@@ -1,12 +1,10 @@
 """A mesh that the application's own kernel deforms, rendered frame by frame on one queue.
 
-python examples/deforming_mesh.py [FOLDER]     writes deforming_mesh.png, a strip of frames
-
 The vertices never leave the device: the kernel writes them, clpt refits its tree to them and
 renders, and only the picture comes back. Nothing waits in between: the queue keeps the order.
 """
 
-import sys
+from argparse import ArgumentParser
 from pathlib import Path
 
 import numpy as np
@@ -57,7 +55,9 @@ def scene(mesh: trimesh.Trimesh) -> Scene:
     )
 
 
-folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
+arguments = ArgumentParser(description=__doc__)
+arguments.add_argument("folder", type=Path, nargs="?", default=".", help="gets the picture")
+folder = arguments.parse_args().folder
 context = cl.create_some_context(interactive=False)
 queue = cl.CommandQueue(context)
 deform = cl.Program(queue.context, DEFORM).build().deform

@@ -1,6 +1,6 @@
 """Two star clusters meet: bodies of an n-body simulation, moved and rendered on the device."""
 
-import sys
+from argparse import ArgumentParser
 from pathlib import Path
 
 import numpy as np
@@ -59,6 +59,9 @@ def scene(bodies, rng):
     return clpt.Scene(camera=camera, shapes=things, lights=[sky], film=film)
 
 
+arguments = ArgumentParser(description=__doc__)
+arguments.add_argument("folder", type=Path, nargs="?", default=".", help="gets the picture")
+picture = arguments.parse_args().folder / "nbody.png"
 rng, context = np.random.default_rng(3), cl.create_some_context(interactive=False)
 queue = cl.CommandQueue(context)
 advance = cl.Program(queue.context, KERNEL).build().advance
@@ -74,6 +77,5 @@ for _ in range(FRAMES):
     for _ in range(STEPS):
         advance(queue, now.shape[:1], None, now.data, np.float32(DT), then.data, speed.data)
         now, then = then, now
-picture = Path(sys.argv[1] if len(sys.argv) > 1 else ".") / "nbody.png"
 clpt.write_image(picture, np.hstack(pictures), exposure=0.7, tone="agx")
 print(f"wrote {picture}")

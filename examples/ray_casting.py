@@ -1,10 +1,7 @@
-"""Ray queries on a mesh: sun and sky over a town, and how long trimesh takes for the same rays.
+"""Ray queries on a mesh: sun and sky over a town, and how long trimesh takes for the same rays."""
 
-python examples/ray_casting.py [FOLDER]     writes ray_casting.png
-"""
-
-import sys
 import time
+from argparse import ArgumentParser
 from pathlib import Path
 
 import numpy as np
@@ -46,7 +43,9 @@ def seconds(function, repeats: int = 3) -> float:
     return (time.perf_counter() - start) / repeats
 
 
-folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
+arguments = ArgumentParser(description=__doc__)
+arguments.add_argument("folder", type=Path, nargs="?", default=".", help="gets the picture")
+folder = arguments.parse_args().folder
 rng = np.random.default_rng(7)
 mesh = town(rng)
 origins, directions = camera_rays([-13, -20, 12], [0.3, 0, 1.2], 42)

@@ -1,6 +1,6 @@
 """A plume of smoke: a fluid in the program's own kernels, rendered on the device as it rises."""
 
-import sys
+from argparse import ArgumentParser
 from pathlib import Path
 
 import numpy as np
@@ -58,6 +58,9 @@ def scene(density):
     return clpt.Scene(camera=camera, film=film, integrator=path, **things)
 
 
+arguments = ArgumentParser(description=__doc__)
+arguments.add_argument("folder", type=Path, nargs="?", default=".", help="gets the picture")
+picture = arguments.parse_args().folder / "smoke.png"
 queue = cl.CommandQueue(context := cl.create_some_context(interactive=False))
 built = cl.Program(context, KERNEL).build("-DNX={} -DNY={} -DNZ={}".format(*SIZE))
 advect, press, project = built.advect, built.press, built.project
@@ -75,6 +78,5 @@ for step in range(1, FRAMES * STEPS + 1):
         renderer.update(scene=scene(density))
         renderer.step(48)
         pictures.append(renderer.image())
-picture = Path(sys.argv[1] if len(sys.argv) > 1 else ".") / "smoke.png"
 clpt.write_image(picture, np.hstack(pictures), tone="agx")
 print(f"wrote {picture}")

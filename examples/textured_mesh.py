@@ -1,11 +1,9 @@
 """A mesh of one's own with a texture: a vase turned from a curve, with a painted glaze.
 
-python examples/textured_mesh.py [FOLDER]     writes textured_mesh.png
-
 Vertices, texture coordinates and the image are plain numpy arrays; no file is read.
 """
 
-import sys
+from argparse import ArgumentParser
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +45,9 @@ def glaze() -> np.ndarray:
     return np.float32(np.where(gold[..., None], [0.6, 0.35, 0.05], image))
 
 
+arguments = ArgumentParser(description=__doc__)
+arguments.add_argument("folder", type=Path, nargs="?", default=".", help="gets the picture")
+picture = arguments.parse_args().folder / "textured_mesh.png"
 paint = textures.Bitmap(image=glaze(), wrap="repeat")
 china = materials.RoughPlastic(diffuse_reflectance=paint, alpha=0.06)
 table = materials.RoughPlastic(diffuse_reflectance=(0.25, 0.13, 0.07), alpha=0.25)
@@ -64,6 +65,5 @@ scene = Scene(
     lights=[lights.Constant(radiance=(0.4, 0.45, 0.55))],
     film=Film(width=400, height=320),
 )
-picture = Path(sys.argv[1] if len(sys.argv) > 1 else ".") / "textured_mesh.png"
 clpt.write_image(picture, clpt.render(scene, spp=64), tone="agx")
 print(f"wrote {picture}")

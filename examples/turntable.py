@@ -1,13 +1,12 @@
 """A turntable: the camera goes once around a thing that an image of a studio (HDRI) lights.
 
-python examples/turntable.py [FOLDER [MESH]]     writes turntable.png, all frames, and a video
-
-MESH is any mesh file; without one a ring is shown. The video is turntable.mp4; it
-needs `pip install 'clpt[video]'`.
+It writes turntable.png, a sheet of all frames, and turntable.mp4, which needs
+`pip install 'clpt[video]'`.
 """
 
 import dataclasses
 import sys
+from argparse import ArgumentParser
 from pathlib import Path
 
 import numpy as np
@@ -42,9 +41,12 @@ def studio() -> np.ndarray:
     return np.float32(image)
 
 
-folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
+arguments = ArgumentParser(description=__doc__)
+arguments.add_argument("folder", type=Path, nargs="?", default=".", help="gets the files")
+arguments.add_argument("mesh", nargs="?", help="a mesh file; without it a ring is shown")
+given = arguments.parse_args()
+folder, mesh = given.folder, clpt.load(given.mesh).shapes[0] if given.mesh else ring()
 gold = materials.RoughConductor(metal="gold", alpha=0.12)
-mesh = clpt.load(sys.argv[2]).shapes[0] if len(sys.argv) > 2 else ring()
 corners = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
 middle, radius = np.add(*corners) / 2, np.linalg.norm(np.subtract(*corners)) / 2
 scene = Scene(
@@ -56,7 +58,7 @@ scene = Scene(
 frames = []
 with clpt.Renderer(scene) as renderer:
     for angle in np.arange(FRAMES) * 2 * np.pi / FRAMES:
-        origin = middle + 2.6 * radius * np.array([np.sin(angle), 0.6, np.cos(angle)])
+        origin = middle + 3.4 * radius * np.array([np.sin(angle), 0.6, np.cos(angle)])
         pose = look_at(origin, middle, [0, 1, 0])
         renderer.update(camera=dataclasses.replace(scene.camera, to_world=pose))
         renderer.run(SAMPLES)

@@ -34,8 +34,18 @@ def test_it_writes_a_picture(
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+def test_help_is_no_folder(example: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", [str(example), "--help"])
+    with pytest.raises(SystemExit, match="0"):
+        runpy.run_path(str(example), run_name="__main__")
+    assert f"usage: {example.name} [-h] [folder]" in capsys.readouterr().out
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_it_can_be_read_at_once(example: Path):
     lines = example.read_text("utf-8").splitlines()
-    assert len(lines) <= 80
+    assert len(lines) <= 85
     assert lines[0].startswith('"""')
     assert f"`{example.name}`" in (FOLDER / "README.md").read_text("utf-8")

@@ -13,6 +13,15 @@ def test_order_is_right_to_left():
     np.testing.assert_allclose(tf.transform_vectors(matrix, [1, 1, 1]), [2, 3, 4])
 
 
+def test_three_numbers_are_as_good_as_one_array():
+    np.testing.assert_array_equal(tf.translate(1, 2, 3), tf.translate([1, 2, 3]))
+    np.testing.assert_array_equal(tf.scale(1, 2, 3), tf.scale([1, 2, 3]))
+    np.testing.assert_array_equal(tf.scale(2), tf.scale(2, 2, 2))
+    for wrong in ((), (1, 2), (1, 2, 3, 4)):
+        with pytest.raises(SceneError, match="three finite numbers"):
+            tf.translate(*wrong)
+
+
 def test_rotation_is_counter_clockwise_and_orthonormal():
     np.testing.assert_allclose(
         tf.transform_vectors(tf.rotate([0, 0, 2], 90), [1, 0, 0]), [0, 1, 0], atol=1e-15

@@ -43,6 +43,7 @@ import numpy as np
 from clpt.errors import SceneError, UnusedParameterError
 from clpt.scene import roles
 from clpt.scene.roles import HostForm, Param
+from clpt.scene.shown import shown
 
 MOST_PARTS, MOST_NESTED = 1000, 64  # of a material, texture, light or medium
 
@@ -106,7 +107,7 @@ def quantity(default: object, doc: str, low: float = -math.inf, high: float = ma
 
 
 def angular(doc: str) -> Any:
-    """Declare a table over the cosine of an angle; `clpt.scene.media.Tabulated` says of what."""
+    """Declare a table over the cosine of an angle; `clpt.scene.phases.Tabulated` says of what."""
     return _field((1.0, 1.0), Param(roles.ANGULAR, doc))
 
 
@@ -269,6 +270,9 @@ class Kind(metaclass=KindType):
     is_tree: ClassVar[bool] = True  # its parts become one text in the kernels, each at every use
     _size: ClassVar[tuple[int, int]] = (1, 1)  # of an object: its parts, and how deep they lie
 
+    def __init_subclass__(cls) -> None:
+        cls.__repr__ = Kind.__repr__  # type: ignore[method-assign]  # `dataclass` leaves it then
+
     @classproperty
     def kind(cls) -> str:
         """The name in scene files and kernels: RoughConductor -> rough_conductor."""
@@ -293,6 +297,13 @@ class Kind(metaclass=KindType):
     def check(self) -> None:
         """Raise SceneError where the parameters contradict each other."""
 
+    def __repr__(self) -> str:
+        """Return the class, and the parameters that differ from their defaults."""
+        usual = {name: shown(value) for name, value in _usual(type(self)).items()}
+        texts = {name: shown(value) for name, value in fields_of(self).items()}
+        changed = (f"{n}={text}" for n, text in texts.items() if text != usual.get(n, "None"))
+        return f"{type(self).__name__}({', '.join(changed)})"
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Texture(Kind):
@@ -305,18 +316,18 @@ def _snake(name: str) -> str:
 
 
 @cache  # thousands of objects ask
-def _declared(cls: Any) -> Mapping[str, Param]:
+def _declared(cls: type[Kind]) -> Mapping[str, Param]:
     fields = dataclasses.fields(cls)
     return MappingProxyType({f.name: f.metadata["param"] for f in fields if "param" in f.metadata})
 
 
 @cache
-def _declared_of(cls: Any, place: str) -> Mapping[str, Param]:
+def _declared_of(cls: type[Kind], place: str) -> Mapping[str, Param]:
     found = {name: p for name, p in _declared(cls).items() if p.role.place == place}
     return MappingProxyType(found)
 
 
-def params(cls: type) -> Mapping[str, Param]:
+def params(cls: type[Kind]) -> Mapping[str, Param]:
     """Return the declared parameters of a kind, by name, in their order."""
     return _declared(cls)
 
@@ -328,7 +339,7 @@ def shorthands(cls: type[Kind]) -> Mapping[str, Param]:
     return MappingProxyType(merged)
 
 
-def defaults(cls: type) -> dict[str, Any]:
+def defaults(cls: type[Kind]) -> dict[str, Any]:
     """Return the defaults of a kind's declared parameters, by name."""
     fields = {f.name: f for f in dataclasses.fields(cls) if "param" in f.metadata}
     return {
@@ -337,21 +348,27 @@ def defaults(cls: type) -> dict[str, Any]:
     }
 
 
+@cache
+def _usual(cls: type[Kind]) -> Mapping[str, Any]:
+    """Return the defaults of a kind as its objects have them, but for what must be given."""
+    given = {name: v for name, v in defaults(cls).items() if v is not dataclasses.MISSING}
+    return {name: _checked(v, _declared(cls)[name], cls.kind) for name, v in given.items()}
+
+
 def fields_of(kind: Kind) -> dict[str, Any]:
     """Return the values of an object's fields by name."""
-    cls: Any = type(kind)
-    names, read = _fields(cls)
+    names, read = _fields(type(kind))
     return dict(zip(names, read(kind), strict=False))
 
 
 @cache
-def _fields(cls: Any) -> tuple[tuple[str, ...], Callable[[Any], tuple[Any, ...]]]:
+def _fields(cls: type[Kind]) -> tuple[tuple[str, ...], Callable[[Any], tuple[Any, ...]]]:
     """The names of a class's fields, and what reads them all at once, and more."""
     names = tuple(field.name for field in dataclasses.fields(cls))
     return names, attrgetter(*names, "__class__", "__class__")  # of two or more: a tuple
 
 
-def _field_names(cls: Any) -> tuple[str, ...]:
+def _field_names(cls: type[Kind]) -> tuple[str, ...]:
     return _fields(cls)[0]
 
 
@@ -361,12 +378,12 @@ def place_of(kind: Kind, name: str) -> str:
     return f"{kind.kind}.{name}" + (f" of {named!r}" if named else "")
 
 
-def device_params(cls: type) -> Mapping[str, Param]:
+def device_params(cls: type[Kind]) -> Mapping[str, Param]:
     """Return the parameters that the kernels read."""
     return _declared_of(cls, "row")
 
 
-def interior_params(cls: type) -> Mapping[str, Param]:
+def interior_params(cls: type[Kind]) -> Mapping[str, Param]:
     """Return the parameters of the inside of a body; they follow the others in its row."""
     return _declared_of(cls, "inside")
 

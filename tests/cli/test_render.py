@@ -26,6 +26,7 @@ from clpt.cli.options.applied import changed
 from clpt.cli.options.changes import SceneChanges
 from clpt.cli.process import stopping
 from clpt.cli.render import picture
+from clpt.cli.render.passes import render_samples
 from clpt.colour.view import View
 from clpt.errors import DeviceError, SceneError
 from clpt.formats import load
@@ -78,10 +79,18 @@ def test_noise_ends_a_render(tmp_path, capsys):
     )
 
 
-def test_a_limit_of_time_leaves_a_whole_picture(tmp_path, capsys):
-    path = tmp_path / "out.exr"
+def test_a_limit_of_time_leaves_a_whole_picture(tmp_path, capsys, monkeypatch):
+    """The limit is the render's own: neither reading the scene nor compiling counts."""
+    limits, path = [], tmp_path / "out.exr"
+
+    def spied(renderer, end, *others, **options):
+        limits.append(end.seconds)
+        render_samples(renderer, end, *others, **options)
+
+    monkeypatch.setattr(picture, "render_samples", spied)
     arguments = ["-o", str(path), "--size", "64x64", "--time", "0.01s"]
     assert run(["render", CORNELL, *arguments]) == 0
+    assert limits == [0.01]
     with OpenEXR.File(str(path)) as file:
         assert file.header()["spp"] >= 1
     assert (images.read(path).mean(axis=2) > 0).mean() > 0.5  # one sample a pixel at least

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from clpt.__main__ import run
+from clpt.cli.view import page, view
 from clpt.view.access import is_loopback
 
 CORNELL = str(Path(__file__).resolve().parents[2] / "scenes" / "cornell_box")
@@ -35,6 +36,26 @@ def test_it_prints_one_line_and_ends_by_ctrl_c(tmp_path):
         finally:
             process.kill()
         assert process.stdout.read() == ""
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [([], "opens in your browser; Ctrl-C ends it\n"),
+     (["--no-browser"], "open this address in a browser; Ctrl-C ends it\n"), (["--quiet"], "")],
+)  # fmt: skip
+def test_it_says_how_it_ends(options, said, capsys, monkeypatch):
+    class Ended(Exception):
+        """Stands for all that follows the address."""
+
+    def fail(*others):
+        raise Ended
+
+    monkeypatch.setattr(page, "open_scene", fail)
+    monkeypatch.setattr(page.webbrowser, "open", lambda address: True)
+    with pytest.raises(Ended):
+        view.main([CORNELL, *options], standalone_mode=False)
+    told = capsys.readouterr()
+    assert told.out.startswith("http://127.0.0.1:") and told.err == said
 
 
 def test_bad_input_is_one_line(capsys, tmp_path):

@@ -46,11 +46,9 @@ def render_picture(job: Job, shown: Display, began: float) -> int:
         end = former.go_on(renderer, job.until.end(opened.scene), shown.note)
         opened.tell_before(job.verbose)
         picture = _Picture(job, renderer, former, shown)
-        limit = job.until.limit
-        shown.limit = None if limit is None else max(began + limit - picture.ready, 0.0)
         viewer = showing(job.tev, job.scene.name, renderer, shown.note)
         with stops() as stopped, viewer as show_picture:
-            ends = End(end, shown.limit, renderer.scene.noise, stopped)
+            ends = End(end, job.until.limit, renderer.scene.noise, stopped)
             picture.render(opened.maker, ends, show_picture)
             picture.finish(bool(stopped))
             shown.note(report.ending(renderer, ends, time.perf_counter() - began))

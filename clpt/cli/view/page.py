@@ -31,7 +31,7 @@ from ..printing.display import Display as Progress
 from ..printing.display import display
 from ..process.extras import extra
 from ..process.stopping import STATUS, stops
-from .settings import Listening, Settings
+from .settings import Settings
 
 CLOSE_SECONDS = 3.0  # in which a session ends that waits for no compiler
 
@@ -46,7 +46,7 @@ def show(scene: Path, settings: Settings) -> int:
     with ExitStack() as resources:
         server = Server(settings.listening.host, settings.listening.port)
         resources.callback(server.close)
-        _announce(server.address, settings.listening)
+        _announce(server.address, settings)
         shown = display(settings.quiet, None)
         opened = open_scene(file, settings.options, shown, resources)
         where, make = _renderers(settings, opened, shown, resources)
@@ -78,9 +78,13 @@ def _display(settings: Settings) -> Display:
     return Display(grading.exposure, tone, grading.view)
 
 
-def _announce(address: str, listening: Listening) -> None:
-    """Print the page's address, and open the page."""
+def _announce(address: str, settings: Settings) -> None:
+    """Print the page's address, say what to do with it, and open the page."""
+    listening = settings.listening
     click.echo(address)
+    if not settings.quiet:
+        what = "open this address in a browser" if listening.no_browser else "opens in your browser"
+        click.echo(f"{what}; Ctrl-C ends it", err=True)
     if not is_loopback(listening.host):
         warning = f"other machines can reach {listening.host}, and read along"
         click.echo(f"clpt: warning: {warning}", err=True)

@@ -402,7 +402,7 @@ def _warnings(index: SceneIndex) -> list[str]:
             f"film.sensor sees nothing from {film.lambda_min:g} to {film.lambda_max:g} nm, so the"
             " picture is black; ask for film.bands"
         )
-    if next(emissions(index), None) is None:
+    if not index.lights and next(emissions(index), None) is None:
         warnings.append("no light in the scene, so the picture is black: add one to `lights`")
     if film.mode == "rgb" and mt.Fluorescent in index.leaves:
         warnings.append("in rgb mode fluorescent paint has its colour under D65, at most white")

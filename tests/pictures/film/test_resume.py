@@ -19,7 +19,8 @@ from clpt.scene import Scene, lights, shapes
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Independent, Zsobol
 from clpt.scene.materials import Null
-from clpt.scene.media import Blend, HenyeyGreenstein, Homogeneous, Isotropic
+from clpt.scene.media import Homogeneous
+from clpt.scene.phases import Blend, HenyeyGreenstein, Isotropic
 from tests.pictures.support import with_film
 
 SKY = lights.Constant()

@@ -78,5 +78,5 @@ def test_a_scene_without_light_is_told_once() -> None:
     assert warning.startswith("no light in the scene")
     lamp = Sphere(emission=lights.Area())
     whitted = integrators.Whitted()
-    for lit in ({"shapes": [lamp]}, {"integrator": whitted}):
+    for lit in ({"shapes": [lamp]}, {"integrator": whitted}, {"lights": [lights.Sky()]}):
         assert not lower(dataclasses.replace(dark, **lit)).warnings
