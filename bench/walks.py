@@ -54,6 +54,7 @@ def stays(root: Path, start: str = START) -> list[str]:
         room, _, last = name.rpartition(".")
         if last in names.get(room, {}) and names[room][last] != name:  # which another room hands on
             open_.append(names[room][last])
+        name = name if name in functions else f"{name}.__init__"
         if name in functions and name not in seen:
             seen.add(name)
             open_ += _called(functions[name])
@@ -102,5 +103,5 @@ def _called(one: _Function) -> list[str]:
         if isinstance(node, (ast.Name, ast.Attribute)) and id(node) not in types:
             first, *rest = ast.unparse(node).split(".")
             name = ".".join([one.names.get(first, first), *rest])
-            found += [name, f"{name}.__init__", f"{one.owner}.{'.'.join(rest)}"]
+            found += [name, f"{one.owner}.{'.'.join(rest)}"]
     return found
