@@ -131,8 +131,8 @@ assert not {"clpt.render.renderer", "clpt.cluster", "rich"} & sys.modules.keys()
     assert done.returncode == 0, done.stderr
 
 
-def test_side_tools_do_not_weigh_on_a_render(scenes, tmp_path):
-    """Mie's series, spot diagrams, tev, plots, the page and the cluster load when they are asked."""
+def test_side_tools_do_not_weigh_on_a_render(tmp_path):
+    """Mie's series, spots, tev, plots, the page and the cluster load when they are asked."""
     code = """
 import sys
 from clpt.__main__ import run
@@ -141,7 +141,14 @@ side = ("clpt.mie", "clpt.lenses.spots", "clpt.tev", "clpt.cli.plots", "clpt.vie
 side += ("clpt.benchmark", "clpt.testing", "matplotlib", "scipy", "trimesh", "dask", "IPython")
 assert "clpt.render.renderer" in sys.modules and not {*side} & sys.modules.keys()
 """
-    given = ["render", str(scenes / "cornell_box"), "--size", "16x16", "--spp", "1"]
+    given = [
+        "render",
+        str(Path(__file__).parents[1] / "scenes/cornell_box"),
+        "--size",
+        "16x16",
+        "--spp",
+        "1",
+    ]
     given += ["-o", str(tmp_path / "a.exr")]
     done = subprocess.run([sys.executable, "-c", code, *given], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
