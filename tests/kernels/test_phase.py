@@ -17,7 +17,6 @@ from tests.rotation import rotating
 
 BUMPS = np.cos(np.linspace(0.0, 9.0, 33)) + 1.1
 COSINES = (-1.0, -0.95, -0.1, 0.0, 0.3, 0.9, 0.97, 1.0)
-AT = np.sort(LAMBDAS)
 SETTINGS = {
     phases.Isotropic: [{}],
     phases.HenyeyGreenstein: [{"g": g} for g in (-0.95, -0.3, 0.0, 1e-4, 0.002, 0.6, 0.99)],
