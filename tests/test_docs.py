@@ -50,6 +50,15 @@ def test_links_lead_somewhere():
     assert [f"{page.name}: {link}" for page, link in links if not (DOCS / link).exists()] == []
 
 
+def test_the_site_has_the_pictures_of_scenes():
+    pytest.importorskip("mkdocs")
+    from docs.theme.pages import pictures
+
+    for page in (ROOT / "README.md", DOCS / "gallery.md"):
+        shown = re.findall(r"\]\((?:\.\./)?(scenes/[^)]+\.\w+)\)", page.read_text("utf-8"))
+        assert {name for name in shown if not name.endswith(".json")} <= {*pictures()}
+
+
 def test_commands_and_options_exist():
     lines = [(page.name, line) for page in PAGES for line in pages.commands(page)]
     unknown = [(name, line, pages.unknown(line)) for name, line in lines]
