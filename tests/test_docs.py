@@ -11,6 +11,7 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +48,15 @@ def test_every_page_is_in_the_navigation():
 def test_links_lead_somewhere():
     links = [(page, link) for page in PAGES for link in LINK.findall(page.read_text("utf-8"))]
     assert [f"{page.name}: {link}" for page, link in links if not (DOCS / link).exists()] == []
+
+
+def test_the_site_has_the_pictures_of_scenes():
+    pytest.importorskip("mkdocs")
+    from docs.theme.pages import pictures
+
+    for page in (ROOT / "README.md", DOCS / "gallery.md"):
+        shown = re.findall(r"\]\((?:\.\./)?(scenes/[^)]+\.\w+)\)", page.read_text("utf-8"))
+        assert {name for name in shown if not name.endswith(".json")} <= {*pictures()}
 
 
 def test_commands_and_options_exist():
@@ -98,6 +108,22 @@ def test_pages_use_plain_words():
 def test_commands_name_files_of_the_repository_that_are_there():
     lines = [(page.name, line) for page in PAGES for line in pages.commands(page)]
     assert [(name, pages.lost(line, ROOT)) for name, line in lines if pages.lost(line, ROOT)] == []
+
+
+def test_what_one_command_writes_no_other_scene_overwrites():
+    """Whoever follows several pages in one folder keeps all pictures."""
+    made: dict[str, set[str]] = {}
+    for page in (*PAGES, ROOT / "README.md"):
+        for line in pages.commands(page):
+            _, name, *words = shlex.split(line, comments=True)
+            source = words[0] if name == "render" else name
+            for option, value in pairwise(words):
+                if option in ("-o", "--output"):
+                    made.setdefault(value, set()).add(source)
+        for code in pages.blocks(page, "python"):
+            for value in re.findall(r'(?:write_image|write_layers|save)\(\s*"([^"]+)"', code):
+                made.setdefault(value, set()).add(f"Python of {page.name}")
+    assert {name: of for name, of in made.items() if len(of) > 1} == {}
 
 
 TYPED = ("rendering.md", "image_tools.md", "recipes.md", "tutorial.md", "noise.md", "denoising.md")
@@ -234,7 +260,16 @@ def test_the_code_of_architecture(run: Run, capsys: pytest.CaptureFixture):
 @pytest.mark.slow
 def test_the_recipes(run: Run):
     run("recipes.md")
-    for name in ("object", "glass", "gold", "focus", "product", "outdoors", "cloud"):
+    for name in (
+        "object",
+        "chrome",
+        "glass",
+        "golden_pawn",
+        "focus",
+        "product",
+        "outdoors",
+        "noon",
+    ):
         picture = clpt.read_image(f"{name}.png")
         assert picture.shape == (30, 40, 3) and 0.01 < picture.mean() < 0.95, name
 
@@ -250,7 +285,7 @@ def test_the_code_of_colour(run: Run):
     pytest.importorskip("PyOpenColorIO", reason="OpenColorIO is not installed")
     names = run("colour.md")
     assert names["view"].name.startswith("ACES 2.0")
-    agx, aces = (clpt.read_image(f"cornell{name}.png").mean() for name in ("", "_aces"))
+    agx, aces = (clpt.read_image(f"{name}.png").mean() for name in ("graded", "cornell_aces"))
     assert agx > 1.5 * aces > 0.0  # half a stop more, and other curves
 
 

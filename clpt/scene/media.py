@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt import spectra
 from clpt.errors import SceneError
+from clpt.records import CLOUD_OCTAVES
 from clpt.scene.params import (
     Kind,
     coefficient,
@@ -39,7 +40,7 @@ from clpt.spectra.spectrum import WIDEST, extremes
 SOOT = 0.26  # E(m), the imaginary part of (m^2 - 1) / (m^2 + 2) without its sign
 COLDEST = 100.0  # [K] below which nothing is seen of a black body
 ON_POINTS = ("emission_grid", "temperature", "albedo_grid", "color_grid")  # of a `Grid`
-OCTAVE = 1.99  # how much finer each octave of a cloud's noise is than the one before
+OCTAVE = CLOUD_OCTAVES["finer"]
 CLOUD_LEAST, CLOUD_MOST, CLOUD_FINEST = 32, 256, 1024  # points along a cloud's longest side
 MOST_PARTS = 8  # of a mixture
 RADIANCE = "W m^-2 sr^-1 nm^-1"

@@ -66,7 +66,11 @@ PARTS = {  # modules on the page of their package, which exports no names itself
 }
 SHOWN = {*MODULES, *(f"{package}.{part}" for package, parts in PARTS.items() for part in parts)}
 DEEPER = {"heading_level": 3}
-PAIR = re.compile(r"^```json\n(.*?)^```\n\n?^```python\n(.*?)^```\n", re.M | re.S)
+TABS = {"json": "JSON", "python": "Python", "xml": "Mitsuba XML"}
+BLOCK = r"^```(?:{})\n(?:(?!```).*\n)*```\n"
+TABBED = re.compile(
+    rf"{BLOCK.format('json')}\n?{BLOCK.format('python')}(?:\n?{BLOCK.format('xml')})?", re.M
+)
 LINK = re.compile(r"(!?)\[((?:`[^`]*`|[^\]\[])*)\]\((?!\w+:)([^)#\s]*)(#[^)\s]*)?\)")
 
 
@@ -81,10 +85,15 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
             parts += [f"## `{module}.{part}`", f"::: {module}.{part}\n    options: {DEEPER}"]
         files.append(File.generated(config, f"api/{page}.md", content="\n\n".join(parts)))
     files.append(File.generated(config, "command_line.md", content=command_line()))
-    for picture in sorted(ROOT.glob("scenes/*/picture*.png")):
-        name = picture.relative_to(ROOT).as_posix()
-        files.append(File.generated(config, name, abs_src_path=str(picture)))
+    for name in pictures():
+        files.append(File.generated(config, name, abs_src_path=str(ROOT / name)))
     return files
+
+
+def pictures() -> list[str]:
+    """Return the pictures of scenes, which lie beside them."""
+    found = sorted(ROOT.glob("scenes/*/picture*"))
+    return [picture.relative_to(ROOT).as_posix() for picture in found]
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
@@ -105,16 +114,15 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
         relative = posixpath.relpath(page_path, posixpath.dirname(own) or ".")
         return f"{picture}[{text}]({relative}{anchor})"
 
-    return PAIR.sub(_tabs, LINK.sub(relinked, markdown))
+    return TABBED.sub(_tabs, LINK.sub(relinked, markdown))
 
 
 def _tabs(match: re.Match[str]) -> str:
-    """Return tabs for a block of JSON that a block of Python follows."""
+    """Return tabs for a block of JSON that one of Python, and perhaps of XML, follows."""
     parts = []
-    for title, language, code in (("JSON", "json", match[1]), ("Python", "python", match[2])):
-        block = f"```{language}\n{code}```\n"
+    for block, language in re.findall(r"(```(\w+)\n.*?```\n)", match[0], re.S):
         inside = re.sub(r"^(?=.)", "    ", block, flags=re.M)
-        parts.append(f'=== "{title}"\n\n{inside}')
+        parts.append(f'=== "{TABS[language]}"\n\n{inside}')
     return "\n".join(parts)
 
 

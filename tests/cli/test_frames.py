@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 import numpy as np
 import pytest
+from PIL import Image
 
 from clpt import device, images
 from clpt.__main__ import run
@@ -204,6 +205,9 @@ with open(sys.argv[-1], "wb") as file:
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     assert run([*command, "--video", "a.mp4"]) == 2
     assert "clpt[video]" in capsys.readouterr().err
+    assert run([*command, "--video", "a.webp"]) == 0  # this one needs no other package
+    with Image.open("a.webp") as moving:
+        assert moving.n_frames == 3 and moving.size == (16, 12) and moving.info["loop"] == 0
 
 
 @pytest.mark.parametrize(

@@ -268,7 +268,9 @@ _ANIMATION = (
         "--fps", type=click.FloatRange(0.0, min_open=True), default=24.0, show_default=True,
         help="Frames a second, of {time} and of the video.",
     ),
-    click.option("--video", type=click.Path(path_type=Path), help="Write the frames as .mp4 too."),
+    click.option(
+        "--video", type=click.Path(path_type=Path), help="Write the frames as .mp4 or .webp too."
+    ),
 )  # fmt: skip
 _SEED = click.option(
     "--seed", type=click.IntRange(0, 2**31 - 1), help="Seed of the random numbers."

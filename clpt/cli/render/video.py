@@ -1,6 +1,7 @@
 """A video of frames that are image files, by the ffmpeg of the package imageio-ffmpeg.
 
-The package's own writer does not tell whether ffmpeg came to its end, so it is not used.
+The package's own writer does not tell whether ffmpeg came to its end, so it is not used. A .webp is
+a picture that moves, for pages; Pillow writes it.
 """
 
 from __future__ import annotations
@@ -11,9 +12,11 @@ import time
 from collections.abc import Sequence
 from contextlib import suppress
 from fractions import Fraction
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 from ... import images, output_files
 from ...errors import SceneError
@@ -21,7 +24,8 @@ from ..process.extras import extra
 from ..process.stopping import stops
 
 LOOK = 0.02  # seconds between two looks at ffmpeg
-FORMATS = (".mp4", ".mov", ".mkv", ".webm")
+MOVING_PICTURE = ".webp"
+FORMATS = (".mp4", ".mov", ".mkv", ".webm", MOVING_PICTURE)
 QUALITY = {"libx264": ["-crf", "16"], "libvpx-vp9": ["-crf", "24", "-b:v", "0"]}
 # Even sides, which chroma of half the size needs, and colours as screens for Rec. 709 expect.
 FILTER = (
@@ -38,17 +42,37 @@ def check(path: Path) -> None:
         output_files.check_writable(path)
     except OSError as error:
         raise SceneError(f"cannot be written: {error}", file=path) from error
-    with extra("video", "--video"):
-        import imageio_ffmpeg  # noqa: F401
+    if path.suffix.lower() != MOVING_PICTURE:
+        with extra("video", "--video"):
+            import imageio_ffmpeg  # noqa: F401
 
 
 def write(path: Path, frames: Sequence[Path], fps: float) -> None:
     """Write .png files of one size as a video. Raises SceneError."""
+    if path.suffix.lower() == MOVING_PICTURE:
+        _moving_picture(path, frames, fps)
+        return
     with extra("video", "--video"):
         from imageio_ffmpeg import get_ffmpeg_exe
     try:
         with output_files.replacing(path) as partial:
             _encode(get_ffmpeg_exe(), partial, frames, fps)
+    except OSError as error:
+        raise SceneError(f"cannot be written: {error}", file=path) from error
+
+
+def _moving_picture(path: Path, frames: Sequence[Path], fps: float) -> None:
+    """Write .png files of one size as a .webp that begins again at its end. Raises SceneError."""
+    first, *others = (Image.fromarray(_read(frame)) for frame in frames)
+    if any(other.size != first.size for other in others):
+        raise SceneError("frames of a video have one size", file=frames[0])
+    ends = [round(1000 * n / fps) for n in range(len(frames) + 1)]  # [ms]
+    try:
+        with output_files.replacing(path) as partial:
+            first.save(
+                partial, "WEBP", save_all=True, append_images=others, loop=0, quality=80, method=6,
+                duration=[end - begin for begin, end in pairwise(ends)],
+            )  # fmt: skip
     except OSError as error:
         raise SceneError(f"cannot be written: {error}", file=path) from error
 

@@ -11,6 +11,7 @@ import json
 import sys
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from clpt.formats.native import forms
 from clpt.formats.native.reradiation import RERADIATIONS
 from clpt.formats.native.shape_files import FILES
 from clpt.formats.native.spectra import SPECTRA
-from clpt.scene import KINDS, integrators, materials, shapes
+from clpt.scene import KINDS, integrators, materials, shapes, textures
 from clpt.scene.params import Kind, defaults, params
 
 INTRODUCTION = """# scene.json
@@ -121,6 +122,18 @@ HEADINGS = {
 }  # fmt: skip
 
 
+MITSUBA = {  # elements of kinds whose plugin there has the same name and parameters
+    **dict.fromkeys(
+        (materials.Diffuse, materials.Dielectric, materials.ThinDielectric,
+         materials.RoughDielectric, materials.Conductor, materials.RoughConductor,
+         materials.Plastic, materials.RoughPlastic, materials.Principled,
+         materials.PrincipledThin, materials.Grating),
+        "bsdf",
+    ),
+    textures.Checkerboard: "texture",
+}  # fmt: skip
+
+
 def text() -> str:
     """Return the page as the published file has it."""
     parts = [INTRODUCTION, *_spectra()]
@@ -173,7 +186,8 @@ def _reradiations() -> list[str]:
 
 
 def _kind(category: str, cls: type[Kind]) -> str:
-    shown = "\n".join([_summary(cls) + _picture(category, cls), *map(_blocks, example(cls))])
+    blocks = [_blocks(*both, xml(cls)) for both in example(cls)]
+    shown = "\n".join([_summary(cls) + _picture(category, cls), *blocks])
     return f"### `{cls.kind}`\n\n{shown}\n{_table(cls)}"
 
 
@@ -184,12 +198,31 @@ def example(cls: type[Kind]) -> list[tuple[str, str]]:
     """
     if cls in FILES or cls is shapes.Instance:
         return []
-    default, own = defaults(cls), vars(cls).get("__annotations__", {})
-    plain = {n: default[n] for n in params(cls) if n in own and _is_plain(default[n])}
-    chosen = dict(list(plain.items())[:EXAMPLE])
+    chosen = _chosen(cls)
     given = ", ".join(f"{name}={value!r}" for name, value in chosen.items())
     code = f"{cls.__module__.rpartition('.')[2]}.{cls.__name__}({given})"
     return [(json.dumps({"type": cls.kind, **chosen}), code)]
+
+
+def xml(cls: type[Kind]) -> str:
+    """Return the same as an element of Mitsuba's, empty where it has no plugin of that name."""
+    if cls not in MITSUBA:
+        return ""
+    lines = [f'<{MITSUBA[cls]} type="{cls.kind.replace("_", "")}">']
+    if "distribution" in params(cls):  # Mitsuba's default is another one
+        lines.append(f'    <string name="distribution" value="{defaults(cls)["distribution"]}"/>')
+    for name, value in _chosen(cls).items():
+        number = params(cls)[name].role.name == "real" or name.endswith("_ior")
+        tag = "float" if number else "spectrum"
+        lines.append(f'    <{tag} name="{name}" value="{value:g}"/>')
+    return "\n".join([*lines, f"</{MITSUBA[cls]}>"])
+
+
+def _chosen(cls: type[Kind]) -> dict[str, Any]:
+    """Return the parameters that an example shows, with their defaults."""
+    default, own = defaults(cls), vars(cls).get("__annotations__", {})
+    plain = {n: default[n] for n in params(cls) if n in own and _is_plain(default[n])}
+    return dict(list(plain.items())[:EXAMPLE])
 
 
 def _is_plain(value: object) -> bool:
@@ -198,10 +231,10 @@ def _is_plain(value: object) -> bool:
     return bool(each) and all(type(one) in (int, float) for one in each)
 
 
-def _blocks(both: tuple[str, str]) -> str:
-    """Return a block of JSON and one of Python, which the site shows as tabs."""
-    text, code = both
-    return f"```json\n{text}\n```\n\n```python\n{code}\n```\n"
+def _blocks(text: str, code: str, element: str) -> str:
+    """Return blocks of JSON, Python and Mitsuba's XML, which the site shows as tabs."""
+    blocks = {"json": text, "python": code, "xml": element}
+    return "\n".join(f"```{name}\n{block}\n```\n" for name, block in blocks.items() if block)
 
 
 def _picture(category: str, cls: type[Kind]) -> str:

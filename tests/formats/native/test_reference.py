@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import get_args
 
+import clpt
 from clpt import scene
 from clpt.formats.native import forms, reference
 from clpt.scene import KINDS, integrators, materials
@@ -56,3 +57,21 @@ def test_examples_say_the_same_in_json_and_python():
                 assert repr(eval(code, modules)) == repr(cls(**lists))
                 shown += 1
     assert shown > 60
+
+
+def test_examples_in_xml_say_the_same(tmp_path):
+    """Mitsuba's reader takes them for what the example in Python makes."""
+    modules = {name: getattr(scene, name) for name in scene.__all__}
+    for cls, tag in reference.MITSUBA.items():
+        element, ((_, code),) = reference.xml(cls), reference.example(cls)
+        if tag == "texture":
+            named = element.replace("<texture", '<texture name="reflectance"')
+            element = f'<bsdf type="diffuse">{named}</bsdf>'
+        inside = f'<shape type="sphere">{element}</shape>'
+        file = tmp_path / "scene.xml"
+        file.write_text(
+            f'<scene version="3.0.0"><sensor type="perspective"/>{inside}</scene>', "utf-8"
+        )
+        read = clpt.load(file).shapes[0].material
+        read = read.reflectance if tag == "texture" else read
+        assert repr(read) == repr(eval(code, modules)), element

@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt.arrays import Array, Floats
+from clpt.records import GRID_SIZES
 
 Directions = Callable[[ArrayLike, ArrayLike], Floats]  # unit (..., 3) of rows and columns 0 to 1
 
-SIDE = 8  # of the square of parts of the octahedron, GRID_SIDE
+SIDE = GRID_SIZES["side"]  # of the square of parts of the octahedron
 DOWN, ACROSS = 8, 16  # blocks of a grid, at most; of several grids a fourth of a face's side each
 FINER = 4  # parts of a block's side, of each of which the cosine is taken
 NORMALS = 5  # of a part, along each axis

@@ -280,9 +280,15 @@ def _bordered(faces: Floats32) -> Floats32:
     """The faces (6, n + 2, n + 2, 3) with the nearest texels of their neighbours around them."""
     n = faces.shape[1]
     centers = (np.arange(-1, n + 1) + 0.5) / n * 2.0 - 1.0
-    face, a, b = face_coordinates(face_directions(centers[None, :], centers[:, None]))
+    around = np.ones((n + 2, n + 2), bool)
+    around[1:-1, 1:-1] = False
+    rows, columns = np.nonzero(around)
+    face, a, b = face_coordinates(face_directions(centers[columns], centers[rows]))
     column, row = (np.clip(((c + 1.0) * 0.5 * n).astype(int), 0, n - 1) for c in (a, b))
-    return faces[face, row, column]
+    bordered = np.empty((6, n + 2, n + 2, 3), np.float32)
+    bordered[:, 1:-1, 1:-1] = faces
+    bordered[:, rows, columns] = faces[face, row, column]
+    return bordered
 
 
 def _brightness(image: Floats32) -> Floats32:
