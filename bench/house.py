@@ -20,7 +20,7 @@ from pathlib import Path
 import click
 from click.testing import CliRunner
 
-from bench import imports, kernel_files, python_files
+from bench import imports, kernel_files, python_files, walks
 from bench.imports import ROOT
 
 LINES, LONG = 40, 60  # of a function: what it may have, and what it must not
@@ -121,6 +121,14 @@ def circles(root: Path) -> Iterator[Figure]:
     yield _sum("rooms in circles of imports", found)
 
 
+def ways(root: Path) -> Iterator[Figure]:
+    """Functions that see a whole scene between `clpt.render` and the tables; see bench.walks."""
+    found = walks.stays(root)
+    yield Figure("stays of a scene from render() to the tables", len(found), tuple(found))
+    rooms = tuple(dict.fromkeys(place.partition(" ")[0] for place in found))
+    yield Figure("rooms of these stays", len(rooms), rooms)
+
+
 def words(root: Path) -> Iterator[Figure]:
     """Docstrings that cannot be understood alone."""
     found = [
@@ -145,7 +153,7 @@ def programs(root: Path) -> Iterator[Figure]:
 
 
 MEASURES: tuple[Callable[[Path], Iterator[Figure]], ...] = (
-    functions, kernels, features, types, circles, sizes, words, programs,
+    functions, kernels, features, types, circles, ways, sizes, words, programs,
 )  # fmt: skip
 
 Counted = Iterable[tuple[int, str]]

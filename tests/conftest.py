@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import os
+import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -13,7 +15,11 @@ import pytest
 
 from clpt import device
 
+# the processes that tests start take a second each to parse all sources, where none keeps bytecode
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 os.environ.setdefault("POCL_WORK_GROUP_SPECIALIZATION", "0")  # as of the command
+gc.disable()  # what collection makes stays: to seek garbage in it takes a third of the time
 HERE = Path(__file__).resolve().parent
 # Tests that start processes, and wait for what the machine's other work may hold up.
 PROCESSES = [HERE / name for name in ("benchmark", "cli", "cluster", "device", "embedding")]
@@ -30,6 +36,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         if any(item.path.is_relative_to(folder) for folder in PROCESSES):
             item.add_marker(pytest.mark.flaky(reruns=2))
+
+
+def pytest_collection_finish() -> None:
+    """Collect cycles from now on, but among what tests make alone."""
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(scope="session")

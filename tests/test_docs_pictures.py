@@ -6,19 +6,28 @@ import dataclasses
 import json
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
+import pytest
 from PIL import Image
 
 from clpt.scene import KINDS
 from clpt.scene.params import Kind
-from docs.pictures import sheet, table
 
 ROOT = Path(__file__).resolve().parents[1]
 
 
-def test_every_kind_has_a_picture_and_every_picture_is_of_a_kind():
+@pytest.fixture(scope="module")
+def table() -> ModuleType:
+    """The table of pictures, whose materials take seconds to make: not for each collection."""
+    from docs.pictures import table
+
+    return table
+
+
+def test_every_kind_has_a_picture_and_every_picture_is_of_a_kind(table):
     assert {c: list(made) for c, made in table.PICTURES.items()} == {
         category: [cls.kind for cls in classes] for category, classes in KINDS.items()
     }
@@ -28,7 +37,7 @@ def test_every_kind_has_a_picture_and_every_picture_is_of_a_kind():
     assert files == set(table.pictures()), "run python -m docs.pictures with the names that differ"
 
 
-def test_the_picture_of_a_kind_shows_it():
+def test_the_picture_of_a_kind_shows_it(table):
     wrong = []
     for name, picture in table.pictures().items():
         category, kind = name.split("/")
@@ -42,7 +51,9 @@ def test_the_picture_of_a_kind_shows_it():
     assert not wrong, "\n  ".join([asked, *wrong])
 
 
-def test_captions_and_contact_sheet_are_up_to_date():
+def test_captions_and_contact_sheet_are_up_to_date(table):
+    from docs.pictures import sheet
+
     told = {name: picture.caption for name, picture in table.pictures().items()}
     assert json.loads(table.CAPTIONS.read_text("utf-8")) == told, "run python -m docs.pictures none"
     page = (ROOT / "docs/gallery.md").read_text("utf-8")

@@ -129,3 +129,26 @@ assert not {"clpt.render.renderer", "clpt.cluster", "rich"} & sys.modules.keys()
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+def test_side_tools_do_not_weigh_on_a_render(tmp_path):
+    """Mie's series, spots, tev, plots, the page and the cluster load when they are asked."""
+    code = """
+import sys
+from clpt.__main__ import run
+assert run(sys.argv[1:]) == 0
+side = ("clpt.mie", "clpt.lenses.spots", "clpt.tev", "clpt.cli.plots", "clpt.view", "clpt.cluster")
+side += ("clpt.benchmark", "clpt.testing", "matplotlib", "scipy", "trimesh", "dask", "IPython")
+assert "clpt.render.renderer" in sys.modules and not {*side} & sys.modules.keys()
+"""
+    given = [
+        "render",
+        str(Path(__file__).parents[1] / "scenes/cornell_box"),
+        "--size",
+        "16x16",
+        "--spp",
+        "1",
+    ]
+    given += ["-o", str(tmp_path / "a.exr")]
+    done = subprocess.run([sys.executable, "-c", code, *given], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

@@ -1,7 +1,16 @@
 """Acceleration structures over triangles and boxes, built on the device."""
 
 from ..choices import Quality
-from .build import Bvh, build, build_boxes, build_parts, choose_layout, choose_tree, outgrows_caches
+from .build import (
+    Bvh,
+    Runs,
+    build,
+    build_boxes,
+    build_parts,
+    choose_layout,
+    choose_tree,
+    outgrows_caches,
+)
 from .building import Building
 from .layouts import LAYOUTS, TREES, shapes_layout, traversal_text
 from .refit import rebuild_boxes, refit, refit_boxes
@@ -12,6 +21,7 @@ __all__ = [
     "Building",
     "Bvh",
     "Quality",
+    "Runs",
     "build",
     "build_boxes",
     "build_parts",

@@ -133,32 +133,46 @@ def _build(
     return Bvh(layout, count, packed.buffers, (part,), stats)
 
 
+@dataclass(frozen=True)
+class Runs:
+    """Runs of triangles, one after the other; triangles count from 0 in each.
+
+    counts: their lengths; keys: of each run how many rows a vertex has, 1 by default, see
+    clpt.bvh.keyed; corners: the vertices on the host, for runs of several.
+    """
+
+    counts: Sequence[int]
+    keys: Sequence[int] = ()
+    corners: NDArray | None = None
+
+    @property
+    def firsts(self) -> list[int]:
+        """The first triangle of each run, and the end of the last one."""
+        ends: list[int] = np.cumsum([0, *self.counts]).tolist()
+        return ends
+
+
 def build_parts(
     device: Device,
     vertices: Array,
     faces: NDArray,
     tags: NDArray,
-    counts: Sequence[int],
+    runs: Runs,
     layout: str,
     quality: Quality = "high",
-    keys: Sequence[int] = (),
-    corners: NDArray | None = None,
 ) -> tuple[Bvh, NDArray[np.uint32]]:
     """Build a tree for each run of triangles, in shared buffers.
 
-    counts: the lengths of the runs, one after the other; triangles count from 0 in each. Returns
-    the trees, and the offsets of the nodes and leaves of each, (n, 2) uint32 [32 bytes]. keys: of
-    each run how many rows a vertex has, see clpt.bvh.keyed; corners: the vertices on the host, for
-    runs of several. The other parameters are those of `build`, which raises alike.
+    Returns the trees, and the offsets of the nodes and leaves of each, (n, 2) uint32 [32 bytes].
+    The other parameters are those of `build`, which raises alike.
     """
     start = time.perf_counter()
     trees, building = [], Building(device)
-    runs = pairwise(np.cumsum([0, *counts]).tolist())
-    for (i, j), rows in zip(runs, chain(keys, repeat(1)), strict=False):
+    for (i, j), rows in zip(pairwise(runs.firsts), chain(runs.keys, repeat(1)), strict=False):
         building = Building(device, building.stream)
-        if rows > 1 and corners is not None:
-            _check_reach(corners, "a vertex")
-            packed = keyed(building, corners, faces[i:j], tags[i:j], rows, layout, quality)
+        if rows > 1 and runs.corners is not None:
+            _check_reach(runs.corners, "a vertex")
+            packed = keyed(building, runs.corners, faces[i:j], tags[i:j], rows, layout, quality)
             trees.append(Bvh(layout, j - i, packed.buffers, (packed.part,), packed.stats))
             continue
         trees.append(_build(building, vertices, faces[i:j], tags[i:j], layout, quality))
@@ -174,12 +188,11 @@ def build_parts(
     building.stream.wait()
     stats = {"trees": len(trees), "seconds": time.perf_counter() - start}
     offsets //= 32
-    firsts = np.cumsum([0, *counts]).tolist()
     parts = tuple(
         replace(tree_.parts[0], nodes=nodes, leaves=leaves, first=first)
-        for tree_, (nodes, leaves), first in zip(trees, offsets.tolist(), firsts, strict=False)
+        for tree_, (nodes, leaves), first in zip(trees, offsets.tolist(), runs.firsts, strict=False)
     )
-    return Bvh(layout, sum(counts), buffers, parts, stats), offsets.astype(np.uint32)
+    return Bvh(layout, runs.firsts[-1], buffers, parts, stats), offsets.astype(np.uint32)
 
 
 def build_boxes(device: Device, boxes: NDArray, layout: str = "shapes_binary") -> Bvh:

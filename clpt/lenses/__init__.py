@@ -3,7 +3,7 @@
 Lengths are in millimetres here, wavelengths in nm.
 """
 
-from clpt.lenses import paraxial, spots
+from clpt.lenses import paraxial
 from clpt.lenses.coatings import COATINGS
 from clpt.lenses.files import READERS, library, names, read
 from clpt.lenses.paraxial import Cardinal, cardinal
@@ -21,5 +21,4 @@ __all__ = [
     "names",
     "paraxial",
     "read",
-    "spots",
 ]

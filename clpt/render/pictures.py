@@ -13,7 +13,7 @@ from pyopencl.array import Array
 from clpt import device as dev
 from clpt import images
 from clpt.colour.view import View
-from clpt.render.film.resolve import Resolve
+from clpt.render.film.resolve import Resolve, Screen
 from clpt.render.film_renderer import FilmRenderer
 from clpt.render.locking import synchronized
 from clpt.render.stats import RenderStats
@@ -81,11 +81,8 @@ class DevicePictures(FilmRenderer):
         """
         if self._resolve is None:
             self._resolve = Resolve(self.device, self._wavefront.stream)
-        return self._resolve(
-            self.film, into, dtype=dtype, exposure=exposure,
-            tone=tone, srgb=srgb, flip=flip, view=view, wait_for=wait_for,
-            space=self.scene.film.output_space,
-        )  # fmt: skip
+        screen = Screen(exposure, tone, srgb, view, self.scene.film.output_space)
+        return self._resolve(self.film, into, screen, dtype=dtype, flip=flip, wait_for=wait_for)
 
     def widget(self, **options: Any) -> Any:
         """Return a widget for notebooks: the scene, rendered while it is watched and steered.

@@ -96,7 +96,7 @@ class PoweredLamp(Lamp):
 
         area: of its surface [m^2].
         """
-        return 4.0 * math.pi
+        raise NotImplementedError(f"{type(self).__name__}.extent: what it sends out in all")
 
     def check(self) -> None:
         """Raise SceneError for a strength that is given twice."""
@@ -190,6 +190,10 @@ class Point(PoweredLamp):
     intensity: SpectrumLike = emission(1.0, "radiant intensity", "W sr^-1 nm^-1")
     falloff: bool = flag(True, "False: irradiance does not fall with the distance (not physical)")
 
+    def extent(self, area: float) -> float:
+        """Return the solid angle of all directions [sr]."""
+        return 4.0 * math.pi
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Spot(PoweredLamp):
@@ -250,6 +254,10 @@ class Goniometric(PoweredLamp):
     )
     image: Textured = reflectance(1.0, "factor by direction; a bitmap may go beyond 1")
     to_world: Matrix4 = host(np.eye(4), "placement, (4, 4), without a shear")
+
+    def extent(self, area: float) -> float:
+        """Return the solid angle of all directions, before the image takes its share [sr]."""
+        return 4.0 * math.pi
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -131,6 +131,11 @@ class Material(Scatterer):
     layers = cast("tuple[Layer, ...]", ())
 
 
+def _factor(of: str, *, linear: bool = False) -> Any:
+    """Declare a factor on light that a material sends out, which is 1 in physics."""
+    return reflectance(1.0, f"factor on {of}; 1 is physical", linear=linear)
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Diffuse(Material):
     """Lambertian reflection of the front side."""
@@ -166,12 +171,8 @@ class Dielectric(Material):
 
     int_ior: IndexLike = index(1.5046, "inside index, number, glass name or spectrum")
     ext_ior: IndexLike = index(1.000277, "outside index")
-    specular_reflectance: Textured = reflectance(
-        1.0, "factor on reflection; 1 is physical", linear=True
-    )
-    specular_transmittance: Textured = reflectance(
-        1.0, "factor on transmission; 1 is physical", linear=True
-    )
+    specular_reflectance: Textured = _factor("reflection", linear=True)
+    specular_transmittance: Textured = _factor("transmission", linear=True)
     absorption: SpectrumLike = coefficient(0.0, "of the inside: exp(-absorption distance) passes")
     layers: tuple[Layer, ...] = layers(FILMS)
 
@@ -190,12 +191,8 @@ class ThinDielectric(Material):
 
     int_ior: IndexLike = index(1.5046, "index of the slab")
     ext_ior: IndexLike = index(1.000277, "index around it")
-    specular_reflectance: Textured = reflectance(
-        1.0, "factor on reflection; 1 is physical", linear=True
-    )
-    specular_transmittance: Textured = reflectance(
-        1.0, "factor on transmission; 1 is physical", linear=True
-    )
+    specular_reflectance: Textured = _factor("reflection", linear=True)
+    specular_transmittance: Textured = _factor("transmission", linear=True)
 
     @property
     def transmits(self) -> bool:
@@ -222,12 +219,8 @@ class RoughDielectric(Material):
         0.1, "roughness along the tangent", low=1e-4, high=1.0, textured=True
     )
     alpha_v: TexturedNumber = real(0.1, "roughness across it", low=1e-4, high=1.0, textured=True)
-    specular_reflectance: Textured = reflectance(
-        1.0, "factor on reflection; 1 is physical", linear=True
-    )
-    specular_transmittance: Textured = reflectance(
-        1.0, "factor on transmission; 1 is physical", linear=True
-    )
+    specular_reflectance: Textured = _factor("reflection", linear=True)
+    specular_transmittance: Textured = _factor("transmission", linear=True)
     absorption: SpectrumLike = coefficient(0.0, "of the inside: exp(-absorption distance) passes")
     layers: tuple[Layer, ...] = layers(FILMS)
 
@@ -248,9 +241,7 @@ class Conductor(Material):
 
     eta: IndexLike | Texture = index(0.0, "index of refraction", zero=True, textured=True)
     k: IndexLike | Texture = index(1.0, "extinction coefficient", zero=True, textured=True)
-    specular_reflectance: Textured = reflectance(
-        1.0, "factor on reflection; 1 is physical", linear=True
-    )
+    specular_reflectance: Textured = _factor("reflection", linear=True)
     layers: tuple[Layer, ...] = layers(FILMS)
 
 
@@ -271,9 +262,7 @@ class RoughConductor(Material):
         0.1, "roughness along the tangent", low=1e-4, high=1.0, textured=True
     )
     alpha_v: TexturedNumber = real(0.1, "roughness across it", low=1e-4, high=1.0, textured=True)
-    specular_reflectance: Textured = reflectance(
-        1.0, "factor on reflection; 1 is physical", linear=True
-    )
+    specular_reflectance: Textured = _factor("reflection", linear=True)
     layers: tuple[Layer, ...] = layers(FILMS)
 
 
@@ -286,9 +275,7 @@ class Plastic(Material):
     diffuse_reflectance: Textured = reflectance(0.5, "albedo of the base")
     int_ior: IndexLike = index(1.49, "index of the coat")
     ext_ior: IndexLike = index(1.000277, "index outside")
-    specular_reflectance: Textured = reflectance(
-        1.0, "factor on the coat's reflection; 1 is physical"
-    )
+    specular_reflectance: Textured = _factor("the coat's reflection")
     nonlinear: bool = flag(False, "whether internal reflection saturates the colour")
 
 
@@ -305,9 +292,7 @@ class RoughPlastic(Material):
     diffuse_reflectance: Textured = reflectance(0.5, "albedo of the base")
     int_ior: IndexLike = index(1.49, "index of the coat")
     ext_ior: IndexLike = index(1.000277, "index outside")
-    specular_reflectance: Textured = reflectance(
-        1.0, "factor on the coat's reflection; 1 is physical"
-    )
+    specular_reflectance: Textured = _factor("the coat's reflection")
     distribution: str = choice("ggx", "of the microfacet normals", DISTRIBUTIONS)
     alpha: TexturedNumber = real(0.1, "roughness", low=1e-4, high=1.0, textured=True)
     nonlinear: bool = flag(False, "whether internal reflection saturates the colour")
@@ -349,9 +334,7 @@ class CoatedConductor(Material):
     alpha_v: TexturedNumber = real(
         0.1, "the metal's roughness across it", "", 1e-4, 1.0, textured=True
     )
-    specular_reflectance: Textured = reflectance(
-        1.0, "factor on the metal's reflection; 1 is physical"
-    )
+    specular_reflectance: Textured = _factor("the metal's reflection")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -584,9 +567,7 @@ class Grating(Material):
     k: IndexLike | Texture = index(
         1.0, "extinction coefficient of the metal", zero=True, textured=True
     )
-    reflectance: Textured = reflectance(
-        1.0, "factor on the light of all orders; 1 is physical", linear=True
-    )
+    reflectance: Textured = _factor("the light of all orders", linear=True)
 
     @property
     def transmits(self) -> bool:

@@ -32,7 +32,8 @@ inline void query_put(TriHit hit, uint8 begins, uint i, global float *t, global 
 /* The rays of a batch: `alone` traces ray i by itself; `step` takes state s a step further and is 0 at the end of
  * ray i, where `finish` stores its hit. */
 #define QUERY_BATCH(alone, step, finish)                                                        \
-    uint next = get_global_id(0) * QUERY_RAYS, end = min(next + QUERY_RAYS, count), active = INTERLEAVED; \
+    uint next = get_global_id(0) * QUERY_RAYS, end = min(next + QUERY_RAYS, count);             \
+    uint active = INTERLEAVED;                                                                  \
     if (next >= end) return;                                                                    \
     if (query_alike(directions + begins.s1, next, end)) {                                       \
         for (uint i = next; i < end; i++) {                                                     \

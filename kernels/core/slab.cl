@@ -45,22 +45,16 @@ inline void slab_write_vec3(Slab s, uint c, uint at, mask m, vec3 v)
 inline Spectrum slab_read_spectrum(Slab s, uint c, uint at)
 {
     Spectrum r;
-    r.x = slab_read(s, c, at);
-    r.y = slab_read(s, c + 1u, at);
-    r.z = slab_read(s, c + 2u, at);
-#if SPECTRUM_SIZE == 4
-    r.w = slab_read(s, c + 3u, at);
-#endif
+#define C(x) r.x = slab_read(s, c++, at);
+    SPECTRUM_EACH(C)
+#undef C
     return r;
 }
 inline void slab_write_spectrum(Slab s, uint c, uint at, mask m, Spectrum v)
 {
-    slab_write(s, c, at, m, v.x);
-    slab_write(s, c + 1u, at, m, v.y);
-    slab_write(s, c + 2u, at, m, v.z);
-#if SPECTRUM_SIZE == 4
-    slab_write(s, c + 3u, at, m, v.w);
-#endif
+#define C(x) slab_write(s, c++, at, m, v.x);
+    SPECTRUM_EACH(C)
+#undef C
 }
 inline Natural3 slab_read_natural3(Slab s, uint c, uint at)
 {

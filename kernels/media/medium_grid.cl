@@ -79,7 +79,7 @@ inline GridBrick grid_brick(Scene scene, GridWalk w, mask active)
     b.points = w.first + gather_i(scene.images, at);
     b.most = gather_w(scene.images, at + 1);
     real end_x, end_y, end_z;
-#define AXIS(a)                                                                                      \
+#define AXIS(a)                                                                                       \
     end_##a = to_real(BRICK_CELLS * (w.a + sel_i(w.d.a > 0.0f, (integer)(1), (integer)(0)))) - w.o.a; \
     end_##a = sel(fabs(w.d.a) > 1e-20f, end_##a * w.inverse.a, (real)(FAR));
     AXIS(x)
@@ -110,10 +110,10 @@ inline mask grid_next(GridWalk *w, GridBrick b, mask active)
 inline integer grid_corner(GridWalk w, natural bits)
 {
     integer at = 0;
-#define AXIS(a, shift, step)                                                                                 \
+#define AXIS(a, shift, step)                                                                                   \
     real p_##a = clamp_r(w.o.a + w.t * w.d.a - to_real(BRICK_CELLS * w.a), (real)(0.0f), (real)(BRICK_CELLS)); \
-    integer c_##a = clamp_i(to_integer(p_##a), (integer)(BRICK_CELLS - 1));                                   \
-    real u_##a = (to_real(as_integer((bits >> shift) & 1023u)) + 0.5f) * (1.0f / 1024.0f);                   \
+    integer c_##a = clamp_i(to_integer(p_##a), (integer)(BRICK_CELLS - 1));                                    \
+    real u_##a = (to_real(as_integer((bits >> shift) & 1023u)) + 0.5f) * (1.0f / 1024.0f);                     \
     at += step * (c_##a + sel_i(u_##a < p_##a - to_real(c_##a), (integer)(1), (integer)(0)));
     AXIS(x, 0u, 1)
     AXIS(y, 10u, BRICK_POINTS)

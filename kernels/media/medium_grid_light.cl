@@ -27,9 +27,9 @@ inline real grid_number(Scene scene, GridWalk w, integer first, mask active)
     integer points = first + gather_i(scene.images, at);
     real most = gather_w(scene.images, at + 1), sum = 0.0f;
     active = active & (most > 0.0f);
-#define AXIS(a)                                                                                              \
+#define AXIS(a)                                                                                                \
     real p_##a = clamp_r(w.o.a + w.t * w.d.a - to_real(BRICK_CELLS * w.a), (real)(0.0f), (real)(BRICK_CELLS)); \
-    integer c_##a = clamp_i(to_integer(p_##a), (integer)(BRICK_CELLS - 1));                                   \
+    integer c_##a = clamp_i(to_integer(p_##a), (integer)(BRICK_CELLS - 1));                                    \
     p_##a -= to_real(c_##a);
     AXIS(x)
     AXIS(y)

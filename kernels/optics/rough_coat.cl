@@ -104,11 +104,13 @@ inline real coat_transmittance(Microfacets d, real cos_i, real eta)
     if (any(eta < 1.0f)) passed = sel(eta < 1.0f, coat_transmittance_thinner(d, cos_i, eta), passed);
     return passed;
 }
+/* That of a wavelength apart: few coats disperse, and their text stands once. */
+called real coat_transmittance_apart(Microfacets d, real cos_i, real eta) { return coat_transmittance(d, cos_i, eta); }
 inline Spectrum coat_transmittance_spectrum(Microfacets d, real cos_i, Spectrum eta)
 {
     Spectrum t = spectrum_of(coat_transmittance(d, cos_i, eta.x));
     if (any(spectrum_varies(eta))) {
-#define C(c) t.c = coat_transmittance(d, cos_i, eta.c);
+#define C(c) t.c = coat_transmittance_apart(d, cos_i, eta.c);
         SPECTRUM_EACH(C)
 #undef C
     }

@@ -121,13 +121,24 @@ Maker = Callable[..., DevicePictures]
 
 
 def of_plans(which: Callable[[Plan], bool] = lambda plan: True) -> pytest.MarkDecorator:
-    """Parametrize a test over films; tests of one film follow one another, and share programs."""
+    """Parametrize a test over films."""
     cases = [
         pytest.param(plan, marks=() if name in QUICK else pytest.mark.slow, id=name)
         for name, plan in PLANS.items()
         if which(plan)
     ]
-    return pytest.mark.parametrize("plan", cases, scope="module")
+    return pytest.mark.parametrize("plan", cases)
+
+
+def pairs() -> Iterator[Any]:
+    """Yield films, who saves them and who goes on: of quick films all pairs, of others three."""
+    for number, (name, plan) in enumerate(PLANS.items()):
+        for (i, saving), (k, loading) in itertools.product(enumerate(MAKERS), repeat=2):
+            if name in QUICK or (i + k + number) % len(MAKERS) == 0:
+                marks = () if name in QUICK else pytest.mark.slow
+                yield pytest.param(
+                    plan, saving, loading, marks=marks, id=f"{name}-{saving}-{loading}"
+                )
 
 
 @pytest.fixture(scope="module")
@@ -185,12 +196,19 @@ class Whole:
 
 
 @pytest.fixture(scope="module")
-def whole(plan: Plan, one_context: None, tmp_path_factory: pytest.TempPathFactory) -> Whole:
-    folder = tmp_path_factory.mktemp("whole")
-    with clpt.Renderer(plan.scene, halves=plan.halves) as one:
-        assert one.run(sum(plan.splits), noise=plan.noise)
-        films = one._saved_film(), pictures(one), one.film.get(), one.active
-        return Whole(*films, files(one, folder))
+def wholes() -> dict[Plan, Whole]:
+    """What was made by one run, for all tests of a film."""
+    return {}
+
+
+@pytest.fixture
+def whole(plan: Plan, wholes: dict[Plan, Whole], tmp_path: Path) -> Whole:
+    if plan not in wholes:
+        with clpt.Renderer(plan.scene, halves=plan.halves) as one:
+            assert one.run(sum(plan.splits), noise=plan.noise)
+            films = one._saved_film(), pictures(one), one.film.get(), one.active
+            wholes[plan] = Whole(*films, files(one, tmp_path))
+    return wholes[plan]
 
 
 def pictures(source: Pictures) -> dict[str, np.ndarray]:
@@ -311,9 +329,7 @@ def check_files(source: FilmRenderer | SavedFilm, whole: Whole, folder: Path) ->
         check_arrays(found[suffix], wanted)
 
 
-@of_plans()
-@pytest.mark.parametrize("saving", MAKERS)
-@pytest.mark.parametrize("loading", MAKERS)
+@pytest.mark.parametrize(("plan", "saving", "loading"), list(pairs()))
 def test_a_saved_film_is_gone_on_with(saving, loading, make, plan, whole, tmp_path):
     """A stopped run leaves no trace in what was held before; the loader's own film is gone."""
     path, (first, second, third) = tmp_path / "a.film", plan.splits

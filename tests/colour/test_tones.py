@@ -7,7 +7,7 @@ from clpt import device, images
 from clpt.colour import tones
 from clpt.device import DeviceArray
 from clpt.errors import UnknownKindError
-from clpt.render.film.resolve import Resolve
+from clpt.render.film.resolve import Resolve, Screen
 
 RNG = np.random.default_rng(7)
 CURVES = [name for name in tones.TONES if name != "none"]
@@ -73,7 +73,7 @@ def on_device():
     film = DeviceArray(opened.queue, (*COLOURS.shape[:2], 4), np.float32)
     film.set(np.concatenate([COLOURS, np.full((*COLOURS.shape[:2], 1), 16, np.float32)], axis=2))
     resolve = Resolve(opened, device.Stream(opened.queue))
-    return lambda **how: resolve(film, **how).get()[..., :3]
+    return lambda dtype=None, **how: resolve(film, screen=Screen(**how), dtype=dtype).get()[..., :3]
 
 
 @pytest.mark.parametrize("tone", CURVES)

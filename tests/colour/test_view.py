@@ -10,7 +10,7 @@ from clpt.colour import view as views
 from clpt.colour.view import View
 from clpt.device import DeviceArray
 from clpt.errors import DeviceError, SceneError, UnknownKindError
-from clpt.render.film.resolve import Resolve
+from clpt.render.film.resolve import Resolve, Screen
 
 ocio = pytest.importorskip("PyOpenColorIO", reason="OpenColorIO is not installed")
 
@@ -61,7 +61,7 @@ def on_device():
     film = DeviceArray(opened.queue, (*SHAPE, 4), np.float32)
     film.set(np.concatenate([COLOURS, np.ones((*SHAPE, 1), np.float32)], axis=2))
     resolve = Resolve(opened, device.Stream(opened.queue))
-    return lambda **how: resolve(film, **how).get()[..., :3]
+    return lambda dtype=None, **how: resolve(film, screen=Screen(**how), dtype=dtype).get()[..., :3]
 
 
 @pytest.mark.parametrize(("name", "share"), [(None, 0.98), (PLAIN, 1.0)])

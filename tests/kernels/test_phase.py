@@ -17,7 +17,6 @@ from tests.rotation import rotating
 
 BUMPS = np.cos(np.linspace(0.0, 9.0, 33)) + 1.1
 COSINES = (-1.0, -0.95, -0.1, 0.0, 0.3, 0.9, 0.97, 1.0)
-AT = np.sort(LAMBDAS)
 SETTINGS = {
     phases.Isotropic: [{}],
     phases.HenyeyGreenstein: [{"g": g} for g in (-0.95, -0.3, 0.0, 1e-4, 0.002, 0.6, 0.99)],
@@ -48,8 +47,16 @@ VARIED = {  # at the four wavelengths of the probe, or for three colours
         "wavelengths": (430.0, 500.0, 570.0, 640.0),
     },
 }
-CASES = [(cls, given) for cls in phases.LEAVES for given in SETTINGS[cls]]
-VARIED_CASES = [(cls, mode) for cls in VARIED for mode in ("rgb", "spectral")]
+CASES = [
+    pytest.param(cls, given, id=f"{cls.kind}-{i}")
+    for cls in phases.LEAVES
+    for i, given in enumerate(SETTINGS.get(cls, []))
+]
+VARIED_CASES = [
+    pytest.param(cls, mode, id=f"{cls.kind}-{mode}")
+    for cls in VARIED
+    for mode in ("rgb", "spectral")
+]
 TESTS = 2 * (len(CASES) + len(VARIED_CASES))
 SIGNIFICANCE = 1.0 - (1.0 - 1e-3) ** (1.0 / TESTS)  # chance of a false alarm: 1e-3 (Sidak)
 WO = np.array([[0.0, 0.0, 1.0]])
@@ -59,22 +66,44 @@ BINS = 40
 def formula(cls, given, cos, part=0, mode="rgb"):
     """Phase functions [1/sr] in float64; cos: of the angle by which light turns; part: which of the
     probe's wavelengths or colours."""
-    if cls is phases.Isotropic:
-        return np.full_like(cos, 0.25 / np.pi)
-    if cls is phases.Rayleigh:
-        return 3.0 / (16.0 * np.pi) * (1.0 + cos**2)
-    if cls is phases.Tabulated:
-        made = phases.Tabulated(**given)
-        cosines, rows, start, step = made.device_rows(mode == "spectral")
-        at = (LAMBDAS[part] - start) / step if mode == "spectral" else part
-        at = np.clip(at, 0, len(rows) - 1)
-        low = min(int(at), max(len(rows) - 2, 0))
-        high = min(low + 1, len(rows) - 1)
-        return np.interp(cos, cosines, rows[low] + (at - low) * (rows[high] - rows[low]))
+    return FORMULAS[cls](given, cos, part, mode)
+
+
+def tabulated(given, cos, part, mode):
+    made = phases.Tabulated(**given)
+    cosines, rows, start, step = made.device_rows(mode == "spectral")
+    at = (LAMBDAS[part] - start) / step if mode == "spectral" else part
+    at = np.clip(at, 0, len(rows) - 1)
+    low = min(int(at), max(len(rows) - 2, 0))
+    high = min(low + 1, len(rows) - 1)
+    return np.interp(cos, cosines, rows[low] + (at - low) * (rows[high] - rows[low]))
+
+
+def draine(given, cos, part, mode):
+    """Draine 2003 eq. 4; alpha 0 is Henyey and Greenstein's."""
     g, alpha = (np.ravel(given.get(name, 0.0)) for name in ("g", "alpha"))
     g, alpha = g[min(part, len(g) - 1)], alpha[min(part, len(alpha) - 1)]
     hg = (1.0 - g * g) / (4.0 * np.pi * (1.0 + g * g - 2.0 * g * cos) ** 1.5)
     return hg * (1.0 + alpha * cos**2) / (1.0 + alpha * (1.0 + 2.0 * g * g) / 3.0)
+
+
+FORMULAS = {
+    phases.Isotropic: lambda given, cos, *_: np.full_like(cos, 0.25 / np.pi),
+    phases.Rayleigh: lambda given, cos, *_: 3.0 / (16.0 * np.pi) * (1.0 + cos**2),
+    phases.HenyeyGreenstein: draine,
+    phases.Draine: draine,
+    phases.Reradiating: draine,
+    phases.Tabulated: tabulated,
+}
+
+
+@pytest.mark.parametrize("cls", phases.LEAVES, ids=lambda cls: cls.kind)
+def test_has_settings_and_a_formula(cls):
+    """A kind that is listed and has none would not be tested."""
+    tables = {"SETTINGS": SETTINGS, "FORMULAS": FORMULAS}
+    tables |= {"VARIED": VARIED} if cls.chromatic else {}
+    missing = [name for name, table in tables.items() if cls not in table]
+    assert not missing, f"{cls.__name__} is missing: add it to {' and to '.join(missing)} above"
 
 
 def directions(cos, turn):
@@ -88,7 +117,7 @@ def test_is_its_formula(cls, lanes):
     rng = np.random.default_rng(5)
     cos = np.concatenate([rng.uniform(-1.0, 1.0, 500), [-1.0, 1.0]])
     wi = directions(cos, rng.uniform(0.0, 6.0, 502))
-    for given in SETTINGS[cls]:
+    for given in SETTINGS.get(cls, []):
         got = Probe(cls, "rgb", lanes)(given, WO, wi, np.full((1, 3), 0.5))
         expected = formula(cls, given, cos)
         # near its peak HG turns the rounding of a direction into 3 / (1 - g)^2 times as much

@@ -11,6 +11,7 @@ from tests.kernels import harness
 ROW = Record("Row", "Words.", a=("natural", ""), b=("vec3", ""), c=("vec2", ""))
 TEXT = f"""#include "core/lanes.cl"
 #include "core/rows.cl"
+#include "core/math.cl"
 {ROW.row_text()}
 kernel void probe(global const float *in, global float *out, uint n)
 {{

@@ -154,3 +154,10 @@ def test_scene_files_have_them(tmp_path: Path) -> None:
     clpt.save(made, tmp_path / "again.json")
     again = clpt.load(tmp_path / "again.json")
     assert again.lights[0].temperature == 3000.0 and again.shapes[0].emission.power == 20.0  # type: ignore[attr-defined, union-attr]
+
+
+@pytest.mark.parametrize("cls", lights.KINDS, ids=lambda cls: cls.kind)
+def test_what_has_a_power_says_its_extent(cls: type[lights.Light]) -> None:
+    """Another light's would be wrong, and nobody would see it."""
+    if issubclass(cls, lights.PoweredLamp):
+        assert "extent" in vars(cls), f"{cls.__name__} needs a method `extent`"

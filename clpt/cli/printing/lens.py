@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from rich.table import Table
 
 from ... import lenses
+from ...lenses import spots
 
 
 def near_axis(lens: lenses.Prescription, waves: Sequence[float]) -> Table:
@@ -32,7 +33,7 @@ def of_spots(lens: lenses.Prescription, waves: Sequence[float], angles: Sequence
         table.add_column(heading, justify="right")
     for angle in angles:
         for wavelength in waves:
-            spot = lenses.spots.spot(lens, angle, wavelength)
+            spot = spots.spot(lens, angle, wavelength)
             size = f"{spot.radius * 1e3:.4g}" if len(spot.points) else "-"
             table.add_row(f"{angle:g}", f"{wavelength:g}", size, f"{spot.through:.3f}")
     return table

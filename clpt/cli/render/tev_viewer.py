@@ -8,7 +8,6 @@ from contextlib import contextmanager
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import tev
 from ...render.film.layer_channels import channels_of
 from ..files.outputs import Film
 
@@ -24,6 +23,8 @@ def showing(
     if address is None:
         yield lambda: None
         return
+    from ... import tev  # here: most renders show nothing
+
     viewer = tev.Viewer(name, *address, tell=note)
     try:
         yield lambda: viewer.show(shown(source))

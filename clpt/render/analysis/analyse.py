@@ -24,9 +24,12 @@ from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.render.analysis.sealed import sealed_media
 from clpt.render.analysis.surroundings import (
     bodies_around,
+    bodies_at,
     boundaries,
+    camera_origin,
     contested,
     media_around,
+    media_at,
     stands_still,
     warnings_of,
 )
@@ -122,26 +125,28 @@ def _at_the_camera(index: SceneIndex, cache: LoweringCache) -> tuple[tuple[Any, 
     around: tuple[Any, ...] = ()
     if index.nested:
         around = bodies_around(scene, matter_of, cache)
-        warnings = contested(scene, matter_of, cache)
+        warnings = contested(scene.shapes, matter_of, cache)
     else:
         around = media_around(scene, cache) if index.media else ()
         warnings = warnings_of(around)
     if index.motions and index.has_media and scene.camera.medium is None:
-        warnings += _passed_through(scene, index, cache)
+        warnings += _passed_through(index, cache)
     return around, warnings
 
 
-def _passed_through(scene: Scene, index: SceneIndex, cache: LoweringCache) -> list[str]:
+def _passed_through(index: SceneIndex, cache: LoweringCache) -> list[str]:
     """A warning where the camera is not in the same media all the time, else none."""
-    bounding = boundaries(scene, matter_of if index.nested else None)
+    bounding = boundaries(index.scene.shapes, matter_of if index.nested else None)
     if index.motions.camera is None and stands_still(bounding):
         return []
-    found = [
-        bodies_around(bounding, matter_of, cache, time)
-        if index.nested
-        else media_around(bounding, cache, time)
-        for time in index.motions.looks()
-    ]
+    found: list[tuple[Any, ...]] = []
+    for time in index.motions.looks():
+        origin = camera_origin(index.camera, index.film, time)
+        found.append(
+            bodies_at(bounding, matter_of, origin, time, cache)
+            if index.nested
+            else media_at(bounding, origin, time, cache)
+        )
     if all(one == found[0] for one in found):
         return []
     return [

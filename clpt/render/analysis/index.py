@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,11 +12,12 @@ from clpt.geometry.motion import Motions
 from clpt.render.analysis import cameras, filters
 from clpt.render.contract import custom_materials
 from clpt.render.contract.features import GridFeatures
-from clpt.scene import Scene
+from clpt.scene import Film, Scene
 from clpt.scene import materials as mt
-from clpt.scene.cameras import Lens
-from clpt.scene.integrators import Auto, Direct, ParticleTracer, Path, Vcm
+from clpt.scene.cameras import Camera, Lens
+from clpt.scene.integrators import Auto, Direct, Integrator, ParticleTracer, Path, Vcm
 from clpt.scene.layers import LAYERS
+from clpt.scene.lights import Light
 from clpt.scene.media import Grid, Lattice, Medium, Mixture
 from clpt.scene.phases import LEAVES
 from clpt.scene.scatterer import Scatterer
@@ -229,6 +230,29 @@ class SceneIndex:
         It is 0 without splatting.
         """
         return self.spread[1] if self.splatting else 0
+
+    @property
+    def film(self) -> Film:
+        return self.scene.film
+
+    @property
+    def camera(self) -> Camera:
+        return self.scene.camera
+
+    @property
+    def integrator(self) -> Integrator:
+        """The integrator that the scene asks for, or what was chosen."""
+        return self.scene.integrator
+
+    @property
+    def lights(self) -> Sequence[Light]:
+        """The lights that are on no shape."""
+        return self.scene.lights
+
+    @property
+    def adaptive(self) -> bool:
+        """Whether pixels get more samples where there is noise."""
+        return self.scene.noise is not None
 
     @property
     def mode(self) -> str:

@@ -27,15 +27,15 @@ def sealed_media(index: SceneIndex, cached: Callable[..., Any] | None = None) ->
     There are none where a ray cannot meet all lights. cached: `LoweringCache`, which keeps the
     triangles of boundaries.
     """
-    scene = index.scene
-    if index.nested or any(light.reach != "infinite" for light in scene.lights):
+    placed = index.scene.shapes
+    if index.nested or any(light.reach != "infinite" for light in index.lights):
         return frozenset()
     inside: dict[Medium, list[Shape]] = {}
-    for shape in every(scene):
+    for shape in every(placed):
         if shape.interior is not None:
             inside.setdefault(shape.interior, []).append(shape)
-    around = {shape.exterior for shape in index.shapes} | {scene.camera.medium}
-    shapes = every(scene, lambda one: one.emission is not None)
+    around = {shape.exterior for shape in index.shapes} | {index.camera.medium}
+    shapes = every(placed, lambda one: one.emission is not None)
     lamps = [box(shape, cached) for shape in shapes if shape.emission is not None]
     found = set()
     for medium, bodies in inside.items():

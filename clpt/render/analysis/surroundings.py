@@ -13,7 +13,7 @@ was lowered. By default that time is when the shutter opens.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,8 @@ from clpt.geometry.motion import AT_ONCE, corners
 from clpt.geometry.triangles import at_time
 from clpt.geometry.winding import box
 from clpt.render.analysis.cameras import origin_of
-from clpt.scene import Scene
+from clpt.scene import Film, Scene
+from clpt.scene.cameras import Camera
 from clpt.scene.media import Medium
 from clpt.scene.shapes import Instance, Shape
 
@@ -41,22 +42,20 @@ def media_around(
     cached: `LoweringCache`, which keeps the triangles of boundaries. Raises SceneError for shapes
     and cameras that make no sense.
     """
-    if scene.camera.medium is not None:
-        return (scene.camera.medium,)
-    return media_at(scene, camera_origin(scene, time), cached, time)
+    camera, time = scene.camera, moment(scene.camera, time)
+    if camera.medium is not None:
+        return (camera.medium,)
+    return media_at(scene.shapes, camera_origin(camera, scene.film, time), time, cached)
 
 
 def media_at(
-    scene: Scene,
+    placed: Sequence[Shape],
     p: NDArray[np.float64],
+    time: float,
     cached: Callable[..., Any] | None = None,
-    time: float | None = None,
 ) -> tuple[Medium, ...]:
     """Return the media that boundaries put at a point (3,) [m], of the smallest extent first."""
-    bounding = [shape for shape in every(scene) if bounds_media(shape)]
-    if not bounding:
-        return ()
-    time = _moment(scene, time)
+    bounding = [shape for shape in every(placed) if bounds_media(shape)]
     turns: dict[Medium, float] = {}
     extents: dict[Medium, float] = {}
     bounds: dict[Medium, list[NDArray[np.float64]]] = {}
@@ -81,15 +80,14 @@ def media_at(
 
 
 def open_medium(
-    scene: Scene, cached: Callable[..., Any] | None = None, time: float | None = None
+    placed: Sequence[Shape], time: float, cached: Callable[..., Any] | None = None
 ) -> Medium | None:
     """Return a medium whose boundary has a hole, None where all are closed.
 
     The areas of a closed surface, each along its normal, add up to nothing.
     """
-    time = _moment(scene, time)
     sums: dict[Medium, NDArray[np.float64]] = {}
-    for shape in every(scene):
+    for shape in every(placed):
         then = _then(shape, time)
         to_world = None if shape.motion is None else shape.motion.at(time)
         area = winding.areas(then, cached if then is shape else None, to_world)
@@ -114,20 +112,21 @@ def bodies_around(
     matter: of a shape's body, None of a shape that is none. What a body has inside of it faces it,
     as the inner side of a glass does.
     """
-    return bodies_at(scene, matter, camera_origin(scene, time), cached, time)
+    time = moment(scene.camera, time)
+    origin = camera_origin(scene.camera, scene.film, time)
+    return bodies_at(scene.shapes, matter, origin, time, cached)
 
 
 def bodies_at(
-    scene: Scene,
+    placed: Sequence[Shape],
     matter: Callable[[Shape], tuple[Any, ...] | None],
     p: NDArray[np.float64],
+    time: float,
     cached: Callable[..., Any] | None = None,
-    time: float | None = None,
 ) -> tuple[tuple[Any, ...], ...]:
     """Return the matter of the bodies at a point (3,) [m]; matter: as of `bodies_around`."""
-    time = _moment(scene, time)
     turns: dict[tuple[Any, ...], float] = {}
-    for shape in every(scene, lambda one: matter(one) is not None):
+    for shape in every(placed, lambda one: matter(one) is not None):
         own = matter(shape)
         if own is not None:
             low, high = _swept_box(shape, cached, time)
@@ -154,7 +153,7 @@ def bounds_media(shape: Shape) -> bool:
 
 
 def contested(
-    scene: Scene,
+    placed: Sequence[Shape],
     matter: Callable[[Shape], tuple[Any, ...] | None],
     cached: Callable[..., Any] | None = None,
 ) -> list[str]:
@@ -163,7 +162,7 @@ def contested(
     matter: as of `bodies_around`; its first entry is the priority.
     """
     boxes: list[tuple[tuple[Any, ...], Shape, NDArray[Any], NDArray[Any]]] = []
-    for shape in every(scene, lambda one: matter(one) is not None):
+    for shape in every(placed, lambda one: matter(one) is not None):
         own = matter(shape)
         if own is None or len(boxes) >= MOST_COMPARED:
             continue
@@ -182,12 +181,14 @@ def contested(
     return []
 
 
-def every(scene: Scene, bounds: Callable[[Shape], bool] = bounds_media) -> Iterator[Shape]:
+def every(
+    placed: Sequence[Shape], bounds: Callable[[Shape], bool] = bounds_media
+) -> Iterator[Shape]:
     """Return the shapes of a scene that may bound media.
 
     Those of instances are where they are placed, with their motion.
     """
-    for thing in scene.shapes:
+    for thing in placed:
         if not isinstance(thing, Instance):
             yield thing
             continue
@@ -198,9 +199,9 @@ def every(scene: Scene, bounds: Callable[[Shape], bool] = bounds_media) -> Itera
 
 
 def boundaries(
-    scene: Scene, matter: Callable[[Shape], tuple[Any, ...] | None] | None = None
-) -> Scene:
-    """Return a scene of nothing but boundaries of media, or of bodies, where they are placed.
+    placed: Sequence[Shape], matter: Callable[[Shape], tuple[Any, ...] | None] | None = None
+) -> list[Shape]:
+    """Return nothing but the boundaries of media, or of bodies, where they are placed.
 
     matter: of bodies, as of `bodies_around`; None: of media.
     """
@@ -208,28 +209,27 @@ def boundaries(
     def wanted(shape: Shape) -> bool:
         return bounds_media(shape) if matter is None else matter(shape) is not None
 
-    found = [shape for shape in every(scene, wanted) if wanted(shape)]
-    return dataclasses.replace(scene, shapes=found)
+    return [shape for shape in every(placed, wanted) if wanted(shape)]
 
 
-def stands_still(scene: Scene) -> bool:
-    """Whether no shape of a scene of `boundaries` moves or deforms."""
-    moving = ((one.motion, one.deformation) for one in scene.shapes)
+def stands_still(bounding: Sequence[Shape]) -> bool:
+    """Whether none of these `boundaries` moves or deforms."""
+    moving = ((one.motion, one.deformation) for one in bounding)
     return all(keys is None and points is None for keys, points in moving)
 
 
-def camera_origin(scene: Scene, time: float | None = None) -> NDArray[np.float64]:
+def camera_origin(camera: Camera, film: Film, time: float) -> NDArray[np.float64]:
     """The point from which a camera sees at a time [s], see `origin_of`."""
-    origin = origin_of(scene.camera, scene.film.width, scene.film.height)
-    if scene.camera.motion is None:
+    origin = origin_of(camera, film.width, film.height)
+    if camera.motion is None:
         return origin
-    matrix = scene.camera.motion.at(_moment(scene, time))
+    matrix = camera.motion.at(time)
     return np.asarray(transforms.transform_points(matrix, origin), np.float64)
 
 
-def _moment(scene: Scene, time: float | None) -> float:
+def moment(camera: Camera, time: float | None = None) -> float:
     """A time, by default that when the shutter opens [s]."""
-    return (scene.camera.shutter or AT_ONCE).open if time is None else time
+    return (camera.shutter or AT_ONCE).open if time is None else time
 
 
 def _then(shape: Shape, time: float) -> Shape:

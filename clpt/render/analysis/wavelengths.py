@@ -80,7 +80,7 @@ class Density:
 
 def density(index: SceneIndex) -> Density:
     """The density that suits a scene in spectral mode, or the one that its film asks for."""
-    film = index.scene.film
+    film = index.film
     lo, hi = _support(film)
     visible = Density(lo, hi)
     nodes = np.linspace(lo, hi, int(np.ceil((hi - lo) / STEP - 1e-9)) + 1)
@@ -133,7 +133,7 @@ def _normalised(values: Floats, nodes: Floats) -> Floats:
 
 def _glow(index: SceneIndex, nodes: Floats) -> Callable[[Spectrum], Floats]:
     """Return a function of a light: what all fluorescent materials emit under it at nodes [nm]."""
-    film = index.scene.film
+    film = index.film
     cells = int(np.ceil((film.lambda_max - film.lambda_min) / STEP - 1e-9))
     into = np.linspace(film.lambda_min, film.lambda_max, cells + 1)
     found = {id(m): m for shape in index.shapes for m in _fluorescent(shape.material)}
@@ -158,11 +158,10 @@ def _fluorescent(material: object) -> Iterator[Reradiation]:
 
 def emissions(index: SceneIndex) -> Iterator[Spectrum]:
     """Yield the emissions of a scene's lights; an image of colours stands for D65."""
-    scene = index.scene
     sources: list[Any] = [
-        *scene.lights,
+        *index.lights,
         *(shape.emission for shape in index.shapes),
-        scene.integrator,
+        index.integrator,
     ]
     for source in sources:
         if source is None:

@@ -31,6 +31,29 @@ _IMAGE_TYPES: dict[Any, np.dtype] = {
 
 
 @dataclass(frozen=True)
+class Screen:
+    """A way from light to the colours of a screen, as of `Renderer.resolve`; space: of the film.
+
+    Raises DeviceError for a view beside a tone curve or a transfer, UnknownKindError for names.
+    """
+
+    exposure: float = 0.0
+    tone: str = "none"
+    srgb: bool | None = None
+    view: View | None = None
+    space: str = "rec709"
+
+    def __post_init__(self) -> None:
+        check_tone(self.tone)
+        if self.view is not None and (self.tone != "none" or self.srgb is not None):
+            raise DeviceError("a view has its own tone curve and transfer; leave out tone and srgb")
+
+    def encodes(self, dtype: np.dtype) -> bool:
+        """Whether the sRGB transfer is applied to a picture of this type."""
+        return self.view is None and (dtype == BYTES if self.srgb is None else self.srgb)
+
+
+@dataclass(frozen=True)
 class _Target:
     """The memory that a picture goes to.
 
@@ -72,32 +95,22 @@ class Resolve:
         self,
         film: Array,
         into: Array | cl.MemoryObject | None = None,
+        screen: Screen = Screen(),
         *,
         dtype: DTypeLike | None = None,
-        exposure: float = 0.0,
-        tone: str = "none",
-        srgb: bool | None = None,
         flip: bool = False,
-        space: str = "rec709",
-        view: View | None = None,
         wait_for: device.Events = None,
     ) -> Array | cl.Event:
-        """Enqueue that a film (h, w, 4) float32 becomes a picture; see `Renderer.resolve`.
-
-        space: of the film's colours, see clpt.spectra.spaces.
-        """
-        check_tone(tone)
-        if view is not None and (tone != "none" or srgb is not None):
-            raise DeviceError("a view has its own tone curve and transfer; leave out tone and srgb")
+        """Enqueue that a film (h, w, 4) float32 becomes a picture; see `Renderer.resolve`."""
         target = self._target(film, into, dtype)
         named = {
-            **_to_rec709(space),
+            **_to_rec709(screen.space),
             "film": film.base_data,
             "steps": self.steps,
-            "scale": 2.0**exposure,
-            **self._looked_up(view),
-            "tone": TONE_NUMBERS[tone],
-            "encoded": int(view is None and (target.dtype == BYTES if srgb is None else srgb)),
+            "scale": 2.0**screen.exposure,
+            **self._looked_up(screen.view),
+            "tone": TONE_NUMBERS[screen.tone],
+            "encoded": int(screen.encodes(target.dtype)),
             "flip": int(flip),
             "width": film.shape[1],
             "height": film.shape[0],

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from clpt.geometry.motion import Motions
 from clpt.records import MOTION_SIZES
 from clpt.render.lowering.tables import TableStore
-from clpt.scene import Scene
 from clpt.scene.motion import Keys, Shutter, arc, decomposed
 
 STEP = MOTION_SIZES["step"]
@@ -51,11 +50,11 @@ def shutter_words(shutter: Shutter) -> NDArray[np.float32]:
     return np.concatenate([head, rows.ravel()]).astype(np.float32)
 
 
-def lower_motion(motions: Motions, scene: Scene, rows: list[int], store: TableStore) -> int:
+def lower_motion(motions: Motions, shapes: int, rows: list[int], store: TableStore) -> int:
     """Append the table of what moves to `distributions`; return where it begins.
 
-    rows: the index of each light that is no shape, in the order of their rows; -1: one that does
-    not move.
+    shapes: how many the scene has; rows: the index of each light that is no shape, in the order of
+    their rows; -1: one that does not move.
     """
     head = 4 + bool(motions.deforming)
     first = store.size("distributions")
@@ -75,13 +74,13 @@ def lower_motion(motions: Motions, scene: Scene, rows: list[int], store: TableSt
         return places[id(keys)]
 
     camera = place(motions.camera)
-    of_shapes = [place(motions.shapes.get(i)) for i in range(len(scene.shapes))] or [first + still]
+    of_shapes = [place(motions.shapes.get(i)) for i in range(shapes)] or [first + still]
     of_lamps = [place(motions.lamps.get(i)) for i in rows] or [first + still]
     maps = np.array([*of_shapes, *of_lamps], np.int32).view(np.float32)
     heads = [first + head, camera, first + at, first + at + len(of_shapes)]
     if motions.deforming:
         heads.append(first + at + len(maps))
-        maps = np.concatenate([maps, _deformations(motions, len(scene.shapes), heads[-1])])
+        maps = np.concatenate([maps, _deformations(motions, shapes, heads[-1])])
     parts[0] = np.array(heads, np.int32).view(np.float32)
     # a kernel reads one step beyond the last
     parts += [maps, np.zeros(STEP + 1, np.float32)]

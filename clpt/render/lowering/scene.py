@@ -130,7 +130,7 @@ def encode(found: Analysis, cache: LoweringCache, texture_budget: int | None = N
 
     texture_budget: as of `lower`. Raises SceneError for parameters that cannot be encoded.
     """
-    index, film = found.index, found.index.scene.film
+    index, film = found.index, found.index.film
     ends = film.lambda_min, film.lambda_max
     wavelengths = density(index) if index.spectral else Density(*ends)
     encoder = Encoder(index.mode, *ends, sensor(film), wavelengths, texture_budget, cache)
@@ -177,7 +177,7 @@ def encode(found: Analysis, cache: LoweringCache, texture_budget: int | None = N
         layer_names=names,
         glass_rows=rows.glasses,
         warnings=warnings,
-        integrator=index.scene.integrator,
+        integrator=index.integrator,
         reason=found.reason,
         around=found.around,
         encoder=encoder,
@@ -203,7 +203,7 @@ class _Surfaces:
 def _encode_surfaces(found: Analysis, encoder: Encoder) -> _Surfaces:
     """Append shapes, materials, media and lights."""
     index = found.index
-    filters.lower_filter(index.scene.film.filter, encoder.store, index.splatting)
+    filters.lower_filter(index.film.filter, encoder.store, index.splatting)
     materials = _begin_materials(index, encoder)
     moves = spheres_move(index)
     geometry = lower_geometry(found.geometry, encoder, materials, spheres_move=moves)
@@ -263,7 +263,7 @@ def _lower_motion(found: Analysis, lights: LightRows, encoder: Encoder) -> int:
     if not index.motions:
         return 0
     rows += [-1] * ((*lights.first, len(lights.rows))[0] - len(rows))  # bricks of media
-    return lower_motion(index.motions, index.scene, rows, encoder.store)
+    return lower_motion(index.motions, len(index.scene.shapes), rows, encoder.store)
 
 
 def _lower_tangents(geometry: Geometry, encoder: Encoder) -> int:
@@ -282,7 +282,7 @@ def _lower_profile(index: SceneIndex, encoder: Encoder) -> int:
     """Append the filter's values for light paths, if any; return their place in `distributions`."""
     if not index.weighed:
         return 0
-    return filters.lower_profile(index.scene.film.filter, encoder.store, index.splatting)
+    return filters.lower_profile(index.film.filter, encoder.store, index.splatting)
 
 
 def _lower_density(index: SceneIndex, encoder: Encoder, wavelengths: Density) -> tuple[int, bool]:
@@ -353,7 +353,7 @@ def _lower_lights(
     for medium in index.emitting:
         media.word(medium)
     emitters = geometry.emitters
-    lights = light_rows(index.scene.lights, emitters, encoder, sources, tree_from, media.lights)
+    lights = light_rows(index.lights, emitters, encoder, sources, tree_from, media.lights)
     encoder.store.append("lights", lights.rows.view(np.uint32))
     if lights.tree is not None:
         encoder.store.append("lights", lights.tree)
@@ -366,7 +366,7 @@ def _lower_lights(
 
 def _lower_camera(index: SceneIndex, encoder: Encoder) -> tuple[int, ...]:
     """Append the camera; return the rows in `spectra` of its glasses that disperse."""
-    camera, film = index.scene.camera, index.scene.film
+    camera, film = index.camera, index.film
     glasses = cameras.dispersive_glasses(camera)
     rows = tuple(encoder.spectra.row(glass) for glass in glasses) if index.spectral else ()
     _, words = lower_camera(camera, film.width, film.height, rows)
@@ -376,7 +376,7 @@ def _lower_camera(index: SceneIndex, encoder: Encoder) -> tuple[int, ...]:
 
 def _lower_ambient(index: SceneIndex, encoder: Encoder) -> int:
     """Append the ambient light of an integrator; return its first word, 0 if there is none."""
-    ambient = index.scene.integrator.ambient
+    ambient = index.integrator.ambient
     if ambient is None:
         return 0
     return encoder.store.append("light_params", encoder.emission_words(ambient))
@@ -384,17 +384,17 @@ def _lower_ambient(index: SceneIndex, encoder: Encoder) -> int:
 
 def _warnings(index: SceneIndex) -> list[str]:
     """Return warnings of parts of the scene that are not rendered as it says."""
-    scene, film = index.scene, index.scene.film
+    film, integrator = index.film, index.integrator
     warnings = list(index.warnings)
-    if index.mode == "rgb" and cameras.dispersive_glasses(scene.camera):
-        warnings.append(f"{scene.camera.kind}.glass: in RGB mode all wavelengths have one focus")
+    if index.mode == "rgb" and cameras.dispersive_glasses(index.camera):
+        warnings.append(f"{index.camera.kind}.glass: in RGB mode all wavelengths have one focus")
     if index.mode == "rgb" and any(map(_disperses, index.shapes)):
         warnings.append("in rgb mode glass does not disperse: ask for the spectral mode")
     if index.motions:
         warnings += _of_motion(index)
-    if scene.integrator.light_paths:
+    if integrator.light_paths:
         warnings += _left_to_the_camera(index)
-    depth = scene.integrator.max_depth
+    depth = integrator.max_depth
     if depth > DEEPEST:
         warnings.append(f"integrator.max_depth: {depth} counts as {DEEPEST}, the longest path")
     if index.spectral and not film.bands and not _sees(film):
@@ -402,7 +402,7 @@ def _warnings(index: SceneIndex) -> list[str]:
             f"film.sensor sees nothing from {film.lambda_min:g} to {film.lambda_max:g} nm, so the"
             " picture is black; ask for film.bands"
         )
-    if not scene.lights and next(emissions(index), None) is None:
+    if not index.lights and next(emissions(index), None) is None:
         warnings.append("no light in the scene, so the picture is black: add one to `lights`")
     if film.mode == "rgb" and mt.Fluorescent in index.leaves:
         warnings.append("in rgb mode fluorescent paint has its colour under D65, at most white")
@@ -435,12 +435,12 @@ def _of_motion(index: SceneIndex) -> list[str]:
 
 def _left_to_the_camera(index: SceneIndex) -> list[str]:
     """Return warnings of light that only paths from the camera find, not light paths or photons."""
-    scene, integrator = index.scene, index.scene.integrator
+    camera, integrator = index.camera, index.integrator
     kind, warnings = integrator.kind, []
     if integrator.light_tracing and not index.joined:
         names = " and ".join(cameras.CONNECTED)
-        reason = f"a {scene.camera.kind} camera cannot be joined to a point"
-        if scene.camera.kind in cameras.CONNECTED:
+        reason = f"a {camera.kind} camera cannot be joined to a point"
+        if camera.kind in cameras.CONNECTED:
             reason = "its glass disperses"
         name = "light_tracing" if kind == "vcm" else "light_paths"
         warnings.append(f"{kind}.{name}: left aside, as {reason}; {names} can, without such glass")
@@ -457,7 +457,7 @@ def _left_to_the_camera(index: SceneIndex) -> list[str]:
         warnings += [
             f"{kind}.light_paths: none start at lights[{i}], whose light does not fall with "
             "distance"
-            for i, light in enumerate(scene.lights)
+            for i, light in enumerate(index.lights)
             if isinstance(light, Point) and not light.falloff
         ]
     return warnings

@@ -77,7 +77,7 @@ def settings_of(
     settings["shape_count"] = len(geometry.rows)
     settings["tanh_min"], settings["tanh_max"] = tanh_ends(density.lo, density.hi)
     settings["density"] = found.density_row
-    film = index.scene.film
+    film = index.film
     matrix = output_matrix(film, index.mode)
     scale = settings["film_scale"] = film_scale(film, light_level(index, lights, sphere))
     settings["to_first"], settings["to_second"], settings["to_third"] = matrix / scale
@@ -88,7 +88,7 @@ def settings_of(
 
 def _set_film(settings: NDArray[np.void], index: SceneIndex) -> None:
     """Write the size of the film, and which of its pixels and wavelengths are rendered."""
-    film = index.scene.film
+    film = index.film
     width, height = film.size
     settings["width"], settings["height"] = width, height
     settings["crop_x"], settings["crop_y"] = (0, 0) if film.crop is None else film.crop[:2]
@@ -103,7 +103,7 @@ def _set_film(settings: NDArray[np.void], index: SceneIndex) -> None:
 
 def _set_paths(settings: NDArray[np.void], index: SceneIndex) -> None:
     """Write what the sampler and the integrator say of paths."""
-    scene, integrator = index.scene, index.scene.integrator
+    scene, integrator = index.scene, index.integrator
     settings["seed"] = scene.seed % 2**32
     settings["sample_bits"] = min((max(scene.spp, 1) - 1).bit_length(), MOST_SAMPLE_BITS)
     depth = integrator.max_depth
@@ -143,13 +143,11 @@ def _set_photons(
     disperses: bool,
 ) -> None:
     """Write what merging needs; the wavefront adds how many light paths leave photons."""
-    scene = index.scene
-    integrator = scene.integrator
+    integrator, film = index.integrator, index.film
     assert isinstance(integrator, Vcm)
-    size = scene.film.width, scene.film.height
     settings["max_depth"] = min(int(settings["max_depth"]), photons.DEEPEST)
     settings["radius"] = integrator.radius or photons.first_radius(
-        scene.camera, geometry, size, scene_radius
+        index.camera, geometry, (film.width, film.height), scene_radius
     )
     settings["photon_places"] = photons.places(integrator)
     held = photons.pixels(integrator, int(settings["padded_pixels"]))

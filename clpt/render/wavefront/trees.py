@@ -71,11 +71,11 @@ def build(
     instances = lowered.instances
     if former is None:
         counts = [len(lowered.faces) - sum(instances.triangles), *instances.triangles]
+        runs = bvh.Runs(counts, (1, *instances.keys), lowered.vertices)
         points = vertices if len(lowered.faces) else lowered.vertices
         triangles, offsets = bvh.build_parts(
-            buffers.device, points, lowered.faces, lowered.tags, counts, layout, quality,
-            (1, *instances.keys), lowered.vertices,
-        )  # fmt: skip
+            buffers.device, points, lowered.faces, lowered.tags, runs, layout, quality
+        )
     else:
         triangles, offsets = former.triangles, former.offsets
     boxes = {}

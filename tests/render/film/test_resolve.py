@@ -11,7 +11,7 @@ from pyopencl.tools import get_gl_sharing_context_properties
 from clpt import device, images
 from clpt.device import DeviceArray
 from clpt.errors import DeviceError, UnknownKindError
-from clpt.render.film.resolve import Resolve
+from clpt.render.film.resolve import Resolve, Screen
 from clpt.spectra import spaces
 
 H, W = 65, 48
@@ -51,22 +51,22 @@ def resolve(opened):
 
 @pytest.mark.parametrize("exposure", [0.0, -1.5])
 def test_bytes_are_those_of_a_png(resolve, film, exposure):
-    made = resolve(film, exposure=exposure).get()
+    made = resolve(film, screen=Screen(exposure=exposure)).get()
     assert made.dtype == np.uint8
     np.testing.assert_array_equal(made[..., :3], images.to_srgb8(LINEAR, exposure))
     assert (made[..., 3] == 255).all()
 
 
 def test_floats_are_linear_or_encoded(resolve, film):
-    plain = resolve(film, dtype=np.float32, exposure=1.0).get()
+    plain = resolve(film, screen=Screen(exposure=1.0), dtype=np.float32).get()
     expected = np.where(np.isnan(LINEAR), 0.0, LINEAR * np.float32(2.0))
     np.testing.assert_array_equal(plain[..., :3], expected)
     assert (plain[..., 3] == 1.0).all()
-    encoded = resolve(film, dtype=np.float32, srgb=True).get()[..., :3]
+    encoded = resolve(film, screen=Screen(srgb=True), dtype=np.float32).get()[..., :3]
     inside = (LINEAR >= 0.0) & (LINEAR <= 1.0)
     want = images.linear_to_srgb(LINEAR[inside])
     np.testing.assert_allclose(encoded[inside], want, atol=1e-6)
-    linear8 = resolve(film, srgb=False).get()[..., :3]
+    linear8 = resolve(film, screen=Screen(srgb=False)).get()[..., :3]
     np.testing.assert_array_equal(linear8[inside], np.round(LINEAR[inside] * 255))
 
 
@@ -79,17 +79,17 @@ def test_tone_curves(resolve, film):
         "aces": np.clip(x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14), 0.0, 1.0),
     }
     for tone, want in expected.items():
-        made = resolve(film, dtype=np.float32, tone=tone).get()
+        made = resolve(film, screen=Screen(tone=tone), dtype=np.float32).get()
         np.testing.assert_allclose(made[good][:, :3], want, atol=2e-6, rtol=1e-5)
         assert np.isfinite(made).all()
     with pytest.raises(UnknownKindError, match=r"tone curve 'filmic'.*aces"):
-        resolve(film, tone="filmic")
+        resolve(film, screen=Screen(tone="filmic"))
 
 
 def test_other_spaces_become_rec709(resolve, film):
     good = np.isfinite(LINEAR).all(axis=2) & (np.abs(LINEAR).max(axis=2) < 1e9)
     want = LINEAR[good].astype(np.float64) @ spaces.between("rec2020", "rec709").T
-    made = resolve(film, dtype=np.float32, space="rec2020").get()[good][:, :3]
+    made = resolve(film, screen=Screen(space="rec2020"), dtype=np.float32).get()[good][:, :3]
     np.testing.assert_allclose(made, want, rtol=1e-5, atol=1e-5)
 
 
@@ -130,10 +130,11 @@ def test_into_an_image_of_floats(opened, resolve, film):
         pytest.skip("the device has no images")
     form = cl.ImageFormat(RGBA, cl.channel_type.FLOAT)
     image = cl.create_image(opened.context, cl.mem_flags.READ_WRITE, form, shape=(W, H))
-    event = resolve(film, image, tone="aces")
+    event = resolve(film, image, Screen(tone="aces"))
     host = np.empty((H, W, 4), np.float32)
     cl.enqueue_copy(opened.queue, host, image, origin=(0, 0), region=(W, H), wait_for=[event])
-    np.testing.assert_array_equal(host, resolve(film, dtype=np.float32, tone="aces").get())
+    expected = resolve(film, screen=Screen(tone="aces"), dtype=np.float32).get()
+    np.testing.assert_array_equal(host, expected)
 
 
 def test_what_does_not_fit_is_told(opened, resolve, film):

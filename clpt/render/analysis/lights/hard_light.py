@@ -72,7 +72,7 @@ def decided(lit: Lit, former: Integrator | None = None) -> tuple[SceneIndex, str
     an image light that is broken.
     """
     index = lit.index
-    given = index.scene.integrator
+    given = index.integrator
     if not isinstance(given, Auto) and given.light_paths != AUTO:
         return index, ""
     if former is None:
@@ -81,7 +81,7 @@ def decided(lit: Lit, former: Integrator | None = None) -> tuple[SceneIndex, str
         keeps = isinstance(former, Vcm) and isinstance(given, Auto)
         chosen = former if keeps else Path(light_paths=former.light_paths)
         reason = "as before the scene was edited"
-    if index.light_layers and index.scene.noise is not None:
+    if index.light_layers and index.adaptive:
         chosen, reason = Path(light_paths=0), "layers of light have no guides of noise"
     elif "light_groups" in index.layers and isinstance(chosen, Vcm):
         chosen, reason = Path(light_paths=chosen.light_paths), "photons do not know their group"
@@ -94,12 +94,11 @@ def decided(lit: Lit, former: Integrator | None = None) -> tuple[SceneIndex, str
 def _choice(lit: Lit) -> tuple[Integrator, str]:
     """The integrator but for its depths, and why; what is cheap to know is asked first."""
     index, geometry = lit.index, lit.geometry
-    scene, without = index.scene, Path(light_paths=0)
+    integrator, without = index.integrator, Path(light_paths=0)
     if not index.lights_reach:
         return without, index.lit_media
-    if not cameras.is_connected(scene.camera, scene.film.mode):
+    if not cameras.is_connected(index.camera, index.mode):
         return without, "points cannot be joined to this camera"
-    integrator = scene.integrator
     fewest = FEWEST - index.free_panes  # a pane on the way costs no depth
     if 0 <= integrator.max_depth < fewest:
         return without, "the longest path is too short for a caustic"
@@ -120,9 +119,9 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
     number = SOME
     if sum(share for _, place, share in small if _is_enclosed(geometry, place)) >= MOSTLY:
         number, reason = MANY, f"{reason}, in a bulb"
-    if not isinstance(scene.integrator, Auto):
+    if not isinstance(integrator, Auto):
         return Path(light_paths=number), reason
-    if scene.noise is not None:
+    if index.adaptive:
         return Path(light_paths=number), f"{reason}; noise is not measured with photons"
     if index.has_media or index.shifts or _share_seen(index, geometry) < SEEN:
         return Path(light_paths=number), reason
@@ -144,8 +143,8 @@ def _in_fog(lit: Lit) -> tuple[Integrator, str] | None:
     share = lit.sources.power / max(lit.sources.power.sum(), 1e-300)
     bounds = light_bounds.concatenated([one.bounds for one in lit.sources.every])
     spots = bounds.theta_o + bounds.theta_e < ALL_AROUND
-    shutter = lit.index.motions.shutter
-    eye = surroundings.camera_origin(lit.index.scene, (shutter.open + shutter.close) / 2.0)
+    index, shutter = lit.index, lit.index.motions.shutter
+    eye = surroundings.camera_origin(index.camera, index.film, (shutter.open + shutter.close) / 2.0)
     small = []
     for name, place, _, rows in _small_rows(lit):
         far = 0.0 if place is None else float(np.linalg.norm(place - eye))
@@ -187,7 +186,7 @@ def _is_enclosed(geometry: Geometry, place: NDArray[np.float64] | None) -> bool:
 
 def _share_seen(index: SceneIndex, geometry: Geometry) -> float:
     """The share of the picture that sharp things fill: as if nothing hid them, with all sides."""
-    view = cameras.view_of(index.scene.camera, index.scene.film.width, index.scene.film.height)
+    view = cameras.view_of(index.camera, index.film.width, index.film.height)
     assert view is not None, "a camera that can be joined has a point"
     pieces = np.concatenate([np.zeros((0, 10)), *sharp_pieces(geometry, index.motions.shapes)])
     a, b, c = (pieces[:, i : i + 3] - view.place for i in (0, 3, 6))
@@ -231,7 +230,7 @@ def _small_rows(lit: Lit) -> Iterator[tuple[str, NDArray[np.float64] | None, flo
     """Yield small lights as `_small_lights` does, each with its rows in `lights`."""
     motions, geometry = lit.index.motions, lit.geometry
     sources, (middle, radius) = lit.sources, lit.sphere
-    lamps, share = lit.index.scene.lights, sources.power / max(sources.power.sum(), 1e-300)
+    lamps, share = lit.index.lights, sources.power / max(sources.power.sum(), 1e-300)
     for row, i in enumerate(sources.order):
         lamp = lamps[i]
         if isinstance(lamp, (Envmap, CubeMap)):

@@ -23,7 +23,6 @@ from clpt.render.analysis.index import SceneIndex
 from clpt.render.analysis.lights import light_bounds
 from clpt.render.analysis.lights.sources import Sources, row_order
 from clpt.render.analysis.lowering_cache import LoweringCache
-from clpt.scene import Scene
 from clpt.scene.lights import Light
 from clpt.scene.media import Lattice, Medium
 from clpt.scene.motion import Deformation, Keys
@@ -95,11 +94,10 @@ def around(
     What moves is looked at again and again while the shutter is open. Raises Unknown for a light
     that is not in one medium which is known, and for media that give out light.
     """
-    scene, motions = index.scene, index.motions
     if index.emitting:
         name = index.emitting[0].name or index.emitting[0].kind
         raise Unknown(f"no path starts in the medium {name!r}, which gives out light")
-    known = _Known(scene, index.nested, cache, motions)
+    known = _Known(index, cache)
     hole = None if index.nested else known.open_medium()
     unknown = (
         ""
@@ -111,7 +109,7 @@ def around(
     )
     afar = sphere[0] + AFAR * sphere[1] * np.ones(3)
     lamps = [
-        _around_lamp(i, scene.lights[i], known, afar, unknown) for i in row_order(scene.lights)
+        _around_lamp(i, index.lights[i], known, afar, unknown) for i in row_order(index.lights)
     ]
     return lamps + [
         _around_emitter(one, known, index, geometry, unknown) for one in geometry.emitters
@@ -168,25 +166,28 @@ def _extinction(around: Around) -> float:
 
 
 class _Known:
-    """A scene as it is asked which media or matter are at its points."""
+    """Boundaries of a scene, which are asked which media or matter are at its points."""
 
-    def __init__(self, scene: Scene, nested: bool, cache: LoweringCache, motions: Motions):
-        self.scene = surroundings.boundaries(scene, matter_of if nested else None)
-        self.nested, self.cache, self.motions = nested, cache, motions
-        self.looks = motions.looks()
-        self.still = surroundings.stands_still(self.scene)
+    def __init__(self, index: SceneIndex, cache: LoweringCache):
+        self.nested, self.cache, self.motions = index.nested, cache, index.motions
+        matter = matter_of if self.nested else None
+        self.bounding = surroundings.boundaries(index.scene.shapes, matter)
+        self.looks = self.motions.looks()
+        self.still = surroundings.stands_still(self.bounding)
         # A camera's medium that no boundary holds is wherever there is no other.
         self.rest: Around = ()
-        named = scene.camera.medium
-        if named is not None and not nested:
-            origin = surroundings.camera_origin(scene)
-            found = surroundings.media_at(self.scene, origin, cache)
+        camera = index.camera
+        named = camera.medium
+        if named is not None and not self.nested:
+            time = surroundings.moment(camera)
+            origin = surroundings.camera_origin(camera, index.film, time)
+            found = surroundings.media_at(self.bounding, origin, time, cache)
             self.rest = () if named in found else (named,)
 
     def open_medium(self) -> Medium | None:
         """A medium whose boundary has a hole at some time."""
         times = self.looks[:1] if self.still else self.looks
-        found = (surroundings.open_medium(self.scene, self.cache, time) for time in times)
+        found = (surroundings.open_medium(self.bounding, time, self.cache) for time in times)
         return next((one for one in found if one is not None), None)
 
     def along(
@@ -208,8 +209,8 @@ class _Known:
 
     def _at(self, p: NDArray[np.float64], time: float) -> Around:
         if self.nested:
-            return surroundings.bodies_at(self.scene, matter_of, p, self.cache, time)
-        return surroundings.media_at(self.scene, p, self.cache, time)[:1] or self.rest
+            return surroundings.bodies_at(self.bounding, matter_of, p, time, self.cache)
+        return surroundings.media_at(self.bounding, p, time, self.cache)[:1] or self.rest
 
 
 def _around_shape(emitter: Emitter, known: _Known, motions: Motions, number: int) -> Around | None:

@@ -58,7 +58,7 @@ def content(lamp: Sky, look: Look) -> Content:
 
 
 def _kept(numbers: tuple[float, ...], ground: tuple[float, ...]) -> tuple[Floats, Floats]:
-    """What `dome.unscaled` returns, of the cache folder where it is there."""
+    """Return what `dome.unscaled` does, from the cache folder where it is there."""
     code = *Path(dome.__file__).parent.glob("*.py"), Path(air.__file__)
     tables = (data.ROOT / name for name in ("sky.csv", "air.csv"))
     around, disc = kept_arrays.kept(dome.unscaled, numbers, ground, files=(*code, *tables))

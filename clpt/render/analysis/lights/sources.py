@@ -96,7 +96,7 @@ def sources_of(index: SceneIndex, geometry: Geometry, scene_radius: float, look:
     """
     found = glows(index.emitting, index.spectral)
     around = _around(index, geometry) if index.motions else None
-    return measured(index.scene.lights, geometry.emitters, scene_radius, look, found, around)
+    return measured(index.lights, geometry.emitters, scene_radius, look, found, around)
 
 
 def measured(

@@ -28,6 +28,6 @@ def light_level(
         square = np.where(bounds.placed, np.maximum(away, radius**2), radius**2)
         arrives = float((lights.power / (4.0 * np.pi * square)).sum())
     glow = [brightness(one.light) * radius for one in index.emitting if one.light is not None]
-    ambient = index.scene.integrator.ambient
+    ambient = index.integrator.ambient
     around = 0.0 if ambient is None else brightness(ambient)
     return max(lights.radiance, arrives, around, *glow)

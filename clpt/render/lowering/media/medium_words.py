@@ -68,7 +68,7 @@ class MediumWords:
         self._sealed, self._glows = sealed, glows
         self._words: dict[Medium, int] = {}
         self.lights: list[BrickLights] = []  # of media whose words are made
-        self._row = len(index.scene.lights)  # in `lights`, of the next brick
+        self._row = len(index.lights)  # in `lights`, of the next brick
         self._has_media = bool(index.media)  # not of an integrator that sees none
 
     def word(self, medium: Medium | None) -> int:

@@ -1,0 +1,107 @@
+"""The ways that a value takes through the package: which functions see it, one after the other.
+
+A stay is a function that is given a scene, or takes it out of what was found in it (`index.scene`);
+a room is a file. A way leads from a function to those that it names, and to methods of its own
+class; methods of other objects are not followed.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from bench.imports import modules
+
+START = "clpt.one_call.render"
+SCENE = re.compile(r"\bScene\b")
+FOUND = "index"  # the name of what was found in a scene
+
+
+@dataclass(frozen=True)
+class _Function:
+    """A function: its module, its class ("" for none), what its names are, and its code."""
+
+    module: str
+    owner: str
+    names: dict[str, str]
+    code: ast.FunctionDef
+
+    @property
+    def stays(self) -> bool:
+        """Whether it sees the scene."""
+        given = self.code.args
+        types = [one.annotation for one in (*given.posonlyargs, *given.args, *given.kwonlyargs)]
+        if any(one is not None and SCENE.search(ast.unparse(one)) for one in types):
+            return True
+        return any(
+            isinstance(node, ast.Attribute)
+            and node.attr == "scene"
+            and ast.unparse(node.value).split(".")[-1] == FOUND
+            for node in ast.walk(self.code)
+        )
+
+
+def stays(root: Path, start: str = START) -> list[str]:
+    """Return the stays of a scene, each as "file name"."""
+    known = modules(root)
+    functions, names = _functions(known)
+    seen: set[str] = set()
+    open_ = [start]
+    while open_:
+        name = open_.pop()
+        room, _, last = name.rpartition(".")
+        if last in names.get(room, {}) and names[room][last] != name:  # which another room hands on
+            open_.append(names[room][last])
+        name = name if name in functions else f"{name}.__init__"
+        if name in functions and name not in seen:
+            seen.add(name)
+            open_ += _called(functions[name])
+    found = [functions[name] for name in sorted(seen) if functions[name].stays]
+    return [f"{known[one.module].relative_to(root).as_posix()} {one.code.name}" for one in found]
+
+
+def _functions(known: dict[str, Path]) -> tuple[dict[str, _Function], dict[str, dict[str, str]]]:
+    """The functions of all modules by their full names, and what names mean in each module."""
+    found: dict[str, _Function] = {}
+    everywhere = {}
+    for module, path in known.items():
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        everywhere[module] = names = dict[str, str]()
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ImportFrom):
+                inside = module.split(".") + ["__init__"] * (path.name == "__init__.py")
+                package = ".".join(inside[: len(inside) - node.level]) if node.level else ""
+                source = ".".join(part for part in (package, node.module or "") if part)
+                names |= {one.asname or one.name: f"{source}.{one.name}" for one in node.names}
+        names |= {
+            node.name: f"{module}.{node.name}"
+            for node in tree.body
+            if isinstance(node, (ast.FunctionDef, ast.ClassDef))
+        }
+        for node in tree.body:
+            if isinstance(node, ast.FunctionDef):
+                found[f"{module}.{node.name}"] = _Function(module, "", names, node)
+            for part in node.body if isinstance(node, ast.ClassDef) else ():
+                if isinstance(part, ast.FunctionDef):
+                    own = f"{module}.{node.name}"
+                    found[f"{own}.{part.name}"] = _Function(module, own, names, part)
+    return found, everywhere
+
+
+def _called(one: _Function) -> list[str]:
+    """The full names of what a function names, and so may call."""
+    types = {
+        id(part)
+        for node in ast.walk(one.code)
+        if isinstance(node, (ast.AnnAssign, ast.arg)) and node.annotation is not None
+        for part in ast.walk(node.annotation)
+    }
+    found = []
+    for node in ast.walk(one.code):
+        if isinstance(node, (ast.Name, ast.Attribute)) and id(node) not in types:
+            first, *rest = ast.unparse(node).split(".")
+            name = ".".join([one.names.get(first, first), *rest])
+            found += [name, f"{one.owner}.{'.'.join(rest)}"]
+    return found
