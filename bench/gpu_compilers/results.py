@@ -66,10 +66,10 @@ def page(rows: list[Row], longest: int | None = None) -> str:
     few = f"The {longest} longest" if longest and longest > 1 else "The longest program"
     some = f"{few}{'' if longest == 1 else ' programs'} of each stage and mode,"
     counts = {device: _programs(rows, device) for v in VENDORS for device in v.devices}
-    most = [device for device, count in counts.items() if count == max(counts.values())]
-    less = any(0 < count < max(counts.values()) for count in counts.values())
+    half = max(counts.values()) / 2
+    most = [device for device, count in counts.items() if count > half]
     every = f"On {', '.join(most)} all programs, on others the longest of each stage and mode,"
-    every = every if less else "All programs"
+    every = every if any(0 < count <= half for count in counts.values()) else "All programs"
     parts = [HEAD.replace("WHICH", some if longest else every)]
     for vendor in VENDORS:
         for device in vendor.devices:
