@@ -172,7 +172,7 @@ inline BsdfSample guide_sample(global const uint *guide, Guided g, Bsdf m, Frame
     real brings = spectrum_mean(s.weight);
     own.weight = sel(s.pdf > 0.0f, brings * share * guide_expects(g, own), (real)(0.0f));
 
-    vec3 wi = to_local(frame, guide_direction(guide, g, toward, &guided));
+    vec3 wi = to_frame(frame, guide_direction(guide, g, toward, &guided));
     Candidate other = guide_candidate(wo, wi, guided, hero_pdf(m, wo, wi, before));
     Spectrum f = bsdf_eval(m, wo, wi);
     real sent = spectrum_mean(f);
