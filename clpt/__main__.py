@@ -6,8 +6,6 @@ import os
 import sys
 from collections.abc import Sequence
 
-import click
-
 from .cli import cli
 from .cli.process import allocator, failures, stopping, streams
 
@@ -17,10 +15,14 @@ def main() -> None:
     streams.make_safe()
     allocator.return_large_blocks()
     allocator.collect_later()
-    stopping.raise_at_signals()
     # PoCL compiles a kernel once for its binary, and once more for each size of groups, if it may
     os.environ.setdefault("POCL_WORK_GROUP_SPECIALIZATION", "0")
-    sys.exit(run(sys.argv[1:]))
+    try:
+        stopping.raise_at_signals()
+        status = run(sys.argv[1:])
+    except KeyboardInterrupt as error:  # before `run` heeds it, or a second one after it did
+        status = stopping.ended_by(error)
+    sys.exit(status)
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -33,12 +35,11 @@ def run(arguments: Sequence[str]) -> int:
         status = cli.main(args=list(arguments), prog_name="clpt", standalone_mode=False)
         return status if isinstance(status, int) else 0
     except KeyboardInterrupt as error:
-        stopping.tell()
-        return stopping.status(error)
-    except click.Abort as error:
-        stopping.tell()
-        return stopping.status(error.__cause__)
+        return stopping.ended_by(error)
     except Exception as error:
+        interrupt = stopping.interrupt_behind(error)
+        if interrupt is not None:
+            return stopping.ended_by(interrupt)
         message, status = failures.message_of(error)
     failures.complain(message)
     return status

@@ -23,7 +23,7 @@ Boxes = NDArray[np.float32]  # (n, 2, 3): lowest and highest corners
 Balls = NDArray[np.float32]  # (n, 4): centre and radius
 
 
-def on_host(values: Any) -> Any:
+def on_host(values: object) -> Any:
     """Return values in host memory; of an array on a device a copy, for which it waits."""
     module = sys.modules.get("pyopencl.array")  # whoever has such an array has imported it
     return values.get() if module and isinstance(values, module.Array) else values

@@ -15,9 +15,11 @@ from __future__ import annotations
 from collections.abc import Container
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Generic, TypeVar
 
 import numpy as np
 
+Number = TypeVar("Number", int, float)
 SLAB_BLOCK = 32  # slots of a block of kernels/core/slab.cl, on a GPU
 
 # type: (words, uniform form, lane form, components as the text names them)
@@ -51,16 +53,17 @@ def select_name(lane: str) -> str:
     return _SELECT.get(lane) or f"{_snake(lane)}_sel"
 
 
-class Constants:
+class Constants(Generic[Number]):
     """Numbers that host and kernels share, by their names; kernels put a prefix before them.
 
     values: each number, and what it means. `constants["name"]` is the number.
     """
 
-    def __init__(self, prefix: str, doc: str, unsigned: bool = False, **values: tuple[int, str]):
-        self.prefix, self.doc, self.unsigned, self._values = prefix, doc, unsigned, values
+    def __init__(self, prefix: str, doc: str, unsigned: bool = False, **values: tuple[Number, str]):
+        self.prefix, self.doc, self.unsigned = prefix, doc, unsigned
+        self._values: dict[str, tuple[Number, str]] = values
 
-    def __getitem__(self, name: str) -> int:
+    def __getitem__(self, name: str) -> Number:
         return self._values[name][0]
 
     @property
@@ -72,13 +75,15 @@ class Constants:
         """Return a `#define` of each."""
         rows = [f"/* {self.doc} */"]
         for name, (value, doc) in self._values.items():
-            number = f"{value:#x}" if value >= 1 << 12 else str(value)
+            number = f"{value!r}f" if isinstance(value, float) else str(value)
+            if isinstance(value, int) and value >= 1 << 12:
+                number = f"{value:#x}"
             suffix, comment = "u" * self.unsigned, f" /* {doc} */" if doc else ""
             rows.append(f"#define {self.prefix}{name.upper()} {number}{suffix}{comment}")
         return "\n".join([*rows, ""])
 
 
-def bits(prefix: str, doc: str, first: int = 1, **docs: str) -> Constants:
+def bits(prefix: str, doc: str, first: int = 1, **docs: str) -> Constants[int]:
     """Return constants that are a bit each, from `first` on; docs: what each means."""
     values = {name: (first << i, meaning) for i, (name, meaning) in enumerate(docs.items())}
     return Constants(prefix, doc, False, **values)
@@ -170,6 +175,10 @@ class Record:
         body, words = row_words("table", "at", self.words)
         body = [f"    {row}" for row in body]
         for m in self.members:
+            if m.type == "vec3":
+                whole = ", ".join(words[m.word + i] for i in range(3))
+                body.append(f"    r.{m.name} = v3({whole});")
+                continue
             for i, component in enumerate(TYPES[m.type][3]):
                 value = words[m.word + i]
                 if m.type in _CASTS:
@@ -238,39 +247,31 @@ class Record:
         unused: members that a scene does not use, by name: to load one gives `Member.nothing`, to
         store one does nothing. So kernels need not ask whether a scene has them.
         """
-        lower = self.snake_name
-        parts: list[str] = []
-        for m in self.members:
-            lane = TYPES[m.type][2]
-            if m.name in unused:
-                value = m.nothing or _ZERO.get(lane, "0.0f")
-                value = value if "(" in value else f"(({lane})({value}))"
-                parts += [
-                    f"#define load_{lower}_{m.name}(s, at) {value}",
-                    f"#define store_{lower}_{m.name}(s, at, m, v) ((void)0)",
-                ]
-                continue
-            cast = _CASTS.get(m.type, "")
-            heads = [
-                f"/* {m.doc} */\ninline {lane} load_{lower}_{m.name}(Slab s, uint at)",
-                f"inline void store_{lower}_{m.name}(Slab s, uint at, mask m, {lane} v)",
-            ]
-            load, store = [], []
-            for i, component in enumerate(TYPES[m.type][3]):
-                read = f"slab_read(s, {m.word + i}, at)"
-                value = f"as_real(v{component})" if cast else f"v{component}"
-                load.append(f"    r{component} = {f'{cast}({read})' if cast else read};")
-                store.append(f"    slab_write(s, {m.word + i}, at, m, {value});")
-            if m.words == 1:
-                bodies = [f"{{ return {load[0].partition('= ')[2]} }}", f"{{ {store[0].strip()} }}"]
-                parts += [f"{head} {body}" for head, body in zip(heads, bodies, strict=True)]
-                continue
-            if m.type == "spectrum":
-                for rows in (load, store):
-                    rows[3:] = ["#if SPECTRUM_SIZE == 4", rows[3], "#endif"]
-            parts += [heads[0], "{", f"    {lane} r;", *load, "    return r;", "}"]
-            parts += [heads[1], "{", *store, "}"]
-        return "\n".join([*parts, ""])
+        used = [self._accessors(m) for m in self.members if m.name not in unused]
+        absent = [self._without(m) for m in self.members if m.name in unused]
+        note = [f"/* Members of {self.name} that nothing here uses. */"] * bool(absent)
+        return "\n".join([*used, *note, *absent, ""])
+
+    def _accessors(self, m: Member) -> str:
+        """Return a load and a store of a member, with a comment in front of them."""
+        lane, name, at = TYPES[m.type][2], f"{self.snake_name}_{m.name}", f"(s, {m.word}, at"
+        cast = _CASTS.get(m.type, "") if m.words == 1 else ""
+        several = f"_{m.type}" if m.words > 1 else ""  # a function of kernels/core/slab.cl
+        read = f"slab_read{several}{at})"
+        read = f"{cast}({read})" if cast else read
+        write = f"slab_write{several}{at}, m, {'as_real(v)' if cast else 'v'})"
+        return (
+            f"/* {m.doc} */\ninline {lane} load_{name}(Slab s, uint at) {{ return {read}; }}\n"
+            f"inline void store_{name}(Slab s, uint at, mask m, {lane} v) {{ {write}; }}"
+        )
+
+    def _without(self, m: Member) -> str:
+        """Return macros in the place of a member's accessors, for a scene that does not use it."""
+        lane, name = TYPES[m.type][2], f"{self.snake_name}_{m.name}"
+        value = m.nothing or _ZERO.get(lane, "0.0f")
+        value = value if "(" in value else f"(({lane})({value}))"
+        store = f"#define store_{name}(s, at, m, v) ((void)0)"
+        return f"#define load_{name}(s, at) {value}\n{store}"
 
 
 def row_words(table: str, at: str, count: int) -> tuple[list[str], list[str]]:
@@ -281,7 +282,7 @@ def row_words(table: str, at: str, count: int) -> tuple[list[str], list[str]]:
     if count < 4:
         return [], [f"gather_w({table}, {at} + {i})" for i in range(count)]
     firsts = [*range(0, count - 4, 4), count - 4]
-    rows = [f"vec4 words{first} = gather_w4({table} + {first}, {at});" for first in firsts]
+    rows = [f"vec4 words{first} = row4({table} + {first}, {at});" for first in firsts]
     names = {first + i: f"words{first}.{c}" for first in firsts for i, c in enumerate("xyzw")}
     return rows, [names[i] for i in range(count)]
 

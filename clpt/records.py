@@ -334,6 +334,12 @@ BRICK_SIZES = Constants(
     unsigned=True,
     words=(365, "of its 9^3 points, two in each"),
 )
+BRICK_CELLS = Constants(
+    "BRICK_",
+    "Cells of the bricks of a grid along each axis.",
+    cells=(8, ""),
+    points=(9, "the ends of these cells"),
+)
 LAYER_SIZES = Constants(
     "LAYER_",
     "Sizes of layers of the first samples of a pixel.",
@@ -357,11 +363,50 @@ TREE_BITS = Constants(
     unsigned=True,
     leaf=(0x80000000, "it names an item, no node"),
 )
+TREE_SIZES = Constants(
+    "BVH_", "Sizes of trees.", depth=(48, "most levels of a leaf below the root")
+)
+TREE_REACHES = Constants(
+    "BVH_",
+    "How far a tree reaches.",
+    reach=(1e12, "[m] so that products of three coordinates stay inside a float"),
+)
+CURVE_KEYS = Constants(
+    "CURVE_",
+    "Keys of items on a curve through space.",
+    bits=(11, "of a digit"),
+    index=(31, "bits of the index of an item, below its code"),
+)
+CURVE_SIZES = Constants("CURVE_", "Sizes of tables of strands.", words=(24, "of a piece"))
+QUERY_SIZES = Constants("QUERY_", "Sizes of queries.", rays=(64, "that a work-item traces"))
+GRATING_SIZES = Constants(
+    "GRATING_", "Sizes of gratings.", orders=(8, "highest order of diffraction that is followed")
+)
+GRID_SIZES = Constants(
+    "GRID_", "Sizes of tables of directions.", side=(8, "parts along a side of the octahedron")
+)
+SKY_SIZES = Constants(
+    "SKY_",
+    "Sizes of the image of the sun.",
+    sun_rows=(24, "from its lower edge to its upper one"),
+    sun_columns=(12, "from its edge to the middle"),
+)
+IMPORTANCE = Constants(
+    "IMPORTANCE_",
+    "The density by which wavelengths are sampled, see `clpt.spectra.cie.sampled`.",
+    slope=(0.0072, "[1/nm]"),
+    peak=(538.0, "[nm]"),
+)
+CLOUD_OCTAVES = Constants(
+    "CLOUD_",
+    "The noise of a cloud.",
+    finer=(1.99, "how much finer each octave is than the one before"),
+)
 MATERIAL_KINDS = Constants(
     "MATERIAL_", "Kinds of material words.", mixture=(0xFF, "of a mask or a blend, no leaf")
 )
 
-CONSTANTS = {
+CONSTANTS: dict[str, Constants[int] | Constants[float]] = {
     "shape_bits": SHAPE_BITS,
     "medium_bits": MEDIUM_BITS,
     "path_bits": PATH_BITS,
@@ -369,11 +414,22 @@ CONSTANTS = {
     "counter_numbers": COUNTER_NUMBERS,
     "photon_numbers": PHOTON_NUMBERS,
     "brick_sizes": BRICK_SIZES,
+    "brick_cells": BRICK_CELLS,
     "layer_sizes": LAYER_SIZES,
     "reradiation_sizes": RERADIATION_SIZES,
     "motion_sizes": MOTION_SIZES,
     "density_sizes": DENSITY_SIZES,
     "tree_bits": TREE_BITS,
+    "tree_sizes": TREE_SIZES,
+    "tree_reaches": TREE_REACHES,
+    "curve_keys": CURVE_KEYS,
+    "curve_sizes": CURVE_SIZES,
+    "query_sizes": QUERY_SIZES,
+    "grating_sizes": GRATING_SIZES,
+    "grid_sizes": GRID_SIZES,
+    "sky_sizes": SKY_SIZES,
+    "importance": IMPORTANCE,
+    "cloud_octaves": CLOUD_OCTAVES,
     "material_kinds": MATERIAL_KINDS,
 }
 

@@ -280,7 +280,7 @@ def _exposure(value: Any) -> float:
     return stops if np.isfinite(stops) else 0.0
 
 
-def _curve(path: Path, text: Any) -> Tabulated | None:
+def _curve(path: Path, text: object) -> Tabulated | None:
     """A spectrum in an attribute: 400nm:0.5;410nm:0.6; and so on."""
     points = {}
     for digits, exponent, prefix, unit, value in _POINT.findall(

@@ -47,7 +47,7 @@ class RayMeshIntersector:
     intersector.
     """
 
-    def __init__(self, geometry: Any, queue: Any = None, *, scale_to_box: bool = True):
+    def __init__(self, geometry: Any, queue: object = None, *, scale_to_box: bool = True):
         if not (hasattr(geometry, "faces") and hasattr(geometry, "vertices")):
             message = f"must be a trimesh.Trimesh, not {type(geometry).__name__}; "
             raise SceneError(message + "a trimesh.Scene gives one by its to_mesh()", where="mesh")
@@ -202,7 +202,7 @@ class RayMeshIntersector:
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__init__(state["mesh"])  # type: ignore[misc]
 
-    def __deepcopy__(self, memo: Any) -> RayMeshIntersector:
+    def __deepcopy__(self, memo: object) -> RayMeshIntersector:
         return RayMeshIntersector(self.mesh, self.queue)
 
 

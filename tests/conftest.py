@@ -16,7 +16,8 @@ from clpt import device
 os.environ.setdefault("POCL_WORK_GROUP_SPECIALIZATION", "0")  # as of the command
 HERE = Path(__file__).resolve().parent
 # Tests that start processes, and wait for what the machine's other work may hold up.
-PROCESSES = [HERE / name for name in ("cli", "cluster", "embedding", "faults", "view")]
+PROCESSES = [HERE / name for name in ("benchmark", "cli", "cluster", "device", "embedding")]
+PROCESSES += [HERE / name for name in ("faults", "test_output_files.py", "view")]
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -16,6 +16,14 @@ from clpt import __main__ as entry
 from clpt import cli
 from clpt.errors import SceneError
 
+INTERRUPTED = "clpt: error: interrupted\n"
+
+
+def of(error: BaseException, cause: BaseException) -> BaseException:
+    """The error, with its cause: an import in C that a signal ends is an ImportError."""
+    error.__cause__ = cause
+    return error
+
 
 @pytest.fixture
 def failing(monkeypatch):
@@ -37,8 +45,10 @@ def failing(monkeypatch):
         (SceneError("no shape", file="a.xml", line=3), 2, "clpt: error: a.xml:3: no shape\n"),
         (SceneError("two\nlines"), 2, "clpt: error: two lines\n"),
         (click.UsageError("what?"), 2, "clpt: error: what?\n"),
-        (KeyboardInterrupt(), 130, "clpt: error: interrupted\n"),
-        (KeyboardInterrupt(signal.SIGTERM), 143, "clpt: error: interrupted\n"),
+        (KeyboardInterrupt(), 130, INTERRUPTED),
+        (KeyboardInterrupt(signal.SIGTERM), 143, INTERRUPTED),
+        (of(ImportError("initialization failed"), KeyboardInterrupt()), 130, INTERRUPTED),
+        (of(SceneError("no"), of(OSError(), KeyboardInterrupt(signal.SIGTERM))), 143, INTERRUPTED),
     ],
 )
 def test_status_and_line(failing, capsys, error, status, line):

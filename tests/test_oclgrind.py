@@ -49,6 +49,15 @@ program = cl.Program(context, text).build(cache_dir=False)
 program.probe(queue, (4,), None, cl.Buffer(context, cl.mem_flags.READ_WRITE, 16))
 queue.finish()
 """
+UNALIGNED = """
+import numpy as np, pyopencl as cl
+context = cl.create_some_context(interactive=False)
+queue = cl.CommandQueue(context)
+text = "kernel void probe(global int *a) { *(global long *)(a + 1) = 1; }"
+program = cl.Program(context, text).build(cache_dir=False)
+program.probe(queue, (1,), None, cl.Buffer(context, cl.mem_flags.READ_WRITE, 16))
+queue.finish()
+"""
 
 
 def waves(film: Film, photons: bool) -> Scene:
@@ -145,6 +154,7 @@ def checked(tmp_path: Path, script: str, *arguments: str, races: bool = False) -
 
 def test_it_finds_what_is_wrong(tmp_path: Path) -> None:
     assert "Invalid write" in checked(tmp_path, OUT_OF_BOUNDS)
+    assert "not aligned to the pointed type" in checked(tmp_path, UNALIGNED)
 
 
 QUICK = [

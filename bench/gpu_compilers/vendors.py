@@ -188,7 +188,7 @@ def nvidia(text: str, device: str, folder: Path) -> Figures:
     )
 
 
-@functools.lru_cache(maxsize=2)
+@functools.cache
 def _ptx(text: str, library: str) -> str:
     """PTX of a text, once for all devices."""
     with tempfile.TemporaryDirectory() as folder:

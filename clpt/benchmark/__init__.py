@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 
 from clpt import bvh, device
 
-from . import bandwidth, building, pictures, rays, shading, stages, starting
+from . import agreement, bandwidth, building, pictures, rays, shading, stages, starting
 from .figures import Figure
 from .picture_scenes import PICTURES
 from .scenes import opened
@@ -23,10 +23,11 @@ PARTS = {
     "rays": "rays a second by layout, set and query, hits checked",
     "stages": "what each stage of a render gets through, Mitems/s and GB/s; sort and film too",
     "shading": "every kind of material in a box of its own, Mitems/s, beside diffuse; if asked for",
+    "agreement": "each stage beside itself without optimisation; if asked for",
     "build": "trees built and refitted, Mtri/s",
     "start": "whole processes until a first picture, with empty caches and with full ones",
 }
-DEFAULT_PARTS = tuple(part for part in PARTS if part != "shading")  # that one takes minutes
+DEFAULT_PARTS = tuple(part for part in PARTS if part not in ("shading", "agreement"))
 START_SCENE = "cornell"  # where none is asked for
 
 
@@ -54,13 +55,14 @@ def measure(
         yield from pictures.measure(on, rounds, size, (scene,) if scene else ())
     if "bandwidth" in parts:
         yield from bandwidth.measure(on, rounds)
-    inside = {"rays", "stages", "build"} & set(parts)
-    if inside:
+    if {"rays", "stages", "agreement", "build"} & set(parts):
         plan = opened(scene or "atrium", mode)
         if "rays" in parts:
             yield from rays.measure(on, plan, rounds, layouts, count)
         if "stages" in parts:
             yield from stages.measure(on, plan, rounds, only)
+        if "agreement" in parts:
+            yield from agreement.measure(on, plan, only)
         if "build" in parts:
             yield from building.measure(on, plan, rounds, layouts)
     if "shading" in parts:

@@ -25,6 +25,7 @@ from clpt.errors import ClptError, one_line
 from .figures import Figure
 
 PART = "process"  # of figures that tell how a process ended
+HANGS = "it hangs"  # how the figure of a process begins that told nothing for too long
 LIMIT = 900.0  # seconds without a figure after which a process is ended
 
 About = Mapping[str, Any]  # of a device, see clpt.benchmark.records.of_device
@@ -62,7 +63,7 @@ def measured(
                     last = f"{figure.part} {figure.name}"
                     yield about, figure
         except TimeoutError:
-            yield about, _ended(f"it hangs: nothing came for {limit:g} s after {last}", errors)
+            yield about, _ended(f"{HANGS}: nothing came for {limit:g} s after {last}", errors)
             return
         yield about, _ended(f"it died ({_status(process.wait())}) after {last}", errors)
 

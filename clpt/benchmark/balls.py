@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from clpt import transforms
-from clpt.scene import Scene, integrators, lights, media
+from clpt.scene import Scene, integrators, lights, media, phases
 from clpt.scene.cameras import Perspective
 from clpt.scene.materials import (
     Conductor,
@@ -75,7 +75,7 @@ def glass() -> Scene:
 
 def mist() -> Scene:
     """A white and a coloured ball of mist, and one of wine, without surfaces."""
-    white = media.Homogeneous(sigma_s=5.0, phase=media.HenyeyGreenstein(g=0.6))
+    white = media.Homogeneous(sigma_s=5.0, phase=phases.HenyeyGreenstein(g=0.6))
     amber = media.Homogeneous(sigma_t=(1.2, 3.0, 7.0), albedo=(0.999, 0.99, 0.96))
     wine = media.Homogeneous(sigma_a=(0.3, 3.4, 3.0), sigma_s=0.1)
     balls = [

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Sequence
 from functools import cached_property
-from typing import Any, get_args
+from typing import get_args
 
 import numpy as np
 
@@ -28,7 +28,7 @@ def measure(
     rounds: int,
     layouts: Sequence[str] = bvh.TREES,
     count: int | None = None,
-    accel: Any = Accel,
+    accel: type[Accel] = Accel,
 ) -> Iterator[Figure]:
     """Figures of builds and refits, in Mtri/s by the host's clock, from arrays on the device.
 
@@ -64,7 +64,7 @@ def _name(layout: str, quality: Quality) -> str:
 class _Work:
     """Triangles on the device, where they are and where they move to, and rays among them."""
 
-    def __init__(self, on: device.Device, given: Sets, scene: str, accel: Any):
+    def __init__(self, on: device.Device, given: Sets, scene: str, accel: type[Accel]):
         self.device, self.given, self.scene, self.accel = on, given, scene, accel
         height = float(np.ptp(given.vertices[:, 1]))
         wave = np.sin(given.vertices[:, [1, 2, 0]] * (12.0 / max(height, 1e-6)))

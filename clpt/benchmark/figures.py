@@ -86,12 +86,12 @@ class Taken:
 
 def timed(on: device.Device, enqueue: Callable[[], Iterable[Any]]) -> Taken:
     """Time the commands whose events `enqueue` returns, on a queue with profiling."""
-    timings = Timings(on.queue)
-    on.queue.finish()
+    timings, stream = Timings(on.queue), device.Stream(on.queue)
+    device.wait(stream.mark())
     start = time.perf_counter()
     for event in enqueue():
         timings.add("", event)
-    on.queue.finish()
+    device.wait(stream.mark())
     host = time.perf_counter() - start
     return Taken(timings.collect()[""].seconds, host)
 

@@ -17,7 +17,7 @@ from clpt.render.renderer import Renderer
 from clpt.render.resumable import kernels_digest
 from clpt.scene import Scene
 
-from . import rays, tiles
+from . import agreement, rays, tiles
 from .figures import Figure
 from .picture_scenes import BENCHMARK_VERSION, PICTURES, SIZES, picture
 
@@ -105,7 +105,7 @@ def _exact(
 
 
 def first_wrong_stage(on: device.Device, scene: Scene, layout: str) -> str:
-    """Tell whether the rays of a scene are right, by the check of `rays`, which needs a tree.
+    """Tell which stage is wrong: `intersect` by the check of `rays`, others by `agreement`.
 
     on: profiling; layout: of the render's triangles.
     """
@@ -114,9 +114,9 @@ def first_wrong_stage(on: device.Device, scene: Scene, layout: str) -> str:
         for figure in rays.measure(on, scene, 1, layouts, CHECKED_RAYS):
             if figure.refused:
                 return f"first in intersect: {figure.refused}"
+        return agreement.first_wrong(on, scene)
     except ClptError as error:
-        return f"and the check of its rays failed: {error}"
-    return "its rays are right: look at generate, shade and accumulate"
+        return f"and the check of its stages failed: {error}"
 
 
 def film_digest(renderer: Renderer) -> str:

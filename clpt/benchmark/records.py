@@ -77,6 +77,7 @@ def circumstances() -> dict[str, Any]:
 
 def of_device(info: device.DeviceInfo) -> dict[str, Any]:
     """Return the part of a record that describes the device."""
+    own = info.cl_device
     return {
         "device": info.label,
         "kind": info.kind,
@@ -84,6 +85,12 @@ def of_device(info: device.DeviceInfo) -> dict[str, Any]:
         "driver": info.driver,
         "compute_units": info.compute_units,
         "global_mem": info.global_mem,
+        "max_alloc": info.max_alloc,
+        "local_mem": own.local_mem_size,
+        "group": own.max_work_group_size,
+        "address_align": own.mem_base_addr_align // 8,
+        "doubles": "cl_khr_fp64" in own.extensions.split(),
+        "images": bool(own.image_support),
     }
 
 

@@ -133,6 +133,11 @@ def opened(name: str, mode: str | None = None) -> Scene:
 
         scene = load(name)
         scene.name = scene.name or name
+    return in_mode(scene, mode)
+
+
+def in_mode(scene: Scene, mode: str | None) -> Scene:
+    """Return a scene whose light is made of rgb or spectral; None: as it is."""
     if mode is None:
         return scene
     return dataclasses.replace(scene, film=dataclasses.replace(scene.film, mode=mode))

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..choices import Quality
 from ..device import Device
 from ..errors import SceneError
+from ..records import TREE_REACHES
 from .building import Array, Building
 from .keyed import keyed
 from .layouts import BOX_LAYOUTS, LAYOUTS, Mesh, Part
@@ -26,7 +27,7 @@ BRUTE_LIMIT = 96  # triangles up to which brute force is faster; measured, see b
 
 WIDE8_BYTES = 54  # of a triangle, with its share of nodes, in large scenes
 MOST = (2**31 - 1) // 3  # triangles or vertices: kernels count words of them by an int
-_REACH = 1e12  # so that products of three coordinates stay inside a float
+_REACH = TREE_REACHES["reach"]
 
 
 @dataclass(frozen=True)

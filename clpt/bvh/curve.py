@@ -8,10 +8,11 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
+from ..records import CURVE_KEYS
 from .building import Building
 
 _CURVE, _BUILD = "bvh/curve.cl", "bvh/build.cl"
-_DIGIT, _INDEX = 11, 31  # CURVE_BITS and CURVE_INDEX of that file
+_DIGIT, _INDEX = CURVE_KEYS["bits"], CURVE_KEYS["index"]
 _CODE = 33  # bits of a key above those of the index
 _CHUNKS = 4  # for each compute unit, to sort
 _RUN = 2048  # items of the curve that one work-item cuts, and puts into the tree's bounds

@@ -8,11 +8,12 @@ from itertools import pairwise
 import numpy as np
 import pyopencl as cl
 
+from ..records import TREE_SIZES
 from .building import Building
 from .tree import Tree
 
 _ROOT = "bvh/collapse.cl"
-_DEEPEST = 48  # BVH_DEPTH of kernels/bvh/node.cl
+_DEEPEST = TREE_SIZES["depth"]
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -21,7 +20,7 @@ class PixelType(click.ParamType):
     name = "X,Y"
 
     def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> Pixel:
         match = re.fullmatch(r"(\d{1,9}),(\d{1,9})", str(value).replace(" ", ""))
         if not match:

@@ -1,17 +1,40 @@
-"""`clpt kernels`: the OpenCL sources that a scene is rendered with."""
+"""`clpt kernels`: the OpenCL sources that a scene is rendered with, or one launch of them."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from .. import output_files
-from ..choices import LAYOUTS
+from ..choices import LAYOUTS, MODES
 from ..errors import SceneError
 from ..formats import load, locate
 from .options.loading_options import loading_options
+from .options.records import with_records
+
+if TYPE_CHECKING:
+    from ..scene import Scene
+
+FIRST = "first"  # in the place of a stage's name: the first that is wrong
+
+
+@dataclass(frozen=True)
+class Texts:
+    """The kind of device that texts are for: paths of a work-item, and trees."""
+
+    lanes: str
+    layout: str
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """The stage whose launch is written, if one is asked for, and where it runs."""
+
+    repro: str | None
+    device: str | None
 
 
 @click.command()
@@ -28,24 +51,47 @@ from .options.loading_options import loading_options
     "--layout", type=click.Choice(LAYOUTS), default="wide8", show_default=True,
     help="Acceleration structure of the triangles.",
 )  # fmt: skip
+@click.option("--mode", type=click.Choice(MODES), help="What light is made of.")
+@click.option(
+    "--repro", metavar="STAGE",
+    help="Write a program of its own, in C and in Python, that shows whether a device runs this "
+    "stage right; `first`: the first stage that is wrong.",
+)  # fmt: skip
+@click.option("--device", help="Of --repro: index or part of the name of the device.")
 @loading_options
-def kernels(scene: Path, folder: Path, lanes: str, layout: str, variables: dict[str, Any]) -> None:
+@with_records(texts=Texts, reproduction=Reproduction)
+def kernels(
+    scene: Path,
+    folder: Path,
+    mode: str | None,
+    texts: Texts,
+    reproduction: Reproduction,
+    variables: dict[str, Any],
+) -> None:
     """Write the OpenCL programs that render SCENE, one file each.
 
     Each is a complete program for any OpenCL compiler. No device is needed. On a CPU a render has
-    their functions in one program.
+    their functions in one program. SCENE may be one of `clpt bench --list`.
     """
-    locate(scene)
+    plan = _opened(scene, mode, variables)
+    if reproduction.repro is not None:
+        _reproduce(plan, scene, folder, reproduction.repro, reproduction.device)
+        return
+    _write_texts(plan, folder, texts)
+
+
+def _write_texts(plan: Scene, folder: Path, texts: Texts) -> None:
+    """Write the programs of a scene, one file each."""
     from ..render.codegen.programs import film_sources, sources  # here: help needs no OpenCL
     from ..render.lowering.scene import lower
 
-    features = lower(load(scene, **variables)).features
+    features = lower(plan).features
     queued = len(features.materials.kinds) > 1
-    made = film_sources(features, layout)
+    made = film_sources(features, texts.layout)
     for own in features.passes:
         label = "light_" if own is not features else ""
-        texts = sources(own, layout, int(lanes), queued=queued)
-        made |= {f"{label}{name}": text for name, text in texts.items()}
+        written = sources(own, texts.layout, int(texts.lanes), queued=queued)
+        made |= {f"{label}{name}": text for name, text in written.items()}
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, source in made.items():
@@ -55,3 +101,33 @@ def kernels(scene: Path, folder: Path, lanes: str, layout: str, variables: dict[
     for name, source in made.items():
         rows, files = source.text.count("\n"), len(source.files)
         click.echo(f"{folder / name}.cl  {rows:,} lines from {files} files")
+
+
+def _opened(scene: Path, mode: str | None, variables: dict[str, Any]) -> Scene:
+    """Return a scene of a file, or of the benchmark where there is no such file."""
+    from ..benchmark.picture_scenes import PICTURES  # here: help needs no OpenCL
+    from ..benchmark.scenes import in_mode, made
+
+    if str(scene) in PICTURES and not scene.exists():
+        return in_mode(made(str(scene)), mode or PICTURES[str(scene)].mode)
+    locate(scene)
+    return in_mode(load(scene, **variables), mode)
+
+
+def _reproduce(plan: Scene, scene: Path, folder: Path, stage: str, which: str | None) -> None:
+    """Write a program that shows whether a device runs a stage right."""
+    from .. import device
+    from ..benchmark import agreement, repro
+
+    on = device.choose(which)
+    witness = agreement.witness_of(on)
+    only = () if stage == FIRST else (stage,)
+    for one in agreement.checked(on, plan, witness, only):
+        if only or one.told:
+            break
+    else:
+        raise SceneError(f"no stage is wrong beside {witness.name}", file=scene)
+    told = one.told or "right"
+    repro.write(folder, one.launch, str(scene), on.info, witness.name, told)
+    click.echo(f"{one.launch.stage} on {on.info.label}: {told}, beside {witness.name}")
+    click.echo(f"{folder / 'README.txt'} says how to run it without clpt")

@@ -49,7 +49,7 @@ class Bundle:
         return {"format": "clpt bundle", "version": VERSION, "files": self.files}
 
     @classmethod
-    def from_json(cls, document: Any) -> Bundle:
+    def from_json(cls, document: object) -> Bundle:
         """Read a bundle's list.
 
         Raises ClusterError for a version that is not known, a name that is no plain file name, and

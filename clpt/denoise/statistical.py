@@ -153,7 +153,7 @@ class Statistical:
         return guide, self._blurred(variance, NOISE_RADIUS, LEAST_VARIANCES[which])
 
     def _average(
-        self, which: int, values: Any, count: int, by: tuple[Any, Any] | None = None
+        self, which: int, values: object, count: int, by: tuple[Any, Any] | None = None
     ) -> Any:
         """Averages of `count` vectors a pixel; which: the first time or the second.
 
@@ -168,7 +168,7 @@ class Statistical:
         )  # fmt: skip
         return made
 
-    def _decide(self, halves: Any, once: Any, twice: Any) -> Image:
+    def _decide(self, halves: object, once: object, twice: object) -> Image:
         """Return the share of each picture in the result, (h, w, 4); the last one is 0."""
         errors, shares = self._allocate(1), self._allocate(1)
         self._run(
@@ -206,7 +206,7 @@ class Statistical:
     def _upload(self, image: Image) -> Any:
         return self._buffers.upload("a picture to denoise", image)
 
-    def _download(self, buffer: Any, shape: tuple[int, ...]) -> Image:
+    def _download(self, buffer: object, shape: tuple[int, ...]) -> Image:
         return self._stream.read(buffer, np.empty(shape, np.float32))
 
 

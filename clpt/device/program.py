@@ -144,6 +144,11 @@ class BoundKernel:
             raise TypeError(f"kernel {self.kernel.name!r} also takes {', '.join(missing)}")
         self.set_args(**named)
 
+    @property
+    def values(self) -> Mapping[str, Any]:
+        """The arguments by name, as the driver has them."""
+        return self._values
+
     def drop_buffers(self) -> None:
         """Forget the buffers, which the driver keeps until the commands that use them end."""
         self._values.clear()
@@ -177,15 +182,16 @@ class BoundKernel:
         global_size: Sequence[int],
         local_size: Sequence[int] | None = None,
         wait_for: Sequence[cl.Event] | None = None,
+        offset: Sequence[int] | None = None,
     ) -> cl.Event:
-        """Enqueue it; sizes are (x,), (x, y) or (x, y, z).
+        """Enqueue it; sizes are (x,), (x, y) or (x, y, z); offset: of the first work-item.
 
         Raises DeviceError if the driver refuses it, MemoryBudgetError if memory has run out.
         """
         try:
             group = self._fitting(queue, local_size)
             return cl.enqueue_nd_range_kernel(
-                queue, self._cl_kernel, global_size, group, wait_for=wait_for
+                queue, self._cl_kernel, global_size, group, offset, wait_for=wait_for
             )
         except cl.Error as error:
             where = f"kernel {self.kernel.name!r} at {global_size}, {local_size}"

@@ -39,7 +39,7 @@ class ProgramCache:
                 self._programs.move_to_end(key)
             return self._programs.get(key)
 
-    def keep(self, key: Hashable, program: Any) -> None:
+    def keep(self, key: Hashable, program: object) -> None:
         """Keep a program; drop the one that was used longest ago if there are too many."""
         with self._lock:
             self._programs[key] = program

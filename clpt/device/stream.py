@@ -79,9 +79,10 @@ class Stream:
         bound: BoundKernel,
         global_size: Sequence[int],
         local_size: Sequence[int] | None = None,
+        offset: Sequence[int] | None = None,
     ) -> cl.Event:
-        """Enqueue a kernel. Raises DeviceError if the driver refuses it."""
-        self.last = bound.enqueue(self.queue, global_size, local_size, self._waits())
+        """Enqueue a kernel; offset: of its first work-item. Raises DeviceError if it is refused."""
+        self.last = bound.enqueue(self.queue, global_size, local_size, self._waits(), offset)
         return self.last
 
     def fill(self, buffer: cl.Buffer, word: int, offset: int, nbytes: int) -> cl.Event:

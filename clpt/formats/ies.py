@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from clpt import text as text_files
+from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
 from clpt.scene.textures import Bitmap
 
@@ -42,7 +43,7 @@ class Photometry:
     horizontal: NDArray[np.float64]
     candela: NDArray[np.float64]
 
-    def intensity(self, vertical: Any, horizontal: Any) -> NDArray[np.float64]:
+    def intensity(self, vertical: ArrayLike, horizontal: ArrayLike) -> NDArray[np.float64]:
         """Return the intensity [cd] at angles [degrees] that broadcast; 0 where none was measured.
 
         Between the angles it is linear; what is measured of a half or a quarter is mirrored.
@@ -86,7 +87,7 @@ def parameters(path: Path) -> dict[str, Any]:
     return {"image": Bitmap(image=image, raw=True, wrap="repeat", wrap_v="clamp")}
 
 
-def _between(angles: NDArray[np.float64], at: Any) -> tuple[Any, Any]:
+def _between(angles: NDArray[np.float64], at: Floats) -> tuple[Integers, Floats]:
     """The angle before each of `at`, and how far it is on the way to the next."""
     index = np.clip(np.searchsorted(angles, at, "right") - 1, 0, max(len(angles) - 2, 0))
     if len(angles) == 1:

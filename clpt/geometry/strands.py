@@ -14,9 +14,10 @@ from clpt import transforms
 from clpt.arrays import Floats32
 from clpt.errors import SceneError
 from clpt.geometry import analytic, shapes, tubes
+from clpt.records import CURVE_SIZES
 from clpt.scene.shapes import Curves
 
-CONTROL, WORDS = 16, 24  # words of a piece: its control points, and all
+CONTROL, WORDS = 16, CURVE_SIZES["words"]  # words of a piece: its control points, and all
 BEND = np.pi / 6.0  # by which the control polygon of a piece may turn
 SLENDER = 20.0  # times as large as the piece a box may be, before the piece is cut
 MOST_CUTS = 64  # of a cubic

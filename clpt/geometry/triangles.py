@@ -104,7 +104,7 @@ def keyed(
         raise SceneError("its triangles are others at other times", where=where(shape))
     solid = np.any([_solid(one[0], faces) for one in at_all], axis=0)
     flat = [] if solid.all() else [Flat(where(shape), int((~solid).sum()), len(solid))]
-    normals: Any = None
+    normals: Points | None = None
     if at_all[0][2] is not None:
         normals = np.stack([np.asarray(one[2]) for one in at_all], axis=1).reshape(-1, 3)
     return (
@@ -202,8 +202,7 @@ def attribute(shape: Shape, name: str) -> Points:
     else:
         vertices, faces, _, _ = _in_world(shape)
         count = len(faces) if by_face else len(vertices)
-    given: Any = shape.attributes[name]
-    values = np.asarray(on_host(given), np.float32)
+    values = np.asarray(on_host(shape.attributes[name]), np.float32)
     values = values[:, None] if values.ndim == 1 else values
     if values.shape not in ((count, 1), (count, 3)):
         message = f"attribute {name!r} must be ({count}, 1 or 3), found {values.shape}"

@@ -115,7 +115,7 @@ def _note(path: Path, made: _Header, name: str, value: str) -> None:
     if name in ("EXPOSURE", "COLORCORR"):
         made.divide *= np.array(numbers, np.float32)
     elif name == "PRIMARIES":
-        made.primaries = numbers
+        made.primaries = numbers if any(numbers) else None  # Photoshop's zeros state none
     elif name == "PIXASPECT":
         made.aspect *= numbers[0]
     else:

@@ -77,7 +77,8 @@ def _fields(data: bytes) -> dict[str, np.ndarray]:
         if not 1 <= kind <= len(TYPES):
             raise SceneError(f"is damaged: the field {name!r} is of an unknown type ({kind})")
         dtype, size = np.dtype(TYPES[kind - 1]), math.prod(shape)
-        if offset + size * dtype.itemsize > len(data):
+        # of an empty field too: NumPy has no shape of larger numbers
+        if max(offset + size * dtype.itemsize, *shape, 0) > len(data):
             raise SceneError(f"is damaged: the field {name!r} goes beyond its end")
         fields[name] = np.frombuffer(data, dtype, size, offset).reshape(shape)
     return fields

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -12,7 +10,9 @@ from clpt.errors import SceneError
 from clpt.mie.sizes import Sizes
 from clpt.mie.sphere import spheres
 from clpt.mie.water import water_index
-from clpt.scene.media import Homogeneous, Tabulated
+from clpt.scene.media import Homogeneous
+from clpt.scene.phases import Tabulated
+from clpt.spectra import Spectrum
 
 DENSE = 0.1  # share of the volume above which spheres do not scatter on their own
 WATER = "water"
@@ -47,9 +47,9 @@ def droplets(
     of: Sizes,
     share: float,
     *,
-    index: Any = WATER,
-    k: Any = 0.0,
-    host: Any = 1.0,
+    index: float | str | Spectrum = WATER,
+    k: float | Spectrum = 0.0,
+    host: float | str | Spectrum = 1.0,
     lambdas: ArrayLike = (),
     name: str = "",
 ) -> Homogeneous:
@@ -92,13 +92,13 @@ def droplets(
     )
 
 
-def _index(value: Any, at: NDArray[np.float64]) -> NDArray[np.float64]:
+def _index(value: float | str | Spectrum, at: NDArray[np.float64]) -> NDArray[np.float64]:
     if isinstance(value, str) and value == WATER:
         return water_index(at)
     return _values(spectra.index(value) if not isinstance(value, (int, float)) else value, at)
 
 
-def _values(value: Any, at: NDArray[np.float64]) -> NDArray[np.float64]:
+def _values(value: float | Spectrum, at: NDArray[np.float64]) -> NDArray[np.float64]:
     if isinstance(value, (int, float)):
         return np.full(len(at), float(value))
     return np.asarray(value.sample(at), np.float64)

@@ -141,7 +141,7 @@ class Accel(Queries):
         self._stream.copy(copy, buffer, src_offset=4 * argument.offset, byte_count=12 * rows)
         return copy, rows
 
-    def _upload(self, array: Any, kind: type) -> Any:
+    def _upload(self, array: object, kind: type) -> Any:
         """An array on the device, None for no values; a buffer is returned as it is."""
         if not isinstance(array, np.ndarray):
             return array

@@ -27,12 +27,12 @@ from ..device import (
     wait,
 )
 from ..errors import DeviceError, SceneError
-from ..records import INSTANCE
+from ..records import INSTANCE, QUERY_SIZES
 from . import batch
 from .arrays import ArrayInput, DeviceArg
 
 _GROUP = 64  # rays of a work-group
-_BATCH = 64  # BATCH of kernels/bvh/query_interleaved.cl
+_BATCH = QUERY_SIZES["rays"]  # rays of a work-item
 _HITS: batch.Columns = {
     "t": (0, np.float32),
     "primitive": (0, np.int32),
@@ -89,7 +89,7 @@ class Queries:
 
     instanced = False
 
-    def __new__(cls, queue: Any = None, *_: Any, **__: Any) -> Queries:
+    def __new__(cls, queue: object = None, *_: Any, **__: Any) -> Queries:
         if not isinstance(queue, cl.CommandQueue):  # before Python counts the other arguments
             found = f"its first argument is a pyopencl.CommandQueue, not {type(queue).__name__}"
             advice = "clpt.device.choose().queue is one"

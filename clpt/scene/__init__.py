@@ -19,6 +19,7 @@ from clpt.scene import (
     materials,
     media,
     paths,
+    phases,
     shapes,
     studio,
     textures,
@@ -40,6 +41,7 @@ __all__ = [
     "lights",
     "materials",
     "media",
+    "phases",
     "shapes",
     "textures",
 ]
@@ -47,7 +49,7 @@ __all__ = [
 KINDS: dict[str, tuple[type[Kind], ...]] = {
     "material": materials.KINDS,
     "medium": media.KINDS,
-    "phase": media.PHASES,
+    "phase": phases.KINDS,
     "light": lights.KINDS,
     "shape": shapes.KINDS,
     "camera": cameras.KINDS,
@@ -74,7 +76,7 @@ def _show_own(module: ModuleType) -> None:
     vars(module)["__dir__"] = lambda: own
 
 
-for _module in (cameras, integrators, lights, materials, media, shapes, textures):
+for _module in (cameras, integrators, lights, materials, media, phases, shapes, textures):
     _show_own(_module)
 
 

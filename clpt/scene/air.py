@@ -9,8 +9,9 @@ import numpy as np
 from clpt import transforms as tf
 from clpt.errors import SceneError
 from clpt.scene.lights import Sky
-from clpt.scene.media import Draine, Grid, HenyeyGreenstein, Mixture, Phase
+from clpt.scene.media import Grid, Mixture
 from clpt.scene.params import params
+from clpt.scene.phases import Draine, HenyeyGreenstein, Phase
 from clpt.spectra import Tabulated
 from clpt.spectra.air import DEPOLARISED, Atmosphere, densities
 

@@ -93,7 +93,7 @@ class _Walk:
         self._known: dict[tuple[int, str], Values] = {}
         self._alive: list[Any] = []  # so that no id is used again
 
-    def values(self, thing: Any, where: str, form: str = "") -> Values:
+    def values(self, thing: object, where: str, form: str = "") -> Values:
         """Return what a thing consists of, by names below its own; "" is the thing itself.
 
         where: its name, for errors; form: of the parameter that holds it, see HostForm.
@@ -108,7 +108,7 @@ class _Walk:
             self._known[key] = self._inner(thing, where, form)
         return self._known[key]
 
-    def _inner(self, thing: Any, where: str, form: str) -> Values:
+    def _inner(self, thing: object, where: str, form: str) -> Values:
         if isinstance(thing, Group):  # many instances may share many shapes
             return {"": _digest(self._fields(thing, where))}
         if dataclasses.is_dataclass(thing):

@@ -386,7 +386,7 @@ class Film(Kind):
             known = f"{', '.join(OBSERVERS)}, nor a Sensor"
             raise SceneError(f"{self.sensor!r} is none of {known}", where="film.sensor")
         object.__setattr__(self, "white_balance", _white_balance(self.white_balance))
-        given: Any = self.layers
+        given: str | tuple[str, ...] = self.layers
         object.__setattr__(self, "layers", (given,) if isinstance(given, str) else tuple(given))
         for name in self.layers:
             if name not in LAYERS:

@@ -288,6 +288,9 @@ class Envmap(Light):
     )
     scale: float = real(1.0, "factor on the radiance", low=0.0)
     to_world: Matrix4 = host(np.eye(4), "rotation, (4, 4)")
+    mis_compensation: bool = flag(
+        False, "True: rays are sent to its bright parts, and what materials scatter finds the rest"
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -136,7 +136,6 @@ class Diffuse(Material):
     """Lambertian reflection of the front side."""
 
     absorbs = True
-    guided = True
 
     reflectance: Textured = reflectance(0.5, "albedo", linear=True)
 

@@ -1,35 +1,29 @@
-"""Media: what light does between surfaces.
-
-A phase function has a pair kernels/phase/<kind>.cl. It scatters at a point as a material does at a
-surface: its local frame has z along the ray back to where light was last.
-"""
+"""Media: what light does between surfaces."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from clpt import spectra
 from clpt.errors import SceneError
-from clpt.scene.energy import check_reradiation
+from clpt.records import CLOUD_OCTAVES
 from clpt.scene.params import (
     Kind,
-    angular,
     coefficient,
     fields_of,
     host,
-    quantity,
     real,
     reflectance,
     reradiation,
 )
 from clpt.scene.params import emission as emitted
-from clpt.scene.scatterer import Scatterer
+from clpt.scene.phases import HenyeyGreenstein, Isotropic, PerCollision, Phase, Reradiating
 from clpt.scene.values import Matrix4, SpectrumLike, Vector3
 from clpt.scene.volumes import Volume, check_volume, resampled
 from clpt.spectra import (
@@ -43,207 +37,13 @@ from clpt.spectra import (
 )
 from clpt.spectra.spectrum import WIDEST, extremes
 
-MOST_ROWS = 512  # of a table by wavelength
 SOOT = 0.26  # E(m), the imaginary part of (m^2 - 1) / (m^2 + 2) without its sign
 COLDEST = 100.0  # [K] below which nothing is seen of a black body
 ON_POINTS = ("emission_grid", "temperature", "albedo_grid", "color_grid")  # of a `Grid`
-OCTAVE = 1.99  # how much finer each octave of a cloud's noise is than the one before
+OCTAVE = CLOUD_OCTAVES["finer"]
 CLOUD_LEAST, CLOUD_MOST, CLOUD_FINEST = 32, 256, 1024  # points along a cloud's longest side
 MOST_PARTS = 8  # of a mixture
 RADIANCE = "W m^-2 sr^-1 nm^-1"
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Phase(Scatterer):
-    """Base of all phase functions: how much light a point of a medium sends where, in 1/sr."""
-
-    folder: ClassVar[str] = "phase"
-    is_phase = True
-
-    @property
-    def leaves(self) -> tuple[Phase, ...]:
-        """The phase functions that it is made of: itself, but of a blend."""
-        return (self,)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Isotropic(Phase):
-    """Scattering with the same strength in all directions."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class HenyeyGreenstein(Phase):
-    """Henyey and Greenstein 1941: one number tells how much goes forward."""
-
-    chromatic = True
-
-    g: SpectrumLike = quantity(0.0, "mean cosine: 1 is forward, -1 back", low=-0.999, high=0.999)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Draine(Phase):
-    """Draine 2003: from Henyey and Greenstein's, with alpha 0, to Cornette and Shanks's, with 1.
-
-    With g of 0 and alpha of 1 it is Rayleigh's. Jendersie and d'Eon 2023 fit water drops by it.
-    """
-
-    chromatic = True
-
-    g: SpectrumLike = quantity(0.0, "shape: 1 is forward, -1 back", low=-0.999, high=0.999)
-    alpha: SpectrumLike = quantity(1.0, "how much more goes forward and back", low=0.0, high=1e4)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Tabulated(Phase):
-    """Measured or calculated: a table over the cosine of the angle by which light turns.
-
-    values: numbers (n,) from 0, in any unit, or a row for each wavelength (m, n); cosines: of each
-    number, ascending from -1 to 1, by default even; wavelengths: of each row [nm], ascending. It is
-    linear between, holds its end rows, and is scaled so that its integral over directions is 1. Its
-    parameters are then float64 arrays, (m, n) and (n,) and (m,).
-
-    Raises SceneError where it is none.
-    """
-
-    chromatic = True
-
-    values: Any = angular("how much goes where, over the cosine; a row for each wavelength")
-    cosines: Any = host((), "of each value, from -1 to 1; none: even", form="numbers")
-    wavelengths: Any = host((), "of each row; none: one row is of all", "nm", form="numbers")
-
-    def check(self) -> None:
-        """Check the three arrays, and scale the rows."""
-        values = np.atleast_2d(self._numbers("values", self.values))
-        cosines = self._numbers("cosines", self.cosines)
-        lambdas = self._numbers("wavelengths", self.wavelengths)
-        if values.ndim != 2 or values.shape[1] < 2:
-            raise self._error("values", "must be two numbers or more, or rows of them")
-        if not cosines.size:
-            cosines = np.linspace(-1.0, 1.0, values.shape[1])
-        if len(cosines) != values.shape[1]:
-            message = f"{len(cosines)} for {values.shape[1]} values: there must be one of each"
-            raise self._error("cosines", message)
-        if (cosines[0], cosines[-1]) != (-1.0, 1.0) or not (np.diff(cosines) > 0.0).all():
-            raise self._error("cosines", "must ascend from -1 to 1")
-        if len(lambdas) != len(values) and (len(values) > 1 or len(lambdas) > 1):
-            message = f"{len(lambdas)} for {len(values)} rows: there must be one of each"
-            raise self._error("wavelengths", message)
-        if not (np.diff(lambdas) > 0.0).all() or not (lambdas > 0.0).all():
-            raise self._error("wavelengths", "must ascend, and be above 0")
-        if (values < 0.0).any():
-            raise self._error("values", f"{values.min():g} is negative")
-        whole = _whole(values, cosines)
-        if not (whole > 0.0).all():
-            raise self._error("values", f"row {int(np.argmin(whole))} holds nothing but 0")
-        object.__setattr__(self, "values", values / whole[:, None])
-        object.__setattr__(self, "cosines", cosines)
-        object.__setattr__(self, "wavelengths", lambdas)
-
-    def device_rows(
-        self, spectral: bool
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], float, float]:
-        """Return cosines (n,), densities (m, n) [1/sr], and the first row's wavelength and the
-        distance of two rows [nm].
-
-        spectral: the rows are even in wavelength; else they are of the three colours, or there is
-        one.
-        """
-        values, lambdas = self.values, self.wavelengths
-        if len(values) == 1:
-            return self.cosines, values, 0.0, 1.0
-        if spectral:
-            gaps = np.diff(lambdas)
-            step = max(float(gaps.min()), float(lambdas[-1] - lambdas[0]) / (MOST_ROWS - 1))
-            count = round(float(lambdas[-1] - lambdas[0]) / step) + 1
-            even = np.linspace(lambdas[0], lambdas[-1], count)
-            at = np.clip(np.searchsorted(lambdas, even, "right") - 1, 0, len(lambdas) - 2)
-            share = ((even - lambdas[at]) / gaps[at])[:, None]
-            rows = values[at] * (1.0 - share) + values[at + 1] * share
-            return self.cosines, rows, float(even[0]), float(even[1] - even[0])
-        colours = [spectra.Tabulated(lambdas, v, "hold").to_rgb("unbounded") for v in values.T]
-        rows = np.maximum(np.array(colours, np.float64).T, 0.0)
-        whole = _whole(rows, self.cosines)
-        return self.cosines, rows / whole[:, None], 0.0, 1.0
-
-    def _numbers(self, name: str, given: Any) -> NDArray[np.float64]:
-        try:
-            made = np.array(given, np.float64)
-        except (TypeError, ValueError):
-            raise self._error(name, "must be numbers, in rows of one length") from None
-        if not np.isfinite(made).all():
-            raise self._error(name, "must be finite")
-        return made
-
-    def _error(self, name: str, message: str) -> SceneError:
-        return SceneError(message, where=f"{self.kind}.{name}")
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Blend(Phase):
-    """Two phase functions, of which each scatters its share of the light."""
-
-    weight: float = real(0.5, "share of the second", low=0.0, high=1.0)
-    first: Phase = host(Isotropic(), "a phase function", form="phase")
-    second: Phase = host(Isotropic(), "another one", form="phase")
-
-    def check(self) -> None:
-        """Raise SceneError for what is no phase function."""
-        parts: dict[str, object] = {"first": self.first, "second": self.second}
-        for name, part in parts.items():
-            if not isinstance(part, Phase):
-                message = f"must be a phase function, not {part!r}"
-                raise SceneError(message, where=f"{self.kind}.{name}")
-
-    @property
-    def leaves(self) -> tuple[Phase, ...]:
-        return (*self.first.leaves, *self.second.leaves)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Rayleigh(Phase):
-    """Scattering by particles far smaller than the wavelength, as air: 3 (1 + cos^2) / 16 pi."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Reradiating(Phase):
-    """Isotropic scattering with fluorescence: light also leaves at longer wavelengths than it came.
-
-    Of what collides the share `reflectance` keeps its wavelength, and `reradiation` tells what is
-    given out at others. For particles that collide with all wavelengths alike; `dyed` makes one for
-    what absorbs by wavelength. In RGB mode it has the colour that it has under D65, at most white.
-    """
-
-    fluoresces = True
-
-    reflectance: SpectrumLike = reflectance(
-        0.5, "share of the light that keeps its wavelength", textured=False
-    )
-    reradiation: Reradiation | None = reradiation(None, "what is given out at other wavelengths")
-    amount: float = real(1.0, "factor on the re-radiation", low=0.0, high=1.0)
-
-    def check(self) -> None:
-        """Raise SceneError where more light would leave than comes."""
-        if self.reradiation is not None and not isinstance(self.reradiation, PerCollision):
-            check_reradiation(self.kind, self.reflectance, self.reradiation, self.amount)
-
-
-@dataclass(frozen=True, eq=False)
-class PerCollision(Reradiation):
-    """Re-radiation of a dye, over the collisions at the wavelength that leaves.
-
-    factor: the dye's absorption where that of `dye` is 1, over the collisions, a spectrum.
-    """
-
-    dye: Reradiation
-    factor: Spectrum
-
-    @property
-    def table(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        out, into, values = self.dye.table
-        return out, into, values * self.factor.sample(out)[:, None]
-
-    def on_nodes(self, nodes: NDArray[np.float64]) -> NDArray[np.float64]:
-        return self.dye.on_nodes(nodes) * self.factor.sample(nodes)[:, None]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -308,7 +108,7 @@ class Homogeneous(Medium):
 
     @classmethod
     def from_albedo(
-        cls, albedo: Any, mean_free_path: Any, g: float = 0.0, **parameters: Any
+        cls, albedo: SpectrumLike, mean_free_path: SpectrumLike, g: float = 0.0, **parameters: Any
     ) -> Homogeneous:
         """Return a medium by how it looks: a thick body of it reflects `albedo` of even light.
 
@@ -457,11 +257,6 @@ class Dyed(Homogeneous):
         return spectra.Tabulated(out, sums)
 
 
-def _whole(rows: NDArray[Any], cosines: NDArray[Any]) -> NDArray[np.float64]:
-    """Integrals over directions of rows (m, n) that are linear between cosines (n,)."""
-    return np.pi * ((rows[:, 1:] + rows[:, :-1]) @ np.diff(cosines))
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Lattice(Medium):
     """Base of media whose coefficients a density multiplies, at points of a lattice in a box."""
@@ -565,14 +360,14 @@ class Grid(Lattice, Homogeneous):
         form="volume",
     )
     bits: int = host(16, "of a number of the density on the device: 16 or 8")
-    albedo_grid: Any = host(
+    albedo_grid: NDArray[Any] | Volume | None = host(
         None, "colours (nx, ny, nz, 3) that multiply what is scattered; the rest is absorbed",
         form="colour_volume",
     )  # fmt: skip
     albedo_with_density: bool = host(
         False, "whether what is scattered, density times `albedo_grid`, is trilinear; else each is"
     )
-    color_grid: Any = host(
+    color_grid: NDArray[Any] | Volume | None = host(
         None, "colours (nx, ny, nz, 3) up to 1 that multiply the extinction",
         form="colour_volume",
     )  # fmt: skip
@@ -691,11 +486,11 @@ def _mapped(value: Any, function: Callable[[Any], Any]) -> Spectrum:
     return spectra.Tabulated(WIDEST, function(value.sample(WIDEST)), "hold")
 
 
-def _unbounded(value: Any) -> Any:
+def _unbounded(value: object) -> Any:
     return RGBUnbounded(value.r, value.g, value.b) if isinstance(value, RGB) else value
 
 
-def _single_albedo(reflected: Any, g: float) -> Any:
+def _single_albedo(reflected: ArrayLike, g: float) -> Any:
     """The share that a medium scatters, of which a thick body reflects so much of even light."""
     r = np.clip(np.asarray(reflected, np.float64), 0.0, 1.0)
     b = 1.139 + 1.17 * r
@@ -824,13 +619,4 @@ class Mixture(Lattice):
         return [1.0 if one is None else float(np.max(one)) for one in numbers]
 
 
-PHASE_LEAVES: tuple[type[Phase], ...] = (
-    Isotropic,
-    HenyeyGreenstein,
-    Rayleigh,
-    Draine,
-    Reradiating,
-    Tabulated,
-)
-PHASES: tuple[type[Phase], ...] = (*PHASE_LEAVES, Blend)
 KINDS: tuple[type[Medium], ...] = (Homogeneous, Grid, Cloud, Dyed, Soot, Mixture)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from clpt import transforms
 from clpt.errors import SceneError
@@ -60,7 +60,7 @@ class Keys:
 
     def at(self, time: float) -> NDArray[np.float64]:
         """Return the transform at a time [s], (4, 4) float64."""
-        times: Any = self.times
+        times = self.times
         if len(times) == 1 or time <= times[0]:
             return np.array(self.transforms[0])
         if time >= times[-1]:
@@ -113,7 +113,7 @@ class Deformation:
 
     def at(self, time: float) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
         """Return the points (n, 3 or 4) float32 at a time [s], and the normals (n, 3) or None."""
-        times: Any = self.times
+        times = self.times
         i = int(np.searchsorted(times, time, "right")) - 1
         if i < 0 or i >= len(times) - 1:
             share, i, j = 0.0, max(i, 0), max(i, 0)
@@ -176,7 +176,7 @@ def placement(thing: object) -> NDArray[np.float64] | None:
     return None
 
 
-def through(thing: Any, times: Sequence[float], placements: Any) -> Any:
+def through(thing: Any, times: Sequence[float], placements: ArrayLike) -> Any:
     """Return a shape, light or camera that is at placements (k, 4, 4) at times [s], by keys.
 
     It turns about its own origin. Raises SceneError as `Keys` does.
@@ -212,7 +212,7 @@ class Shutter:
 
     open: float = 0.0
     close: float = 1.0
-    shape: Any = "box"
+    shape: str | Sequence[float] | NDArray[Any] = "box"
 
     def __post_init__(self) -> None:
         for name, value in (("open", self.open), ("close", self.close)):

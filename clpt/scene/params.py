@@ -107,7 +107,7 @@ def quantity(default: object, doc: str, low: float = -math.inf, high: float = ma
 
 
 def angular(doc: str) -> Any:
-    """Declare a table over the cosine of an angle; `clpt.scene.media.Tabulated` says of what."""
+    """Declare a table over the cosine of an angle; `clpt.scene.phases.Tabulated` says of what."""
     return _field((1.0, 1.0), Param(roles.ANGULAR, doc))
 
 
@@ -316,18 +316,18 @@ def _snake(name: str) -> str:
 
 
 @cache  # thousands of objects ask
-def _declared(cls: Any) -> Mapping[str, Param]:
+def _declared(cls: type[Kind]) -> Mapping[str, Param]:
     fields = dataclasses.fields(cls)
     return MappingProxyType({f.name: f.metadata["param"] for f in fields if "param" in f.metadata})
 
 
 @cache
-def _declared_of(cls: Any, place: str) -> Mapping[str, Param]:
+def _declared_of(cls: type[Kind], place: str) -> Mapping[str, Param]:
     found = {name: p for name, p in _declared(cls).items() if p.role.place == place}
     return MappingProxyType(found)
 
 
-def params(cls: type) -> Mapping[str, Param]:
+def params(cls: type[Kind]) -> Mapping[str, Param]:
     """Return the declared parameters of a kind, by name, in their order."""
     return _declared(cls)
 
@@ -339,7 +339,7 @@ def shorthands(cls: type[Kind]) -> Mapping[str, Param]:
     return MappingProxyType(merged)
 
 
-def defaults(cls: type) -> dict[str, Any]:
+def defaults(cls: type[Kind]) -> dict[str, Any]:
     """Return the defaults of a kind's declared parameters, by name."""
     fields = {f.name: f for f in dataclasses.fields(cls) if "param" in f.metadata}
     return {
@@ -357,19 +357,18 @@ def _usual(cls: type[Kind]) -> Mapping[str, Any]:
 
 def fields_of(kind: Kind) -> dict[str, Any]:
     """Return the values of an object's fields by name."""
-    cls: Any = type(kind)
-    names, read = _fields(cls)
+    names, read = _fields(type(kind))
     return dict(zip(names, read(kind), strict=False))
 
 
 @cache
-def _fields(cls: Any) -> tuple[tuple[str, ...], Callable[[Any], tuple[Any, ...]]]:
+def _fields(cls: type[Kind]) -> tuple[tuple[str, ...], Callable[[Any], tuple[Any, ...]]]:
     """The names of a class's fields, and what reads them all at once, and more."""
     names = tuple(field.name for field in dataclasses.fields(cls))
     return names, attrgetter(*names, "__class__", "__class__")  # of two or more: a tuple
 
 
-def _field_names(cls: Any) -> tuple[str, ...]:
+def _field_names(cls: type[Kind]) -> tuple[str, ...]:
     return _fields(cls)[0]
 
 
@@ -379,12 +378,12 @@ def place_of(kind: Kind, name: str) -> str:
     return f"{kind.kind}.{name}" + (f" of {named!r}" if named else "")
 
 
-def device_params(cls: type) -> Mapping[str, Param]:
+def device_params(cls: type[Kind]) -> Mapping[str, Param]:
     """Return the parameters that the kernels read."""
     return _declared_of(cls, "row")
 
 
-def interior_params(cls: type) -> Mapping[str, Param]:
+def interior_params(cls: type[Kind]) -> Mapping[str, Param]:
     """Return the parameters of the inside of a body; they follow the others in its row."""
     return _declared_of(cls, "inside")
 

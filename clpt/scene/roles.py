@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from clpt import spectra
 from clpt.errors import SceneError
 from clpt.measured import Measurement, MerlTable
+from clpt.records import GRATING_SIZES
 from clpt.spectra import (
     RGB,
     Constant,
@@ -31,7 +32,7 @@ from clpt.spectra import (
 from clpt.spectra.spectrum import Role as Meaning
 from clpt.spectra.spectrum import check_reach, extremes
 
-ORDERS = 8  # highest order of diffraction, see kernels/optics/diffraction.cl
+ORDERS = GRATING_SIZES["orders"]
 ROUNDING = 1e-6  # by which a spectrum may be beyond its limits
 LARGEST = float(np.finfo(np.float32).max)  # number of a parameter: kernels have no larger ones
 

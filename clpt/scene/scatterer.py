@@ -26,7 +26,6 @@ class Scatterer(Kind):
     is_pane: ClassVar[bool] = False  # what it lets through goes straight on: `free_panes`
     no_back: ClassVar[bool] = False  # its back is not there
     absorbs: ClassVar[bool] = False  # all light, where its albedo is 0: none is sought there
-    guided: ClassVar[bool] = False  # light goes to all of a hemisphere: its directions are learned
     reversible: ClassVar[bool] = True  # light that comes the other way takes the same paths
 
     @property

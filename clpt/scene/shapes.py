@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from clpt.errors import SceneError
 from clpt.scene import trimeshes
@@ -90,7 +90,7 @@ class Mesh(Shape):
         "the side of normal x tangent or not; None: from the uvs",
         form="rows4",
     )
-    attributes: Any = host(
+    attributes: Mapping[str, Any] = host(
         {},
         "name -> (n, 1 or 3) float32; one row a vertex or a face, as vertex_ or face_ begins it",
         form="attributes",
@@ -170,7 +170,7 @@ class Spheres(Shape):
     radii: Any = host(
         1.0, "(n,), or one of all; `to_world` may scale them, evenly", "m", form="number_or_list"
     )
-    attributes: Any = host(
+    attributes: Mapping[str, Any] = host(
         {}, "name that begins with vertex_ -> (n, 1 or 3) float32, per sphere", form="attributes"
     )
     deformation: Deformation | None = host(
@@ -239,7 +239,7 @@ class SdfGrid(Shape):
     uv are 0 everywhere: a texture has one value all over it.
     """
 
-    values: Any = host(
+    values: ArrayLike = host(
         _ball(), "(nx, ny, nz) float32, below 0 inside; default: a ball", form="grid"
     )
     smooth: bool = host(True, "normals are smooth over the cells; False: those of the triangles")
@@ -273,8 +273,8 @@ class Instance(Shape):
 
     group: Group = host(None, "what is placed: a name in the scene's `groups`", form="group")
     # The surfaces are those of the group's shapes.
-    material: Any = field(default=None, init=False, repr=False)
-    emission: Any = field(default=None, init=False, repr=False)
+    material: Material = field(default=cast(Material, None), init=False, repr=False)
+    emission: Light | None = field(default=None, init=False, repr=False)
     flip_normals: bool = field(default=False, init=False, repr=False)
 
     @property

@@ -35,7 +35,7 @@ def check_density(values: np.ndarray, where: str) -> None:
         raise SceneError(f"is negative somewhere: {low:g}", where=where)
 
 
-def check_volume(values: Any, where: str, colours: bool = False) -> None:
+def check_volume(values: object, where: str, colours: bool = False) -> None:
     """Raise SceneError for what is no array (nx, ny, nz), with three `colours` (nx, ny, nz, 3), of
     numbers that are finite and not negative. Arrays on a device are not read."""
     axes, shown = ((3,), "(nx, ny, nz, 3)") if colours else ((), "(nx, ny, nz)")

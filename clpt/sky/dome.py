@@ -6,6 +6,7 @@ cosine at its surface, Hestroffer and Magnan 1998.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
@@ -13,14 +14,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from clpt.arrays import Floats
+from clpt.records import SKY_SIZES
 from clpt.scene.lights import Sky
 from clpt.sky import atmosphere, skylight
 from clpt.spectra.air import EARTH, LAMBDAS, SUNLIGHT, Atmosphere
 
 ROWS, COLUMNS = 48, 96  # of cells from the horizon to the zenith, or to the nadir; around
-SUN_ROWS, SUN_COLUMNS = 24, 12  # SKY_SUN_ROWS, SKY_SUN_COLUMNS
+SUN_ROWS, SUN_COLUMNS = SKY_SIZES["sun_rows"], SKY_SIZES["sun_columns"]
 SUN_RADIUS = np.radians(0.2666)  # [rad]
 LOWEST = 1e-3  # of the observer above the ground [km]
+
+Unscaled = Callable[[tuple[float, ...], tuple[float, ...]], tuple[Floats, Floats]]
 
 
 def numbers(lamp: Sky) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -61,19 +65,24 @@ def directions(at: float, row: ArrayLike, column: ArrayLike) -> Floats:
 def sky_image(lamp: Sky) -> tuple[Floats, Floats]:
     """Radiance at LAMBDAS of the dome and the ground (2, rows + 1, columns / 2 + 1, n),
     and of the sun's disc (rows, columns, n) [W m^-2 sr^-1 nm^-1]."""
-    return images(*numbers(lamp))
+    return images(unscaled, *numbers(lamp))
 
 
-def images(given: tuple[float, ...], ground: tuple[float, ...]) -> tuple[Floats, Floats]:
-    """Return what `sky_image` does, of the `numbers` of a sky."""
+def images(
+    made: Unscaled, given: tuple[float, ...], ground: tuple[float, ...]
+) -> tuple[Floats, Floats]:
+    """Return what `sky_image` does, of the `numbers` of a sky; made: `unscaled`, or kept of it."""
     *physical, sky, sun = given
-    around, disc = _unscaled(tuple(physical), ground)
+    around, disc = made(tuple(physical), ground)
     return np.maximum(around * (sky * SUNLIGHT), 0.0), disc * sun
 
 
 @lru_cache(maxsize=4)  # it takes seconds, and a sky's scene is often made again
-def _unscaled(numbers: tuple[float, ...], ground: tuple[float, ...]) -> tuple[Floats, Floats]:
-    """Both images without their factors: that of the dome per irradiance of the sun [1/sr]."""
+def unscaled(numbers: tuple[float, ...], ground: tuple[float, ...]) -> tuple[Floats, Floats]:
+    """Return both images without their factors: that of the dome per irradiance of the sun [1/sr].
+
+    numbers, ground: those that `numbers` tells, without the two scales.
+    """
     elevation, altitude, aerosol, exponent, share, asymmetry, ozone = numbers
     air = Atmosphere(aerosol, exponent, share, asymmetry, ozone)
     at, high, zenith = horizon(altitude), height(altitude), np.radians(90.0 - elevation)

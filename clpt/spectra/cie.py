@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt.errors import SceneError
+from clpt.records import IMPORTANCE
 from clpt.spectra import data
 
 LAMBDA_MIN, LAMBDA_MAX = 360.0, 830.0  # [nm], the observers' range
@@ -18,7 +19,7 @@ LAMBDA_MIN, LAMBDA_MAX = 360.0, 830.0  # [nm], the observers' range
 REC709_PRIMARIES = ((0.64, 0.33), (0.30, 0.60), (0.15, 0.06))
 
 # Centre [nm] and slope [1/nm] of the visible-importance density (Radziszewski et al. 2009).
-SAMPLING_CENTRE, SAMPLING_SLOPE = 538.0, 0.0072
+SAMPLING_CENTRE, SAMPLING_SLOPE = IMPORTANCE["peak"], IMPORTANCE["slope"]
 
 OBSERVERS = ("1931", "1964")
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -37,7 +36,7 @@ class Sensor:
     matrix: Rows | None = None
 
     def __post_init__(self) -> None:
-        curves: Any = tuple(self.curves)
+        curves: tuple[object, ...] = tuple(self.curves)
         if len(curves) != 3 or not all(isinstance(curve, Spectrum) for curve in curves):
             raise SceneError("a sensor has three curves, each a spectrum")
         object.__setattr__(self, "curves", curves)
@@ -117,7 +116,7 @@ def read_sensor(path: str | Path) -> Sensor:
         raise SceneError(error.message, file=path) from None
 
 
-def _rows(matrix: Any) -> Rows:
+def _rows(matrix: object) -> Rows:
     """A matrix as tuples of numbers."""
     try:
         values = np.asarray(matrix, np.float64)

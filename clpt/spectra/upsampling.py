@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import itertools
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 
@@ -25,6 +26,7 @@ QUANTUM = 1.0 / 2048.0  # of the table's values, which are stored as differences
 CENTRE, HALF_WIDTH = 595.0, 235.0  # [nm] of the unit coordinate
 DARKEST = 1e-9  # flat reflectances stay this far inside (0, 1), where x is finite
 EDGE = 1e-4  # the outermost layers, in place of black and white
+PARTS = 1 << 13  # of [0, 1], fewer than two nodes in each
 CHUNK = 1 << 15  # colours at a time, so that the gathered corners stay in the cache
 
 
@@ -84,14 +86,18 @@ def unbounded(rgb: ArrayLike) -> tuple[NDArray[np.float32], NDArray[np.float32]]
     def fill(start: int) -> None:
         part = slice(start, start + CHUNK)
         own = np.maximum(np.nan_to_num(flat[part].astype(np.float64)), 0.0)
-        largest = 2.0 * own.max(axis=1)
+        r, g, b = own.T
+        largest = 2.0 * np.maximum(np.maximum(r, g), b)
         own /= np.where(largest > 0.0, largest, 1.0)[:, None]
         coefficients[part] = _look_up(own, half=True)
         scale[part] = largest
 
     starts = range(0, len(flat), CHUNK)
-    with ThreadPoolExecutor(min(os.cpu_count() or 1, len(starts)) or 1) as pool:
-        list(pool.map(fill, starts))
+    if len(starts) > 1:
+        with ThreadPoolExecutor(min(os.cpu_count() or 1, len(starts))) as pool:
+            list(pool.map(fill, starts))
+    elif starts:
+        fill(0)
     return scale.reshape(colours.shape[:-1]), coefficients.reshape(colours.shape)
 
 
@@ -142,9 +148,10 @@ def _look_up(rgb: Floats, *, half: bool = False) -> Floats:
     for ratio in others:
         ratio[black] = 1.0
     cell, weights = largest, []
-    axes = [(node_values(), value)] * (not half) + [(node_ratios(), ratio) for ratio in others]
-    for nodes, at in axes:
-        below = np.clip(np.searchsorted(nodes, at, "right") - 1, 0, NODES - 2)
+    axes = [(node_values, value)] * (not half) + [(node_ratios, ratio) for ratio in others]
+    for kind, at in axes:
+        nodes, parts = _axis(kind)
+        below = _cells_of(nodes, parts, at)
         cell = cell * NODES + below
         t = (at - nodes[below]) / (nodes[below + 1] - nodes[below])
         weights.append(np.clip(t, 0.0, 1.0).astype(np.float32)[:, None])
@@ -160,12 +167,29 @@ def _look_up(rgb: Floats, *, half: bool = False) -> Floats:
     return np.column_stack([a, b - 2.0 * CENTRE * a, c + (a * CENTRE - b) * CENTRE])
 
 
+@cache
+def _axis(kind: Callable[[], Floats]) -> tuple[Floats, NDArray[np.int64]]:
+    """The nodes (NODES,) of a kind, and how many are at or below each of PARTS in [0, 1], less 1.
+
+    A part has at most one node but for those at its begin, so that one comparison more decides.
+    """
+    nodes = kind()
+    return nodes, np.searchsorted(nodes, np.arange(PARTS + 1) / PARTS, "right") - 1
+
+
+def _cells_of(nodes: Floats, parts: NDArray[np.int64], at: Floats) -> NDArray[np.int64]:
+    """The cell between nodes that each of (n,) in [0, 1] is in; nodes, parts: of `_axis`."""
+    below = parts.take((at * PARTS).astype(np.int64))
+    below += at >= nodes.take(np.minimum(below + 1, NODES - 1))
+    return np.minimum(np.maximum(below, 0), NODES - 2)
+
+
 def _blend(
     table: NDArray[np.float32], cell: NDArray[np.int64], weights: list[NDArray[np.float32]]
 ) -> NDArray[np.float32]:
     """Table entries (n, 3), linear along each axis: corners are halved by the last axis first."""
     steps = [(0, NODES**axis) for axis in reversed(range(len(weights)))]
-    corners = [table[cell + sum(corner)] for corner in itertools.product(*steps)]
+    corners = [table.take(cell + sum(corner), axis=0) for corner in itertools.product(*steps)]
     for weight in reversed(weights):
         pairs = zip(corners[::2], corners[1::2], strict=True)
         corners = [low + weight * (high - low) for low, high in pairs]

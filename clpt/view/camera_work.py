@@ -69,7 +69,7 @@ class CameraWork:
         self._set_pivot()
         self._tell_state()
 
-    def _do_open_view(self, reply: Reply, camera: Any, exposure: float, tone: str) -> None:
+    def _do_open_view(self, reply: Reply, camera: object, exposure: float, tone: str) -> None:
         self._move(views.camera_of(camera, self.scene.camera))
         self._set_pivot()
         if tone == OF_VIEW and self._loop.display.view is None:

@@ -382,6 +382,7 @@ class Server:
             if self._steers is viewer:
                 self._steers = self._viewers[0] if self._viewers else None
             self._tell_wheel()
+            await asyncio.wait([sender], timeout=CLOSE_SECONDS)  # else it may be collected first
 
     def _welcome(self, viewer: Viewer) -> None:
         if self.session is not None:

@@ -22,7 +22,7 @@ def written(scene: Scene, display: Display) -> dict[str, Any]:
     return {"camera": panels.written(scene.camera), "display": shown}
 
 
-def camera_of(document: Any, present: Camera | None = None) -> Camera:
+def camera_of(document: object, present: Camera | None = None) -> Camera:
     """Return the camera that a view has. Raises CommandError.
 
     present: gives what no view holds: a lens, the medium around, motion and shutter.
@@ -47,7 +47,7 @@ def camera_of(document: Any, present: Camera | None = None) -> Camera:
         raise CommandError(str(error)) from None
 
 
-def request(document: Any) -> Request:
+def request(document: object) -> Request:
     """Return the command that opens a view. Raises CommandError."""
     if not isinstance(document, dict) or "camera" not in document:
         raise CommandError("this is no view: it has no camera")

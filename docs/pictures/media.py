@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from clpt import mie
-from clpt.scene import Scene, integrators, media, shapes
+from clpt.scene import Scene, integrators, media, phases, shapes
 from clpt.scene.materials import Null
 from clpt.transforms import scale, translate
 
@@ -40,7 +40,7 @@ def _ball(density: Array, x: float, **given: Any) -> media.Grid:
     return media.Grid(density=density, to_world=box, scale=2.0, **{"albedo": 0.95, **given})
 
 
-def _phases(caption: str, *made: media.Phase) -> Picture:
+def _phases(caption: str, *made: phases.Phase) -> Picture:
     return balls(caption, *(media.Homogeneous(sigma_s=3.0, phase=one) for one in made))
 
 
@@ -124,25 +124,25 @@ PHASES = {
         *(media.Homogeneous(sigma_s=each) for each in (1.0, 4.0, 16.0)),
     ),
     "henyey_greenstein": _phases(
-        "`g` of -0.6, 0.3 and 0.9", *(media.HenyeyGreenstein(g=g) for g in (-0.6, 0.3, 0.9))
+        "`g` of -0.6, 0.3 and 0.9", *(phases.HenyeyGreenstein(g=g) for g in (-0.6, 0.3, 0.9))
     ),
     "rayleigh": balls(
         "`sigma_s` by the fourth power of the wavelength: 0.5, 2 and 8 times",
         *(
-            media.Homogeneous(sigma_s=(0.55, 1.1, 2.6), scale=k, phase=media.Rayleigh())
+            media.Homogeneous(sigma_s=(0.55, 1.1, 2.6), scale=k, phase=phases.Rayleigh())
             for k in (0.5, 2.0, 8.0)
         ),
     ),
     "draine": _phases(
         "`g` of 0.6 and `alpha` of 0, 1 and 30",
-        *(media.Draine(g=0.6, alpha=alpha) for alpha in (0.0, 1.0, 30.0)),
+        *(phases.Draine(g=0.6, alpha=alpha) for alpha in (0.0, 1.0, 30.0)),
     ),
     "reradiating": balls(
         "under a blue lamp: `amount` of 0, 0.4 and 1 of a dye that gives out orange",
         *(
             media.Homogeneous(
                 sigma_s=6.0,
-                phase=media.Reradiating(
+                phase=phases.Reradiating(
                     reflectance=0.3, reradiation=dye()["reradiation"], amount=amount
                 ),
             )
@@ -157,10 +157,10 @@ PHASES = {
     "blend": _phases(
         "of `g` of -0.7 and 0.9, with a `weight` of 0, 0.5 and 1",
         *(
-            media.Blend(
+            phases.Blend(
                 weight=weight,
-                first=media.HenyeyGreenstein(g=-0.7),
-                second=media.HenyeyGreenstein(g=0.9),
+                first=phases.HenyeyGreenstein(g=-0.7),
+                second=phases.HenyeyGreenstein(g=0.9),
             )
             for weight in (0.0, 0.5, 1.0)
         ),

@@ -13,8 +13,7 @@
 #include "bvh/no_vectorize.cl"
 #include "bvh/items.cl"
 
-#define CURVE_BITS 11 /* of a digit */
-#define CURVE_INDEX 31
+#include "generated/curve_keys.cl"
 #define CURVE_AHEAD 16 /* items */
 #define CURVE_SHARE 0.2f /* of the area of the last eight items: what one leaf more costs above it */
 #define CURVE_FAR 1e37f /* more than any sum of areas */

@@ -5,7 +5,7 @@
  */
 #include "bvh/hit.cl"
 
-#define LEAF_REACH 1e12f /* so that products of three coordinates stay inside a float */
+#include "generated/tree_reaches.cl"
 
 /* The corners of a triangle; 0 is returned if they had to be made a point. */
 inline int leaf_corners(global const float *vertices, global const uint *faces, uint prim,
@@ -14,7 +14,7 @@ inline int leaf_corners(global const float *vertices, global const uint *faces, 
     int4 near = (int4)(-1);
     for (uint i = 0; i < 3; i++) {
         corners[i] = (float4)(vload3(faces[3 * prim + i], vertices), 0.0f);
-        near &= fabs(corners[i]) < LEAF_REACH; /* NaN fails the comparison */
+        near &= fabs(corners[i]) < BVH_REACH; /* NaN fails the comparison */
     }
     if (all(near)) return 1;
     corners[0] = corners[1] = corners[2] = (float4)(0.0f);
@@ -76,7 +76,7 @@ inline float8 leaf_store_block(global float *block, global const float *vertices
     float8 v[9] = {LEAF_ROW(a, x), LEAF_ROW(a, y), LEAF_ROW(a, z), LEAF_ROW(b, x), LEAF_ROW(b, y),
                    LEAF_ROW(b, z), LEAF_ROW(c, x), LEAF_ROW(c, y), LEAF_ROW(c, z)};
     int8 sound = (int8)(-1);
-    for (uint i = 0; i < 9; i++) sound &= fabs(v[i]) < LEAF_REACH; /* NaN fails the comparison */
+    for (uint i = 0; i < 9; i++) sound &= fabs(v[i]) < BVH_REACH; /* NaN fails the comparison */
     if (!all(sound)) { /* those that are not become a point of one that is */
         union { float8 row[3]; float at[24]; } corner = {{v[0], v[1], v[2]}};
         union { int8 row; int at[8]; } usable = {sound};

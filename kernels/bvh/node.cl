@@ -4,7 +4,7 @@
  * right one follows it. The root is node 0. No leaf is more than BVH_DEPTH levels below the root.
  */
 #include "generated/tree_bits.cl"
-#define BVH_DEPTH 48
+#include "generated/tree_sizes.cl"
 #define COMPACT_WORDS 20 /* of a node of bvh/compact.cl */
 
 inline uint node_link(float8 node) { return as_uint(node.s3) & ~BVH_LEAF; }

@@ -1,10 +1,10 @@
-/* bvh/query.cl for a tree that is larger than a processor's caches: BATCH rays a work-item, INTERLEAVED of them in
+/* bvh/query.cl for a tree that is larger than a processor's caches: QUERY_RAYS rays a work-item, INTERLEAVED of them in
  * flight. Where most have about the direction of the one before, they are traced one after another, which is quicker:
  * they need the same memory, and the processor predicts their branches. */
 #include "bvh/query_rays.cl"
 #include "bvh/wide8_interleaved.cl"
 
-#define BATCH 64
+#include "generated/query_sizes.cl"
 #define INTERLEAVED 8
 #define TREE_ARGS global const float *nodes, global const float *leaves
 
@@ -32,7 +32,7 @@ inline void query_put(TriHit hit, uint8 begins, uint i, global float *t, global 
 /* The rays of a batch: `alone` traces ray i by itself; `step` takes state s a step further and is 0 at the end of
  * ray i, where `finish` stores its hit. */
 #define QUERY_BATCH(alone, step, finish)                                                        \
-    uint next = get_global_id(0) * BATCH, end = min(next + BATCH, count), active = INTERLEAVED; \
+    uint next = get_global_id(0) * QUERY_RAYS, end = min(next + QUERY_RAYS, count), active = INTERLEAVED; \
     if (next >= end) return;                                                                    \
     if (query_alike(directions + begins.s1, next, end)) {                                       \
         for (uint i = next; i < end; i++) {                                                     \

@@ -38,7 +38,7 @@ inline float8 refit_box(Refit tree, uint item)
 {
     uint at = 2 * tree.indices[item];
     float4 lo = (float4)(vload3(at, tree.boxes), 0.0f), hi = (float4)(vload3(at + 1, tree.boxes), 0.0f);
-    int4 sound = (lo <= hi) & (fabs(lo) < LEAF_REACH) & (fabs(hi) < LEAF_REACH);
+    int4 sound = (lo <= hi) & (fabs(lo) < BVH_REACH) & (fabs(hi) < BVH_REACH);
     return all(sound) ? (float8)(lo, -hi) : REFIT_NOTHING;
 }
 

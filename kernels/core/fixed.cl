@@ -11,12 +11,6 @@ inline Fixed fixed_zero(void)
     return f;
 }
 
-inline Fixed fixed_sel(mask m, Fixed a, Fixed b)
-{
-    Fixed f = {sel_n(m, a.low, b.low), sel_n(m, a.middle, b.middle), sel_n(m, a.high, b.high)};
-    return f;
-}
-
 /* 1 where the sum of two words, one of which is `term`, left its 32 bits. */
 inline natural fixed_carry(natural sum, natural term) { return sel_n(sum < term, (natural)(1u), (natural)(0u)); }
 

@@ -2,7 +2,7 @@
  * weight times the cosine to a receiver's normal, a cell in it by cumulative sums, the point in that by the bilinear
  * function itself (pbrt-v4, A.5). Blocks lie in bands of rows and in strips of columns. The cosines are those of many
  * normals together, GRID_SIDE^2 parts of the octahedron, and none for a receiver on both sides of its surface. */
-#define GRID_SIDE 8
+#include "generated/grid_sizes.cl"
 
 typedef struct {
     integer rows, columns; /* of cells */

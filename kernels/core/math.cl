@@ -40,6 +40,7 @@ inline real wide_length3(vec3 v)
     v = scale3(v, scale_to_one(largest));
     return sqrt(dot3(v, v)) * as_real(as_natural(largest) & 0x7f800000u);
 }
+
 inline real safe_div(real a, real b) { return a / sel(b == 0.0f, (real)(1.0f), b); } /* 0 divisor: a */
 
 /* sin and cos of 2 pi u for u in [0, 1]; absolute error below 3.5e-7. */

@@ -21,6 +21,68 @@ inline void slab_store(global float *p, mask m, real v)
 #endif
 }
 
+/* Members of several words, from word c on. */
+inline vec2 slab_read_vec2(Slab s, uint c, uint at)
+{
+    vec2 r = {slab_read(s, c, at), slab_read(s, c + 1u, at)};
+    return r;
+}
+inline void slab_write_vec2(Slab s, uint c, uint at, mask m, vec2 v)
+{
+    slab_write(s, c, at, m, v.x);
+    slab_write(s, c + 1u, at, m, v.y);
+}
+inline vec3 slab_read_vec3(Slab s, uint c, uint at)
+{
+    return v3(slab_read(s, c, at), slab_read(s, c + 1u, at), slab_read(s, c + 2u, at));
+}
+inline void slab_write_vec3(Slab s, uint c, uint at, mask m, vec3 v)
+{
+    slab_write(s, c, at, m, v.x);
+    slab_write(s, c + 1u, at, m, v.y);
+    slab_write(s, c + 2u, at, m, v.z);
+}
+inline Spectrum slab_read_spectrum(Slab s, uint c, uint at)
+{
+    Spectrum r;
+    r.x = slab_read(s, c, at);
+    r.y = slab_read(s, c + 1u, at);
+    r.z = slab_read(s, c + 2u, at);
+#if SPECTRUM_SIZE == 4
+    r.w = slab_read(s, c + 3u, at);
+#endif
+    return r;
+}
+inline void slab_write_spectrum(Slab s, uint c, uint at, mask m, Spectrum v)
+{
+    slab_write(s, c, at, m, v.x);
+    slab_write(s, c + 1u, at, m, v.y);
+    slab_write(s, c + 2u, at, m, v.z);
+#if SPECTRUM_SIZE == 4
+    slab_write(s, c + 3u, at, m, v.w);
+#endif
+}
+inline Natural3 slab_read_natural3(Slab s, uint c, uint at)
+{
+    vec3 v = slab_read_vec3(s, c, at);
+    Natural3 r = {as_natural(v.x), as_natural(v.y), as_natural(v.z)};
+    return r;
+}
+inline void slab_write_natural3(Slab s, uint c, uint at, mask m, Natural3 v)
+{
+    slab_write_vec3(s, c, at, m, v3(as_real(v.x), as_real(v.y), as_real(v.z)));
+}
+inline Fixed slab_read_fixed(Slab s, uint c, uint at)
+{
+    vec3 v = slab_read_vec3(s, c, at);
+    Fixed r = {as_natural(v.x), as_natural(v.y), as_natural(v.z)};
+    return r;
+}
+inline void slab_write_fixed(Slab s, uint c, uint at, mask m, Fixed v)
+{
+    slab_write_vec3(s, c, at, m, v3(as_real(v.low), as_real(v.middle), as_real(v.high)));
+}
+
 /* Where words of any slots are, from that of slot 0 on. */
 inline integer slab_places(Slab s, integer slots)
 {

@@ -17,12 +17,14 @@ inline vec2 concentric_disk(vec2 u)
     vec2 p = {r * c, r * s};
     return p;
 }
+
 inline vec3 cosine_hemisphere(vec2 u) /* Malley: a point of the disk, raised to the hemisphere */
 {
     vec2 p = concentric_disk(u);
     return v3(p.x, p.y, sqrt_r(1.0f - p.x * p.x - p.y * p.y));
 }
 inline real cosine_hemisphere_pdf(real cos_t) { return max_r(cos_t, (real)(0.0f)) * INV_PI; }
+
 inline vec3 uniform_sphere(vec2 u)
 {
     real s, c, z = 1.0f - 2.0f * u.x, r = sqrt_r(1.0f - z * z);

@@ -3,19 +3,23 @@
  *
  * Space is a grid of cells, and a cell has a row for each of six directions that a surface may mostly face; a hash
  * numbers the rows. A row has the equal parts of the sphere of guiding/bins.cl. stage/train.cl adds what light paths
- * carry to the part from which they come, but for those straight from a light, which next-event estimation finds.
+ * carry to the part from which they come, but for those straight from a light, which next-event estimation finds: of
+ * these it counts what a row has got, behind all rows.
  * guiding/sum.cl turns that to sums: guide[row + k] is light from part k and those before it. Then it stays as it is,
  * so that no pixel depends on the order of samples.
  *
- * Where something is known, a camera's path takes its next direction from the guide with the chance GUIDE_SHARE, else
- * from the material; the density of both together counts (one-sample MIS, balance heuristic). There Russian roulette
- * compares what the path will bring, throughput times the light of the row, with that where it met the guide first, as
- * throughput alone is low where the guide is right (after Vorba and Krivanek 2016, "Adjoint-Driven Russian Roulette and
- * Splitting in Light Transport Simulation"). */
+ * Where something is known, two directions are drawn for a camera's path, one by the guide and one by the material, and
+ * one of them is taken by what it brings (guide_sample). So a sharp lobe keeps to itself, and a dull one follows the
+ * guide, without a word of the material's. There Russian roulette compares
+ * what the path will bring, throughput times the light of the row, with that where it met the guide first, as throughput
+ * alone is low where the guide is right (after Vorba and Krivanek 2016, "Adjoint-Driven Russian Roulette and Splitting in
+ * Light Transport Simulation"). */
 #include "guiding/bins.cl"
 #include "merging/cells.cl"
 
-#define GUIDE_SHARE 0.6f
+#define GUIDE_EVEN 0.5f /* light from everywhere that is expected beside what is known, over that */
+#define GUIDE_STRAIGHT 4.0f /* the same of what comes straight from lights, which may be from anywhere above */
+#define GUIDE_COSINE 0.1f /* the least by which flux is divided for radiance */
 #define GUIDE_LEAST 0.3f /* chance that a path goes on */
 #define GUIDE_FACES 0x01000193 /* sets the faces of a cell apart, in its hash */
 
@@ -28,6 +32,12 @@ inline integer guide_row(Scene scene, vec3 p, vec3 n)
     integer face = sel_i(is_x, (integer)(0), sel_i(is_y, (integer)(2), (integer)(4)));
     face += sel_i(along < 0.0f, (integer)(1), (integer)(0));
     return cell_number(scene, cell_at(scene, p, (real)(scene.settings->guide_side)), face * GUIDE_FACES) * GUIDE_BINS;
+}
+
+/* The word of what comes straight from lights to a row. */
+inline integer guide_straight(Scene scene, integer row)
+{
+    return scene.settings->photon_cells * GUIDE_BINS + row / GUIDE_BINS;
 }
 
 /* The part of the sphere that holds a direction; some part also where it is not finite, as in idle lanes. */
@@ -45,62 +55,125 @@ inline integer guide_bin(vec3 d)
 typedef struct {
     integer row;
     real light; /* all that has come there; 0: nothing is known */
-    real share; /* the chance that the guide gives the next direction */
+    real even;  /* light from everywhere that is expected beside it, over it */
 } Guided;
 
 /* d: the direction in which the path arrives. */
 inline Guided guide_at(Scene scene, global const uint *guide, Surface s, vec3 d)
 {
     Guided g;
+    g.row = 0;
+    g.light = 0.0f;
+    g.even = 0.0f;
+    if (scene.settings->guide_paths == 0) return g; /* as a pilot has decided */
     g.row = guide_row(scene, s.p, sel3(dot3(s.n, d) < 0.0f, s.n, neg3(s.n)));
     g.light = gather((global const float *)guide, g.row + GUIDE_BINS - 1);
-    g.share = sel(g.light > 0.0f, (real)(GUIDE_SHARE), (real)(0.0f));
+    real straight = gather((global const float *)guide, guide_straight(scene, g.row));
+    g.even = GUIDE_EVEN + GUIDE_STRAIGHT * straight / max_r(g.light, (real)(1e-30f));
     return g;
 }
 
-/* Density of a direction by guide and material together, which alone has the density p [1/sr]. */
-inline real guide_pdf(global const uint *guide, Guided g, vec3 d, real p)
+/* Density of the directions of a part by the guide alone [1/sr]. own: light that comes from there. */
+inline real guide_density_of(Guided g, real own)
+{
+    return own * (GUIDE_BINS / (4.0f * PI)) / max_r(g.light, (real)(1e-30f));
+}
+
+/* Density of a direction by the guide alone [1/sr]. */
+inline real guide_density(global const uint *guide, Guided g, vec3 d)
 {
     integer bin = guide_bin(d);
     real before = gather((global const float *)guide, g.row + max_i(bin - 1, (integer)(0)));
     real own = gather((global const float *)guide, g.row + bin) - sel(bin > 0, before, (real)(0.0f));
-    own *= GUIDE_BINS / (4.0f * PI) / max_r(g.light, (real)(1e-30f));
-    return p + g.share * (own - p);
+    return guide_density_of(g, own);
 }
 
-/* A direction of the guide. u: chooses the part, v: a point in it. */
-inline vec3 guide_direction(global const uint *guide, Guided g, real u, vec2 v)
+/* Density by guide and material together, which alone has the density p [1/sr]: the mean, by which light is weighed
+ * that is found in two ways. */
+inline real guide_pdf(global const uint *guide, Guided g, vec3 d, real p)
+{
+    mask known = g.light > 0.0f;
+    return any(known) ? sel(known, 0.5f * (p + guide_density(guide, g, d)), p) : p;
+}
+
+/* A direction of the guide. u: its x chooses the part; what is left of it and its y a point in that.
+ * density: of it [1/sr]. */
+inline vec3 guide_direction(global const uint *guide, Guided g, vec2 u, real *density)
 {
     integer bin = 0;
+    real light = u.x * g.light, below = 0.0f, above = g.light;
     for (int step = GUIDE_BINS / 2; step > 0; step /= 2) {
         real sum = gather((global const float *)guide, g.row + bin + (step - 1));
-        bin += sel_i(u * g.light >= sum, (integer)(step), (integer)(0));
+        mask after = light >= sum;
+        bin += sel_i(after, (integer)(step), (integer)(0));
+        below = sel(after, sum, below);
+        above = sel(after, above, sum);
     }
-    real z = (to_real(bin / GUIDE_COLUMNS) + v.x) * (2.0f / GUIDE_ROWS) - 1.0f, s, c;
-    sincos_2pi((to_real(bin & (GUIDE_COLUMNS - 1)) + v.y) * (1.0f / GUIDE_COLUMNS), &s, &c);
+    *density = guide_density_of(g, above - below);
+    real left = clamp_r((light - below) / max_r(above - below, (real)(1e-30f)), (real)(0.0f), (real)(0.99999994f));
+    real z = (to_real(bin / GUIDE_COLUMNS) + left) * (2.0f / GUIDE_ROWS) - 1.0f, s, c;
+    sincos_2pi((to_real(bin & (GUIDE_COLUMNS - 1)) + u.y) * (1.0f / GUIDE_COLUMNS), &s, &c);
     real level = sqrt(max_r(1.0f - z * z, (real)(0.0f)));
     return v3(level * c, level * s, z);
 }
 
-/* The next direction, of the guide where pick < share, else of the material. pick: uniform in [0, 1), chooses a lobe
- * too. */
-inline BsdfSample guide_sample(global const uint *guide, Guided g, Bsdf m, Frame frame, vec3 wo, vec2 uv, real pick,
-                               Spectrum *ratio)
+/* A direction that may be next. */
+typedef struct {
+    vec3 wi;
+    real guided, material; /* densities of both ways to find it [1/sr]; guided is 0 where this way does not lead */
+    real weight;           /* of what it brings by the mean of the wavelengths: the chance that it is taken, unscaled */
+} Candidate;
+
+/* The guide leads to the side of wo alone. */
+inline Candidate guide_candidate(vec3 wo, vec3 wi, real guided, real material)
 {
-    mask follows = pick < g.share;
-    real lobe = clamp_r((pick - g.share) / (1.0f - g.share), (real)(0.0f), (real)(0.99999994f));
-    BsdfSample s = hero_sample(m, wo, v3(uv.x, uv.y, lobe), ratio);
-    if (any(follows)) {
-        vec3 toward = guide_direction(guide, g, pick * (1.0f / GUIDE_SHARE), uv);
-        s.wi = sel3(follows, to_local(frame, toward), s.wi);
-        s.lobe = sel_i(follows, (integer)(LOBE_REFLECT), s.lobe);
-        s.eta = sel(follows, (real)(1.0f), s.eta);
-    }
-    mask even = (g.light > 0.0f) & ((s.lobe & LOBE_DELTA) == 0) & (follows | (s.pdf > 0.0f));
-    real pdf = guide_pdf(guide, g, normalize3(to_world(frame, s.wi)), hero_pdf(m, wo, s.wi, *ratio));
-    Spectrum weight = spectrum_scale(bsdf_eval(m, wo, s.wi), 1.0f / max_r(pdf, (real)(1e-30f)));
-    s.weight = spectrum_sel(even, weight, spectrum_scale(s.weight, 1.0f / (1.0f - g.share)));
-    s.pdf = sel(even, pdf, s.pdf);
+    Candidate c;
+    c.wi = wi;
+    c.guided = sel(wi.z * wo.z > 0.0f, guided, (real)(0.0f));
+    c.material = material;
+    return c;
+}
+
+/* The radiance that is expected from a direction, over all that the guide knows. */
+inline real guide_expects(Guided g, Candidate c)
+{
+    return c.guided / max_r(fabs(c.wi.z), (real)(GUIDE_COSINE)) + g.even * (0.25f / PI);
+}
+
+/* The next direction: one of the material and one of the guide are drawn, and one of both is taken, by what it brings
+ * of the light that is expected (resampling: Talbot et al. 2005). uv, lobe: of the material; toward: of the guide;
+ * chance: uniform in [0, 1), takes one. */
+inline BsdfSample guide_sample(global const uint *guide, Guided g, Bsdf m, Frame frame, vec3 wo, vec3 u, vec2 toward,
+                               real chance, Spectrum *ratio)
+{
+    Spectrum before = *ratio;
+    BsdfSample s = hero_sample(m, wo, u, ratio);
+    mask known = g.light > 0.0f;
+    if (!any(known)) return s;
+    mask delta = (s.lobe & LOBE_DELTA) != 0;
+    real guided = guide_density(guide, g, normalize3(to_world(frame, s.wi)));
+    Candidate own = guide_candidate(wo, s.wi, guided, s.pdf);
+    real share = sel(delta, (real)(1.0f), s.pdf / max_r(own.material + own.guided, (real)(1e-30f)));
+    real brings = spectrum_mean(s.weight);
+    own.weight = sel(s.pdf > 0.0f, brings * share * guide_expects(g, own), (real)(0.0f));
+
+    vec3 wi = to_local(frame, guide_direction(guide, g, toward, &guided));
+    Candidate other = guide_candidate(wo, wi, guided, hero_pdf(m, wo, wi, before));
+    Spectrum f = bsdf_eval(m, wo, wi);
+    real sent = spectrum_mean(f);
+    other.weight = sent / max_r(other.material + other.guided, (real)(1e-30f)) * guide_expects(g, other);
+    other.weight = sel(other.guided > 0.0f, other.weight, (real)(0.0f));
+
+    real sum = own.weight + other.weight;
+    mask follows = known & (chance * sum < other.weight), stays = known & !follows;
+    real taken = sum / sel(follows, guide_expects(g, other) * sent, guide_expects(g, own) * brings);
+    s.weight = spectrum_sel(known, spectrum_scale(spectrum_sel(follows, f, s.weight), taken), s.weight);
+    s.pdf = sel(follows, other.material + other.guided, s.pdf);
+    s.pdf = sel(stays & !delta & (s.pdf > 0.0f), own.material + own.guided, s.pdf);
+    s.pdf = sel(known & !delta, 0.5f * s.pdf, s.pdf);
+    s.wi = sel3(follows, wi, s.wi);
+    s.lobe = sel_i(follows, (integer)(LOBE_REFLECT), s.lobe);
+    s.eta = sel(follows, (real)(1.0f), s.eta);
     return s;
 }
 
@@ -108,6 +181,7 @@ inline BsdfSample guide_sample(global const uint *guide, Guided g, Bsdf m, Frame
  * [0, 1); beta: the throughput behind. */
 inline mask guide_roulette(Slab path, uint at, Guided g, real brings, real u, mask *next, Spectrum *beta)
 {
+    if (!any(g.light > 0.0f)) return mask_of(0);
     real light = brings * g.light, first = load_path_expected(path, at);
     mask plays = (light > 0.0f) & (first > 0.0f);
     store_path_expected(path, at, *next & (first == 0.0f), light);

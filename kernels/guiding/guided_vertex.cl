@@ -7,8 +7,10 @@
 inline BsdfSample onward_sample(Scattering scatter, global const uint *guide, Guided guided, Spectrum *ratio)
 {
     vec2 uv = sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_BSDF);
-    real pick = sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_CHOICE).y;
-    return guide_sample(guide, guided, scatter.bsdf, scatter.shading.frame, scatter.wo, uv, pick, ratio);
+    vec2 toward = sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_GUIDE);
+    real chance = sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_GUIDE + 1).x;
+    vec3 u = v3(uv.x, uv.y, scatter.choice.y);
+    return guide_sample(guide, guided, scatter.bsdf, scatter.shading.frame, scatter.wo, u, toward, chance, ratio);
 }
 
 /* Russian roulette by what a guide knows, see guide_roulette; beta: of the ray that arrives. */

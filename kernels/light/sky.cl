@@ -5,9 +5,7 @@
  * upper one, its columns from the edge to the middle by the cosine at the sun's surface. Radiance [W m^-2 sr^-1 nm^-1]
  * is what clpt/sky/skylight.py found. */
 #include "core/grid.cl"
-
-#define SKY_SUN_ROWS 24
-#define SKY_SUN_COLUMNS 12
+#include "generated/sky_sizes.cl"
 
 /* Four texels, and the place between them. */
 typedef struct {

@@ -8,8 +8,7 @@
  * number of bricks along x, y and z, a matrix of three rows from the world to the lattice, and the upper corner of the
  * box there; the lower one is (1/2, 1/2, 1/2). In `images` each brick has two words: where its points begin from the
  * first word on, and its highest density. A medium with MEDIUM_BYTES in its name has 8 bits for each number. */
-#define GRID_CELLS 8
-#define GRID_POINTS 9
+#include "generated/brick_cells.cl"
 #define GRID_ROULETTE 0.05f /* what passes below this is at stake */
 
 /* A ray in the lattice, and the brick where it is. */
@@ -64,7 +63,7 @@ inline mask grid_begin(Scene scene, integer name, vec3 o, vec3 d, real t, mask a
     w->end = hi;
     mask inside = active & (lo < hi);
 #define AXIS(a) \
-    w->a = clamp_i(to_integer(sel(inside, w->o.a + lo * w->d.a, (real)(0.0f)) * (1.0f / GRID_CELLS)), w->n##a - 1);
+    w->a = clamp_i(to_integer(sel(inside, w->o.a + lo * w->d.a, (real)(0.0f)) * (1.0f / BRICK_CELLS)), w->n##a - 1);
     AXIS(x)
     AXIS(y)
     AXIS(z)
@@ -81,7 +80,7 @@ inline GridBrick grid_brick(Scene scene, GridWalk w, mask active)
     b.most = gather_w(scene.images, at + 1);
     real end_x, end_y, end_z;
 #define AXIS(a)                                                                                      \
-    end_##a = to_real(GRID_CELLS * (w.a + sel_i(w.d.a > 0.0f, (integer)(1), (integer)(0)))) - w.o.a; \
+    end_##a = to_real(BRICK_CELLS * (w.a + sel_i(w.d.a > 0.0f, (integer)(1), (integer)(0)))) - w.o.a; \
     end_##a = sel(fabs(w.d.a) > 1e-20f, end_##a * w.inverse.a, (real)(FAR));
     AXIS(x)
     AXIS(y)
@@ -112,13 +111,13 @@ inline integer grid_corner(GridWalk w, natural bits)
 {
     integer at = 0;
 #define AXIS(a, shift, step)                                                                                 \
-    real p_##a = clamp_r(w.o.a + w.t * w.d.a - to_real(GRID_CELLS * w.a), (real)(0.0f), (real)(GRID_CELLS)); \
-    integer c_##a = clamp_i(to_integer(p_##a), (integer)(GRID_CELLS - 1));                                   \
+    real p_##a = clamp_r(w.o.a + w.t * w.d.a - to_real(BRICK_CELLS * w.a), (real)(0.0f), (real)(BRICK_CELLS)); \
+    integer c_##a = clamp_i(to_integer(p_##a), (integer)(BRICK_CELLS - 1));                                   \
     real u_##a = (to_real(as_integer((bits >> shift) & 1023u)) + 0.5f) * (1.0f / 1024.0f);                   \
     at += step * (c_##a + sel_i(u_##a < p_##a - to_real(c_##a), (integer)(1), (integer)(0)));
     AXIS(x, 0u, 1)
-    AXIS(y, 10u, GRID_POINTS)
-    AXIS(z, 20u, GRID_POINTS * GRID_POINTS)
+    AXIS(y, 10u, BRICK_POINTS)
+    AXIS(z, 20u, BRICK_POINTS * BRICK_POINTS)
 #undef AXIS
     return at;
 }

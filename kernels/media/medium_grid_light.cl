@@ -28,16 +28,16 @@ inline real grid_number(Scene scene, GridWalk w, integer first, mask active)
     real most = gather_w(scene.images, at + 1), sum = 0.0f;
     active = active & (most > 0.0f);
 #define AXIS(a)                                                                                              \
-    real p_##a = clamp_r(w.o.a + w.t * w.d.a - to_real(GRID_CELLS * w.a), (real)(0.0f), (real)(GRID_CELLS)); \
-    integer c_##a = clamp_i(to_integer(p_##a), (integer)(GRID_CELLS - 1));                                   \
+    real p_##a = clamp_r(w.o.a + w.t * w.d.a - to_real(BRICK_CELLS * w.a), (real)(0.0f), (real)(BRICK_CELLS)); \
+    integer c_##a = clamp_i(to_integer(p_##a), (integer)(BRICK_CELLS - 1));                                   \
     p_##a -= to_real(c_##a);
     AXIS(x)
     AXIS(y)
     AXIS(z)
 #undef AXIS
-    integer corner = (c_z * GRID_POINTS + c_y) * GRID_POINTS + c_x;
+    integer corner = (c_z * BRICK_POINTS + c_y) * BRICK_POINTS + c_x;
     for (int i = 0; i < 8; i++) {
-        integer point = corner + ((i >> 2) * GRID_POINTS + ((i >> 1) & 1)) * GRID_POINTS + (i & 1);
+        integer point = corner + ((i >> 2) * BRICK_POINTS + ((i >> 1) & 1)) * BRICK_POINTS + (i & 1);
         integer word = gather_i(scene.images, sel_i(active, points + (point >> 1), (integer)(0)));
         real share = (i & 1 ? p_x : 1.0f - p_x) * (i & 2 ? p_y : 1.0f - p_y) * (i & 4 ? p_z : 1.0f - p_z);
         sum += share * to_real((word >> ((point & 1) << 4)) & 0xffff);

@@ -5,9 +5,8 @@
  * values: (nx, ny, nz) from `begin` on, z fastest; what is negative or not finite counts as 0. Bricks lie x fastest,
  * `bricks_x` and `bricks_y` of them along these axes, from the word `first` of `images` on.
  */
+#include "generated/brick_cells.cl"
 #include "generated/brick_sizes.cl"
-#define BRICK_CELLS 8
-#define BRICK_POINTS 9
 #define BRICK_ALL 729u  /* points */
 #define BRICK_LARGEST 1e30f
 

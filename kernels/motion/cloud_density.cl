@@ -12,7 +12,7 @@ typedef struct { global const uint *textures; } Scene;
 #include "core/perlin_noise.cl"
 #define CLOUD_OCTAVES 5
 #define CLOUD_SHIFTS 2
-#define CLOUD_FINER 1.99f
+#include "generated/cloud_octaves.cl"
 #define CLOUD_NEAR 0.01f /* differences are over this much */
 
 inline vec3 cloud_shift(Scene scene, vec3 p)

@@ -1,7 +1,7 @@
 /* What a grating does to light, by the scalar theory of a thin grating: the groove delays the wave by
  * `path` [nm], and an order's share is the squared Fourier coefficient of the phase that this makes
  * over one period (Goodman 2005, 4.4; Stam 1999 and Werner et al. 2017 in rendering). */
-#define GRATING_ORDERS 8     /* highest order that is followed */
+#include "generated/grating_sizes.cl"
 #define BESSEL_SMALL 6.0f    /* arguments for which the recurrence starts at 20, */
 #define BESSEL_LARGEST 24.0f /* and at 40 */
 #define GRATING_SINUSOIDAL 0

@@ -1,7 +1,7 @@
 /* Strands of many pieces in one shape: the row at `params` of `geometry` has what they share, and says where in
  * `spheres` each of them lies. One piece has the functions of kernels/shape/curve.cl. */
 
-#define CURVE_WORDS 24 /* of a piece, see clpt/geometry/strands.py */
+#include "generated/curve_sizes.cl"
 
 /* The piece that is primitive `prim`, where `active`; elsewhere one of them. */
 inline Curve curves_one(Scene scene, integer params, integer prim, mask active)

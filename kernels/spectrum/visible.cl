@@ -1,8 +1,7 @@
 /* Wavelengths by visible importance: pdf proportional to sech^2(0.0072 (lambda - 538)), cut to where
  * the sensor responds (Radziszewski et al. 2009; pbrt-v4's constants). Same functions in
  * spectrum/density.cl. */
-#define IMPORTANCE_SLOPE 0.0072f
-#define IMPORTANCE_PEAK 538.0f
+#include "generated/importance.cl"
 inline Wavelengths wavelengths_sample(Scene scene, real u)
 {
     real a = scene.settings->tanh_min, b = scene.settings->tanh_max, offset = 0.0f;

@@ -1,4 +1,4 @@
-/* Adds what light paths carry to the guide where they meet a surface, but for those straight from a light. In whole
+/* Adds what light paths carry to the guide where they meet a surface. In whole
  * numbers, whose sums do not depend on the order. */
 #include "core/base.cl"
 #include "interface/stage.cl"
@@ -16,14 +16,16 @@ STAGE(train)(SLAB_ARGS, SCENE_ARGS DEPOSIT_ARGS STAGE_AT_ARG)
     SCENE
     STAGE_AT
     integer state = load_path_state(path, at);
-    mask active = ((state & PATH_ALIVE) != 0) & ((state & PATH_DEPTH) > 1) & (load_hit_prim(hit, at) >= 0);
+    mask active = ((state & PATH_ALIVE) != 0) & ((state & PATH_DEPTH) > 0) & (load_hit_prim(hit, at) >= 0);
     if (any(active)) {
         scene.time = load_path_time(path, at);
         mask front;
         vec3 d = load_path_d(path, at);
         Surface s = surface_load(scene, hit, at, active, load_path_o(path, at), d, &front);
         vec3 n = sel3(dot3(s.n, d) < 0.0f, s.n, neg3(s.n));
-        integer entry = sel_i(active, guide_row(scene, s.p, n) + guide_bin(neg3(d)), (integer)(0));
+        integer row = guide_row(scene, s.p, n), straight = guide_straight(scene, row);
+        integer entry = sel_i((state & PATH_DEPTH) > 1, row + guide_bin(neg3(d)), straight);
+        entry = sel_i(active, entry, (integer)(0));
         real carried = spectrum_mean(load_path_beta(path, at)) * load_path_weight(path, at);
         integer value = sel_i(active, to_integer(clamp_r(carried, (real)(0.0f), (real)(16.0f)) * TRAIN_UNIT),
                               (integer)(0));

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from xml.etree import ElementTree
+
+import numpy as np
+from PIL import Image
 
 from clpt.benchmark import card, pictures
 from clpt.benchmark.figures import Figure
@@ -38,17 +42,32 @@ def told(text: str) -> list[str]:
 
 
 def test_a_card_tells_points_and_what_made_them() -> None:
-    words = told(card.card(ABOUT, figures()))
+    words = told(card.card(ABOUT, figures()).svg())
     assert "2,605" in words and "5,000" in words and "clpt bench 1, quick" in words
     assert words[0].startswith("A <very> & long") and len(words[0]) == card.LONGEST
     assert any(word.startswith("5 of 5 pictures verified") for word in words)
 
 
 def test_a_card_of_a_wrong_picture_has_no_score() -> None:
-    words = told(card.card(ABOUT, figures("wrong: 12 % of tiles, first in append: 7")))
+    words = told(card.card(ABOUT, figures("wrong: 12 % of tiles, first in append: 7")).svg())
     assert "no score" in words and "wrong: 12 % of tiles" in words
     assert any(word.startswith("4 of 5 pictures verified") for word in words)
 
 
 def test_a_card_without_pictures_is_a_card() -> None:
-    assert "no score" in told(card.card(ABOUT, []))
+    assert "no score" in told(card.card(ABOUT, []).svg())
+
+
+def test_a_card_as_png(tmp_path: Path) -> None:
+    """Of twice the size, with a bar of each scene, the last the longest."""
+    own = card.card(ABOUT, figures())
+    own.write(tmp_path / "card.png")
+    own.write(tmp_path / "card.svg")
+    assert (tmp_path / "card.svg").read_text("utf-8") == own.svg()
+    with Image.open(tmp_path / "card.png") as image:
+        assert image.size == (card.SCALE * card.WIDTH, card.SCALE * own.height)
+        pixels = np.asarray(image.convert("RGB"))
+    blue = (pixels == [int(card.BAR[i : i + 2], 16) for i in (1, 3, 5)]).all(2)
+    bars = [one for one in own.drawn if isinstance(one, card.Bar)]
+    lengths = [int(blue[card.SCALE * (bar.y + bar.height // 2)].sum()) for bar in bars]
+    assert lengths == sorted(lengths) and abs(lengths[-1] - card.SCALE * bars[-1].length) < 3

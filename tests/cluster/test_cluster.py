@@ -9,7 +9,6 @@ import threading
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 pytest.importorskip("distributed")
@@ -19,7 +18,6 @@ sys.path.insert(0, str(Path(__file__).parent))
 from machines import ROOT, digest_of_one_process, machines, scene, wait_until  # noqa: E402
 
 import clpt  # noqa: E402
-from clpt import device  # noqa: E402
 from clpt.cluster import tasks  # noqa: E402
 from clpt.cluster.cluster_renderer import ClusterRenderer  # noqa: E402
 from clpt.errors import ClusterError  # noqa: E402
@@ -63,34 +61,6 @@ def test_two_workers_are_one(two, expected):
         assert renderer.image().shape == (24, 32, 3)
 
 
-def pictures(renderer):
-    """All pictures of what a renderer has, by name."""
-    even, odd = renderer.halves()
-    found = {"image": renderer.image(), "even": even, "odd": odd, **renderer.layers()}
-    return {**found, "samples": renderer.samples_per_pixel()}
-
-
-def test_all_pictures_are_those_of_one_process(two):
-    """By whom ever samples are taken: one device, several, a cluster, or a file of these."""
-    plan = scene()
-    plan.film = dataclasses.replace(plan.film, layers=("albedo", "variance"))
-    with clpt.Renderer(plan, threads=1) as one:
-        one.run(12)
-        wanted, saved = pictures(one), one._saved_film()
-    several = clpt.MultiRenderer(plan, [device.choose(threads=1)])
-    many = ClusterRenderer(plan, two.client, device=device.choose(threads=1))
-    with several, many:
-        for renderer in (several, many):
-            assert renderer.run(5, noise=None) and renderer.run(7)
-            assert renderer.samples == 12 and renderer.active == 1.0
-            assert renderer._saved_film().counts["samples"] == saved.counts["samples"]
-        assert np.array_equal(many.film.get(), several.film.get())
-        for source in (saved, several, many, several._saved_film(), many._saved_film()):
-            found = pictures(source)
-            assert found.keys() == wanted.keys()
-            assert all(np.array_equal(found[name], image) for name, image in wanted.items())
-
-
 @pytest.mark.slow
 def test_images_travel(two):
     """They are files, of which workers keep no copy in the folder of an open scene."""
@@ -103,13 +73,6 @@ def test_images_travel(two):
         assert digest(renderer) == digest_of_one_process(2, plan)
 
 
-def test_runs_go_on_where_the_last_one_ended(two, expected):
-    with ClusterRenderer(scene(), two.client) as renderer:
-        for samples in (1, 50, SAMPLES - 51):
-            assert renderer.run(samples)
-        assert digest(renderer) == expected
-
-
 def test_a_run_that_is_stopped_leaves_a_picture(two):
     """What is missing is rendered by the next run, perhaps with fewer samples in some pixels."""
     with ClusterRenderer(scene(), two.client) as renderer:
@@ -120,25 +83,6 @@ def test_a_run_that_is_stopped_leaves_a_picture(two):
         assert not renderer.run(1)
         assert renderer.run(10)
         assert renderer.samples == stopped + 10
-
-
-def test_a_saved_film_is_gone_on_with(two, expected, tmp_path):
-    """By a cluster, and by one process: the film of a render that was never stopped."""
-    path = tmp_path / "a.resume.exr"
-    with ClusterRenderer(scene(), two.client) as renderer:
-        assert renderer.run(SAMPLES // 2)
-        renderer.save_state(path)
-    with ClusterRenderer(scene(), two.client) as renderer:
-        renderer.load_state(path)
-        assert renderer.samples == SAMPLES // 2
-        assert renderer.counts.samples == SAMPLES // 2 * 32 * 24
-        assert renderer.run(SAMPLES - SAMPLES // 2)
-        assert digest(renderer) == expected
-    with clpt.Renderer(scene(), threads=1) as renderer:
-        renderer.load_state(path)
-        assert renderer.counts.samples == SAMPLES // 2 * 32 * 24
-        renderer.run(SAMPLES - SAMPLES // 2)
-        assert digest(renderer) == expected
 
 
 def test_a_killed_worker_is_not_missed(two):

@@ -80,7 +80,7 @@ class BadDevice:
                 bad.buffer(size or hostbuf.nbytes)
                 super().__init__(context, flags, size=size, hostbuf=hostbuf)
 
-        def run(queue: cl.CommandQueue, kernel: cl.Kernel, size: Any, group: Any, **named: Any):
+        def run(queue: cl.CommandQueue, kernel: cl.Kernel, size: Any, group: Any, *more, **named):
             self._refuse()
             local = kernel.get_work_group_info(
                 cl.kernel_work_group_info.LOCAL_MEM_SIZE, queue.device
@@ -93,7 +93,7 @@ class BadDevice:
             if code := self.launch(launch):
                 self.killed = True
                 return Failed(code)
-            return enqueue(queue, kernel, size, group, **named)
+            return enqueue(queue, kernel, size, group, *more, **named)
 
         def guarded(command: Callable[..., Any]) -> Callable[..., Any]:
             def guard(*args: Any, **named: Any) -> Any:

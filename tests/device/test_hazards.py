@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,11 @@ import pyopencl as cl
 import pytest
 
 import clpt
-from clpt.device import program
-from clpt.render.wavefront.path_buffers import UNIT_SLOTS
+from clpt import device
+from clpt.benchmark import bandwidth
+from clpt.device import building, compile_limits, native_programs, program
+from clpt.render.wavefront import bounce_loop
+from clpt.render.wavefront.bounce_loop import LEAST_ITEMS
 from clpt.scene import Film, Scene, cameras, integrators, lights, materials, shapes
 from clpt.transforms import look_at
 from tests.device.bad_device import CODE, BadDevice, Launch, driver_error, no_images
@@ -43,9 +47,9 @@ def picture(scene: Scene) -> np.ndarray:
     return rendered(scene, BadDevice())
 
 
-def rendered(scene: Scene, bad: BadDevice, **options: Any) -> np.ndarray:
+def rendered(scene: Scene, bad: BadDevice, samples: int = 1, **options: Any) -> np.ndarray:
     with clpt.Renderer(scene, bad.open(), **options) as renderer:
-        renderer.run(1)
+        renderer.run(samples)
         return renderer.image()
 
 
@@ -131,7 +135,7 @@ HAZARDS = {
     "groups of 256": Hazard(lambda: BadDevice(launch=groups_of(256))),
     "16 KiB of local memory": Hazard(lambda: BadDevice(launch=local_memory_of(16 << 10))),
     "a watchdog": Hazard(
-        lambda: BadDevice(launch=watchdog(UNIT_SLOTS), dead=CODE.OUT_OF_RESOURCES),
+        lambda: BadDevice(launch=watchdog(LEAST_ITEMS - 1), dead=CODE.OUT_OF_RESOURCES),
         "stopped a kernel that took too long: take a smaller picture or fewer slots",
     ),
     "a watchdog, and fewer slots": Hazard(
@@ -170,7 +174,43 @@ def test_hazards(
     assert isinstance(raised.value.__cause__, cl.Error) or hazard.error is clpt.MemoryBudgetError
 
 
-@pytest.mark.parametrize("most", [64, 16, 1])
+@dataclass
+class SlowDevice:
+    """A device that takes some time [s] for a work-item; its driver ends kernels after .1 s.
+
+    now: its clock [s]. A pixel of the picture is no path, and takes next to nothing.
+    """
+
+    speed: float
+    now: float = 0.0
+
+    def __call__(self, launch: Launch) -> int | None:
+        took = self.speed * launch.items * (launch.name != "accumulate")
+        self.now += took
+        return CODE.OUT_OF_RESOURCES if took > 0.1 else None
+
+
+@pytest.mark.parametrize(("speed", "most"), [(1e-5, LEAST_ITEMS), (1e-9, 1 << 15)])
+def test_launches_are_shorter_than_a_watchdog_waits(
+    speed: float, most: int, scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A third of a second for all slots, or less than a thousandth: then they are one launch."""
+    samples = 8
+    expected = rendered(scene, BadDevice(), samples)
+    slow = SlowDevice(speed)
+    bad = BadDevice(launch=slow, dead=CODE.OUT_OF_RESOURCES)
+    bad.play(monkeypatch)
+    clock = SimpleNamespace(perf_counter=lambda: slow.now)
+    monkeypatch.setattr(bounce_loop, "time", clock)
+    assert np.array_equal(rendered(scene, bad, samples), expected)
+    assert max(one.items for one in bad.launches if one.name != "accumulate") == most
+    monkeypatch.setattr(bounce_loop, "FIRST_PARTS", 1)
+    if speed > 1e-6:
+        with pytest.raises(clpt.DeviceError, match="stopped a kernel that took too long"):
+            rendered(scene, bad, samples)
+
+
+@pytest.mark.parametrize("most", [64, 32, 16, 8, 1])
 def test_groups_that_the_device_cannot_run_are_smaller(
     most: int, scene: Scene, picture: np.ndarray, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -187,3 +227,46 @@ def test_nothing_needs_images_or_finish(
     no_images(monkeypatch)
     monkeypatch.setattr(cl.CommandQueue, "finish", lambda _: 1 / 0)
     assert np.array_equal(rendered(scene, BadDevice()), picture)
+    copying = bandwidth.Copying(device.choose(profiling=True))
+    _, complaint = copying.rounds(1 << 12, 1)
+    assert complaint == ""
+
+
+def test_a_compiler_that_takes_minutes_is_named(
+    scene: Scene, picture: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It goes on here; the command line ends."""
+    said: list[str] = []
+    build = native_programs.build
+
+    def slow(context: Any, on: Any, code: Any, options: Any = ()) -> Any:
+        while not said:
+            pass
+        return build(context, on, code, options)
+
+    monkeypatch.setenv(compile_limits.VARIABLE, "0.05")
+    monkeypatch.setattr(compile_limits, "at_limit", said.append)
+    monkeypatch.setattr(native_programs, "build", slow)
+    monkeypatch.setattr(building, "_known", lambda *_: None)
+    assert np.array_equal(rendered(scene, BadDevice()), picture)
+    assert re.match("the driver's compiler has been at the program '.*' for 0 s", said[0])
+
+
+def test_a_compiler_that_refuses_is_one_line(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the text was kept is told."""
+    BadDevice().open()  # its trial builds
+
+    def refuse(context: Any, on: Any, code: Any, options: Any = ()) -> Any:
+        raise driver_error(CODE.BUILD_PROGRAM_FAILURE)
+
+    monkeypatch.setattr(native_programs, "build", refuse)
+    monkeypatch.setattr(building, "_known", lambda *_: None)
+    with pytest.raises(clpt.KernelBuildError, match=r"did not build: .*\.cl") as raised:
+        rendered(scene, BadDevice())
+    assert "\n" not in str(raised.value)
+
+
+def test_no_kernel_asks_for_the_size_of_sub_groups() -> None:
+    """Devices have them of 8, 16, 32 or 64 work-items; nothing hangs on that."""
+    for path in device.kernels_folder().rglob("*.cl"):
+        assert "sub_group" not in path.read_text(encoding="utf-8"), path

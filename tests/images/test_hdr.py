@@ -29,6 +29,7 @@ def written(path, pixels: bytes, size: str, *lines: str):
         (("COLORCORR= 2 1 .5",), (0.5, 0.5, 0.5)),
         (("EXPOSURE=2", "COLORCORR=2 1 .5", "COLORCORR=2 1 1"), (0.125, 0.25, 0.25)),
         (("PRIMARIES= .64 .33 .30 .60 .15 .06 .3127 .3290",), (1, 0.5, 0.25)),
+        (("PRIMARIES=0 0 0 0 0 0 0 0",), (1, 0.5, 0.25)),  # as Photoshop writes: none are stated
         (("# EXPOSURE=4", "\tEXPOSURE=4"), (1, 0.5, 0.25)),  # no variables
     ],
 )

@@ -425,6 +425,29 @@ def test_a_hemisphere_of_images(kind, size):
     assert below < (0.15 if size[0] > 2 else 0.5)
 
 
+def test_mis_compensation_leaves_the_dull_part_to_materials():
+    """Light alone still gives the same irradiance; without a normal nothing changes."""
+    image = np.ones((16, 32, 3), np.float32)
+    image[3:5, 5:8] = 60.0  # in the direction that `side` faces
+    n, random = 1 << 15, np.random.default_rng(9)
+    side = image_lights.sphere_directions(32, 0.25, 0.2)[:, None]
+    given = np.vstack([np.tile(side, n), random.random((2, n))])
+    every = np.vstack([np.zeros((3, n)), given[3:]])
+    results, bright = [], []
+    for compensated in (False, True):
+        scene = lit([Envmap(image=image, mis_compensation=compensated)])
+        r = scene(SIDED, given, 9).astype(float)
+        assert (r[3] > 0.0).all()
+        assert (np.abs(r[8] - r[3]) > 3e-4 * r[3]).mean() < 1e-3
+        value = r[4] * np.maximum((side * r[:3]).sum(axis=0), 0.0) / r[3]
+        results.append((value.mean(), value.std() / np.sqrt(n), scene(SIDED, every, 9)))
+        bright.append((r[4] > 2.0).mean())
+    (plain, error, same), (ours, other, equal) = results
+    assert abs(ours - plain) < SIGMAS * np.hypot(error, other)
+    assert bright[1] > bright[0]
+    np.testing.assert_array_equal(same, equal)
+
+
 @pytest.mark.peers
 @pytest.mark.parametrize("mode", ["rgb", "spectral"])
 def test_envmap_is_mitsuba_s(mode):

@@ -1,6 +1,6 @@
 """Every phase function integrates to one, and samples what it says.
 
-The table of kinds is clpt.scene.media.PHASE_LEAVES: a kind is tested by being listed, with the same
+The table of kinds is clpt.scene.phases.LEAVES: a kind is tested by being listed, with the same
 parameters at all wavelengths, and in both modes with others at each.
 """
 
@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from clpt.scene import media
+from clpt.scene import phases
 from clpt.testing.probe import LAMBDAS
 from tests.kernels.harness import Probe
 from tests.rotation import rotating
@@ -19,10 +19,10 @@ BUMPS = np.cos(np.linspace(0.0, 9.0, 33)) + 1.1
 COSINES = (-1.0, -0.95, -0.1, 0.0, 0.3, 0.9, 0.97, 1.0)
 AT = np.sort(LAMBDAS)
 SETTINGS = {
-    media.Isotropic: [{}],
-    media.HenyeyGreenstein: [{"g": g} for g in (-0.95, -0.3, 0.0, 1e-4, 0.002, 0.6, 0.99)],
-    media.Rayleigh: [{}],
-    media.Draine: [
+    phases.Isotropic: [{}],
+    phases.HenyeyGreenstein: [{"g": g} for g in (-0.95, -0.3, 0.0, 1e-4, 0.002, 0.6, 0.99)],
+    phases.Rayleigh: [{}],
+    phases.Draine: [
         {"g": g, "alpha": alpha}
         for g, alpha in (
             (0.0, 1.0),
@@ -33,22 +33,22 @@ SETTINGS = {
             (0.97, 1.0),
         )
     ],
-    media.Reradiating: [{"reflectance": 1.0, "reradiation": 0.0, "amount": 1.0}],
-    media.Tabulated: [
+    phases.Reradiating: [{"reflectance": 1.0, "reradiation": 0.0, "amount": 1.0}],
+    phases.Tabulated: [
         {"values": (1.0, 1.0)},
         {"values": BUMPS},
         {"values": (3.0, 0.0, 0.0, 1.0, 0.5, 0.7, 40.0, 200.0), "cosines": COSINES},
     ],
 }
 VARIED = {  # at the four wavelengths of the probe, or for three colours
-    media.HenyeyGreenstein: {"g": (0.8, 0.3, -0.5, 0.0)},
-    media.Draine: {"g": (0.8, 0.3, -0.5, 0.0), "alpha": (0.0, 1.0, 5.0, 0.3)},
-    media.Tabulated: {
+    phases.HenyeyGreenstein: {"g": (0.8, 0.3, -0.5, 0.0)},
+    phases.Draine: {"g": (0.8, 0.3, -0.5, 0.0), "alpha": (0.0, 1.0, 5.0, 0.3)},
+    phases.Tabulated: {
         "values": [BUMPS, BUMPS[::-1], np.ones(33), np.linspace(0.0, 1.0, 33) ** 4],
         "wavelengths": (430.0, 500.0, 570.0, 640.0),
     },
 }
-CASES = [(cls, given) for cls in media.PHASE_LEAVES for given in SETTINGS[cls]]
+CASES = [(cls, given) for cls in phases.LEAVES for given in SETTINGS[cls]]
 VARIED_CASES = [(cls, mode) for cls in VARIED for mode in ("rgb", "spectral")]
 TESTS = 2 * (len(CASES) + len(VARIED_CASES))
 SIGNIFICANCE = 1.0 - (1.0 - 1e-3) ** (1.0 / TESTS)  # chance of a false alarm: 1e-3 (Sidak)
@@ -59,12 +59,12 @@ BINS = 40
 def formula(cls, given, cos, part=0, mode="rgb"):
     """Phase functions [1/sr] in float64; cos: of the angle by which light turns; part: which of the
     probe's wavelengths or colours."""
-    if cls is media.Isotropic:
+    if cls is phases.Isotropic:
         return np.full_like(cos, 0.25 / np.pi)
-    if cls is media.Rayleigh:
+    if cls is phases.Rayleigh:
         return 3.0 / (16.0 * np.pi) * (1.0 + cos**2)
-    if cls is media.Tabulated:
-        made = media.Tabulated(**given)
+    if cls is phases.Tabulated:
+        made = phases.Tabulated(**given)
         cosines, rows, start, step = made.device_rows(mode == "spectral")
         at = (LAMBDAS[part] - start) / step if mode == "spectral" else part
         at = np.clip(at, 0, len(rows) - 1)
@@ -82,8 +82,8 @@ def directions(cos, turn):
     return np.stack([sine * np.cos(turn), sine * np.sin(turn), -cos], axis=1)
 
 
-@rotating("cls, lanes", media.PHASE_LEAVES, [1, 8, 16],
-          turn=lambda cls: media.PHASE_LEAVES.index(cls) % 3)  # fmt: skip
+@rotating("cls, lanes", phases.LEAVES, [1, 8, 16],
+          turn=lambda cls: phases.LEAVES.index(cls) % 3)  # fmt: skip
 def test_is_its_formula(cls, lanes):
     rng = np.random.default_rng(5)
     cos = np.concatenate([rng.uniform(-1.0, 1.0, 500), [-1.0, 1.0]])
@@ -93,7 +93,7 @@ def test_is_its_formula(cls, lanes):
         expected = formula(cls, given, cos)
         # near its peak HG turns the rounding of a direction into 3 / (1 - g)^2 times as much
         bound = 1e-5 + 1e-6 / (1.0 - abs(given.get("g", 0.0))) ** 2
-        if cls is media.Tabulated:
+        if cls is phases.Tabulated:
             bound = 1e-3  # by what the cosine is rounded, in its steepest cell
         np.testing.assert_allclose(got["pdf"], expected, rtol=bound, atol=bound * expected.mean())
         np.testing.assert_allclose(
@@ -136,7 +136,7 @@ def test_samples_follow_it(cls, given):
 def test_samples_of_several_wavelengths(cls, mode):
     """The hero's density is sampled, or in RGB mode the mean of three; weights tell the others'."""
     given, parts = VARIED[cls], 3 if mode == "rgb" else 4
-    if cls is not media.Tabulated:
+    if cls is not phases.Tabulated:
         given = {name: np.array(values[:parts]) for name, values in given.items()}
     rng = np.random.default_rng(12)
     got = Probe(cls, mode)(given, WO, WO, rng.random((200_000, 3)))

@@ -30,10 +30,14 @@ kernel void probe(global const float *in, global float *out, uint n)
 
 @pytest.mark.parametrize("lanes", [1, 8, 16])
 def test_lanes_read_rows(lanes: int) -> None:
-    """Words are random bits, among them signalling NaN; a row of six words is read in two parts."""
+    """Words are random bits, among them signalling NaN; a row of six words is read in two parts.
+
+    Some work-items read one row in all lanes, and one in all but the last.
+    """
     rng = np.random.default_rng(1)
     n = 64
     first = rng.integers(0, n - 5, n, dtype=np.uint32)
+    first[16:48], first[47] = 2, 3
     words = rng.integers(0, 2**32, n, dtype=np.uint32)
     words[:3] = 0x7F800001, 0xFFC12345, 0x80000000
     given = np.stack([first, words]).view(np.float32)

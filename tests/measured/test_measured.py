@@ -86,6 +86,7 @@ HEAD = b"tensor_file\0\1\0"
         (HEAD + b"\1\0\0\0" + _field(kind=99), "unknown type"),
         (HEAD + b"\1\0\0\0" + _field(shape=(1 << 40,)), "'a' goes beyond its end"),
         (HEAD + b"\1\0\0\0" + _field(axes=2, shape=(1 << 63, 1 << 63)), "goes beyond its end"),
+        (HEAD + b"\1\0\0\0" + _field(axes=2, shape=(1 << 62, 0)), "goes beyond its end"),
         (HEAD + b"\1\0\0\0" + _field(offset=1 << 62), "goes beyond its end"),
         (HEAD + b"\1\0\0\0" + _field(), "no field 'phi_i'; it has 'a'"),
     ],

@@ -9,7 +9,7 @@ import clpt
 from clpt import spectra
 from clpt.errors import SceneError
 from clpt.formats.native.write import write_medium
-from clpt.scene import media
+from clpt.scene import media, phases
 
 BAD = {
     "needs two": ({"values": (1.0,)}, "two numbers or more"),
@@ -29,18 +29,18 @@ BAD = {
 def test_a_table_that_is_none(case: str) -> None:
     given, said = BAD[case]
     with pytest.raises(SceneError, match=said):
-        media.Tabulated(**given)
+        phases.Tabulated(**given)
 
 
 @pytest.mark.parametrize(
     "make, said",
     [
-        (lambda: media.HenyeyGreenstein(g=1.0), "outside"),
-        (lambda: media.HenyeyGreenstein(g=(0.3, -0.2, 0.1)), "cannot be negative"),
-        (lambda: media.HenyeyGreenstein(g=spectra.Tabulated((400, 500), (0, 1.5))), "at 500 nm"),
-        (lambda: media.Draine(alpha=-1.0), "outside"),
-        (lambda: media.Blend(weight=1.5), "outside"),
-        (lambda: media.Blend(first=1.0), "must be a phase function"),
+        (lambda: phases.HenyeyGreenstein(g=1.0), "outside"),
+        (lambda: phases.HenyeyGreenstein(g=(0.3, -0.2, 0.1)), "cannot be negative"),
+        (lambda: phases.HenyeyGreenstein(g=spectra.Tabulated((400, 500), (0, 1.5))), "at 500 nm"),
+        (lambda: phases.Draine(alpha=-1.0), "outside"),
+        (lambda: phases.Blend(weight=1.5), "outside"),
+        (lambda: phases.Blend(first=1.0), "must be a phase function"),
     ],
 )
 def test_says_what_is_wrong(make, said) -> None:
@@ -50,18 +50,18 @@ def test_says_what_is_wrong(make, said) -> None:
 
 def test_rows_lie_even_in_wavelength_and_have_the_integral_one() -> None:
     rows = np.random.default_rng(1).random((4, 9))
-    table = media.Tabulated(values=rows, wavelengths=(400.0, 410.0, 450.0, 500.0))
+    table = phases.Tabulated(values=rows, wavelengths=(400.0, 410.0, 450.0, 500.0))
     cosines, made, start, step = table.device_rows(True)
     assert (start, step, made.shape) == (400.0, 10.0, (11, 9))
     np.testing.assert_allclose(2 * np.pi * np.trapezoid(made, cosines, axis=1), 1.0)
     np.testing.assert_allclose(made[[0, 1, 5, 10]], table.values, rtol=1e-12)
     assert table.device_rows(False)[1].shape == (3, 9)
-    assert media.Tabulated(values=rows[0]).device_rows(False)[1].shape == (1, 9)
+    assert phases.Tabulated(values=rows[0]).device_rows(False)[1].shape == (1, 9)
 
 
 def test_files_hold_them(tmp_path) -> None:
-    table = media.Tabulated(values=[(1.0, 2.0, 4.0), (2.0, 1.0, 1.0)], wavelengths=(400.0, 700.0))
-    blend = media.Blend(weight=0.25, first=table, second=media.Draine(g=0.5, alpha=2.0))
+    table = phases.Tabulated(values=[(1.0, 2.0, 4.0), (2.0, 1.0, 1.0)], wavelengths=(400.0, 700.0))
+    blend = phases.Blend(weight=0.25, first=table, second=phases.Draine(g=0.5, alpha=2.0))
     text = write_medium(media.Homogeneous(sigma_s=1.0, phase=blend, name="x"), 7)
     (tmp_path / "scene.json").write_text(
         '{"camera": {"type": "perspective"}, "shapes": [{"type": "sphere", "interior": "x",'

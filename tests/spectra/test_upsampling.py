@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from clpt import spectra
-from clpt.spectra import cie
+from clpt.spectra import cie, upsampling
 from clpt.spectra.make_uplift import lab
 from clpt.spectra.spectrum import d65
 from clpt.spectra.upsampling import evaluate
@@ -97,6 +97,15 @@ def test_continuous_across_the_largest_component():
     tilted = np.concatenate([rgb + tilt, rgb - tilt[[1, 2, 0]]])
     values = evaluate(spectra.uplift(tilted), cie.GRID)
     np.testing.assert_allclose(values[:3], values[3:], atol=0.02)
+
+
+@pytest.mark.parametrize("kind", [upsampling.node_values, upsampling.node_ratios])
+def test_cells_are_those_of_a_search(kind):
+    nodes, parts = upsampling._axis(kind)
+    beside = np.concatenate([nodes, np.nextafter(nodes, -1.0), np.nextafter(nodes, 2.0)])
+    at = np.concatenate([np.clip(beside, 0.0, 1.0), np.linspace(0.0, 1.0, 20_001)])
+    cells = np.clip(np.searchsorted(nodes, at, "right") - 1, 0, len(nodes) - 2)
+    assert np.array_equal(upsampling._cells_of(nodes, parts, at), cells)
 
 
 def test_shapes_and_unbounded():

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from clpt import transforms as tf
-from clpt.scene import Film, Scene, media
+from clpt.scene import Film, Scene, media, phases
 from clpt.scene import materials as m
 from clpt.scene.cameras import Camera, Perspective, ThinLens
 from clpt.scene.integrators import Independent, Path
@@ -26,7 +26,7 @@ CORNERS = np.array([[-0.9, 0, -0.4], [0.1, 0, -0.5], [-0.4, 0, 0.4], [-0.4, 1.1,
 FACES = np.array([[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]], np.uint32)
 SKY = np.random.default_rng(3).random((4, 8, 3)).astype(np.float32)
 DENSITY = np.random.default_rng(4).random((5, 4, 6)).astype(np.float32)
-FORWARD = media.HenyeyGreenstein(g=0.5)
+FORWARD = phases.HenyeyGreenstein(g=0.5)
 
 
 def peak(material: m.Material, **more: Any) -> Mesh:

@@ -25,7 +25,8 @@ from clpt.scene.materials import (
     Phong,
     RoughConductor,
 )
-from clpt.scene.media import Grid, HenyeyGreenstein, Homogeneous, Mixture
+from clpt.scene.media import Grid, Homogeneous, Mixture
+from clpt.scene.phases import HenyeyGreenstein
 from clpt.scene.shapes import Cube, Disk, Sphere
 from clpt.scene.textures import Checkers, Mix
 from clpt.spectra import Tabulated

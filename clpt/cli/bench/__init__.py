@@ -49,11 +49,20 @@ from .settings import Report, Subject
 )  # fmt: skip
 @click.option(
     "--card", "card", type=click.Path(path_type=Path),
-    help="Write a card of the pictures' points to an .svg; of several devices the last one's.",
+    help="Write a card of the pictures' points to an .svg or .png; of several devices the last "
+    "one's.",
+)  # fmt: skip
+@click.option(
+    "--first-light", "light", type=click.Path(path_type=Path), is_flag=False,
+    flag_value=Path("first-light.md"), metavar="[FILE]",
+    help="Check a device that nobody has tried, in five minutes; FILE gets what works, what is "
+    "wrong, how fast it is, and what to report to whom.  [first-light.md]",
 )  # fmt: skip
 @click.option("--list", "list_all", is_flag=True, help="List what can be measured, and where.")
 @with_records(subject=Subject, report=Report)
-def bench(subject: Subject, report: Report, device: str | None, list_all: bool) -> int:
+def bench(
+    subject: Subject, report: Report, device: str | None, light: Path | None, list_all: bool
+) -> int:
     """Measure pictures, rays, stages of rendering, builds and starts of an OpenCL device.
 
     Figures are medians of rounds; ± is half the distance of their quartiles. A result that cannot
@@ -66,5 +75,9 @@ def bench(subject: Subject, report: Report, device: str | None, list_all: bool) 
     if list_all:
         show_list()
         return 0
+    if light is not None:
+        from .first_light import tell_of_first_light
+
+        return tell_of_first_light(device, light, report.limit)
     report.check()
     return tell_of_devices(device, subject.settings(), report)

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from ... import benchmark, output_files
+from ... import benchmark
 from ... import device as dev
 from ...benchmark import apart, card, comparing, records, scenes
 from ...benchmark.comparing import Ratio
@@ -54,9 +54,7 @@ def _report(console: Console, which: Which, settings: Mapping[str, Any], report:
         then = {figures.index(one.figure): float(one.then["value"]) for one in ratios}
         bench_plot.write(report.plot, f"{label}, clpt bench", figures, then)
     if report.card is not None:
-        output_files.write_text(
-            report.card, card.card({**records.circumstances(), **about}, figures)
-        )
+        card.card({**records.circumstances(), **about}, figures).write(report.card)
     return failed
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from ... import output_files
 from ...choices import TREES
 from ...errors import SceneError
 from ..process.extras import extra
@@ -56,8 +57,12 @@ class Report:
         """Raise what is wrong with a file, before anything is measured."""
         if self.fail_below is not None and self.record is None:
             raise click.UsageError("--fail-below compares: give --compare FILE too")
-        if self.card is not None and self.card.suffix.lower() != ".svg":
-            raise SceneError("a card is written to .svg", file=self.card)
+        if self.card is not None:
+            from ...benchmark.card import FORMATS  # here: help needs no OpenCL
+
+            if self.card.suffix.lower() not in FORMATS:
+                raise SceneError(f"a card is written to {' or '.join(FORMATS)}", file=self.card)
+            check_writable(self.card)
         if self.plot is not None:
             with extra("plot", "a plot"):
                 from ..plots import bench as bench_plot  # here: matplotlib is an extra, and slow
@@ -73,6 +78,14 @@ class Report:
         from ...benchmark import records  # here: help needs no OpenCL
 
         return records.read(self.record)
+
+
+def check_writable(path: Path) -> None:
+    """Raise SceneError if a file cannot be written, before anything is measured."""
+    try:
+        output_files.check_writable(path)
+    except OSError as error:
+        raise SceneError(f"cannot be written: {error}", file=path) from error
 
 
 def _chosen(names: Sequence[str]) -> tuple[list[str], list[str], list[str]]:

@@ -16,6 +16,7 @@ from ..options.scene_options import SceneOptions
 from ..options.workers import Workers
 from ..printing.display import Display
 from ..printing.names import device_names
+from ..process.allocator import reusing
 from ..process.stopping import prompt
 from .devices import ending_at_limit
 
@@ -75,7 +76,8 @@ class DeviceMaker(Maker):
     def make(self, scene: Scene, shown: Display, first_sample: int = 0) -> AnyRenderer:
         """Return a new renderer of a scene; note its warnings."""
         text = f"building kernels for {device_names([on.info for on in self.devices])}"
-        with prompt(dev.kill_compilers), ending_at_limit(), shown.compiling(text) as compiles:
+        compiling = shown.compiling(text)
+        with prompt(dev.kill_compilers), ending_at_limit(), reusing(), compiling as compiles:
             for on in self.devices:
                 on.builds.on_compile = compiles
             renderer = new_renderer(scene, self.devices, first_sample=first_sample, **self._made)

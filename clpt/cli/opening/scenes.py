@@ -16,6 +16,7 @@ from ...scene import Scene
 from ..options.applied import changed
 from ..options.scene_options import SceneOptions
 from ..printing.display import Display
+from ..process.allocator import reusing
 from ..process.stopping import prompt
 from .devices import choose_devices
 
@@ -66,7 +67,8 @@ def open_scene(
     resources: get the processes that compile beside this one; accept: see `read_scene`.
     """
     began = time.perf_counter()
-    with prompt(dev.kill_compilers), ThreadPoolExecutor(max_workers=1) as beside:
+    alone = ThreadPoolExecutor(max_workers=1)
+    with prompt(dev.kill_compilers), reusing(), alone as beside:
         chosen = beside.submit(choose_devices, options.machine)
         scene = read_scene(file, options, shown, accept)
         loading = time.perf_counter() - began

@@ -24,8 +24,8 @@ class FilmChanges:
 
     mode: str | None = None
     size: tuple[int, int] | None = None
-    sensor: Any = None
-    white_balance: Any = None
+    sensor: object = None
+    white_balance: str | float | tuple[float, float] | None = None
     output_space: str | None = None
     bands: int | None = None
     lambda_min: float | None = None

@@ -6,7 +6,6 @@ import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -69,7 +68,7 @@ class CameraType(click.ParamType):
     name = "AZ,EL[,DIST]|NAME"
 
     def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> Orbit | str:
         if isinstance(value, Orbit):
             return value
@@ -99,7 +98,7 @@ class CropType(click.ParamType):
     name = "X0:X1,Y0:Y1"
 
     def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> tuple[Span, Span]:
         if isinstance(value, tuple):
             return value

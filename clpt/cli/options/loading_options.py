@@ -19,7 +19,9 @@ class Bytes(click.ParamType):
 
     name = "SIZE"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Any:
         form, text = r"(\d{1,15}(?:\.\d+)?)\s*([KMGT]?)i?B?", str(value).strip()
         match = re.fullmatch(form, text, re.IGNORECASE)
         if match is None:

@@ -22,7 +22,7 @@ class Size(click.ParamType):
     name = "WxH"
 
     def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> tuple[int, int]:
         found = re.fullmatch(r"(\d{1,9})x(\d{1,9})", str(value).strip().lower())
         if not found:
@@ -102,7 +102,9 @@ class LightPaths(click.ParamType):
 
     name = "N-OR-AUTO"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Any:
         return AUTO if value == AUTO else click.FloatRange(0.0, MOST_LIGHT_PATHS)(value, param, ctx)
 
 
@@ -114,7 +116,9 @@ class Names(click.ParamType):
     def __init__(self, known: Iterable[str]):
         self.known = tuple(known)
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Any:
         given = tuple(str(value).split(","))
         for name in given:
             if name not in self.known:
@@ -127,7 +131,9 @@ class White(click.ParamType):
 
     name = "WHITE"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Any:
         try:
             numbers = [float(part) for part in str(value).split(",")]
         except ValueError:

@@ -6,7 +6,6 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -20,7 +19,9 @@ class Where(click.ParamType):
 
     name = "ADDRESS"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> str:
         text = str(value)
         if not re.fullmatch(rf"{LOCAL}[1-9]\d{{0,2}}|tls://.+:\d+", text):
             self.fail(f"{text!r} is neither tls://HOST:PORT nor local:N")

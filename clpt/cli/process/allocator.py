@@ -5,11 +5,18 @@ from __future__ import annotations
 import ctypes
 import gc
 import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
-_MMAP_THRESHOLD = -3  # glibc's M_MMAP_THRESHOLD
-_LARGE = 1 << 20  # [bytes]
+_TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # glibc's M_TRIM_THRESHOLD, M_MMAP_THRESHOLD
+_LARGE, _KEPT = 1 << 20, 1 << 17  # [bytes]: a block of its own, the free end of the heap
+_LARGE_INSIDE, _KEPT_INSIDE = 1 << 22, 1 << 24  # [bytes]: of `reusing`; glibc maps larger ones
 _STARTED = 200_000  # objects: modules have 120,000
+
+_inside = 0  # how many threads are in `reusing`
+_lock = threading.Lock()
 
 
 def return_large_blocks() -> None:
@@ -18,10 +25,42 @@ def return_large_blocks() -> None:
     By itself it raises the size from which it does so with every block that is freed, up to 32 MiB;
     what is decoded and parsed then leaves holes, a tenth of the peak of a scene with images.
     """
+    _set(_LARGE, _KEPT)
+
+
+@contextmanager
+def reusing() -> Iterator[None]:
+    """Keep large blocks that are freed inside for the next ones; in the end all go back.
+
+    What is new from the system costs a page fault for each 4 KiB, more than to compute what many
+    arrays of a scene hold. Threads may be inside at once: all goes back when the last one leaves.
+    """
+    global _inside
+    with _lock:
+        _inside += 1
+        _set(_LARGE_INSIDE, _KEPT_INSIDE)
+    try:
+        yield
+    finally:
+        with _lock:
+            _inside -= 1
+            if not _inside:
+                _set(_LARGE, _KEPT)
+                _ask("malloc_trim", 0)
+
+
+def _set(large: int, kept: int) -> None:
+    """Set from which size on a block is mapped for itself, and how much may be free behind all."""
+    _ask("mallopt", _MMAP_THRESHOLD, large)
+    _ask("mallopt", _TRIM_THRESHOLD, kept)
+
+
+def _ask(function: str, *numbers: int) -> None:
+    """Call a function of glibc, where that is the C library."""
     if sys.platform == "linux":
-        mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
-        if mallopt is not None:
-            mallopt(_MMAP_THRESHOLD, _LARGE)
+        found = getattr(ctypes.CDLL(None), function, None)
+        if found is not None:
+            found(*numbers)
 
 
 def collect_later() -> None:

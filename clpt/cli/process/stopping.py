@@ -32,10 +32,21 @@ def raise_at_signals() -> None:
             signal.signal(number, _raise)
 
 
-def status(error: BaseException | None) -> int:
-    """Return the exit status of a process that a KeyboardInterrupt ends."""
-    number = error.args[0] if error is not None and error.args else signal.SIGINT
-    return STATUS + int(number)
+def interrupt_behind(error: BaseException) -> KeyboardInterrupt | None:
+    """Return the KeyboardInterrupt that an error comes of, or None.
+
+    click turns it into Abort, and an extension whose import it ends into ImportError.
+    """
+    at: BaseException | None = error
+    while at is not None and not isinstance(at, KeyboardInterrupt):
+        at = at.__cause__ or at.__context__
+    return at
+
+
+def ended_by(interrupt: KeyboardInterrupt) -> int:
+    """Say that a signal ends the command, and return the exit status."""
+    tell()
+    return STATUS + int(interrupt.args[0] if interrupt.args else signal.SIGINT)
 
 
 def tell() -> None:

@@ -30,7 +30,7 @@ class Frames(click.ParamType):
     name = "FIRST:LAST"
 
     def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> range:
         found = re.fullmatch(r"(\d{1,9})(?::(\d{1,9}))?(?::(\d{1,9}))?", str(value).strip())
         if not found:

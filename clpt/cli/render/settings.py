@@ -30,7 +30,7 @@ class SampleRange(click.ParamType):
     name = "FIRST:END"
 
     def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> tuple[int, int]:
         found = re.fullmatch(r"(\d{1,10}):(\d{1,10})", str(value).strip())
         if not found or not int(found[1]) < int(found[2]) <= MOST_SAMPLES:
@@ -45,7 +45,7 @@ class Duration(click.ParamType):
     least = 1e-6
 
     def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> float:
         text = str(value).strip().lower()
         number = r"(\d+(?:\.\d+)?)"
@@ -70,7 +70,9 @@ class Address(click.ParamType):
 
     name = "HOST:PORT"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Any:
         if not isinstance(value, str):
             return value
         from ... import tev  # here: help needs no numpy

@@ -60,7 +60,10 @@ def _decoded(compressed: Element) -> Any:
         raise compressed.error(f"is of Draco's version {data[5]}.{data[6]}; 2.2 is read")
     if data[7] != MESH:
         raise compressed.error("Draco finds a point cloud in it, no triangles")
-    faces = _claimed_faces(data)
+    try:
+        faces = _claimed_faces(data)
+    except IndexError:
+        raise compressed.error("its data end before the triangles") from None
     what = f"{compressed.path} of {faces} triangles"
     budget.check(PER_TRIANGLE * faces, what, compressed.document.file)
     try:
@@ -74,7 +77,10 @@ def _decoded(compressed: Element) -> Any:
 
 
 def _claimed_faces(data: bytes) -> int:
-    """Read the number of faces from a mesh's header (Draco bitstream 2.2, section 3)."""
+    """Read the number of faces from a mesh's header (Draco bitstream 2.2, section 3).
+
+    Raises IndexError where the header goes on behind the data's end.
+    """
     stream = _Stream(data, 11)
     if int.from_bytes(data[9:11], "little") & METADATA:
         for _ in range(stream.number()):
@@ -88,28 +94,35 @@ def _claimed_faces(data: bytes) -> int:
 
 
 class _Stream:
-    """Reads a header's bytes one after the other; beyond the end there are zeros."""
+    """Reads a header's bytes one after the other; beyond the end is an IndexError."""
 
     def __init__(self, data: bytes, at: int):
         self.data, self.at = data, at
+
+    def byte(self) -> int:
+        """Return the next byte."""
+        self.at += 1
+        return self.data[self.at - 1]
 
     def number(self) -> int:
         """Return a whole number, seven bits a byte."""
         value = 0
         for shift in range(0, 35, 7):
-            byte = self.data[self.at] if self.at < len(self.data) else 0
-            self.at += 1
+            byte = self.byte()
             value |= (byte & 127) << shift
             if byte < 128:
                 break
         return value
 
     def skip_metadata(self, depth: int = 0) -> None:
-        """Pass over entries, and what is inside."""
-        for _ in range(min(self.number(), len(self.data))):
-            self.at += self.data[self.at] + 1 if self.at < len(self.data) else 1
-            size = self.number()
+        """Pass over entries, and what is inside; raises IndexError where they are too deep."""
+        if depth > DEEPEST:
+            raise IndexError
+        for _ in range(self.number()):
+            for length in (self.byte, self.number):  # of a name, and of what it names
+                size = length()
+                self.at += size
+        for _ in range(self.number()):
+            size = self.byte()
             self.at += size
-        for _ in range(min(self.number(), len(self.data)) if depth < DEEPEST else 0):
-            self.at += self.data[self.at] + 1 if self.at < len(self.data) else 1
             self.skip_metadata(depth + 1)

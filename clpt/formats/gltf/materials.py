@@ -20,6 +20,7 @@ from clpt.scene.materials import (
     Null,
     TwoSided,
 )
+from clpt.scene.params import Texture
 from clpt.scene.textures import Bitmap, MeshAttribute, Product
 
 UNLIT, EMISSIVE = "KHR_materials_unlit", "KHR_materials_emissive_strength"
@@ -108,7 +109,7 @@ def _opacity(element: Element, colours: bool) -> Any:
         if image is None:
             return None if factor >= cutoff else 0.0
         return _cut(image, cutoff / factor if factor > 0.0 else np.inf)
-    opacity: Any = factor
+    opacity: float | Texture = factor
     if image is not None:
         opacity = image if factor == 1.0 else Product(first=image, second=factor)
     if colours:

@@ -235,7 +235,7 @@ def _tangents(arrays: dict[str, NDArray[Any]], surface: Surface) -> dict[str, ND
     return {TANGENTS: given.astype(np.float32)}
 
 
-def _looks_at_tangents(material: Any) -> bool:
+def _looks_at_tangents(material: object) -> bool:
     inner = [getattr(material, name, None) for name in ("material", "front")]
     return (
         isinstance(material, NormalMap)

@@ -7,13 +7,11 @@ of bytes begin is found one by one, all else goes by arrays.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from clpt import budget
-from clpt.arrays import Bytes
+from clpt.arrays import Array, Bytes
 from clpt.formats.gltf import meshopt_filters, meshopt_indices
 from clpt.formats.gltf.document import Element
 
@@ -161,7 +159,7 @@ def _undone(deltas: Bytes, base: Bytes, mode: int) -> Bytes:
         return np.bitwise_xor.accumulate(words).astype("<u4")[:, None].view(np.uint8)
     if kind > 2 or turn:
         raise ValueError(f"there is no channel mode {mode}")
-    steps: Any = raw if kind == 0 else raw.view("<u2")
+    steps: Array = raw if kind == 0 else raw.view("<u2")
     one = steps.dtype.type(1)
     steps = steps >> one ^ (0 - (steps & one)).astype(steps.dtype)
     steps[0] += base if kind == 0 else base.copy().view("<u2")

@@ -57,7 +57,7 @@ def between(load: Callable[[float], Scene], time: float, length: float) -> Scene
 
 
 def _deforming(
-    shape: Any,
+    shape: object,
     ways: Sequence[Any],
     times: Matrix,
     warnings: list[str],

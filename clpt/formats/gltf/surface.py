@@ -16,6 +16,7 @@ from clpt.formats.gltf.document import Element
 from clpt.formats.gltf.textures import texture
 from clpt.scene.materials import GltfSurface
 from clpt.scene.textures import Bitmap, MeshAttribute, Mix, Product
+from clpt.scene.values import TexturedNumber
 from clpt.spectra import Cauchy, RGBUnbounded
 
 CLEARCOAT = "KHR_materials_clearcoat"
@@ -175,7 +176,7 @@ def _iridescence(owner: Element) -> dict[str, Any]:
         for name, default in ends.items()
     )
     info = owner.child("iridescenceThicknessTexture")
-    thickness: Any = high
+    thickness: TexturedNumber = high
     if info is not None and low != high:
         share = texture(info, raw=True, channel="g")
         thickness = Mix(first=low, second=high, amount=share)

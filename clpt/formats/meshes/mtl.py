@@ -39,7 +39,7 @@ from clpt.scene.materials import (
     parts,
 )
 from clpt.scene.textures import Bitmap, Product
-from clpt.scene.values import Textured
+from clpt.scene.values import ImageLike, Textured
 from clpt.spectra import Spectrum, Tabulated
 
 WHITE, BLACK, UNSAID = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0), (0.6, 0.6, 0.6)
@@ -452,7 +452,7 @@ class _Maker:
         values = np.clip(np.array(table.values) * factor, 0.0, None)
         return Tabulated(table.lambdas, values, table.outside)
 
-    def reflectance(self, key: str, image_key: str | None, default: Any) -> Any:
+    def reflectance(self, key: str, image_key: str | None, default: object) -> Any:
         """Return a colour in [0, 1], times its image."""
         image = None if image_key is None else self.take(image_key)
         value = self.colour(key)
@@ -550,7 +550,7 @@ def _options(statement: Statement, rest: str) -> tuple[str, Options]:
 
 def _placed(path: Path, options: Options, raw: bool) -> Bitmap:
     """Return an image where its options place it."""
-    image: Any = path
+    image: ImageLike = path
     base, gain = options.get("-mm", (0.0, 1.0))
     if (base, gain) != (0.0, 1.0):
         values = images.read(path, linear=not raw) * np.float32(gain) + np.float32(base)

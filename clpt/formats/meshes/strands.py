@@ -43,7 +43,7 @@ def read(path: Path) -> dict[str, Any]:
         return {"points": points.astype(np.float32), "lengths": ends - starts + 1}
 
 
-def write(path: Path, points: Any, lengths: Any) -> None:
+def write(path: Path, points: object, lengths: Any) -> None:
     """Write strands such that `read` gives the same float32 back."""
     rows = [" ".join(f"{x:.9g}" for x in row) for row in np.asarray(points, np.float32).tolist()]
     ends = np.cumsum(lengths if len(lengths) else [len(rows)])

@@ -116,7 +116,7 @@ def _projector(props: Properties) -> Parameters:
     return {**light, "fov": angle, "to_world": props.placement()}
 
 
-def _aspect(image: Any) -> float:
+def _aspect(image: object) -> float:
     """Width over height of an image; 1 for what is none."""
     if not isinstance(image, Bitmap):
         return 1.0
@@ -156,11 +156,11 @@ def _constant(props: Properties) -> Parameters:
 
 
 def _envmap(props: Properties) -> Parameters:
-    props.ignore("mis_compensation")
     return {
         "image": props.image(),
         "scale": props.number("scale", 1.0),
         "to_world": props.placement(),
+        "mis_compensation": props.flag("mis_compensation", False),
     }
 
 

@@ -11,7 +11,7 @@ from clpt.spectra import Constant, Spectrum
 
 
 def fluorescent(props: Properties) -> dict[str, Any]:
-    """Take the parameters of materials.Fluorescent and media.Reradiating."""
+    """Take the parameters of materials.Fluorescent and phases.Reradiating."""
     made: dict[str, Any] = {"amount": real(props, "amount", 1.0)}
     own = reflectance(props, "reflectance", 0.5) if "reflectance" in props.named else None
     if "filename" in props.named:

@@ -33,7 +33,7 @@ def within(cls: type, values: dict[str, Any], props: Properties) -> dict[str, An
     return made
 
 
-def _bent(value: Any, param: Param) -> Any:
+def _bent(value: object, param: Param) -> Any:
     """The value itself where it lies within the limits, or is of a form that is not looked into."""
     if isinstance(value, (int, float)):
         made = _numbers([value], param)
@@ -53,7 +53,7 @@ def _bent(value: Any, param: Param) -> Any:
     return value
 
 
-def _numbers(values: Any, param: Param) -> list[float] | None:
+def _numbers(values: object, param: Param) -> list[float] | None:
     """The numbers within the limits; None where all of them are."""
     given = np.asarray(values, np.float64)
     if ((given >= param.low - ROUNDING) & (given <= param.high + ROUNDING)).all():

@@ -12,8 +12,9 @@ from clpt.formats.mitsuba.fluorescence import dye, fluorescent
 from clpt.formats.mitsuba.limits import within
 from clpt.formats.mitsuba.properties import Context, Properties, unknown
 from clpt.formats.mitsuba.xml import Element
-from clpt.scene import media
-from clpt.scene.media import Grid, Homogeneous, Medium, Phase
+from clpt.scene import media, phases
+from clpt.scene.media import Grid, Homogeneous, Medium
+from clpt.scene.phases import Phase
 from clpt.scene.textures import Texture
 from clpt.scene.volumes import Volume
 
@@ -83,7 +84,7 @@ def _even(props: Properties) -> Homogeneous:
     props.ignore("has_spectral_extinction", "sample_emitters")  # both are found
     blend = _blend_on_grid(props)
     child = props.object("phase")
-    found = media.Isotropic() if child is None else blend or phase(child, props.context)
+    found = phases.Isotropic() if child is None else blend or phase(child, props.context)
     given = {
         "sigma_t": spectra.coefficient(props, "sigma_t", 1.0),
         "albedo": spectra.reflectance(props, "albedo", 0.75),
@@ -108,7 +109,7 @@ def _own_blend(props: Properties) -> Element | None:
     return blends[0] if len(blends) == 1 else None
 
 
-def _blend_on_grid(props: Properties) -> media.Blend | None:
+def _blend_on_grid(props: Properties) -> phases.Blend | None:
     """The medium's `blendphase` without its weight, if that is a grid."""
     element = _own_blend(props)
     if element is None:
@@ -118,7 +119,7 @@ def _blend_on_grid(props: Properties) -> media.Blend | None:
         return None
     first, second = _halves(own)
     own.finish()
-    return media.Blend(first=first, second=second)
+    return phases.Blend(first=first, second=second)
 
 
 def _on_grid(
@@ -167,7 +168,7 @@ def _tabulated(props: Properties) -> Phase:
     except ValueError:
         raise child.error("must be numbers, with commas between them") from None
     with child.locating():
-        return media.Tabulated(values=values)
+        return phases.Tabulated(values=values)
 
 
 def _blend(props: Properties) -> Phase:
@@ -178,7 +179,7 @@ def _blend(props: Properties) -> Phase:
     share = spectra.real(props, "weight", 0.5)
     if isinstance(share, Texture):
         raise props.element.error("'weight' must be a number or a <volume>")
-    return media.Blend(weight=min(max(share, 0.0), 1.0), first=first, second=second)
+    return phases.Blend(weight=min(max(share, 0.0), 1.0), first=first, second=second)
 
 
 def _halves(props: Properties) -> list[Phase]:
@@ -299,11 +300,11 @@ MEDIA: dict[str, Callable[[Properties], Medium]] = {
     "mixture": _mixture,
 }
 PHASES: dict[str, Callable[[Properties], Phase]] = {
-    "isotropic": lambda props: media.Isotropic(),
-    "hg": lambda props: media.HenyeyGreenstein(g=props.number("g", 0.8)),
-    "rayleigh": lambda props: media.Rayleigh(),
+    "isotropic": lambda props: phases.Isotropic(),
+    "hg": lambda props: phases.HenyeyGreenstein(g=props.number("g", 0.8)),
+    "rayleigh": lambda props: phases.Rayleigh(),
     "tabphase": _tabulated,
     "blendphase": _blend,
-    "reradiating": lambda props: media.Reradiating(**fluorescent(props)),
+    "reradiating": lambda props: phases.Reradiating(**fluorescent(props)),
     "sggx": _sggx,
 }

@@ -9,7 +9,6 @@ import dataclasses
 import json
 import sys
 from pathlib import Path
-from typing import Any
 
 from clpt import output_files, spectra
 from clpt.formats.native import forms, motion
@@ -116,7 +115,7 @@ def _untyped(cls: type[Kind]) -> Schema:
     return made
 
 
-def _parameter(param: Param, default: Any) -> Schema:
+def _parameter(param: Param, default: object) -> Schema:
     """The values of a parameter, with its description and its default."""
     doc = f"{param.doc} [{param.unit}]" if param.unit else param.doc
     shown = forms.plain(default)

@@ -48,7 +48,7 @@ def save(scene: Scene, path: str | Path, *, copies: bool = False) -> None:
 def write_medium(medium: Medium, digits: int) -> str:
     """Return a medium as it stands in `media` of a scene.json; digits: of numbers in its tables."""
 
-    def rounded(value: Any, key: str = "") -> Any:
+    def rounded(value: object, key: str = "") -> Any:
         if isinstance(value, dict):
             return {name: rounded(part, name) for name, part in value.items()}
         if isinstance(value, list):
@@ -166,7 +166,7 @@ class _Writer:
         """Return a material, or its name in the table of named ones."""
         return self._named(material, self.materials)
 
-    def medium(self, medium: Any) -> Any:
+    def medium(self, medium: object) -> Any:
         """Return a medium, or its name in the table of named ones."""
         return self._named(medium, self.media)
 
@@ -208,7 +208,7 @@ class _Writer:
             self.files[id(image)] = name
         return self.files[id(image)]
 
-    def volume(self, values: Any) -> str:
+    def volume(self, values: object) -> str:
         """Return the name of the file that a density is written to; its box is the unit cube."""
         if id(values) not in self.files:
             name = self.file_name("density", "npy")

@@ -29,7 +29,7 @@ def hair(params: Parameters, state: State) -> Material:
     )
 
 
-def _absorption(params: Parameters, state: State, around: Any) -> Any:
+def _absorption(params: Parameters, state: State, around: object) -> Any:
     """Take the absorption, the colour of many fibres, or the concentrations of pigments."""
     given = textured(params, "sigma_a", FACTOR, state)
     colour = textured(params, "reflectance", REFLECTANCE, state)

@@ -23,7 +23,8 @@ from clpt.formats.pbrt.state import State
 from clpt.formats.pbrt.textures import textured
 from clpt.scene import materials
 from clpt.scene.materials import Material
-from clpt.scene.media import HenyeyGreenstein, Homogeneous, Isotropic
+from clpt.scene.media import Homogeneous
+from clpt.scene.phases import HenyeyGreenstein, Isotropic
 from clpt.scene.roles import COEFFICIENT, INDEX, REAL, REFLECTANCE
 from clpt.scene.textures import Texture
 from clpt.scene.values import IndexLike, Textured, TexturedNumber
@@ -120,7 +121,7 @@ def body(params: Parameters, state: State) -> Homogeneous | None:
     return Homogeneous.from_albedo(inner, path, g=g)
 
 
-def _coefficient(value: Any) -> Any:
+def _coefficient(value: object) -> Any:
     if isinstance(value, Texture):
         raise SceneError("'sigma_a' and 'sigma_s' cannot be textures")
     return spectra.RGBUnbounded(*value) if isinstance(value, tuple) else value
@@ -146,7 +147,7 @@ def _given(params: Parameters, state: State) -> tuple[Any, Any, Any, float]:
     return *coated_albedo.MEDIA["Wholemilk"], None, g
 
 
-def _albedo(scattering: Any, absorption: Any, g: float) -> Any:
+def _albedo(scattering: object, absorption: object, g: float) -> Any:
     albedo = coated_albedo.body_albedo(_colour(scattering), _colour(absorption), g)
     return tuple(float(v) for v in albedo)
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from clpt import images, transforms
+from clpt.arrays import Floats32
 from clpt.errors import SceneError, UnknownKindError
 from clpt.formats.missing import GREY
 from clpt.formats.pbrt import octahedral
@@ -163,7 +164,7 @@ def _upward(image: np.ndarray) -> float:
 
 def _goniometric(params: Parameters, state: State) -> Light:
     file = params.one("filename", "string", "")
-    image: Any = np.ones((2, 2, 1), np.float32)
+    image: Floats32 = np.ones((2, 2, 1), np.float32)
     if file:
         image = _square(file, state).mean(axis=2, keepdims=True)
     intensity = _intensity(params, state, 4.0 * np.pi * float(image.mean()))

@@ -15,7 +15,7 @@ from clpt.scene.textures import Bitmap, Checkerboard, Mix, Product, Texture
 from clpt.spectra import RGB, Constant, RGBUnbounded, Spectrum, Tabulated, cie
 
 
-def map_values(value: Any, function: Callable[[Any], Any], *, bytes_stay: bool = False) -> Any:
+def map_values(value: object, function: Callable[[Any], Any], *, bytes_stay: bool = False) -> Any:
     """Apply a function to a number, a colour, a spectrum or a texture.
 
     It is applied to both ends of a mixture and of a pattern of numbers, and to both factors of a

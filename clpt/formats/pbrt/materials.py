@@ -76,7 +76,7 @@ def _diffuse_transmission(params: Parameters, state: State) -> Material:
     return materials.DiffuseTransmission(**shares)
 
 
-def _times(value: Any, scale: float) -> Any:
+def _times(value: object, scale: float) -> Any:
     if scale == 1.0:
         return value
     if isinstance(value, Texture) and scale < 1.0:

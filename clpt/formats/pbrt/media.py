@@ -13,7 +13,8 @@ from clpt.formats.pbrt import coated_albedo
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.spectra import spectrum
 from clpt.formats.pbrt.state import Definition, State
-from clpt.scene.media import Cloud, Grid, HenyeyGreenstein, Homogeneous, Isotropic, Medium
+from clpt.scene.media import Cloud, Grid, Homogeneous, Medium
+from clpt.scene.phases import HenyeyGreenstein, Isotropic
 from clpt.scene.roles import COEFFICIENT, EMISSION
 from clpt.scene.volumes import Volume
 from clpt.spectra import Constant, RGBUnbounded, scaled

@@ -43,7 +43,7 @@ def rough(alpha: Any) -> Any:
     return alpha if isinstance(alpha, Texture) else float(np.clip(alpha, SMOOTHEST, 1.0))
 
 
-def stretched(alpha_u: Any, alpha_v: Any) -> dict[str, Any]:
+def stretched(alpha_u: object, alpha_v: object) -> dict[str, Any]:
     return {"alpha_u": rough(alpha_u), "alpha_v": rough(alpha_v)}
 
 

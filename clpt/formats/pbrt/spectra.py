@@ -74,7 +74,7 @@ def value_of(given: Parameter, role: Spectral, state: State) -> Any:
     return _of_luminance_one(made) if role is EMISSION else made
 
 
-def to_rec709(rgb: Any, space: str, *, light: bool) -> Any:
+def to_rec709(rgb: object, space: str, *, light: bool) -> Any:
     """Colours (..., 3) of a space as linear Rec. 709; white stays white but for `light`."""
     if space == ACES:
         white = spaces.xyz_of(spaces.D60_ACES)

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.arrays import on_host
+from clpt.records import BRICK_CELLS
 from clpt.scene.media import Grid, Lattice
 from clpt.scene.volumes import check_density
 from clpt.spectra import cie
 from clpt.spectra.emission import planck
 
-CELLS = 8  # of a brick, along an axis
-POINTS = CELLS + 1
+CELLS, POINTS = BRICK_CELLS["cells"], BRICK_CELLS["points"]  # of a brick, along an axis
 AT_ONCE = 4096  # bricks
 LEAST = 0.01  # of what a brick would emit whose density and light were spread evenly
 FAINT = 1e-3  # of all light, which bricks may emit that are not lights

@@ -17,7 +17,8 @@ from clpt.scene import materials as mt
 from clpt.scene.cameras import Lens
 from clpt.scene.integrators import Auto, Direct, ParticleTracer, Path, Vcm
 from clpt.scene.layers import LAYERS
-from clpt.scene.media import PHASE_LEAVES, Grid, Lattice, Medium, Mixture
+from clpt.scene.media import Grid, Lattice, Medium, Mixture
+from clpt.scene.phases import LEAVES
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.shapes import Shape
 
@@ -268,7 +269,7 @@ def _phase_kinds(scene: Scene, shapes_: tuple[Shape, ...]) -> tuple[type[Scatter
     spectral = scene.film.mode == "spectral"
     phases = (phase for medium in scattering for phase in medium.collisions(spectral))
     found = {type(leaf) for phase in phases for leaf in phase.leaves}
-    return tuple(cls for cls in PHASE_LEAVES if cls in found)
+    return tuple(cls for cls in LEAVES if cls in found)
 
 
 def leaves_of(material: mt.Material) -> Iterator[type[mt.Material]]:

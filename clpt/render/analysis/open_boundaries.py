@@ -75,7 +75,7 @@ def _own_hole(shape: Shape, cached: Callable[..., Any] | None) -> float:
     return share
 
 
-def _hole(index: SceneIndex, inside: Any, cached: Callable[..., Any] | None) -> float:
+def _hole(index: SceneIndex, inside: object, cached: Callable[..., Any] | None) -> float:
     """The largest hole of all shapes around something, over their area."""
     around: list[tuple[float, Shape]] = []
     for shape in every(index.scene, lambda one: True):

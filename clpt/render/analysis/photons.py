@@ -77,6 +77,7 @@ def _median_distance(triangles: NDArray[np.float64], axis: NDArray, angle: float
     triangles: (n, 3, 3); axis: of the cone that is seen, unit length; angle: from it to the cone's
     edge [rad]. Triangles that are large where they are seen are split.
     """
+    kept = []
     for _ in range(SPLITS):
         middles, distance, size = _measures(triangles)
         apart = np.arccos(np.clip(middles @ axis / distance, -1.0, 1.0))
@@ -88,7 +89,9 @@ def _median_distance(triangles: NDArray[np.float64], axis: NDArray, angle: float
         ab, bc, ca = (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0
         parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
         halves = np.concatenate([np.stack(part, axis=1) for part in parts])
-        triangles = np.concatenate([triangles[seen & ~large], halves])
+        kept.append(triangles[seen & ~large])
+        triangles = halves
+    triangles = np.concatenate([*kept, triangles])
     middles, distance, _ = _measures(triangles)
     across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     share = np.abs((across * middles).sum(axis=1)) / distance**3

@@ -21,8 +21,9 @@ from clpt.render.analysis.colour import sensor
 from clpt.render.analysis.index import SceneIndex
 from clpt.scene.integrators import Film
 from clpt.scene.materials import Material
-from clpt.scene.media import Dyed, Reradiating
+from clpt.scene.media import Dyed
 from clpt.scene.params import fields_of, params
+from clpt.scene.phases import Reradiating
 from clpt.scene.roles import EMISSION
 from clpt.scene.textures import Texture
 from clpt.spectra import RGB, RGBIlluminant, Spectrum
@@ -182,7 +183,7 @@ def _emitted(value: Any) -> Spectrum:
     return RGBIlluminant(value.r, value.g, value.b) if isinstance(value, RGB) else value
 
 
-def _mean(image: Any, where: str) -> Spectrum:
+def _mean(image: object, where: str) -> Spectrum:
     """The mean light of an image of spectra; any other stands for D65."""
     found = spectral_exr.find(image, emissive=True, where=where)
     if found is None:

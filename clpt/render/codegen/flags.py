@@ -61,7 +61,9 @@ def is_null(features: Features, cls: type[Scatterer]) -> bool:
 
 def is_guided(features: Features, cls: type[Scatterer]) -> bool:
     """Whether a guide helps to choose directions at a material."""
-    return features.transport.guided and cls.guided
+    unsuited = cls.delta or cls.is_null or cls.is_phase or cls.no_back or fluoresces(features, cls)
+    alone = cls.refracts and features.told_dispersion  # a direction may be of one wavelength
+    return features.transport.guided and not (unsuited or alone)
 
 
 def between_bodies(features: Features, cls: type[Scatterer]) -> bool:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from clpt.geometry import shape_records
-from clpt.records import LIGHT, SHAPE
 from clpt.render.codegen.dispatch import Case, Function, active, choose, function, masked
 from clpt.render.contract import light_records
 from clpt.render.contract.features import Features
@@ -82,7 +81,6 @@ def dispatch_text(features: Features, densities: str = "") -> str:
     includes += ["light/deforming.cl"] if features.motion.emitters else []
     words = shape_records.RECORDS["triangle"].words
     parts = [f"#define TRIANGLE_ROW_WORDS {words}"] * features.motion.emitters
-    parts += [f"#define LIGHT_ROW_WORDS {LIGHT.words}", f"#define SHAPE_ROW_WORDS {SHAPE.words}"]
     parts += [f"#define LIGHT_{kind.upper()} {KINDS.index(kind)}" for kind in present]
     parts += [f'#include "{name}"' for name in includes]
     parts += _tree_text() if features.lights.tree else []

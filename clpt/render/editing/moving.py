@@ -394,5 +394,5 @@ def _check_fields(old: Shape, new: object) -> None:
         raise CannotMove(f"{_name(new)} has another {' and '.join(sorted(changed - _MOVABLE))}")
 
 
-def _name(thing: Any) -> str:
+def _name(thing: object) -> str:
     return shapes.where(thing) if isinstance(thing, Shape) else f"a {type(thing).__name__}"

@@ -35,7 +35,7 @@ class Successors:
     def __init__(self) -> None:
         self._present: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()
 
-    def of(self, thing: Any) -> Any:
+    def of(self, thing: object) -> Any:
         """Return what has replaced a shape or material; itself, if nothing has."""
         return self._present.get(thing, thing)
 
@@ -152,7 +152,7 @@ class _Edit:
                 return material
         raise SceneError(f"the {key.kind} is not in the scene", where="materials")
 
-    def change(self, shape: Shape, name: str, value: Any) -> None:
+    def change(self, shape: Shape, name: str, value: object) -> None:
         """Let a field of a shape have another value."""
         self.changes.setdefault(id(shape), {})[name] = value
 

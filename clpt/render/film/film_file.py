@@ -135,7 +135,7 @@ def _fail(path: Path, message: str) -> NoReturn:
     raise SceneError(message, file=path)
 
 
-def _header(path: Path, text: Any) -> dict[str, Any]:
+def _header(path: Path, text: object) -> dict[str, Any]:
     """The content of the attribute. Raises SceneError."""
     if not isinstance(text, str):
         _fail(path, "not a film of clpt: its header does not say what it is of")

@@ -99,14 +99,16 @@ def _light(form: PictureForm, words: Words, picture: Pictures) -> dict[str, dict
 def white_paper(film: Film, mode: str) -> NDArray[np.float64]:
     """Return the matrix (3, 3) from reflectances that the sensor sees to the film's output space.
 
-    A thing that reflects all light is (1, 1, 1) there.
+    A thing that reflects all light is (1, 1, 1) there; a channel that sees no light at the film's
+    wavelengths stays as it is.
     """
     matrix = output_matrix(film, mode)
     seen = np.ones(3)
     if mode == "spectral":
         lambdas = np.arange(film.lambda_min, film.lambda_max + 1e-6)
         seen = sensor(film).sample(lambdas).sum(axis=0) / cie.CIE_Y_INTEGRAL
-    return matrix / (matrix @ seen)[:, None]
+    white = matrix @ seen
+    return matrix / np.where(white == 0.0, 1.0, white)[:, None]
 
 
 def _near_one(words: Words) -> NDArray[np.float64]:

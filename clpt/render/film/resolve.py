@@ -134,7 +134,7 @@ class Resolve:
             self._bound[kernel] = self.program.kernel(kernel).bind(**named)
         return self._bound[kernel]
 
-    def _target(self, film: Array, into: Any, dtype: DTypeLike | None) -> _Target:
+    def _target(self, film: Array, into: object, dtype: DTypeLike | None) -> _Target:
         """Return the memory for a picture. Raises DeviceError, which says what would fit."""
         wanted = None if dtype is None else np.dtype(dtype)
         if wanted is not None and wanted not in (BYTES, FLOATS):

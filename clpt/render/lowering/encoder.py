@@ -141,7 +141,7 @@ class Encoder:
             self._sources[kind.kind][name].add(source)
         return np.concatenate(made) if made else np.zeros(1, np.uint32)
 
-    def _note_reach(self, value: Any, where: str) -> None:
+    def _note_reach(self, value: object, where: str) -> None:
         """Note a table that the film does not reach."""
         if isinstance(value, Tabulated) and not self.spectra.reaches(value):
             low, high = self.spectra.range

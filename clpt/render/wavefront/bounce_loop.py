@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,6 +30,9 @@ BATCH = 8  # bounces that are enqueued between two reads of the counters
 CORE_BOUNCES = 1 << 16  # of all slots, that a core's part of a loop takes at once
 LEAST_LAUNCH = 1 / 2  # of the usual one: shorter ones cost too much
 LAUNCHES = 3  # that a run has to wait for, about, before it ends
+LAUNCH_SECONDS = 0.05  # of a stage at most: drivers of GPUs that draw a screen end long kernels
+FIRST_PARTS = 8  # launches that a stage is divided into before it is known how long one takes
+LEAST_ITEMS = 1 << 12  # of a part
 ENDLESS = 0xFFFFFFFF  # bounces of a loop that goes on till all paths have ended
 IDLE = {"samples": (0, 0), "bounces": 0, "restart": 0, "leave": None}  # has nothing to do
 
@@ -42,6 +45,14 @@ class Step:
     bound: device.BoundKernel
     size: tuple[int]
     group: tuple[int] | None
+
+    def parts(self, count: int) -> Iterator[tuple[int, int]]:
+        """Yield the first work-item and the number of them of about `count` launches."""
+        (items,) = self.size
+        group = self.group[0] if self.group else items
+        most = -(-max(-(-items // count), LEAST_ITEMS) // group) * group
+        for first in range(0, items, most):
+            yield first, min(most, items - first)
 
 
 class Kernels:
@@ -118,6 +129,7 @@ class BounceLoop:
         self._loop: device.BoundKernel | None = None
         self._cancel_seconds = ending.seconds
         self._bounces = self._most_bounces()
+        self._parts = FIRST_PARTS
 
     @property
     def features(self) -> Features:
@@ -191,7 +203,10 @@ class BounceLoop:
         self._go_on((self._first, self._first), None, lambda _: True)
 
     def _go_on(
-        self, numbers: tuple[int, int], leave: Any, on_batch: Callable[[NDArray[np.uint64]], bool]
+        self,
+        numbers: tuple[int, int],
+        leave: object,
+        on_batch: Callable[[NDArray[np.uint64]], bool],
     ) -> bool:
         """Trace paths of these numbers until none is in flight; see `run`."""
         steps = self._batch()
@@ -204,7 +219,7 @@ class BounceLoop:
         before = time.perf_counter()
         while True:
             for step in steps:
-                self.timings.add(step.name, self.stream.run(step.bound, step.size, step.group))
+                self._launch(step)
             reads.append(self.paths.read_counters())
             self.stream.flush()
             if len(reads) < 2:
@@ -227,6 +242,12 @@ class BounceLoop:
         for _, event in reads:
             device.wait(event)
         return finished
+
+    def _launch(self, step: Step) -> None:
+        """Enqueue a step; a stage in several launches if one would take too long."""
+        for first, items in step.parts(1 if self.looped else self._parts):
+            event = self.stream.run(step.bound, (items,), step.group, (first,) if first else None)
+            self.timings.add(step.name, event)
 
     def _own(self, lowered: Lowered) -> Features:
         return lowered.features.passes[self._which]
@@ -273,7 +294,12 @@ class BounceLoop:
         return self.stages * BATCH
 
     def _adjust(self, loop: device.BoundKernel, took: float) -> None:
-        """Let launches of the loop take so long that a run ends in time; took: the last one [s]."""
+        """Let launches take so long as suits; took: what is between two reads of counters [s].
+
+        One of the loop: that a run ends in time. A stage's: that no driver ends it.
+        """
+        if not self.looped:  # one stage may take all of a bounce
+            self._parts = max(1, math.ceil(took / BATCH / LAUNCH_SECONDS))
         if self._cancel_seconds is None or not self.looped:
             return
         fitting = int(self._bounces * self._cancel_seconds / LAUNCHES / max(took, 1e-6))

@@ -30,7 +30,7 @@ class Guide:
     ):
         self.stream, self.trained = stream, False
         self._rows = int(settings["photon_cells"])
-        self._bytes = 4 * self._rows * guides.BINS
+        self._bytes = 4 * self._rows * (guides.BINS + 1)
         self.arguments: dict[str, Any] = {"guide": buffers.allocate("the guide", self._bytes)}
         self.samples = -(-int(settings["guide_paths"]) // pixels)
 

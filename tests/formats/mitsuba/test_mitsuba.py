@@ -383,7 +383,7 @@ def test_lights(scene):
         '<emitter type="directional"><vector name="direction" x="0" y="-1" z="0"/></emitter>'
         '<emitter type="constant"/>'
         '<emitter type="envmap"><string name="filename" value="t.png"/>'
-        '<float name="scale" value="2"/></emitter>'
+        '<float name="scale" value="2"/><boolean name="mis_compensation" value="true"/></emitter>'
         '<shape type="disk"><emitter type="area"><rgb name="radiance" value="2"/></emitter></shape>'
     )
     point, spot, directional, constant, envmap = made.lights
@@ -391,7 +391,7 @@ def test_lights(scene):
     assert (spot.cutoff, spot.beam_width) == (40.0, 30.0)
     assert directional.direction == (0, -1, 0)
     assert constant.radiance == RGBIlluminant(1, 1, 1)
-    assert (envmap.scale, envmap.image.name) == (2.0, "t.png")
+    assert (envmap.scale, envmap.image.name, envmap.mis_compensation) == (2.0, "t.png", True)
     assert made.shapes[0].emission.radiance == RGBIlluminant(2, 2, 2)
 
 

@@ -22,6 +22,7 @@ from clpt.scene import (
     lights,
     materials,
     media,
+    phases,
     shapes,
     textures,
 )
@@ -74,9 +75,9 @@ VALUES: dict[str, Any] = {
     "texture": textures.Bitmap(image=TEXELS),
     "filter": integrators.Tent(radius=1.5),
     "area_light": lights.Area(radiance=3.0),
-    "medium": media.Homogeneous(sigma_s=2.0, phase=media.HenyeyGreenstein(g=0.4), name="fog"),
+    "medium": media.Homogeneous(sigma_s=2.0, phase=phases.HenyeyGreenstein(g=0.4), name="fog"),
     "media": (media.Homogeneous(sigma_a=0.5), media.Grid(sigma_s=2.0, name="smoke")),
-    "phase": media.Rayleigh(),
+    "phase": phases.Rayleigh(),
     "keys": Keys([0.0, 1.0], [np.eye(4), np.diag([2.0, 2.0, 2.0, 1.0])]),
     "deformation": Deformation([0.5, 1.5], np.arange(18.0).reshape(2, 3, 3)),
     "shutter": Shutter(0.5, 1.5, "triangle"),
@@ -128,7 +129,13 @@ def variants(cls: type[Kind]) -> Iterator[Kind]:
         try:
             yield cls(**{**needed, name: other(param, default[name])})
         except SceneError:  # it does not go with the defaults of the others
-            beside = (cameras.Matrix, integrators.Film, lights.Spot, media.Tabulated, media.Mixture)
+            beside = (
+                cameras.Matrix,
+                integrators.Film,
+                lights.Spot,
+                phases.Tabulated,
+                media.Mixture,
+            )
             assert cls in beside or (issubclass(cls, media.Grid) and name == "bits"), (cls, name)
 
 

@@ -1,4 +1,7 @@
-"""The film adds to the bit: over slots, runs, renderers, halves and crops; and what it counts."""
+"""The film adds to the bit: over slots, halves and crops; and what it counts.
+
+Splits, merging and saving are proved in tests/cluster/test_film_algebra.py.
+"""
 
 from __future__ import annotations
 
@@ -73,30 +76,6 @@ def test_slots_change_no_bit(scene, whole, slots):
         np.testing.assert_array_equal(renderer.image(), whole[1])
 
 
-def test_films_merge_to_the_film_of_one_run(scene, whole):
-    with clpt.Renderer(scene, first_sample=7) as later, clpt.Renderer(scene) as renderer:
-        later.run(SPP - 7)
-        renderer.step(3)
-        renderer.run(4)
-        states = later.film_state(), renderer.film_state()
-        assert same(states[0].merged(states[1]), whole[0])
-        assert same(states[1].merged(states[0]), whole[0])
-        renderer.merge(states[0])
-        assert same(renderer.film_state(), whole[0]) and renderer.samples == SPP
-        np.testing.assert_array_equal(renderer.image(), whole[1])
-        later.reset().wait()
-        assert later.samples == 7 and not later.film_state().words.any()
-
-
-def test_going_on_from_a_film(scene, whole):
-    with clpt.Renderer(scene) as first, clpt.Renderer(scene, slots=128) as second:
-        first.run(5)
-        second.merge(first.film_state())
-        assert second.samples == 5
-        second.run(SPP - 5)
-        assert same(second.film_state(), whole[0])
-
-
 def test_halves(scene, whole):
     """Even and odd samples apart: the whole is the same, and each half is a picture."""
     with clpt.Renderer(scene, halves=True) as renderer:
@@ -144,18 +123,6 @@ def sky(**film: object) -> Scene:
     given = {"width": 3, "height": 2, "mode": "rgb", **film}
     radiance = lights.Constant(radiance=(0.25, 0.5, 1.0))
     return Scene(camera=Perspective(), lights=[radiance], film=Film(**given))
-
-
-def test_films_that_do_not_merge():
-    with clpt.Renderer(sky()) as a, clpt.Renderer(sky(width=4)) as b:
-        for renderer in (a, b):
-            renderer.run(4)
-        before = a.film_state()
-        with pytest.raises(SceneError, match="samples 0 to 3 would be taken twice"):
-            a.merge(before)
-        with pytest.raises(SceneError, match="another form"):
-            a.merge(b.film_state())
-        assert same(a.film_state(), before) and a.samples == 4
 
 
 def test_more_samples_than_a_float_counts():

@@ -11,7 +11,7 @@ import pytest
 from clpt import spectra
 from clpt import transforms as tf
 from clpt.errors import SceneError
-from clpt.scene import Film, Scene, media
+from clpt.scene import Film, Scene, media, phases
 from clpt.scene.cameras import Orthographic
 from clpt.scene.integrators import Box
 from clpt.scene.integrators import Path as PathIntegrator
@@ -120,11 +120,11 @@ def test_what_a_dye_may_be() -> None:
     with pytest.raises(SceneError, match="must be a dye"):
         media.Dyed(dye=spectra.Donaldson((400.0, 500.0), (300.0, 400.0), ((0.0, 0.0), (0.0, 0.0))))
     with pytest.raises(SceneError, match="alike in all directions"):
-        media.Dyed(dye=DYE, phase=media.Rayleigh())
+        media.Dyed(dye=DYE, phase=phases.Rayleigh())
     with pytest.raises(SceneError, match="no light by itself"):
         media.Dyed(dye=DYE, emission=1.0)
     with pytest.raises(SceneError, match="would leave"):
-        media.Reradiating(reflectance=0.9, reradiation=DYE)
+        phases.Reradiating(reflectance=0.9, reradiation=DYE)
 
 
 def test_without_glow_it_is_homogeneous() -> None:

@@ -15,7 +15,7 @@ import clpt
 from clpt import transforms as tf
 from clpt.errors import SceneError
 from clpt.render.lowering.scene import lower
-from clpt.scene import Film, Scene, media
+from clpt.scene import Film, Scene, media, phases
 from clpt.scene import materials as m
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Auto, Box, ParticleTracer, Path, Vcm
@@ -31,7 +31,7 @@ FLAT = tf.rotate([1, 0, 0], -90)
 FOGS = {
     "grey": media.Homogeneous(sigma_t=1.0, albedo=0.9),
     "chromatic": media.Homogeneous(
-        sigma_s=CHROMATIC, sigma_a=0.1, phase=media.HenyeyGreenstein(g=0.5)
+        sigma_s=CHROMATIC, sigma_a=0.1, phase=phases.HenyeyGreenstein(g=0.5)
     ),
     "grid": media.Grid(
         density=np.random.default_rng(1).random((9, 9, 9), np.float32),
@@ -110,9 +110,9 @@ def test_a_ball_of_glass_in_fog(mode: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "phase", [media.Rayleigh(), media.Draine(g=0.3, alpha=2.0), media.Blend(weight=0.3)]
+    "phase", [phases.Rayleigh(), phases.Draine(g=0.3, alpha=2.0), phases.Blend(weight=0.3)]
 )
-def test_phase_functions(phase: media.Phase) -> None:
+def test_phase_functions(phase: phases.Phase) -> None:
     fog = media.Homogeneous(sigma_s=CHROMATIC, phase=phase)
     both(room(fog, SPOT, mode="spectral"), 128, phase.kind, max_depth=6)
 

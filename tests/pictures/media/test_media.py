@@ -18,7 +18,7 @@ import clpt
 from clpt import spectra
 from clpt import transforms as tf
 from clpt.errors import SceneError
-from clpt.scene import Film, Scene, media
+from clpt.scene import Film, Scene, media, phases
 from clpt.scene.cameras import Perspective, Spherical
 from clpt.scene.integrators import Box
 from clpt.scene.integrators import Path as PathIntegrator
@@ -39,10 +39,10 @@ LONG = PathIntegrator(max_depth=-1, rr_depth=1000, light_paths=0)
 CHROMATIC = (0.5, 2.0, 3.0)  # [1/m]
 MODES = ("rgb", "spectral")
 # one part of which differs between wavelengths
-VARIED = media.Blend(
+VARIED = phases.Blend(
     weight=0.4,
-    first=media.HenyeyGreenstein(g=spectra.Tabulated((400.0, 700.0), (-0.3, 0.8), "hold")),
-    second=media.Draine(g=0.3, alpha=2.0),
+    first=phases.HenyeyGreenstein(g=spectra.Tabulated((400.0, 700.0), (-0.3, 0.8), "hold")),
+    second=phases.Draine(g=0.3, alpha=2.0),
 )
 WITHIN = 0.02  # relative; most of it is noise
 
@@ -63,8 +63,8 @@ def with_mode(scene: Scene, mode: str) -> Scene:
     return dataclasses.replace(scene, film=dataclasses.replace(scene.film, mode=mode))
 
 
-ALL_LEAVES = {media.Reradiating: {"reflectance": 1.0}}  # by default some light is lost
-LOSSLESS = [cls(**ALL_LEAVES.get(cls, {})) for cls in media.PHASES]
+ALL_LEAVES = {phases.Reradiating: {"reflectance": 1.0}}  # by default some light is lost
+LOSSLESS = [cls(**ALL_LEAVES.get(cls, {})) for cls in phases.KINDS]
 FURNACES = [
     pytest.param(phase, mode, id=f"{phase.kind}-{mode}", marks=marks)
     for phase in (*LOSSLESS, VARIED)
@@ -74,7 +74,7 @@ FURNACES = [
 
 
 @pytest.mark.parametrize(("phase", "mode"), FURNACES)
-def test_furnace(phase: media.Phase, mode: str) -> None:
+def test_furnace(phase: phases.Phase, mode: str) -> None:
     """What scatters all light cannot be seen under the same light from everywhere."""
     scene = ball(media.Homogeneous(sigma_s=CHROMATIC, phase=phase))
     assert_mean(exposures(with_mode(scene, mode), 8, 64), 1.0, WITHIN)
@@ -150,7 +150,7 @@ LAMPS = {
 def test_light_scattered_once_is_an_integral_over_the_ray(lamps: str) -> None:
     """Of lamps in haze that flights end near: sigma_s p I / r^2 exp(-sigma_t (t + r))."""
     sigma, albedo, g, end = np.array([0.05, 0.2, 0.3]), 0.8, 0.5, 10.0
-    phase = media.HenyeyGreenstein(g=g)
+    phase = phases.HenyeyGreenstein(g=g)
     haze = media.Homogeneous(sigma_t=tuple(sigma), albedo=albedo, phase=phase)
     wall = Rectangle(
         to_world=tf.translate([0, 0, 5 - end]) @ tf.scale(9.0), material=Diffuse(reflectance=0.0)
@@ -283,11 +283,11 @@ def test_albedo_of_a_thick_body(g: float, mode: str) -> None:
 def test_slab_against_adding_and_doubling(name: str) -> None:
     """Reflectance of a slab seen from above, under radiance 1."""
     case = json.loads((SHARED / "references" / "slab.json").read_text())["cases"][name]
-    phases = {"iso": media.Isotropic(), "hg8": media.HenyeyGreenstein(g=0.8)}
+    kinds = {"iso": phases.Isotropic(), "hg8": phases.HenyeyGreenstein(g=0.8)}
     slab = media.Homogeneous(
         sigma_t=case["tau"],
         albedo=case["albedo"],
-        phase=phases.get(case["phase"], media.Rayleigh()),
+        phase=kinds.get(case["phase"], phases.Rayleigh()),
     )
     scene = with_mode(ball(slab), "rgb")
     scene.shapes = [

@@ -17,7 +17,7 @@ import clpt
 from clpt.errors import SceneError
 from clpt.render.lowering import grids
 from clpt.render.lowering.encoder import Encoder
-from clpt.scene import integrators, media
+from clpt.scene import integrators, media, phases
 from clpt.scene.cameras import Perspective
 from clpt.scene.lights import Constant, Spot
 from clpt.spectra import Tabulated
@@ -39,7 +39,7 @@ from tests.pictures.support import (
 )
 
 STEEP = np.broadcast_to(np.linspace(0.0, 3.0, 7)[None, :, None], (1, 7, 1))
-FORWARD = media.HenyeyGreenstein(g=0.7)
+FORWARD = phases.HenyeyGreenstein(g=0.7)
 ENDS = np.array([0.07, 0.11, 5.0]), np.array([0.23, -0.07, -5.0])
 
 

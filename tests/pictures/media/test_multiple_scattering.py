@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from clpt import transforms as tf
-from clpt.scene import Film, Scene, media
+from clpt.scene import Film, Scene, media, phases
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Box, Path
 from clpt.scene.lights import Directional
@@ -29,7 +29,7 @@ CASES = [(0.3, 0.0), (2.0, 0.7), (2.0, -0.4), (8.0, 0.0), (8.0, 0.9)]  # optical
 
 def slab(depth: float, g: float, albedo=ALBEDOS, mu0: float = 1.0) -> Scene:
     """A slab of extinction 1 under a beam of irradiance 1, mu0 the cosine of its direction."""
-    phase = media.HenyeyGreenstein(g=g) if g else media.Isotropic()
+    phase = phases.HenyeyGreenstein(g=g) if g else phases.Isotropic()
     medium = media.Homogeneous(sigma_t=1.0, albedo=albedo, phase=phase)
     size = tf.scale([WIDE, WIDE, depth / 2.0])
     sine = np.sqrt(1.0 - mu0**2)

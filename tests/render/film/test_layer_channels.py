@@ -11,12 +11,16 @@ import pytest
 import clpt
 from clpt import images, spectral_exr
 from clpt.__main__ import run
+from clpt.render.analysis.colour import sensor
 from clpt.render.contract.layer_names import LayerNames
 from clpt.render.film.cryptomatte import RANKS
 from clpt.render.film.layer_channels import SETS, channels_of
+from clpt.render.film.layers import white_paper
 from clpt.render.film.picture_form import PictureForm
 from clpt.render.film.pictures import Still
+from clpt.scene import Film
 from clpt.scene.layers import LAYERS
+from clpt.spectra import cie
 
 SIZE = (3, 5)
 
@@ -95,3 +99,14 @@ def test_a_spectral_file_has_layers_too(tmp_path, capsys):
     said = json.loads(capsys.readouterr().out)
     assert "depth.Z" in said["layers"] and "S0" not in said["layers"]
     assert said["CryptoObject"] == "Cryptomatte, 2 names"
+
+
+@pytest.mark.parametrize("wavelengths", [(300.0, 340.0), (900.0, 950.0), (360.0, 830.0)])
+def test_white_paper_is_white(wavelengths):
+    """Reflectance 1 at every wavelength gives ones; where nothing is seen, nothing divides by 0."""
+    film = Film(lambda_min=wavelengths[0], lambda_max=wavelengths[1])
+    with np.errstate(all="raise"):
+        matrix = white_paper(film, "spectral")
+    lambdas = np.arange(film.lambda_min, film.lambda_max + 1e-6)
+    seen = sensor(film).sample(lambdas).sum(axis=0) / cie.CIE_Y_INTEGRAL
+    np.testing.assert_allclose(matrix @ seen, 1.0 if seen.any() else 0.0, rtol=1e-6)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from functools import cache
-from typing import Any
 
 from clpt import spectra
 from clpt.errors import SceneError
@@ -18,16 +17,15 @@ from clpt.spectra.spectrum import extremes
 def check_indices(kinds: Iterable[Kind], film: Film) -> None:
     """Raise SceneError for an index of some kind that is 0 at a wavelength of the film."""
     for kind in kinds:
-        cls: Any = type(kind)
         given = fields_of(kind)
-        for name in _indices(cls):
+        for name in _indices(type(kind)):
             value = given[name]
             if not isinstance(value, Texture):
                 check_index(value, film, place_of(kind, name))
 
 
 @cache
-def _indices(cls: type) -> tuple[str, ...]:
+def _indices(cls: type[Kind]) -> tuple[str, ...]:
     """The parameters of a class that are indices above 0."""
     return tuple(name for name, param in params(cls).items() if param.positive)
 

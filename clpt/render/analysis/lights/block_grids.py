@@ -15,13 +15,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt.arrays import Array, Floats
+from clpt.records import GRID_SIZES
 
 Directions = Callable[[ArrayLike, ArrayLike], Floats]  # unit (..., 3) of rows and columns 0 to 1
 
-SIDE = 8  # of the square of parts of the octahedron, GRID_SIDE
+SIDE = GRID_SIZES["side"]  # of the square of parts of the octahedron
 DOWN, ACROSS = 8, 16  # blocks of a grid, at most; of several grids a fourth of a face's side each
 FINER = 4  # parts of a block's side, of each of which the cosine is taken
 NORMALS = 5  # of a part, along each axis
+DULL, LEAST = 0.5, 0.05  # see `_beyond`
 ROWS = 256  # of an image that are worked on at a time
 
 
@@ -42,11 +44,15 @@ class BlockGrid(NamedTuple):
 
 
 def of(
-    corners: NDArray[Any], directions: Directions, angles: tuple[float, float] | None = None
+    corners: NDArray[Any],
+    directions: Directions,
+    angles: tuple[float, float] | None = None,
+    even: NDArray[Any] | None = None,
 ) -> BlockGrid:
     """Return the blocks of grids (k, r + 1, c + 1) of weights at corners, one below the other.
 
     angles: of a row and of a column [rad]; by default those of a sphere, or of a cube's faces.
+    even: the weights of a light that is 1 everywhere: blocks are chosen for what is `_beyond`.
     """
     grids, per, columns = corners.shape[0], corners.shape[1] - 1, corners.shape[2] - 1
     rows = grids * per
@@ -55,46 +61,69 @@ def of(
     bands, strips = -(-rows // block_rows), -(-columns // block_columns)
     fine_rows, fine_columns = (np.arange(0, n, max(b // FINER, 1)) for n, b in (
         (rows, block_rows), (columns, block_columns)))  # fmt: skip
-    starts = np.arange(0, columns, block_columns)
     conditional = np.empty((rows, columns), np.float32)
     sums, fine = np.empty((rows, strips)), np.empty((rows, len(fine_columns)))
     for first in range(0, rows, ROWS):
         part = slice(first, min(first + ROWS, rows))
         cells = _cells(corners, np.arange(part.start, part.stop))
         fine[part] = np.add.reduceat(cells, fine_columns, axis=1)
-        for strip, start in enumerate(starts):
-            conditional[part, start : start + block_columns], sums[part, strip] = _cumulative(
-                cells[:, start : start + block_columns]
-            )
-    marginal, weights = np.empty((strips, rows), np.float32), np.empty((bands, strips))
-    for band in range(bands):
-        own = slice(band * block_rows, (band + 1) * block_rows)
-        marginal[:, own], weights[band] = _cumulative(sums[own].T)
-    fine = np.add.reduceat(fine, fine_rows, axis=0)
+        for strip, start in enumerate(range(0, columns, block_columns)):
+            own = slice(start, start + block_columns)
+            conditional[part, own], sums[part, strip] = _cumulative(cells[:, own])
+    marginal, weights = _in_bands(sums, block_rows)
+    fine = np.add.reduceat(fine, fine_rows, axis=0).ravel()
     places = [(at + np.append(at[1:], n)) / (2.0 * n) for at, n in (
         (fine_rows, rows), (fine_columns, columns))]  # fmt: skip
-    toward = directions(*np.meshgrid(*places, indexing="ij"))
+    toward = directions(*np.meshgrid(*places, indexing="ij")).reshape(-1, 3)
     owner = (fine_rows // block_rows)[:, None] * strips + fine_columns // block_columns
     sphere = (np.pi / per, 2.0 * np.pi / columns)
     row, column = angles or (sphere if grids == 1 else (np.pi / 2.0 / per,) * 2)
     step = max(block_rows // FINER, 1) * row, max(block_columns // FINER, 1) * column
-    lit = _lit(toward.reshape(-1, 3), owner.ravel(), fine.ravel(), weights, math.hypot(*step))
+    area = None if even is None else _in_parts(even, fine_rows, fine_columns)
+    lit = _lit(toward, owner.ravel(), fine, weights, math.hypot(*step), area)
     blocks = np.stack([_chances(each.reshape(bands, strips), weights) for each in lit])
     return BlockGrid(marginal, conditional, blocks, block_rows, block_columns, float(weights.sum()))
 
 
-def _lit(toward: Floats, owner: Array, fine: Floats, weights: Floats, step: float) -> Floats:
+def _lit(
+    toward: Floats, owner: Array, fine: Floats, weights: Floats, step: float, area: Floats | None
+) -> Floats:
     """Return what each block sends to surfaces of each normal, and at last to all of space.
 
     toward (n, 3), owner and fine (n,): of parts of blocks, where they are, in which block, and how
-    much they send; step: their size [rad].
+    much they send; step: their size [rad]; area (n,): what they would send if all were 1, None to
+    choose them for all that they send.
     """
     lit = np.empty((SIDE * SIDE + 1, weights.size))
     for index in range(SIDE * SIDE):
         cosine = _cosines(index, toward, 0.5 * step)
-        lit[index] = np.bincount(owner, fine * cosine, weights.size)
+        sent = fine if area is None else _beyond(fine, area, cosine)
+        lit[index] = np.bincount(owner, sent * cosine, weights.size)
     lit[-1] = weights.ravel()
     return lit
+
+
+def _beyond(fine: Floats, area: Floats, cosine: Floats) -> Floats:
+    """Return what parts send beyond DULL of the mean of what a surface receives, (n,).
+
+    The material's own directions find the rest (Karlik et al. 2019, "MIS Compensation"). No part
+    has less than LEAST of its chance, so that nothing is lost where only the light's are drawn.
+    """
+    mean = float(fine @ cosine) / max(float(area @ cosine), 1e-300)
+    return np.maximum(fine - DULL * mean * area, LEAST * fine)
+
+
+def _in_bands(sums: Floats, block_rows: int) -> tuple[NDArray[np.float32], Floats]:
+    """Cumulative sums (strips, rows) of rows (rows, strips) in each band, and the bands' sums."""
+    firsts = range(0, len(sums), block_rows)
+    found = [_cumulative(sums[first : first + block_rows].T) for first in firsts]
+    return np.hstack([made for made, _ in found]), np.stack([total for _, total in found])
+
+
+def _in_parts(corners: NDArray[Any], rows: Array, columns: Array) -> Floats:
+    """Return sums of cells (n,) over parts that begin at these rows and columns."""
+    cells = _cells(corners, np.arange(len(corners) * (corners.shape[1] - 1)))
+    return np.add.reduceat(np.add.reduceat(cells, columns, axis=1), rows, axis=0).ravel()
 
 
 def _cells(corners: NDArray[Any], rows: NDArray[np.int64]) -> Floats:

@@ -62,8 +62,7 @@ def extent(lamp: Envmap | CubeMap, look: Look, share: float) -> float:
     """
     made = content(lamp, look)
     if isinstance(lamp, Envmap):
-        column = _latitude_weights(np.ones((made.height, 1), np.float32))[None, :, :1]
-        even: NDArray[Any] = np.broadcast_to(column, made.corners.shape)
+        even = _even(made.corners)
     else:
         even = _cube_weights(np.ones((6, made.height + 2, made.width + 2), np.float32))
     power, angle = _in_parts(made.corners), _in_parts(even)
@@ -90,7 +89,7 @@ def content(lamp: Envmap | CubeMap, look: Look) -> Content:
     by = version(lamp.image), *given[1:]
     if isinstance(lamp, CubeMap):
         return look.cache(_cube, *given, by=by)
-    ends = look.lo, look.hi
+    ends = look.lo, look.hi, lamp.mis_compensation
     return look.cache(_sphere, *given, *ends, by=(*by, *ends))
 
 
@@ -103,8 +102,13 @@ def mean_radiance(lamp: Envmap | CubeMap, made: Content) -> float:
     return made.grid.total * cell / (4.0 * np.pi)
 
 
-def _sphere(given: Any, scale: float, spectral: bool, lo: float, hi: float) -> Content:
-    """An image in latitude and longitude, its spectra from lo to hi [nm]."""
+def _sphere(
+    given: object, scale: float, spectral: bool, lo: float, hi: float, compensated: bool
+) -> Content:
+    """An image in latitude and longitude, its spectra from lo to hi [nm].
+
+    compensated: its directions are chosen for what a material's own do not find.
+    """
     where = "envmap.image"
     found = spectral_exr.find(given, emissive=True, where=where)
     notes: list[str] = []
@@ -119,17 +123,29 @@ def _sphere(given: Any, scale: float, spectral: bool, lo: float, hi: float) -> C
             height,
             values,
             corners,
-            block_grids.of(corners, partial(sphere_directions, width)),
+            _sphere_blocks(corners, compensated),
             notes=tuple(notes),
         )
     found = _scaled(found, scale, where)
     corners = _latitude_weights(luminance(image) + UNSEEN * _brightness(found.values))[None]
     values, number = bands(found, lo, hi)
-    grid = block_grids.of(corners, partial(sphere_directions, width))
+    grid = _sphere_blocks(corners, compensated)
     return Content(width, height, values, corners, grid, values.shape[1], number)
 
 
-def _cube(given: Any, scale: float, spectral: bool) -> Content:
+def _sphere_blocks(corners: NDArray[Any], compensated: bool) -> block_grids.BlockGrid:
+    """The blocks of weights (1, h, w + 1); compensated: as of `_sphere`."""
+    directions = partial(sphere_directions, corners.shape[2] - 1)
+    return block_grids.of(corners, directions, even=_even(corners) if compensated else None)
+
+
+def _even(corners: NDArray[Any]) -> NDArray[Any]:
+    """The weights of a light that is 1 everywhere, of the shape of those of an image."""
+    column = _latitude_weights(np.ones((corners.shape[1], 1), np.float32))[None, :, :1]
+    return np.broadcast_to(column, corners.shape)
+
+
+def _cube(given: object, scale: float, spectral: bool) -> Content:
     """The faces of a cube, with their borders."""
     notes: list[str] = []
     faces = _faces(given, "cube_map.image", notes) * np.float32(scale)
@@ -165,7 +181,7 @@ def _scaled(image: SpectralImage, scale: float, where: str) -> SpectralImage:
     return dataclasses.replace(image, values=np.maximum(values, np.float32(0.0)))
 
 
-def _loaded(image: Any, where: str, notes: list[str]) -> Floats32:
+def _loaded(image: object, where: str, notes: list[str]) -> Floats32:
     """An image as (h, w, 3) float32 without negative values. Raises SceneError.
 
     notes: gets what its file says that is left out.
@@ -192,7 +208,7 @@ def _loaded(image: Any, where: str, notes: list[str]) -> Floats32:
     return np.maximum(values, np.float32(0.0))
 
 
-def _faces(image: Any, where: str, notes: list[str]) -> Floats32:
+def _faces(image: object, where: str, notes: list[str]) -> Floats32:
     """The six faces of a cube map (6, n, n, 3), in the order of FACES; notes: as of `_loaded`."""
     if isinstance(image, (list, tuple)) or (isinstance(image, np.ndarray) and image.ndim == 4):
         if len(image) != 6:
@@ -264,9 +280,15 @@ def _bordered(faces: Floats32) -> Floats32:
     """The faces (6, n + 2, n + 2, 3) with the nearest texels of their neighbours around them."""
     n = faces.shape[1]
     centers = (np.arange(-1, n + 1) + 0.5) / n * 2.0 - 1.0
-    face, a, b = face_coordinates(face_directions(centers[None, :], centers[:, None]))
+    around = np.ones((n + 2, n + 2), bool)
+    around[1:-1, 1:-1] = False
+    rows, columns = np.nonzero(around)
+    face, a, b = face_coordinates(face_directions(centers[columns], centers[rows]))
     column, row = (np.clip(((c + 1.0) * 0.5 * n).astype(int), 0, n - 1) for c in (a, b))
-    return faces[face, row, column]
+    bordered = np.empty((6, n + 2, n + 2, 3), np.float32)
+    bordered[:, 1:-1, 1:-1] = faces
+    bordered[:, rows, columns] = faces[face, row, column]
+    return bordered
 
 
 def _brightness(image: Floats32) -> Floats32:

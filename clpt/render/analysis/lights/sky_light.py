@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from functools import partial
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from clpt.arrays import Floats
+from clpt.device import kept_arrays
 from clpt.render.analysis.lights import block_grids, image_lights
 from clpt.render.analysis.lights.look import Look
 from clpt.render.analysis.texels import bands, texels
@@ -25,7 +27,7 @@ from clpt.sky.dome import (
     elevations,
     horizon,
 )
-from clpt.spectra import Tabulated, luminance
+from clpt.spectra import Tabulated, air, data, luminance
 from clpt.spectra.air import LAMBDAS
 from clpt.spectral_exr import SpectralImage
 
@@ -55,11 +57,19 @@ def content(lamp: Sky, look: Look) -> Content:
     return look.cache(_content, *given, by=(repr(given),))
 
 
+def _kept(numbers: tuple[float, ...], ground: tuple[float, ...]) -> tuple[Floats, Floats]:
+    """What `dome.unscaled` returns, of the cache folder where it is there."""
+    code = *Path(dome.__file__).parent.glob("*.py"), Path(air.__file__)
+    tables = (data.ROOT / name for name in ("sky.csv", "air.csv"))
+    around, disc = kept_arrays.kept(dome.unscaled, numbers, ground, files=(*code, *tables))
+    return around, disc
+
+
 def _content(
     numbers: tuple[float, ...], ground: tuple[float, ...], spectral: bool, lo: float, hi: float
 ) -> Content:
     """The tables of a sky; its spectra from lo to hi [nm]."""
-    around, sun = dome.images(numbers, ground)
+    around, sun = dome.images(_kept, numbers, ground)
     at = horizon(numbers[1])
     flat = (f.reshape(1, -1, f.shape[-1]) for f in (around, sun))
     images = [SpectralImage(f.astype(np.float32), LAMBDAS, True) for f in flat]

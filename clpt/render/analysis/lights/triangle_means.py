@@ -22,7 +22,7 @@ _GOLDEN = np.array([0.7548776662466927, 0.5698402909980532])  # Roberts' sequenc
 
 
 def triangle_means(
-    value: Any,
+    value: object,
     uvs: NDArray[np.float32] | None,
     faces: NDArray[Any],
     attributes: Mapping[str, NDArray[np.float32]] = MappingProxyType({}),
@@ -49,7 +49,7 @@ def triangle_means(
 
 
 def looked_up(
-    value: Any, uv: Floats, area: Floats, attributes: Mapping[str, NDArray[np.float32]]
+    value: object, uv: Floats, area: Floats, attributes: Mapping[str, NDArray[np.float32]]
 ) -> Floats:
     """Return the brightness of a value at uv (m, k, 2); area (m,): of uv that a look stands for.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -44,7 +43,7 @@ def members(lamp: Light, encoder: Encoder) -> dict[str, ArrayLike]:
     }
 
 
-def _image(image: Any, encoder: Encoder) -> dict[str, ArrayLike]:
+def _image(image: object, encoder: Encoder) -> dict[str, ArrayLike]:
     """The members of an image whose values are brought below 1, as those of a reflectance are."""
     scale = 1.0
     if isinstance(image, Bitmap) and spectral_image(image, REFLECTANCE) is None:

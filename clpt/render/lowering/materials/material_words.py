@@ -17,8 +17,8 @@ from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.materials.normal_maps import NormalPerturbation
 from clpt.scene import materials as mt
 from clpt.scene import roles
-from clpt.scene.media import Blend, Phase
 from clpt.scene.params import Kind, device_params, fields_of
+from clpt.scene.phases import Blend, Phase
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.shapes import Shape
 from clpt.scene.textures import Texture

@@ -21,8 +21,9 @@ from clpt.render.lowering.lights.lights import LightRows
 from clpt.render.lowering.materials.material_words import MaterialWords
 from clpt.render.lowering.tables import as_words
 from clpt.scene import roles
-from clpt.scene.media import Dyed, Grid, Lattice, Medium, Mixture, Phase
+from clpt.scene.media import Dyed, Grid, Lattice, Medium, Mixture
 from clpt.scene.params import fields_of
+from clpt.scene.phases import Phase
 from clpt.scene.shapes import Shape
 from clpt.spectra import Constant, Spectrum
 

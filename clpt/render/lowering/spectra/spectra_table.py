@@ -20,7 +20,7 @@ from clpt.render.contract.parameter_words import (
 )
 from clpt.render.lowering.spectra import measurements, reradiation
 from clpt.render.lowering.tables import TableStore, as_words
-from clpt.scene import media
+from clpt.scene import phases
 from clpt.scene.roles import EMISSION, Spectral
 from clpt.spectra import (
     RGB,
@@ -158,7 +158,7 @@ class SpectraTable:
         words[4] = np.int32(-1 - self.row(spectrum)).view(np.uint32)
         return words
 
-    def angular_words(self, kind: media.Tabulated) -> tuple[Words, str]:
+    def angular_words(self, kind: phases.Tabulated) -> tuple[Words, str]:
         """Return the words of a table over cosines, and its source.
 
         The source is "row", or "rows" where it depends on the wavelength; see

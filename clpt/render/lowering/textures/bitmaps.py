@@ -157,7 +157,7 @@ class Images:
         """
         channel_of = role is REAL and texture.channel
         levels = has_levels(texture, role)
-        key: Any = (identity(texture), texture.raw, role, channel_of, levels)
+        key = (identity(texture), texture.raw, role, channel_of, levels)
         if key not in self._wanted:
             spectral = spectral_image(texture, role)
             image = texture.image if spectral is None else spectral.to_rgb()

@@ -35,7 +35,7 @@ def is_composite(value: object) -> bool:
     return isinstance(value, (Product, Mix))
 
 
-def folded(value: Any, role: Role) -> Any:
+def folded(value: object, role: Role) -> Any:
     """Return a value, with constants that meet each other put together where that is exact.
 
     In the role REAL all constants are numbers; else those that are the same at all wavelengths.
@@ -76,7 +76,7 @@ class _Scaled(Product):
     """A spectrum times a number."""
 
 
-def separated(value: Any, role: Role) -> Any:
+def separated(value: object, role: Role) -> Any:
     """Return a value in which products of colours in RGB are sums of three products of numbers.
 
     Each of `primaries` has its channel as the factor. A program adds by mixing: half and half, the
@@ -168,7 +168,7 @@ class _Writer:
     def __init__(self, role: Role, store: TableStore, spectra_: SpectraTable, lower: Lower):
         self.role, self.store, self.spectra, self.lower = role, store, spectra_, lower
 
-    def code(self, value: Any, use: str) -> tuple[Code, int]:
+    def code(self, value: object, use: str) -> tuple[Code, int]:
         """Instructions that push a value, and how many they stack; use: an operand's name."""
         if isinstance(value, _Scaled):
             return self._joined([(value.first, use)], (value.second, "real"), "multiply")
