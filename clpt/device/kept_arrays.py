@@ -30,7 +30,8 @@ def kept(
     if stored is not None:
         with np.load(io.BytesIO(stored[1]), allow_pickle=False) as found:
             return tuple(found[name] for name in found.files)
-    made, packed = make(*given), io.BytesIO()
+    made = make(*given)
+    packed = io.BytesIO()
     np.savez(packed, *made)
     disk_cache.store(entry, "arrays", packed.getvalue())
     return made
