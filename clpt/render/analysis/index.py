@@ -252,6 +252,10 @@ class SceneIndex:
         return self.scene.lights
 
     @property
+    def spp(self) -> int:
+        return self.scene.spp
+
+    @property
     def adaptive(self) -> bool:
         """Whether pixels get more samples where there is noise."""
         return self.scene.noise is not None

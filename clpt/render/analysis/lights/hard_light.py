@@ -101,12 +101,11 @@ def _may_guide(index: SceneIndex) -> bool:
 
     Where a limit of noise ends the picture nobody knows; and some scenes cannot have a guide.
     """
-    scene = index.scene
-    depth = scene.integrator.max_depth
-    samples = scene.spp * scene.film.width * scene.film.height
+    depth = index.integrator.max_depth
+    samples = index.spp * index.film.width * index.film.height
     hidden = index.has_media or index.lit_ghosts or not index.lights_reach
     several = depth < 0 or depth > 2
-    return several and not hidden and scene.noise is None and samples >= guides.WORTH
+    return several and not hidden and not index.adaptive and samples >= guides.WORTH
 
 
 def _choice(lit: Lit) -> tuple[Integrator, str]:
