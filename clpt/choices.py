@@ -22,6 +22,7 @@ OBSERVERS = ("cie1931", "cie1964")
 SPACES = ("rec709", "rec2020", "display_p3", "aces2065_1", "acescg", "xyz")
 LAYOUTS = ("brute", "binary", "wide8", "compact")  # of triangles, for rays
 TREES = ("binary", "wide8", "compact")  # those of them that are trees
+PICTURE_SCENES = ("cornell", "atrium", "spheres", "glass", "mist")  # of the benchmark
 PICTURE_SIZES = ("quick", "standard", "large")  # of the benchmark
 Quality = Literal["high", "fast"]
 """high: the surface area heuristic down to the leaves, on CPUs large trees improved by reinsertion;

@@ -65,13 +65,23 @@ def page(rows: list[Row], longest: int | None = None) -> str:
     """The tables, a device each; longest: how many texts of each stage and mode, None for all."""
     few = f"The {longest} longest" if longest and longest > 1 else "The longest program"
     some = f"{few}{'' if longest == 1 else ' programs'} of each stage and mode,"
-    parts = [HEAD.replace("WHICH", some if longest else "All programs")]
+    counts = {device: _programs(rows, device) for v in VENDORS for device in v.devices}
+    half = max(counts.values()) / 2
+    most = [device for device, count in counts.items() if count > half]
+    every = f"On {', '.join(most)} all programs, on others the longest of each stage and mode,"
+    every = every if any(0 < count <= half for count in counts.values()) else "All programs"
+    parts = [HEAD.replace("WHICH", some if longest else every)]
     for vendor in VENDORS:
         for device in vendor.devices:
             own = [row for row in rows if row["device"] == device]
             if own:
                 parts.append(_table(f"{vendor.name} {device}", own))
     return "\n".join(parts)
+
+
+def _programs(rows: list[Row], device: str) -> int:
+    """Return how many programs were compiled for a device."""
+    return sum(row["programs"] for row in rows if row["device"] == device)
 
 
 def _table(title: str, rows: list[Row]) -> str:

@@ -152,7 +152,8 @@ def advice(bad: Sequence[Result], about: Mapping[str, Any]) -> list[str]:
     """Return what to do about results that are wrong, a row of a list each."""
     if not bad:
         return ["- Nothing is wrong. Send this file to clpt with an issue: the device is new."]
-    to, rows = tracker(about), {}
+    to = tracker(about)
+    rows: dict[str, None] = {}
     for one in bad:
         scene, wrong = one.check.settings.get("scene", "cornell"), one.wrong[0]
         if wrong.part == agreement.PART:

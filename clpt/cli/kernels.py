@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .. import output_files
-from ..choices import LAYOUTS, MODES
+from ..choices import LAYOUTS, MODES, PICTURE_SCENES
 from ..errors import SceneError
 from ..formats import load, locate
 from .options.loading_options import loading_options
@@ -105,12 +105,14 @@ def _write_texts(plan: Scene, folder: Path, texts: Texts) -> None:
 
 def _opened(scene: Path, mode: str | None, variables: dict[str, Any]) -> Scene:
     """Return a scene of a file, or of the benchmark where there is no such file."""
+    own = str(scene) in PICTURE_SCENES and not scene.exists()
+    if not own:
+        locate(scene)
     from ..benchmark.picture_scenes import PICTURES  # here: help needs no OpenCL
     from ..benchmark.scenes import in_mode, made
 
-    if str(scene) in PICTURES and not scene.exists():
+    if own:
         return in_mode(made(str(scene)), mode or PICTURES[str(scene)].mode)
-    locate(scene)
     return in_mode(load(scene, **variables), mode)
 
 

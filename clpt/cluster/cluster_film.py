@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import datetime
-import logging
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -19,13 +18,7 @@ from clpt.errors import ClusterError, SceneError
 from clpt.render.contents import Contents
 from clpt.render.film.developed import Developed
 from clpt.render.film.picture_form import PictureForm
-from clpt.render.film.saved_film import (
-    Origin,
-    SavedFilm,
-    Session,
-    classes_text,
-    other_devices,
-)
+from clpt.render.film.saved_film import Origin, SavedFilm, Session
 from clpt.render.pictures import DevicePictures
 from clpt.render.renderer import Renderer
 from clpt.render.wavefront.adaptive import Adaptive
@@ -35,8 +28,6 @@ from clpt.render.wavefront.wavefront import Counts, Wavefront
 from clpt.scene import Scene
 from clpt.scene.fingerprint import Plain
 from clpt.version import VERSION
-
-log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,10 +148,8 @@ class ClusterFilm(DevicePictures):
             raise SceneError(message, where="noise")
         local = self.shown()
         tracer = FarmTracer(local, self._take_selection)
-        begun = local._adaptively(tracer, self.denoise)
-        if arrays:
-            begun.restore(arrays)
-        else:
+        begun = local._adaptively(tracer, self.denoise, arrays)
+        if not arrays:
             begun.skip(taken[-1][1] if taken else self._first_sample)
         self._tracer, self._noise = tracer, begun
 
@@ -240,20 +229,17 @@ class ClusterFilm(DevicePictures):
 
         `warnings` tells, once a worker is there, where another class of device took the samples.
         """
-        saved.origin.check_same(self._origin())
-        own, film, former = self._empty().arrays, saved.film, (self._sum, self._whole)
-        if any(own[name].shape != array.shape for name, array in film.arrays.items()):
-            raise SceneError("the film has another form than this scene's")
+        saved.check_fits(self._origin(), self._empty())
+        film, former = saved.film, (self._sum, self._whole)
         counts = Counts(**saved.counts)
         totals = {name: getattr(counts, name) for name in self._sum.totals}
         self._begin_with(FilmSum(film if film.taken else None, totals))
         if saved.adaptive:
             try:
                 self._begin_adaptively(saved.adaptive)
-            except (KeyError, ValueError) as error:
+            except SceneError:
                 self._begin_with(*former)
-                message = f"the state of adaptive sampling does not fit: {error}"
-                raise SceneError(message) from error
+                raise
         self._held, self._sessions, self._seconds_rendered = None, saved.sessions, 0.0
         self._classes = {}
 
@@ -263,10 +249,7 @@ class ClusterFilm(DevicePictures):
             if kind in self._classes:
                 continue
             self._classes[kind] = device
-            others = other_devices(self._sessions, device)
-            if others:
-                self.warnings.append(classes_text(others))
-                log.warning("%s", self.warnings[-1])
+            self._warn_of_others(self._sessions, device)
 
     # ---- pictures
 

@@ -89,9 +89,7 @@ class AdaptiveCrew:
                 first.show(self.base)
                 renderer = first.renderer
                 tracer = _AdaptiveTracer(renderer._wavefront, self)
-                begun = renderer._adaptively(tracer, renderer.denoise)
-                if self._arrays:
-                    begun.restore(self._arrays)
+                begun = renderer._adaptively(tracer, renderer.denoise, self._arrays)
                 break
             except Exception as error:
                 crew.drop(first, error)

@@ -6,9 +6,10 @@ say who takes the samples.
 
 from __future__ import annotations
 
+import logging
 import time
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +27,13 @@ from clpt.render.film.denoised_picture import DenoisedPicture
 from clpt.render.film.developed import Developed
 from clpt.render.film.layer_channels import write_layers
 from clpt.render.film.pictures import Pictures
-from clpt.render.film.saved_film import Origin, SavedFilm, Session
+from clpt.render.film.saved_film import (
+    Origin,
+    SavedFilm,
+    Session,
+    classes_text,
+    other_devices,
+)
 from clpt.render.locking import Stop, synchronized
 from clpt.render.progress import Progress
 from clpt.render.wavefront import adaptive
@@ -41,6 +48,8 @@ from clpt.version import VERSION
 if TYPE_CHECKING:
     from typing_extensions import Self
 
+
+log = logging.getLogger(__name__)
 
 OnProgress = Callable[[Progress], bool | None]
 
@@ -119,6 +128,12 @@ class FilmRenderer(FilmOwner, Pictures):
     @abstractmethod
     def _origin(self) -> Origin:
         """Return what the samples are of. Raises SceneError for a scene that cannot be read."""
+
+    def _warn_of_others(self, sessions: Iterable[Session], device: Mapping[str, Plain]) -> None:
+        """Warn where sessions had other classes of devices than this one."""
+        if others := other_devices(sessions, device):
+            self.warnings.append(classes_text(others))
+            log.warning("%s", self.warnings[-1])
 
     # ---- samples
 

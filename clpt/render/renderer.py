@@ -204,7 +204,7 @@ class Renderer(Resumable):
             return watch()
 
         if noise is not None and self._settled.adaptive is None:
-            begun = self._adaptively(None, self.denoise)
+            begun = self._adaptively(None, self.denoise, {})
             begun.skip(first)
             self._contents = dataclasses.replace(self._settled, adaptive=begun)
         more = self._with(first, end)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import hashlib
-import logging
+from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clpt import device as dev
 from clpt.errors import SceneError
@@ -18,12 +19,7 @@ from clpt.render.film.denoised_noise import DenoisedNoise
 from clpt.render.film.developed import Developed
 from clpt.render.film.layers import white_paper
 from clpt.render.film.picture_form import PictureForm
-from clpt.render.film.saved_film import (
-    Origin,
-    SavedFilm,
-    classes_text,
-    other_devices,
-)
+from clpt.render.film.saved_film import Origin, SavedFilm
 from clpt.render.locking import synchronized
 from clpt.render.pictures import DevicePictures
 from clpt.render.wavefront.adaptive import Adaptive
@@ -34,8 +30,6 @@ from clpt.scene import Scene
 from clpt.scene.fingerprint import Fingerprint, Plain, fingerprint
 from clpt.scene.integrators import PIXELWISE
 from clpt.version import VERSION
-
-log = logging.getLogger(__name__)
 
 TO_OUTPUT = ("to_first", "to_second", "to_third")
 
@@ -129,35 +123,40 @@ class Resumable(DevicePictures):
             "tree_quality": first.scene.tree_quality,
         }
 
-    def _adaptively(self, tracer: Tracer | None, denoise: str | None) -> Adaptive:
-        """Return adaptive sampling of this film, which begins.
+    def _adaptively(
+        self, tracer: Tracer | None, denoise: str | None, arrays: Mapping[str, NDArray[Any]]
+    ) -> Adaptive:
+        """Return adaptive sampling of this film, which begins, or goes on from a state.
 
         tracer: adds the samples; denoise: a denoiser: noise is then what it leaves. Light paths
-        have their noise before. Raises SceneError where halves are wanted and not kept.
+        have their noise before. arrays: the state, empty at the beginning. Raises SceneError where
+        halves are wanted and not kept, and for a state of another film.
         """
-        first = self._wavefront
-        if denoise is None or first.features.transport.weighed:
-            return Adaptive(first, tracer)
-        if first.film.halves != 2:
-            message = "what is left after denoising is told by even and odd samples apart"
-            raise SceneError(f"{message}; give the scene `noise`, or halves=True", where="noise")
-        return Adaptive(first, tracer, DenoisedNoise(self, self.device, denoise).measure)
+        first, measure = self._wavefront, None
+        if denoise is not None and not first.features.transport.weighed:
+            if first.film.halves != 2:
+                raise SceneError(
+                    "what is left after denoising is told by even and odd samples apart; give the "
+                    "scene `noise`, or halves=True",
+                    where="noise",
+                )
+            measure = DenoisedNoise(self, self.device, denoise).measure
+        begun = Adaptive(first, tracer, measure)
+        if arrays:
+            try:
+                begun.restore(arrays)
+            except (KeyError, ValueError) as error:
+                message = f"the state of adaptive sampling does not fit: {error}"
+                raise SceneError(message) from error
+        return begun
 
     @synchronized
     def _restore(self, saved: SavedFilm) -> None:
         """Go on from a saved film, as `load_state` does. Raises SceneError."""
-        saved.origin.check_same(self._origin())
-        own, given = self.film_state().arrays, saved.film.arrays
-        if any(own[name].shape != given[name].shape for name in own):
-            raise SceneError("the film has another form than this scene's")
+        saved.check_fits(self._origin(), self.film_state())
         adaptive = None
         if saved.adaptive:
-            adaptive = self._adaptively(None, self.denoise)
-            try:
-                adaptive.restore(saved.adaptive)
-            except (KeyError, ValueError) as error:
-                message = f"the state of adaptive sampling does not fit: {error}"
-                raise SceneError(message) from error
+            adaptive = self._adaptively(None, self.denoise, saved.adaptive)
         restored = Contents(saved.film.taken, adaptive, saved.sessions)
 
         def put(_: BaseException | None = None) -> Contents:
@@ -168,10 +167,7 @@ class Resumable(DevicePictures):
 
         with self._change("load_state", put):
             self._contents = put()
-        others = other_devices(saved.sessions, self._device_class())
-        if others:
-            self.warnings.append(classes_text(others))
-            log.warning("%s", self.warnings[-1])
+        self._warn_of_others(saved.sessions, self._device_class())
 
     def _put(self, state: FilmState) -> None:
         """Enqueue that the film holds the words of another one of its form."""

@@ -43,7 +43,7 @@ inline vec3 gltf_coat_normal(GltfSurface m)
 }
 inline vec3 gltf_coated(GltfSurface m, vec3 w)
 {
-    return USES_GLTF_SURFACE_CLEARCOAT_APART ? to_local(frame_of(gltf_coat_normal(m)), w) : w;
+    return USES_GLTF_SURFACE_CLEARCOAT_APART ? to_frame(frame_of(gltf_coat_normal(m)), w) : w;
 }
 /* What is left of the coat's light where its normal leans away from a direction by more than the surface's does: so
  * it is reciprocal, and reflects no more than comes. */

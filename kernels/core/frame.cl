@@ -11,7 +11,7 @@ inline Frame frame_of(vec3 n)
     f.n = n;
     return f;
 }
-inline vec3 to_local(Frame f, vec3 w) { return v3(dot3(f.s, w), dot3(f.t, w), dot3(f.n, w)); }
+inline vec3 to_frame(Frame f, vec3 w) { return v3(dot3(f.s, w), dot3(f.t, w), dot3(f.n, w)); }
 inline vec3 to_world(Frame f, vec3 w) { return madd3(f.s, w.x, madd3(f.t, w.y, scale3(f.n, w.z))); }
 inline real cos_theta(vec3 w) { return w.z; }
 inline vec3 reflect_z(vec3 w) { return v3(-w.x, -w.y, w.z); } /* mirror at the local normal */

@@ -96,9 +96,7 @@ inline vec4 gather_w4(global const uint *p, integer at) { return gather4((global
 
 /* The same of a row that a record has. Where a scene has few of a kind all lanes mostly read one row, whose words then
  * come without a gather. */
-#if LANES == 1
-#define row4 gather_w4
-#else
+#ifdef NATIVE_PAIRS
 inline vec4 row4(global const uint *table, integer at)
 {
     if (any(at != at.s0)) return gather_w4(table, at);
@@ -106,4 +104,6 @@ inline vec4 row4(global const uint *table, integer at)
     vec4 r = {(real)(row[0]), (real)(row[1]), (real)(row[2]), (real)(row[3])};
     return r;
 }
+#else
+#define row4 gather_w4
 #endif

@@ -96,23 +96,38 @@ inline real guide_pdf(global const uint *guide, Guided g, vec3 d, real p)
     return any(known) ? sel(known, 0.5f * (p + guide_density(guide, g, d)), p) : p;
 }
 
-/* A direction of the guide. u: its x chooses the part; what is left of it and its y a point in that.
+/* The place of `light` among four bits of sums from `first` on, every `step`-th: what lies below and up to there. */
+inline integer guide_search(global const uint *guide, integer first, int step, real light, real *below, real *above)
+{
+    integer found = 0;
+    for (int size = GUIDE_ROWS / 2; size > 0; size /= 2) {
+        real sum = gather((global const float *)guide, first + (found + (size - 1)) * step);
+        mask after = light >= sum;
+        found += sel_i(after, (integer)(size), (integer)(0));
+        *below = sel(after, sum, *below);
+        *above = sel(after, *above, sum);
+    }
+    return found;
+}
+
+/* Where `light` lies between two sums, in [0, 1). */
+inline real guide_left(real light, real below, real above)
+{
+    real left = (light - below) / max_r(above - below, (real)(1e-30f));
+    return clamp_r(left, (real)(0.0f), (real)(0.99999994f));
+}
+
+/* A direction of the guide. u: its x goes to the height, its y to the turn, so that what is spread evenly stays so.
  * density: of it [1/sr]. */
 inline vec3 guide_direction(global const uint *guide, Guided g, vec2 u, real *density)
 {
-    integer bin = 0;
     real light = u.x * g.light, below = 0.0f, above = g.light;
-    for (int step = GUIDE_BINS / 2; step > 0; step /= 2) {
-        real sum = gather((global const float *)guide, g.row + bin + (step - 1));
-        mask after = light >= sum;
-        bin += sel_i(after, (integer)(step), (integer)(0));
-        below = sel(after, sum, below);
-        above = sel(after, above, sum);
-    }
+    integer row = guide_search(guide, g.row + (GUIDE_COLUMNS - 1), GUIDE_COLUMNS, light, &below, &above);
+    real z = (to_real(row) + guide_left(light, below, above)) * (2.0f / GUIDE_ROWS) - 1.0f, s, c;
+    light = below + u.y * (above - below);
+    integer column = guide_search(guide, g.row + row * GUIDE_COLUMNS, 1, light, &below, &above);
     *density = guide_density_of(g, above - below);
-    real left = clamp_r((light - below) / max_r(above - below, (real)(1e-30f)), (real)(0.0f), (real)(0.99999994f));
-    real z = (to_real(bin / GUIDE_COLUMNS) + left) * (2.0f / GUIDE_ROWS) - 1.0f, s, c;
-    sincos_2pi((to_real(bin & (GUIDE_COLUMNS - 1)) + u.y) * (1.0f / GUIDE_COLUMNS), &s, &c);
+    sincos_2pi((to_real(column) + guide_left(light, below, above)) * (1.0f / GUIDE_COLUMNS), &s, &c);
     real level = sqrt(max_r(1.0f - z * z, (real)(0.0f)));
     return v3(level * c, level * s, z);
 }
@@ -157,7 +172,7 @@ inline BsdfSample guide_sample(global const uint *guide, Guided g, Bsdf m, Frame
     real brings = spectrum_mean(s.weight);
     own.weight = sel(s.pdf > 0.0f, brings * share * guide_expects(g, own), (real)(0.0f));
 
-    vec3 wi = to_local(frame, guide_direction(guide, g, toward, &guided));
+    vec3 wi = to_frame(frame, guide_direction(guide, g, toward, &guided));
     Candidate other = guide_candidate(wo, wi, guided, hero_pdf(m, wo, wi, before));
     Spectrum f = bsdf_eval(m, wo, wi);
     real sent = spectrum_mean(f);

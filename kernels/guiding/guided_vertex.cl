@@ -7,7 +7,7 @@
 inline BsdfSample onward_sample(Scattering scatter, global const uint *guide, Guided guided, Spectrum *ratio)
 {
     vec2 uv = sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_BSDF);
-    vec2 toward = sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_GUIDE);
+    vec2 toward = BSDF_CHROMATIC ? sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_GUIDE) : uv;
     real chance = sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_GUIDE + 1).x;
     vec3 u = v3(uv.x, uv.y, scatter.choice.y);
     return guide_sample(guide, guided, scatter.bsdf, scatter.shading.frame, scatter.wo, u, toward, chance, ratio);

@@ -22,7 +22,7 @@ inline integer whitted_light(Scene scene, Slab shadow, uint at, mask active, Ver
     vec2 point = sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_LIGHT);
     vec3 side = vertex_hemisphere(frame, scatter.wo);
     LightSample ls = common_light_sample(scene, v.s.p, side, scatter.choice.x, point, scatter.lambdas);
-    Spectrum f = bsdf_eval(scatter.bsdf, scatter.wo, to_local(frame, ls.wi));
+    Spectrum f = bsdf_eval(scatter.bsdf, scatter.wo, to_frame(frame, ls.wi));
     f = spectrum_scale(f, shading_frame_share(scatter.shading, ls.wi));
     mask shine = active & (ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
     real w = 1.0f / sel(shine, fabs(ls.pdf), (real)(1.0f));

@@ -15,7 +15,7 @@
 inline Spectrum merge_photon(Photon photon, mask near, Vertex v, Scattering scatter, Rival rival, Spectrum ratio,
                              real area, real unit, real number)
 {
-    vec3 to = octahedral_unpack(photon.to_light), wi = to_local(scatter.shading.frame, to);
+    vec3 to = octahedral_unpack(photon.to_light), wi = to_frame(scatter.shading.frame, to);
     Spectrum f = bsdf_eval(scatter.bsdf, scatter.wo, wi);
     real p = rival_pdf(scatter.bsdf, scatter.wo, wi), p_back = rival_pdf(scatter.bsdf, wi, scatter.wo);
     real w = photon_weight(photon.rival, rival.arrives, number, area / unit, p, p_back);

@@ -6,7 +6,7 @@ inline Bsdf coat_normal_turned(Bsdf m, Surface s, Frame shaded)
     real scale = m.clearcoat_normal_scale, x = (2.0f * m.clearcoat_normal_x - 1.0f) * scale;
     real y = (2.0f * m.clearcoat_normal_y - 1.0f) * scale;
     vec3 n = v3(x, sel(dot3(own.t, s.dpdv) < 0.0f, -y, y), 2.0f * m.clearcoat_normal_z - 1.0f);
-    n = to_local(shaded, to_world(own, normalize3(n)));
+    n = to_frame(shaded, to_world(own, normalize3(n)));
     m.clearcoat_normal_x = 0.5f * n.x + 0.5f;
     m.clearcoat_normal_y = 0.5f * n.y + 0.5f;
     m.clearcoat_normal_z = 0.5f * n.z + 0.5f;

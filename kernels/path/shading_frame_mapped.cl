@@ -47,7 +47,7 @@ inline ShadingFrame shading_frame_load(Scene scene, integer row, Surface s, vec3
         slope = sel(s.flipped & !inside, -slope, slope);
         vec3 u = madd3(s.ns, (hu - h) * slope - dot3(s.ns, s.dpdu), s.dpdu);
         vec3 v = madd3(s.ns, (hv - h) * slope - dot3(s.ns, s.dpdv), s.dpdv);
-        vec3 across = to_local(f.base, cross3(u, v));
+        vec3 across = to_frame(f.base, cross3(u, v));
         mask usable = bumpy & (fabs(across.z) > 1e-20f);
         n = sel3(usable, scale3(across, sel(across.z < 0.0f, (real)(-1.0f), (real)(1.0f))), n);
     }
@@ -64,7 +64,7 @@ inline ShadingFrame shading_frame_load(Scene scene, integer row, Surface s, vec3
         vec3 m = v3(x, y, z);
         n = sel3(mapped & (dot3(m, m) > 1e-12f), m, n);
     }
-    vec3 wo = to_local(f.base, neg3(d));
+    vec3 wo = to_frame(f.base, neg3(d));
     mask away = (wo.z * dot3(wo, n) <= 0.0f) & ((flags & PERTURB_AS_IT_IS) == 0);
     n = normalize3(v3(sel(away, -n.x, n.x), sel(away, -n.y, n.y), n.z));
     vec3 along = normalize3(v3(1.0f - n.x * n.x, -n.x * n.y, -n.x * n.z));

@@ -88,7 +88,7 @@ inline Scattering vertex_scattering(Scene scene, Slab path, uint at, mask active
 #endif
     scatter.shading = shading_frame_load(scene, v.row, v.s, v.d, scatter.lambdas);
     scatter.bsdf = coat_normal_turned(scatter.bsdf, v.s, scatter.shading.frame);
-    scatter.wo = to_local(scatter.shading.frame, neg3(v.d));
+    scatter.wo = to_frame(scatter.shading.frame, neg3(v.d));
     return scatter;
 }
 

@@ -5,7 +5,7 @@ inline integer join_camera(Scene scene, Slab shadow, uint at, mask active, Verte
 {
     vec2 lens = sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_LIGHT);
     CameraPoint c = camera_connect(scene, v.s.p, mask_of(0), lens);
-    vec3 to = to_local(scatter.shading.frame, neg3(c.d));
+    vec3 to = to_frame(scatter.shading.frame, neg3(c.d));
     Spectrum f = bsdf_eval(scatter.bsdf, to, scatter.wo);
     mask shine = active & c.seen & (spectrum_max(f) > 0.0f);
     real share = shading_frame_share(scatter.shading, neg3(v.d));

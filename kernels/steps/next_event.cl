@@ -16,7 +16,7 @@ inline NextEvent next_event(Scene scene, mask next, Vertex v, Scattering scatter
     e.ls = light_sample_nothing();
     if (!(BSDF_ABSORBS || BSDF_IS_SEALED) || any(seeks))
         e.ls = common_light_sample(scene, v.s.p, hemisphere, scatter.choice.x, point, scatter.lambdas);
-    vec3 wi = to_local(frame, e.ls.wi);
+    vec3 wi = to_frame(frame, e.ls.wi);
     Spectrum f = bsdf_eval(scatter.bsdf, scatter.wo, wi);
     f = spectrum_scale(f, shading_frame_share(scatter.shading, e.ls.wi));
     real w = event_weight(scene, rival, v.s, e.ls, scatter.bsdf, scatter.wo, wi,

@@ -9,6 +9,9 @@ import pytest
 
 from clpt import device
 from clpt.__main__ import run
+from clpt.benchmark import agreement
+from clpt.benchmark.picture_scenes import PICTURES
+from clpt.choices import PICTURE_SCENES
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 
@@ -39,3 +42,25 @@ def test_bad_input_is_one_line(tmp_path, capsys):
         assert run(["kernels", *arguments]) == 2
         error = capsys.readouterr().err
         assert error.startswith("clpt: error: ") and error.count("\n") == 1
+
+
+def test_a_stage_as_a_program_of_its_own(tmp_path, monkeypatch, capsys):
+    """Of a scene of the benchmark; which stages there are is told."""
+    monkeypatch.setattr(agreement, "SLOTS", 1024)
+    folder = tmp_path / "fault"
+    given = ["kernels", "cornell", "-o", str(folder), "--repro"]
+    assert run([*given, "shadow"]) == 0
+    told = capsys.readouterr().out.splitlines()
+    assert told[0].startswith("shadow on ") and ": right, beside " in told[0]
+    assert {"kernel.cl", "launch.c", "launch.py", "launch.txt", "README.txt"} <= {
+        path.name for path in folder.iterdir()
+    }
+    assert run([*given, "shadows"]) == 2
+    assert "did you mean 'shadow'" in capsys.readouterr().err
+    monkeypatch.setattr(agreement, "checked", lambda *given: iter(()))
+    assert run([*given, "first"]) == 2
+    assert "no stage is wrong beside" in capsys.readouterr().err
+
+
+def test_scenes_of_the_benchmark_have_their_names():
+    assert tuple(PICTURES) == PICTURE_SCENES

@@ -373,3 +373,26 @@ def test_noise_is_decided_as_by_one_device(maker, make, plan):
     assert len(np.unique(films[0].film.samples)) > 1
     assert films[1].counts["samples"] == films[0].counts["samples"]
     check_arrays(pictures(films[1]), pictures(films[0]))
+
+
+@pytest.mark.parametrize("plan", [pytest.param(QUICK["noise"], id="noise")])
+@pytest.mark.parametrize("maker", MAKERS)
+def test_a_film_that_does_not_fit_changes_nothing(maker, make, plan):
+    renderer = make("device")
+    assert renderer.run(SPLIT[0], noise=plan.noise)
+    saved = renderer._saved_film()
+    torn = {name: array for name, array in saved.adaptive.items() if name != "next"}
+    narrow = dataclasses.replace(saved.film, words=saved.film.words[..., :-1])
+    other = dataclasses.replace(saved.origin, kernels="0")
+    renderer = make(maker)
+    assert renderer.run(3)
+    before = renderer.film_state()
+    for changes, told in (
+        ({"adaptive": torn}, "adaptive sampling does not fit"),
+        ({"film": narrow}, "another form"),
+        ({"origin": other}, "kernels: of clpt"),
+    ):
+        with pytest.raises(SceneError, match=told):
+            renderer._restore(dataclasses.replace(saved, **changes))
+        check_film(renderer.film_state(), before)
+    assert renderer.run(2) and renderer.samples == 5

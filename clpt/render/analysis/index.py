@@ -36,7 +36,8 @@ class SceneIndex:
     order that material words count; normal_mapped: whether a material has a normal or a bump map;
     warnings: of instances that became triangles; motions: what moves; lit_media: why no paths can
     start at some light in a medium, "" if they can; lit_before: whether light paths were ghosts of
-    a lens before an edit, whose film has sums for them or none.
+    a lens before an edit, whose film has sums for them or none; piloted: whether a pilot decides on
+    guiding, as nobody has asked for it.
     """
 
     scene: Scene
@@ -49,6 +50,7 @@ class SceneIndex:
     motions: Motions
     lit_media: str = UNKNOWN
     lit_before: bool | None = None
+    piloted: bool = False
 
     @classmethod
     def of(cls, scene: Scene) -> SceneIndex:

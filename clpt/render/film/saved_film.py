@@ -90,6 +90,13 @@ class SavedFilm(Pictures):
         """Return the pictures of the film."""
         return Developed(self.film, self.form)
 
+    def check_fits(self, origin: Origin, film: FilmState) -> None:
+        """Raise SceneError where its samples are of something else, or a film has another form."""
+        self.origin.check_same(origin)
+        given = self.film.arrays
+        if any(array.shape != given[name].shape for name, array in film.arrays.items()):
+            raise SceneError("the film has another form than this scene's")
+
     def _saved_film(self, *, held: bool = False) -> SavedFilm:
         """Return itself; held: as of a renderer, here without a meaning."""
         return self

@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.records import SETTINGS
-from clpt.render.analysis import photons
+from clpt.render.analysis import guides, photons
 from clpt.render.analysis.colour import film_scale, output_matrix
 from clpt.render.analysis.geometry import Geometry
 from clpt.render.analysis.index import SceneIndex
 from clpt.render.analysis.wavelengths import Density
 from clpt.render.contract.features import LayerFeatures
-from clpt.render.lowering import guides
 from clpt.render.lowering.lights.light_level import light_level
 from clpt.render.lowering.lights.lights import LightRows
 from clpt.scene.integrators import DEEPEST, Vcm
@@ -63,7 +62,7 @@ def settings_of(
         _set_photons(settings, index, geometry, sphere[1], found.disperses)
     if index.guided:
         settings["photon_cells"] = guides.CELLS
-        settings["guide_paths"] = guides.PATHS
+        settings["guide_paths"] = guides.PILOTED_PATHS if index.piloted else guides.PATHS
         settings["guide_side"] = guides.SIDE * sphere[1]
     settings["rival_area"] = rival_area(sphere[1])
     settings["aims"], settings["aim_count"] = found.aims

@@ -86,6 +86,7 @@ class Adaptive:
         self.wavefront, self._meter = wavefront, NoiseMeter(wavefront)
         self._tracer, self._left = tracer or Tracer(wavefront), left
         self._pixels = self._meter.pixels
+        self._rate = _rate(wavefront.features)
         count = len(self._pixels)
         self._partner = _partners(self._pixels, self._meter.across)
         self._lights = (
@@ -97,7 +98,7 @@ class Adaptive:
         self._begun = self.next  # what `next` becomes when the samples under way have ended
         self._level = 0  # samples at the last look
         self._measured_at = np.zeros(count, np.int64)  # samples when a cell was last measured
-        self._variance = np.full(count, np.inf)  # of a sample, relative
+        self._variance = np.full(count, np.inf)  # of a sample, relative; of n over n^rate
         self._film_copies: dict[str, Any] = {}
         self._has_guides = False  # whether the film has samples beside those of the picture
 
@@ -118,7 +119,8 @@ class Adaptive:
         known = np.isfinite(self._variance) & (self._pixels > 0) & (self.next > 0)
         if not known.any():
             return None
-        variance, pixels = self._variance[known] / self.next[known], self._pixels[known]
+        variance = self._variance[known] / self.next[known].astype(float) ** self._rate
+        pixels = self._pixels[known]
         return math.sqrt(float((pixels * variance).sum() / pixels.sum()))
 
     @property
@@ -243,13 +245,14 @@ class Adaptive:
         if not cells.any():
             return
         if self._left is None:
-            relative = self._meter.measure(cells)
+            # From n samples to 2n variance falls by 2^rate - 1 of what is left.
+            relative = self._meter.measure(cells) / (2.0**self._rate - 1.0)
             known = cells & (self._measured_at > 0)
         elif self._level < 2 * LEAST:
             return
         else:
             relative, known = self._left(cells), cells
-        self._variance[known] = self._level * relative[known]
+        self._variance[known] = self._level**self._rate * relative[known]
         self._measured_at[cells] = self._level
 
     def _decide(self, noise: float) -> None:
@@ -259,7 +262,7 @@ class Adaptive:
             self._lights.decide(limit, self._known_variance, AHEAD, STEPS)
             limit = self._lights.left_over(limit, self._known_variance)[self._partner]
         measured_at = self._measured_at[self._partner]
-        needed = divide(self._variance[self._partner], limit)
+        needed = divide(self._variance[self._partner], limit) ** (1.0 / self._rate)
         ahead = AHEAD if self._left is None else 1
         sure = (self.stop == OPEN) & (needed <= ahead * measured_at) & (self._pixels > 0)
         step = np.maximum(measured_at // STEPS, 1)
@@ -283,6 +286,13 @@ class Adaptive:
             self.wavefront.stream.copy(sums, self._film_copies[name])
         self._has_guides = False
         self.wavefront.refresh()
+
+
+def _rate(features: Features) -> float:
+    """Return how fast variance falls with samples, `Sampler.rate`; beside light paths 1."""
+    transport = features.transport
+    rates = {cls.kind: cls.rate for cls in PIXELWISE}
+    return 1.0 if transport.weighed else rates[transport.sampler]
 
 
 def _partners(pixels: Integers, across: int) -> Integers:

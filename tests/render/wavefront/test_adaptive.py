@@ -8,6 +8,7 @@ here, 7.4 standard errors of the first test's mean.
 from __future__ import annotations
 
 import dataclasses
+import pathlib
 
 import numpy as np
 import pytest
@@ -24,10 +25,11 @@ from clpt.render.wavefront.light_rounds import LightRounds
 from clpt.render.wavefront.work_list import FOREVER, inside, pixels, table
 from clpt.scene import Film, Scene, materials
 from clpt.scene.cameras import Perspective
-from clpt.scene.integrators import Mitchell, ParticleTracer, Path, Vcm
+from clpt.scene.integrators import PIXELWISE, Box, Mitchell, ParticleTracer, Path, Vcm
 from clpt.scene.lights import Area, Constant
 from clpt.scene.shapes import Rectangle, Sphere
 
+ROOT = pathlib.Path(__file__).resolve().parents[3]
 RENDERS, MOST, NOISE, SMALL = 100, 512, 2.0, 0.02
 FEW_SEE, TINY = 400, 0.005  # renders and radius, with light paths
 SIGNIFICANCE = 4.5  # standard deviations: by chance once in 150,000
@@ -103,6 +105,28 @@ def test_the_noise_so_far(renderer):
     levels = [(p.samples, p.noise) for p in seen if p.noise]
     (few, first), (many, last) = levels[0], levels[-1]
     assert many > 4 * few and 0.5 < first / last / np.sqrt(many / few) < 2.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sampler", PIXELWISE)
+def test_the_noise_is_the_true_error(sampler):
+    """Root of the mean square over 48 pictures, of their errors and of what is told of them."""
+    scene = clpt.load(ROOT / "scenes/cornell_box/scene.json")
+    film = dataclasses.replace(scene.film, width=48, height=48, mode="rgb", filter=Box())
+    changes = {"sampler": sampler(), "film": film, "integrator": Path(max_depth=6, light_paths=0)}
+    scene = dataclasses.replace(scene, **changes)
+    told, pictures = [], []
+    with clpt.Renderer(scene) as made:
+        for seed in range(48):
+            made.update(scene=dataclasses.replace(scene, seed=seed))
+            seen = []
+            made.run(17, lambda p, seen=seen: seen.append(p.noise) or True, noise=1e-6)
+            told.append(seen[-1] * np.sqrt(17 / 16))
+            pictures.append(made.image() @ [0.2126, 0.7152, 0.0722])
+    mean, variance = np.mean(pictures, axis=0), np.var(pictures, axis=0, ddof=1)
+    around = mean.reshape(12, 4, 12, 4).mean(axis=(1, 3)).repeat(4, 0).repeat(4, 1)
+    true = np.mean(variance / (around + 0.01 * mean.mean()) ** 2)
+    assert np.sqrt(np.mean(np.square(told)) / true) == pytest.approx(1.0, abs=0.15)
 
 
 def test_pieces_are_the_whole(renderer):

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from clpt.choices import AUTO
 from clpt.geometry import analytic, shape_records, shapes, triangles
-from clpt.render.analysis import cameras, surroundings
+from clpt.render.analysis import cameras, guides, surroundings
 from clpt.render.analysis.geometry import Emitter, Geometry
 from clpt.render.analysis.index import SceneIndex
 from clpt.render.analysis.lights import image_lights, light_bounds, sky_light
@@ -79,16 +79,34 @@ def decided(lit: Lit, former: Integrator | None = None) -> tuple[SceneIndex, str
         chosen, reason = _choice(lit)
     else:
         keeps = isinstance(former, Vcm) and isinstance(given, Auto)
-        chosen = former if keeps else Path(light_paths=former.light_paths)
+        guiding = former.guiding and not given.guiding
+        chosen = former if keeps else Path(light_paths=former.light_paths, guiding=guiding)
         reason = "as before the scene was edited"
     if index.light_layers and index.adaptive:
         chosen, reason = Path(light_paths=0), "layers of light have no guides of noise"
     elif "light_groups" in index.layers and isinstance(chosen, Vcm):
         chosen, reason = Path(light_paths=chosen.light_paths), "photons do not know their group"
+    if former is None and not chosen.light_paths and _may_guide(index):
+        chosen, reason = Path(light_paths=0, guiding=True), f"{reason}; a pilot decides on guiding"
+    piloted = chosen.guiding
     if given.guiding:
         chosen, reason = Path(light_paths=0, guiding=True), "directions are guided"
+        piloted = False
     chosen = replace(chosen, **shared(given, chosen))
-    return replace(index, scene=replace(index.scene, integrator=chosen)), reason
+    return replace(index, scene=replace(index.scene, integrator=chosen), piloted=piloted), reason
+
+
+def _may_guide(index: SceneIndex) -> bool:
+    """Whether so many samples are to come that a pilot may ask whether guiding pays.
+
+    Where a limit of noise ends the picture nobody knows; and some scenes cannot have a guide.
+    """
+    scene = index.scene
+    depth = scene.integrator.max_depth
+    samples = scene.spp * scene.film.width * scene.film.height
+    hidden = index.has_media or index.lit_ghosts or not index.lights_reach
+    several = depth < 0 or depth > 2
+    return several and not hidden and scene.noise is None and samples >= guides.WORTH
 
 
 def _choice(lit: Lit) -> tuple[Integrator, str]:
