@@ -19,7 +19,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-Number = TypeVar("Number", int, float)
+Number = TypeVar("Number", bound=float)
 SLAB_BLOCK = 32  # slots of a block of kernels/core/slab.cl, on a GPU
 
 # type: (words, uniform form, lane form, components as the text names them)
@@ -73,14 +73,20 @@ class Constants(Generic[Number]):
 
     def text(self) -> str:
         """Return a `#define` of each."""
-        rows = [f"/* {self.doc} */"]
-        for name, (value, doc) in self._values.items():
-            number = f"{value!r}f" if isinstance(value, float) else str(value)
-            if isinstance(value, int) and value >= 1 << 12:
-                number = f"{value:#x}"
-            suffix, comment = "u" * self.unsigned, f" /* {doc} */" if doc else ""
-            rows.append(f"#define {self.prefix}{name.upper()} {number}{suffix}{comment}")
-        return "\n".join([*rows, ""])
+        suffix = "u" * self.unsigned
+        rows = [
+            f"#define {self.prefix}{name.upper()} {_literal(value)}{suffix}"
+            + (f" /* {doc} */" if doc else "")
+            for name, (value, doc) in self._values.items()
+        ]
+        return "\n".join([f"/* {self.doc} */", *rows, ""])
+
+
+def _literal(value: int | float) -> str:
+    """Return a number as OpenCL has it: one that is not whole by type is a float."""
+    if isinstance(value, float):
+        return f"{value!r}f"
+    return f"{value:#x}" if value >= 1 << 12 else str(value)
 
 
 def bits(prefix: str, doc: str, first: int = 1, **docs: str) -> Constants[int]:
