@@ -8,12 +8,12 @@
  * guiding/sum.cl turns that to sums: guide[row + k] is light from part k and those before it. Then it stays as it is,
  * so that no pixel depends on the order of samples.
  *
- * Where something is known, two directions are drawn for a camera's path, one by the guide and one by the material, and
- * one of them is taken by what it brings (guide_sample). So a sharp lobe keeps to itself, and a dull one follows the
- * guide, without a word of the material's. There Russian roulette compares
- * what the path will bring, throughput times the light of the row, with that where it met the guide first, as throughput
- * alone is low where the guide is right (after Vorba and Krivanek 2016, "Adjoint-Driven Russian Roulette and Splitting in
- * Light Transport Simulation"). */
+ * Where something is known, two directions are drawn for a camera's path, one by the guide and one by the material,
+ * and one of them is taken by what it brings (guide_sample). So a sharp lobe keeps to itself, and a dull one follows
+ * the guide, without a word of the material's. There Russian roulette compares what the path will bring, throughput
+ * times the light of the row, with that where it met the guide first, as throughput alone is low where the guide is
+ * right (after Vorba and Krivanek 2016, "Adjoint-Driven Russian Roulette and Splitting in Light Transport
+ * Simulation"). */
 #include "guiding/bins.cl"
 #include "merging/cells.cl"
 

@@ -13,7 +13,7 @@
 
 /* Dimensions of a sample, in pairs: film, lens, wavelength and time, then DIMENSIONS_A_VERTEX per surface that is met,
  * null ones among them; beyond all these DIMENSION_TEXEL, DIMENSION_FLIGHT and DIMENSION_AIM, one pair per surface
- * each, and DIMENSION_GUIDE, two of as many as DIMENSIONS_A_VERTEX. */
+ * each. */
 #define DIMENSION_FILM 0
 #define DIMENSION_LENS 1
 #define DIMENSION_WAVELENGTH 2
@@ -27,7 +27,6 @@
 #define DIMENSION_TEXEL 0x10000 /* which texel stands for those around */
 #define DIMENSION_FLIGHT 0x20000 /* how far a ray flies through a medium */
 #define DIMENSION_AIM 0x30000 /* near which lamp */
-#define DIMENSION_GUIDE 0x40000 /* a direction of the guide; which direction is taken */
 
 /* To weigh a light that a ray has met, the pdf of the ray's direction counts, and the point where it was chosen: that
  * lies `null_distance` [m] before the ray's origin if the path has crossed null boundaries since. */
