@@ -1,6 +1,6 @@
 """Makes what a room by a window needs: the curtains, a vase, a pendant lamp, boards and books.
 
-    python scenes/sitting_room/generate.py
+python scenes/sitting_room/generate.py
 """
 
 from __future__ import annotations
@@ -172,7 +172,8 @@ def furniture() -> list[JSON]:
 def scene() -> JSON:
     """Return the scene."""
     chair, things = furniture()
-    covers = [[0.42, 0.07, 0.05], [0.08, 0.18, 0.34], [0.62, 0.52, 0.36], [0.12, 0.3, 0.18], [0.6, 0.3, 0.08]]
+    covers = [[0.42, 0.07, 0.05], [0.08, 0.18, 0.34], [0.62, 0.52, 0.36]]
+    covers += [[0.12, 0.3, 0.18], [0.6, 0.3, 0.08]]
 
     def satin(colour: Any, alpha: float = 0.25) -> JSON:
         return {"type": "rough_plastic", "alpha": alpha, "diffuse_reflectance": colour}
@@ -188,12 +189,14 @@ def scene() -> JSON:
             "to_world": {"look_at": {"origin": [1.55, 1.4, 2.7], "target": [-0.35, 1.12, -1.6],
                                      "up": [0, 1, 0]}},
         },
-        "film": {"width": 640, "height": 360, "exposure": 6.5, "filter": {"type": "blackman_harris"}},
+        "film": {"width": 640, "height": 360, "exposure": 6.5,
+                 "filter": {"type": "blackman_harris"}},
         "integrator": {"type": "path", "max_depth": 16},
         "spp": 256,
         "materials": {
             "white": matt(0.82), "black": matt(0.03), "wall": matt([0.72, 0.7, 0.64]),
-            "oak": satin({"type": "bitmap", "image": "boards.png", "to_uv": [{"scale": [2, 2, 1]}]}),
+            "oak": satin({"type": "bitmap", "image": "boards.png",
+                          "to_uv": [{"scale": [2, 2, 1]}]}),
             "walnut": satin([0.3, 0.16, 0.08], 0.2), "glaze": satin([0.05, 0.16, 0.24], 0.06),
             "wool": matt([0.36, 0.42, 0.4]), "mustard": matt([0.5, 0.27, 0.04]),
             "orange": satin([0.75, 0.24, 0.02], 0.3),

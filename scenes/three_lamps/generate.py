@@ -2,8 +2,8 @@
 
     python scenes/three_lamps/generate.py
 
-The balls are painted in two greys that look alike by day: of all reflectances that have the X, Y and
-Z of grey under D65, the two whose Y under the fluorescent lamp F11 and under the bulb A differs most.
+The balls are painted in two greys that look alike by day: of all reflectances that have the X, Y
+and Z of grey under D65, the two whose X under the lamps F11 and A differs most.
 Needs scipy.
 """
 
@@ -33,7 +33,7 @@ WIDE, DEEP, HIGH = 1.54, 1.3, 1.5  # of a booth
 
 
 def paint(sign: float) -> Array:
-    """Return the reflectance at NM that is grey under D65 and has most (1) or least (-1) red in it."""
+    """Return the reflectance at NM that is grey under D65, with most (1) or least (-1) red."""
     day = illuminant("D65").sample(NM)[:, None] * cie_xyz(NM)
     others = sum(illuminant(lamp).sample(NM) * cie_xyz(NM)[:, 0] for lamp in ("A", "F11"))
     bend = np.diff(np.eye(len(NM)), 2, axis=0)
@@ -58,7 +58,7 @@ def patches() -> dict[str, Any]:
     path = HERE.parent / "color_checker" / "reflectances.csv"
     lines = path.read_text(encoding="utf-8").splitlines()
     names = lines[2].removeprefix("# lambda [nm],").split(",")
-    rows = np.array([line for line in csv.reader(lines[3:])], float)[::2]
+    rows = np.array(list(csv.reader(lines[3:])), float)[::2]
     return {
         names[i].strip(): {"type": "diffuse", "reflectance": table(rows[:, 0], rows[:, 1 + i])}
         for i in (1, 2, 6, 7, 10, 11, 12, 13, 14, 15, 16, 17)
@@ -85,7 +85,8 @@ def things(chart: list[str]) -> list[dict[str, Any]]:
         cube("board", "board", [0.56, 0.2, 0.015], [0, 1.02, back]),
         {"type": "sphere", "name": "ball", "material": "two greys", "center": [0.3, 0.27, -0.62],
          "radius": 0.27},
-        {"type": "mesh", "name": "knot", "file": "../fluorescent_paint/knot.ply", "material": "coral",
+        {"type": "mesh", "name": "knot", "file": "../fluorescent_paint/knot.ply",
+         "material": "coral",
          "to_world": [{"scale": 0.3}, {"translate": [-0.38, 0.23, -0.75]}]},
         {"type": "mesh", "name": "pawn", "file": "../glass_caustics/pawn.ply", "material": "brass",
          "to_world": [{"scale": 0.16}, {"translate": [-0.05, 0, -0.3]}]},
@@ -108,7 +109,8 @@ def scene() -> dict[str, Any]:
     }  # fmt: skip
     lamps = [
         {"type": "rectangle", "name": what, "material": "black",
-         "emission": {"type": "area", "radiance": {"type": "illuminant", "name": lamp, "scale": 4.2}},
+         "emission": {"type": "area",
+                      "radiance": {"type": "illuminant", "name": lamp, "scale": 4.2}},
          "to_world": [{"scale": [0.5, 0.3, 1]}, {"rotate": {"axis": [1, 0, 0], "angle": 90}},
                       {"translate": [x, HIGH - 0.01, -0.55]}]}
         for lamp, (what, x) in LAMPS.items()
@@ -126,7 +128,8 @@ def scene() -> dict[str, Any]:
             "to_world": {"look_at": {"origin": [0, 0.86, 6.9], "target": [0, 0.72, -0.5],
                                      "up": [0, 1, 0]}},
         },
-        "film": {"width": 640, "height": 240, "exposure": 1.2, "filter": {"type": "blackman_harris"}},
+        "film": {"width": 640, "height": 240, "exposure": 1.2,
+                 "filter": {"type": "blackman_harris"}},
         "integrator": {"type": "path", "max_depth": 8},
         "spp": 256,
         "materials": {
@@ -134,7 +137,8 @@ def scene() -> dict[str, Any]:
             "board": {"type": "diffuse", "reflectance": 0.03},
             "black": {"type": "diffuse", "reflectance": 0},
             "two greys": {"type": "rough_plastic", "alpha": 0.2, "diffuse_reflectance": greys},
-            "coral": {"type": "rough_plastic", "alpha": 0.15, "diffuse_reflectance": [0.62, 0.1, 0.07]},
+            "coral": {"type": "rough_plastic", "alpha": 0.15,
+                      "diffuse_reflectance": [0.62, 0.1, 0.07]},
             "brass": {"type": "rough_conductor", "metal": "brass", "alpha": 0.12},
             **chart,
         },
