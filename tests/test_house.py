@@ -16,7 +16,7 @@ BOUNDS = {
     "lines of the longest function": 60,
     "functions with 8 or more parameters": 4,
     "parameters of a function, most": 10,
-    "#if, #ifdef, #ifndef and #elif in kernels": 171,
+    "#if, #ifdef, #ifndef and #elif in kernels": 172,
     "lines of the longest kernel function": 50,
     "#if of a kernel function, most": 4,
     "kernel functions over 60 lines": 0,
@@ -33,7 +33,7 @@ BOUNDS = {
     "words of README.md": 1_200,
     "docstrings that begin with What, Of, How, Those, The same": 0,
     "lines of accumulate of Cornell's box": 255,
-    "lines of shade_diffuse of Cornell's box": 1_837,
+    "lines of shade_diffuse of Cornell's box": 1_840,
 }
 SHOWN = 12  # places of a figure that has risen
 

@@ -7,9 +7,13 @@
 #if LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_gathersiv16sf)
 #define NATIVE_GATHER(p, at) \
     __builtin_ia32_gathersiv16sf((real)(0.0f), (const void *)(size_t)(p), at, (ushort)0xffff, 4)
+#define NATIVE_PAIRS(p, at) \
+    as_float16(__builtin_ia32_gathersiv8di((long8)(0), (const void *)(size_t)(p), at, (uchar)0xff, 4))
 #elif LANES == 8 && defined(__AVX2__) && __has_builtin(__builtin_ia32_gatherd_ps256)
 #define NATIVE_GATHER(p, at) \
     __builtin_ia32_gatherd_ps256((real)(0.0f), (const float *)(size_t)(p), at, as_real((mask)(-1)), 4)
+#define NATIVE_PAIRS(p, at) \
+    as_float8(__builtin_ia32_gatherd_q256((long4)(0), (const long *)(size_t)(p), at, (long4)(-1), 4))
 #endif
 #if LANES == 16 && defined(__AVX512DQ__) && __has_builtin(__builtin_ia32_scattersiv16sf)
 #define NATIVE_SCATTER(p, at, m, v) \

@@ -2,17 +2,8 @@
  * be valid: give 0. Processors that gather do so by pairs of words: 10 instructions for four words of 16 lanes. Others
  * read the words of a lane at once and transpose them in registers, which are 100 instructions to compile, but half of
  * the time of reading word by word. gather_w4 is gather4 of a table of words. */
-#ifdef __has_builtin
-#if LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_gathersiv8di)
-#define NATIVE_PAIRS(p, at) \
-    as_float16(__builtin_ia32_gathersiv8di((long8)(0), (const void *)(size_t)(p), at, (uchar)0xff, 4))
-#elif LANES == 8 && defined(__AVX2__) && __has_builtin(__builtin_ia32_gatherd_q256)
-#define NATIVE_PAIRS(p, at) \
-    as_float8(__builtin_ia32_gatherd_q256((long4)(0), (const long *)(size_t)(p), at, (long4)(-1), 4))
-#endif
-#endif
-
 #if LANES == 1
+#define row4 gather_w4
 inline vec2 gather2(global const float *p, integer at)
 {
     vec2 r = {p[at], p[at + 1]};
@@ -47,7 +38,18 @@ inline vec4 gather4(global const float *p, integer at)
     vec4 r = {xy.x, xy.y, zw.x, zw.y};
     return r;
 }
+/* Of a row that a record has. Where a scene has few of a kind all lanes mostly read one row, whose words then come
+ * without a gather. */
+inline vec4 row4(global const uint *table, integer at)
+{
+    global const float *row = (global const float *)table;
+    if (any(at != at.s0)) return gather4(row, at);
+    row += at.s0;
+    vec4 r = {(real)(row[0]), (real)(row[1]), (real)(row[2]), (real)(row[3])};
+    return r;
+}
 #else
+#define row4 gather_w4
 #define ROW_2(i) vload2(0, p + at.s##i)
 #define ROW_3(i) (float4)(vload3(0, p + at.s##i), 0.0f)
 #define ROW_4(i) vload4(0, p + at.s##i)
@@ -93,17 +95,3 @@ inline vec4 gather4(global const float *p, integer at)
 #undef ROW_QUARTERS
 #endif
 inline vec4 gather_w4(global const uint *p, integer at) { return gather4((global const float *)p, at); }
-
-/* The same of a row that a record has. Where a scene has few of a kind all lanes mostly read one row, whose words then
- * come without a gather. */
-#ifdef NATIVE_PAIRS
-inline vec4 row4(global const uint *table, integer at)
-{
-    if (any(at != at.s0)) return gather_w4(table, at);
-    global const float *row = (global const float *)table + at.s0;
-    vec4 r = {(real)(row[0]), (real)(row[1]), (real)(row[2]), (real)(row[3])};
-    return r;
-}
-#else
-#define row4 gather_w4
-#endif
