@@ -3,7 +3,7 @@
  * read the words of a lane at once and transpose them in registers, which are 100 instructions to compile, but half of
  * the time of reading word by word. gather_w4 is gather4 of a table of words. */
 #if LANES == 1
-#define row4 gather_w4
+inline vec4 row4(global const uint *table, integer at) { return gather_w4(table, at); }
 inline vec2 gather2(global const float *p, integer at)
 {
     vec2 r = {p[at], p[at + 1]};
@@ -49,7 +49,7 @@ inline vec4 row4(global const uint *table, integer at)
     return r;
 }
 #else
-#define row4 gather_w4
+inline vec4 row4(global const uint *table, integer at) { return gather_w4(table, at); }
 #define ROW_2(i) vload2(0, p + at.s##i)
 #define ROW_3(i) (float4)(vload3(0, p + at.s##i), 0.0f)
 #define ROW_4(i) vload4(0, p + at.s##i)

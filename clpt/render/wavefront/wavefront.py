@@ -84,12 +84,14 @@ class Wavefront:
         self.timings = Timings(self.device.queue)
         features = self.features
         self.film = film = Film(self.stream, self.buffers, paths.settings, features)
-        photons, guide = None, pilot_of.guide if pilot_of else None
+        photons: Photons | None = None
+        guide: Guide | None = pilot_of.guide if pilot_of else None
         if features.transport.merged:
             photons = Photons(self.stream, self.buffers, paths.settings)
         if features.transport.guided and guide is None:
             guide = Guide(self.stream, paths, features.transport.piloted)
-        self.photons, self.guide = photons, None if pilot_of else guide
+        self.photons = photons
+        self.guide: Guide | None = None if pilot_of else guide
         own = (photons.arguments if photons else {}) | (guide.arguments if guide else {})
         # What follows knows nothing of this wavefront: memory is given back without a collector.
         self.kernels = Kernels(
