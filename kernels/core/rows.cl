@@ -3,7 +3,7 @@
  * read the words of a lane at once and transpose them in registers, which are 100 instructions to compile, but half of
  * the time of reading word by word. gather_w4 is gather4 of a table of words. */
 #if LANES == 1
-inline vec4 row4(global const uint *table, integer at) { return gather_w4(table, at); }
+#define row4 gather_w4
 inline vec2 gather2(global const float *p, integer at)
 {
     vec2 r = {p[at], p[at + 1]};
@@ -40,7 +40,7 @@ inline vec4 gather4(global const float *p, integer at)
 }
 /* Of a row that a record has. Where a scene has few of a kind all lanes mostly read one row, whose words then come
  * without a gather. */
-inline vec4 row4(global const uint *table, integer at)
+inline vec4 row4_alike(global const uint *table, integer at)
 {
     global const float *row = (global const float *)table;
     if (any(at != at.s0)) return gather4(row, at);
@@ -48,8 +48,9 @@ inline vec4 row4(global const uint *table, integer at)
     vec4 r = {(real)(row[0]), (real)(row[1]), (real)(row[2]), (real)(row[3])};
     return r;
 }
+#define row4 row4_alike
 #else
-inline vec4 row4(global const uint *table, integer at) { return gather_w4(table, at); }
+#define row4 gather_w4
 #define ROW_2(i) vload2(0, p + at.s##i)
 #define ROW_3(i) (float4)(vload3(0, p + at.s##i), 0.0f)
 #define ROW_4(i) vload4(0, p + at.s##i)
