@@ -6,4 +6,4 @@ BINS = 256  # of a row
 PATHS = 1 << 20  # light paths from which it learns
 PILOTED_PATHS = 1 << 17  # where a pilot decides
 PILOT_BEGINS = 1 << 22  # samples of the whole film without a guide, before it learns
-WORTH = 1 << 23  # samples of a film that are enough for a pilot
+WORTH = 1 << 27  # samples of a film beside which compiling a guide and its pilot are nothing

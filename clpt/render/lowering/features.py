@@ -68,7 +68,6 @@ def of_transport(index: SceneIndex, profile: int, *, aimed: bool) -> TransportFe
         joined=index.joined and (index.light_paths or weighed),
         merged=index.merged,
         guided=index.guided,
-        piloted=index.piloted,
         aimed=aimed,
         lit_ghosts=index.lit_ghosts,
         light_filter=(*index.spread, profile) if weighed else (0, 0, 0),

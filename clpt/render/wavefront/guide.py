@@ -17,21 +17,22 @@ GROUP = 8  # work-items of a group
 class Guide:
     """The sums of a guide, and whether it is `trained` on the present scene.
 
-    paths: whose directions are guided; piloted: whether a pilot decides. arguments: of kernels, by
+    paths: whose directions are guided. piloted: whether a pilot decides; arguments: of kernels, by
     name; first: the sample of each pixel from which on the guide is used, if it `pays`.
     """
 
-    def __init__(self, stream: device.Stream, paths: PathBuffers, piloted: bool):
-        self.stream, self._paths, self.piloted = stream, paths, piloted
+    def __init__(self, stream: device.Stream, paths: PathBuffers):
+        self.stream, self._paths = stream, paths
         self.trained, self.pays = False, True
         settings = paths.settings
         self._learns_from = int(settings["guide_paths"])
+        self.piloted = self._learns_from == guides.PILOTED_PATHS
         self._rows = int(settings["photon_cells"])
         self._bytes = 4 * self._rows * (guides.BINS + 1)
         guide = paths.buffers.allocate("the guide", self._bytes)
         self.arguments: dict[str, Any] = {"guide": guide}
         size = int(settings["film_width"]) * int(settings["film_height"])
-        self.first = -(-guides.PILOT_BEGINS // size) if piloted else 0
+        self.first = -(-guides.PILOT_BEGINS // size) if self.piloted else 0
 
     @property
     def samples(self) -> int:

@@ -89,7 +89,7 @@ class Wavefront:
         if features.transport.merged:
             photons = Photons(self.stream, self.buffers, paths.settings)
         if features.transport.guided and guide is None:
-            guide = Guide(self.stream, paths, features.transport.piloted)
+            guide = Guide(self.stream, paths)
         self.photons = photons
         self.guide: Guide | None = None if pilot_of else guide
         own = (photons.arguments if photons else {}) | (guide.arguments if guide else {})

@@ -239,7 +239,7 @@ def test_few_samples_ask_no_pilot() -> None:
     scene = dataclasses.replace(slit(), integrator=Auto())
     assert not lower(scene).features.transport.guided
     many = dataclasses.replace(scene, spp=guides.WORTH // 256)
-    assert lower(many).features.transport.piloted
+    assert lower(many).settings["guide_paths"] == guides.PILOTED_PATHS
     assert not lower(dataclasses.replace(many, noise=0.1)).features.transport.guided
 
 

@@ -18,7 +18,6 @@ class TransportFeatures:
     joined: bool = flag("JOINS_CAMERA")  # those are joined to the camera
     merged: bool = False  # those leave photons, which paths from the camera gather
     guided: bool = flag("USES_GUIDE")  # directions of the camera's paths are learned
-    piloted: bool = False  # if a pilot finds that this pays, see clpt.render.wavefront.pilot
     aimed: bool = False  # some light paths start toward what is sharp
     lit_ghosts: bool = False  # light paths are ghosts of the lens, and no more
     light_filter: tuple[int, int, int] = (0, 0, 0)  # of weighed light paths: taps, reach, profile
