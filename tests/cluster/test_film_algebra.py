@@ -25,7 +25,7 @@ from clpt import device as dev
 from clpt import images
 from clpt.cli.files import outputs
 from clpt.cli.options.grading import Grading
-from clpt.cluster import crew
+from clpt.cluster import crew, tasks
 from clpt.errors import SceneError
 from clpt.render.film import film_file
 from clpt.render.film.pictures import Pictures
@@ -396,3 +396,15 @@ def test_a_film_that_does_not_fit_changes_nothing(maker, make, plan):
             renderer._restore(dataclasses.replace(saved, **changes))
         check_film(renderer.film_state(), before)
     assert renderer.run(2) and renderer.samples == 5
+
+
+def test_a_worker_s_renderer_keeps_no_choice_of_another_scene():
+    """Light paths suit the ball of glass, not the box without it: "auto" is asked for each."""
+    with_ball = PLANS["rgb"].scene
+    without = dataclasses.replace(with_ball, shapes=with_ball.shapes[:-1])
+    job = tasks._Job(without, [dev.choose()], {})
+    assert not job.renderer._form.weighed
+    assert not job.shows(with_ball)
+    fixed = [dataclasses.replace(one, integrator=PathTracing(light_paths=0)) for one in (
+        without, with_ball)]  # fmt: skip
+    assert tasks._Job(fixed[0], [dev.choose()], {}).shows(fixed[1])
