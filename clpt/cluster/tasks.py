@@ -19,7 +19,6 @@ from typing import Any, get_args
 import numpy as np
 
 from clpt import device as dev
-from clpt.choices import AUTO
 from clpt.cluster.bundle import Bundle, Store, canonical
 from clpt.cluster.multi_renderer import MultiRenderer
 from clpt.errors import ClptError, ClusterError, MemoryBudgetError, SceneError
@@ -28,7 +27,6 @@ from clpt.render.resumable import kernels_digest
 from clpt.render.wavefront.film_state import DIMENSIONS, FilmState
 from clpt.render.wavefront.tracer import Paths, Selection
 from clpt.scene import Scene
-from clpt.scene.integrators import Auto
 from clpt.version import VERSION as VERSION_OF_CLPT
 
 log = logging.getLogger(__name__)
@@ -65,7 +63,7 @@ class _Job:
 
         What "auto" chose for the scene before stays in a renderer, and may not suit this one.
         """
-        if isinstance(scene.integrator, Auto) or scene.integrator.light_paths == AUTO:
+        if scene.integrator.leaves_choice:
             return False
         try:
             self.renderer.update(scene=scene)

@@ -45,6 +45,11 @@ class Integrator(Kind):
         return 0
 
     @property
+    def leaves_choice(self) -> bool:
+        """Whether the scene decides if paths start at lights."""
+        return self.light_paths == AUTO
+
+    @property
     def ambient(self) -> SpectrumLike | None:
         """The radiance that reaches every surface; None: there is none."""
         return None
@@ -164,6 +169,11 @@ class Auto(Integrator):
     rr_depth: int = host(3, "depth from which Russian roulette may end a path")
     hide_lights: bool = flag(False, "the camera sees through lights, also those on shapes")
     free_panes: bool = flag(True, "as of `path`")
+
+    @property
+    def leaves_choice(self) -> bool:
+        """It always does."""
+        return True
 
 
 def shared(integrator: Integrator, other: Integrator) -> dict[str, Any]:

@@ -150,6 +150,17 @@ def ended(command: list[str], folder: Path) -> tuple[int, str]:
     return done.returncode, (done.stdout.strip() or done.stderr.strip()).splitlines()[-1]
 
 
+def check_host(command: list[str], folder: Path) -> None:
+    """Expect what a host says of a launch as it is, of a spoilt one, and of a text that is none."""
+    status, last = ended(command, folder)
+    assert status == 0 and last.startswith("right: 0 words are off, rounding allows "), last
+    spoil(folder)
+    status, last = ended(command, folder)
+    assert status == 1 and last.startswith("WRONG: "), last
+    (folder / "kernel.cl").write_text("this is no kernel", encoding="utf-8")
+    assert ended(command, folder)[0] == 2
+
+
 def numbers(on: device.Device) -> list[str]:
     """The numbers of a device's platform and of it there."""
     import pyopencl as cl
@@ -165,13 +176,7 @@ def test_the_python_host_needs_no_clpt(on: device.Device, folder: Path) -> None:
     run = "import sys; sys.modules['clpt'] = None; import runpy; sys.argv = sys.argv[1:]; "
     run += "runpy.run_path('launch.py', run_name='__main__')"
     command = [sys.executable, "-I", "-c", run, "launch.py", *numbers(on)]
-    status, last = ended(command, folder)
-    assert status == 0 and last.startswith("right: 0 words are off, rounding allows "), last
-    spoil(folder)
-    status, last = ended(command, folder)
-    assert status == 1 and last.startswith("WRONG: "), last
-    (folder / "kernel.cl").write_text("this is no kernel", encoding="utf-8")
-    assert ended(command, folder)[0] == 2
+    check_host(command, folder)
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
@@ -187,13 +192,7 @@ def test_the_c_host_compiles_and_runs(on: device.Device, folder: Path, compiler:
         pytest.skip("no headers or no loader of OpenCL")
     assert built(compiler, "launch", strict, loader, folder) == ""
     command = [str(folder / "launch"), *numbers(on)]
-    status, last = ended(command, folder)
-    assert status == 0 and last.startswith("right: 0 words are off, rounding allows "), last
-    spoil(folder)
-    status, last = ended(command, folder)
-    assert status == 1 and last.startswith("WRONG: "), last
-    (folder / "kernel.cl").write_text("this is no kernel", encoding="utf-8")
-    assert ended(command, folder)[0] == 2
+    check_host(command, folder)
 
 
 def loaders() -> list[list[str]]:

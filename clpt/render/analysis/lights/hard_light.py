@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.choices import AUTO
 from clpt.geometry import analytic, shape_records, shapes, triangles
 from clpt.render.analysis import cameras, guides, surroundings
 from clpt.render.analysis.geometry import Emitter, Geometry
@@ -73,7 +72,7 @@ def decided(lit: Lit, former: Integrator | None = None) -> tuple[SceneIndex, str
     """
     index = lit.index
     given = index.integrator
-    if not isinstance(given, Auto) and given.light_paths != AUTO:
+    if not given.leaves_choice:
         return index, ""
     if former is None:
         chosen, reason = _choice(lit)
