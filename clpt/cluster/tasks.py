@@ -22,8 +22,8 @@ from clpt import device as dev
 from clpt.cluster.bundle import Bundle, Store, canonical
 from clpt.cluster.multi_renderer import MultiRenderer
 from clpt.errors import ClptError, ClusterError, MemoryBudgetError, SceneError
+from clpt.render.device_film import kernels_digest
 from clpt.render.renderer import Renderer
-from clpt.render.resumable import kernels_digest
 from clpt.render.wavefront.film_state import DIMENSIONS, FilmState
 from clpt.render.wavefront.tracer import Paths, Selection
 from clpt.scene import Scene
@@ -54,7 +54,7 @@ class _Job:
             if len(devices) > 1
             else Renderer(scene, devices[0], **options)
         )
-        self.options, self._tracer = options, self.renderer._tracer()
+        self.options, self._tracer = options, self.renderer._maker.tracer()
         self._packed: Reply | None = None  # the selection that was taken last
         self._selection: Selection | None = None
 
