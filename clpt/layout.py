@@ -123,20 +123,17 @@ class Record:
     def __init__(self, name: str, doc: str, **members: tuple[str, str] | tuple[str, str, str]):
         self.name, self.doc = name, doc
         self.members: tuple[Member, ...] = ()
+        self.words = 0  # of 4 bytes
         for member, (kind, text, *nothing) in members.items():
             if kind not in TYPES:
                 raise ValueError(f"{name}.{member}: {kind!r} is none of {', '.join(TYPES)}")
             self.members += (Member(member, kind, text, self.words, *nothing),)
+            self.words += self.members[-1].words
 
     @property
     def snake_name(self) -> str:
         """The name as the kernels' functions have it: LightRow is light_row."""
         return _snake(self.name)
-
-    @property
-    def words(self) -> int:
-        """Size in 4-byte words."""
-        return sum(m.words for m in self.members)
 
     @property
     def step(self) -> int:
