@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,29 +30,21 @@ from clpt.scene.fingerprint import Plain
 
 @dataclass(frozen=True, eq=False)
 class FilmSum:
-    """The sum of films, None before there is one, and counts of what all of them took."""
+    """The sum of films, None before there is one; counts: of what all of them took."""
 
     film: FilmState | None = None
-    totals: Mapping[str, int] = field(
-        default_factory=lambda: dict.fromkeys(("samples", "rays", "rejected", "full"), 0)
-    )
+    counts: Counts = Counts()
 
     def plus(self, film: Film, *, merged: bool) -> FilmSum:
         """Return the sum with one film more; merged: whether samples of all pixels are added."""
-        total, counts = film.state, film.counts
+        total = film.state
         if self.film is not None:
             total = self.film.merged(total) if merged else self.film.plus(total)
-        return FilmSum(total, {name: n + counts[name] for name, n in self.totals.items()})
+        return FilmSum(total, self.counts.plus(film.counts))
 
     @property
     def taken(self) -> Ranges:
         return () if self.film is None else self.film.taken
-
-    @property
-    def counts(self) -> Counts:
-        """Counts of all films that were added; `closest` has rays of both kinds."""
-        samples, rays, rejected, full = self.totals.values()
-        return Counts(samples=samples, closest=rays, rejected=rejected, full=full)
 
 
 class ClusterMaker(HostMaker):
@@ -145,7 +137,7 @@ class ClusterMaker(HostMaker):
             if error is not None:
                 more.adaptive.finish()
             film = replace(self.words(), taken=more.taken)
-            self._sum = self._whole = FilmSum(film, self._sum.totals)
+            self._sum = self._whole = FilmSum(film, self.counts)
             return more
 
         return settle
@@ -200,11 +192,7 @@ class ClusterMaker(HostMaker):
 
     def put(self, state: FilmState, counts: Counts | None = None) -> None:
         """Let the film be another one."""
-        totals = self._sum.totals if counts is None else {
-            "samples": counts.samples, "rays": counts.rays, "rejected": counts.rejected,
-            "full": counts.full,
-        }  # fmt: skip
-        self._sum = self._whole = FilmSum(state, totals)
+        self._sum = self._whole = FilmSum(state, self.counts if counts is None else counts)
 
     def shown(self) -> DeviceFilm:
         """Return the device of this machine, whose own film is now the whole one."""
@@ -217,9 +205,8 @@ class ClusterMaker(HostMaker):
 
     def hold(self, taken: Ranges) -> Held:
         """Keep the film of whole blocks: those that a stop cut are in the picture alone."""
-        whole = self._whole
-        film = whole.film
-        return Held(lambda: self.home.no_words if film is None else film, whole.counts, taken)
+        film, counts = self._whole.film, self._whole.counts
+        return Held(lambda: self.home.no_words if film is None else film, counts, taken)
 
     def empty(self, *, seed: int | None = None, recover: bool = False) -> None:
         """Let the film be empty; workers open the scene with another seed at the next call."""

@@ -15,7 +15,7 @@ from functools import partial
 from typing import NoReturn
 
 from clpt.cluster.blocks import Block, Blocks, WorkerRecord
-from clpt.cluster.device_worker import DeviceWorker, added
+from clpt.cluster.device_worker import DeviceWorker
 from clpt.cluster.sample_ranges import gaps
 from clpt.cluster.threads import TICK, Threads
 from clpt.errors import ClusterError
@@ -60,7 +60,7 @@ class Crew:
         """Counts of all devices together, those that were dropped included."""
         total = self._past
         for worker in self.workers:
-            total = added(total, worker.counts)
+            total = total.plus(worker.counts)
         return total
 
     @property
@@ -165,7 +165,7 @@ class Crew:
             self.workers.remove(worker)
             self.failed.append((worker, error))
             self.lost += worker.unsaved
-            self._past = added(self._past, worker.past)
+            self._past = self._past.plus(worker.past)
             self._tell()
         others = "others do its part" if self.workers else "no other is left"
         log.warning("%s failed and is left out, %s: %s", worker.name, others, error)

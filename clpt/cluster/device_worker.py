@@ -59,7 +59,7 @@ class DeviceWorker:
     @property
     def counts(self) -> Counts:
         """Counts of what the device has rendered so far."""
-        return added(self.past, self.film.wavefront.counts)
+        return self.past.plus(self.film.wavefront.counts)
 
     @property
     def ranges(self) -> Ranges:
@@ -102,11 +102,6 @@ class DeviceWorker:
             self.is_other, self.shown = True, None  # wherever an error comes
             self.film.put(state)
             self.shown = state
-
-
-def added(a: Counts, b: Counts) -> Counts:
-    """Return the sums of what happened."""
-    return Counts(**{name: value + vars(b)[name] for name, value in vars(a).items()})
 
 
 def device_names(devices: list[Device]) -> list[str]:

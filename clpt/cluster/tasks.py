@@ -34,6 +34,7 @@ log = logging.getLogger(__name__)
 VERSION = 3  # of what client and worker say to each other
 OPTIONS = ("halves", "layout", "queued", "looped", "slots", "texture_budget", "tree_quality")
 MOST_OPEN = 2  # jobs of a worker, each with its memory on the device
+COUNTED = ("samples", "rays", "rejected", "full")  # of what was done
 ENDS = np.dtype("<u4")  # of cells, where they travel
 
 Reply = dict[str, Any]
@@ -98,10 +99,7 @@ class _Job:
             **state_to_arrays(state),
             "whole": whole,
             "seconds": time.perf_counter() - began,
-            **{
-                name: getattr(after, name) - getattr(before, name)
-                for name in ("samples", "rays", "rejected", "full")
-            },
+            **{name: getattr(after, name) - getattr(before, name) for name in COUNTED},
         }
 
 

@@ -153,7 +153,8 @@ class FilmRenderer(FilmOwner, Pictures):
 
     def _check_open(self) -> None:
         super()._check_open()
-        if self._telling and not (self._maker.shows_meanwhile or self._maker.is_always_whole):
+        changes = isinstance(self._contents, Change)
+        if self._telling and changes and not self._maker.shows_meanwhile:
             raise DeviceError("devices are at work; the picture is there when the run has ended")
 
     def _warn_of_others(self) -> None:
