@@ -54,7 +54,7 @@ class ClusterMaker(HostMaker):
     once that is asked for; options: see `ClusterRenderer`.
     """
 
-    is_always_whole = fills_gaps = True
+    adds_films = True
 
     def __init__(
         self,
@@ -112,12 +112,6 @@ class ClusterMaker(HostMaker):
         """Counts of all blocks that were added."""
         return self._sum.counts
 
-    def mean(self, now: Contents) -> float:
-        """Return how many samples a pixel has in the mean, without the device of this machine."""
-        if now.adaptive is not None:
-            return super().mean(now)
-        return float(sum(end - first for first, end in self._sum.taken))
-
     @property
     def classes(self) -> tuple[Mapping[str, Plain], ...]:
         """The classes of the devices of all workers so far."""
@@ -148,9 +142,13 @@ class ClusterMaker(HostMaker):
             return adaptive.run(call.end, call.noise, lambda _: tick())
         if adaptive is None:
             return self._take(Selection("all", 1), 1, self._range(call), self._sum.taken, tick)
-        finished = self.add(Selection("all", self.pixels), call.first, call.end, tick)
+        finished = self.add(Selection("all", self._pixels), call.first, call.end, tick)
         adaptive.skip(call.end)  # after a stop too: numbers are not used again
         return finished
+
+    @property
+    def _pixels(self) -> int:
+        return self.home.wavefront.paths.pixels
 
     def _range(self, call: Call) -> tuple[int, int]:
         """Return the range in which as many samples are missing as a call wants."""
@@ -166,7 +164,7 @@ class ClusterMaker(HostMaker):
 
     def add(self, selection: Selection, first: int, end: int, tick: Callable[[], bool]) -> bool:
         """Add samples first to end - 1 of a selection; return whether it was not stopped."""
-        return self._take(selection, self.pixels, (first, end), None, tick)
+        return self._take(selection, self._pixels, (first, end), None, tick)
 
     def _take(
         self, selection: Selection, pixels: int, samples: tuple[int, int], taken: Ranges | None,

@@ -54,11 +54,6 @@ class DevicesMaker(HostMaker):
     # ---- what there is
 
     @property
-    def scene(self) -> Scene:
-        """The scene that is rendered."""
-        return self.home.scene
-
-    @property
     def home(self) -> DeviceFilm:
         """The first device that has not failed. Raises ClusterError if all have."""
         return self.crew.first.film

@@ -25,6 +25,10 @@ class HostMaker(Maker):
         for event in events or ():
             dev.wait(event)
 
+    @property
+    def last(self) -> None:
+        """None: all has been waited for."""
+
     @abstractmethod
     def add(self, selection: Selection, first: int, end: int, tick: Callable[[], bool]) -> bool:
         """Add samples first to end - 1 of a selection; return whether it was not stopped."""

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 
-import pyopencl as cl
-
-from clpt import device as dev
 from clpt.errors import DeviceError, MemoryBudgetError
 from clpt.render.contents import Contents
-from clpt.render.device_film import Apply, Changes, DeviceFilm
+from clpt.render.device_film import DeviceFilm
 from clpt.render.maker import Call, Discarded, Held, Maker, Settle
 from clpt.render.wavefront.adaptive import Adaptive
 from clpt.render.wavefront.film_state import FilmState, Ranges
-from clpt.render.wavefront.tracer import Tracer
 from clpt.render.wavefront.wavefront import Counts
-from clpt.scene import Scene
-from clpt.scene.fingerprint import Plain
 
 
 class DeviceMaker(Maker):
@@ -30,49 +24,11 @@ class DeviceMaker(Maker):
         self._discards = False
 
     @property
-    def scene(self) -> Scene:
-        """The scene that is rendered."""
-        return self._home.scene
-
-    @property
-    def warnings(self) -> list[str]:
-        """Warnings of the scene as it was lowered."""
-        return self._home.warnings
-
-    @property
     def home(self) -> DeviceFilm:
         """The film on the device."""
         return self._home
 
-    @property
-    def devices(self) -> tuple[dev.Device, ...]:
-        """The device alone."""
-        return (self._home.device,)
-
-    @property
-    def counts(self) -> Counts:
-        """Counts of samples and rays so far, and of those that the film refused."""
-        return self._home.wavefront.counts
-
-    @property
-    def classes(self) -> tuple[Mapping[str, Plain], ...]:
-        """The class of the device."""
-        return (self._home.device_class(),)
-
     # ---- samples
-
-    def after(self, events: dev.Events) -> None:
-        """Let commands that follow come after events of the caller."""
-        self._home.wavefront.stream.after(events)
-
-    @property
-    def last(self) -> cl.Event:
-        """The event of the last command."""
-        return self._home.wavefront.stream.last
-
-    def prepare(self) -> None:
-        """Run every kernel of `run` once with nothing to do, and wait."""
-        self._home.wavefront.render_samples(0, 0)
 
     def begin(self, call: Call, now: Contents, more: Contents) -> Settle:
         """Return what makes the film whole; see `Maker`.
@@ -127,25 +83,13 @@ class DeviceMaker(Maker):
         if adaptive is not None:
             adaptive.skip(call.end)
 
-    def leave(self) -> None:
-        """Let a call that is told to stop leave paths in flight as they are."""
-        if self._home.is_open:  # who sees the flag finds the reason soon
+    def leave(self, film: bool) -> None:
+        """Say whether a call that is told to stop may leave paths in flight as they are."""
+        if film and self._home.is_open:  # who sees the flag finds the reason soon
             self._home.wavefront.leave.raise_()
-            self._discards = True
-
-    def rest(self) -> None:
-        """Note that no call is under way."""
-        self._discards = False
-
-    def tracer(self) -> Tracer:
-        """Return what adds selections of samples to the film."""
-        return Tracer(self._home.wavefront)
+        self._discards = film
 
     # ---- the film
-
-    def words(self, *names: str) -> FilmState:
-        """Return the film on the host; names: of the arrays that are wanted, by default all."""
-        return self._home.words(*names)
 
     def put(self, state: FilmState, counts: Counts | None = None) -> None:
         """Enqueue that the film is another one."""
@@ -153,23 +97,7 @@ class DeviceMaker(Maker):
             self._home.wavefront.counts = counts
         self._home.put(state)
 
-    def shown(self) -> DeviceFilm:
-        """Return the film on the device."""
-        return self._home
-
     def hold(self, taken: Ranges) -> Held:
         """Keep a copy of the film on the device, one at a time. Raises MemoryBudgetError."""
         self._home.hold()
         return Held(partial(self._home.words, held=True, taken=taken), self.counts, taken)
-
-    def empty(self, *, seed: int | None = None, recover: bool = False) -> None:
-        """Enqueue that the film is empty; recover: from an error at any line."""
-        self._home.empty(seed=seed, recover=recover)
-
-    def update(self, changes: Changes, events: dev.Events, apply: Apply) -> None:
-        """Render another scene from now on."""
-        self._home.update(changes, events, apply)
-
-    def close(self) -> None:
-        """Give the device's memory back."""
-        self._home.close()

@@ -124,7 +124,7 @@ class FilmRenderer(FilmOwner, Pictures):
     def samples(self) -> int:
         """The number of the next sample: of all so far, where they began at number 0."""
         taken = self._known.taken
-        if self._maker.fills_gaps:
+        if self._maker.adds_films:
             return self._first_sample + sum(end - first for first, end in taken)
         return taken[-1][1] if taken else self._first_sample
 
@@ -132,7 +132,7 @@ class FilmRenderer(FilmOwner, Pictures):
     def first_sample(self) -> int:
         """The number of the first sample of the film, or of the first one to come."""
         taken = self._known.taken
-        return taken[0][0] if taken and not self._maker.fills_gaps else self._first_sample
+        return taken[0][0] if taken and not self._maker.adds_films else self._first_sample
 
     @property
     def active(self) -> float:
@@ -225,7 +225,7 @@ class FilmRenderer(FilmOwner, Pictures):
         maker, now = self._maker, self._settled
         if call.noise is not None and now.adaptive is None:
             now = self._with_noise()
-        if maker.is_always_whole and now.adaptive is None:
+        if maker.adds_films and now.adaptive is None:
             return self._add_films(call, watch)
         change, settle = self._adding("run", call)
         with change:
@@ -241,7 +241,7 @@ class FilmRenderer(FilmOwner, Pictures):
     def _with_noise(self) -> Contents:
         """Begin adaptive sampling; return what the film then holds."""
         taken = self._settled.taken
-        if self._maker.fills_gaps and len(taken) > 1:
+        if self._maker.adds_films and len(taken) > 1:
             message = "samples are missing before the last one; add them first, without noise"
             raise SceneError(message, where="noise")
         first = taken[-1][1] if taken else self._first_sample
@@ -273,8 +273,11 @@ class FilmRenderer(FilmOwner, Pictures):
     def _so_far(self, end: int, seconds: float) -> Progress:
         """Return how far a run is after some seconds; end: the number after its last sample."""
         counts, chosen = self.counts, self._known.adaptive
-        mean = self._maker.mean(self._known)
         noise = None if chosen is None else chosen.level
+        if self._maker.adds_films and chosen is None:
+            mean = float(self.samples - self._first_sample)
+        else:
+            mean = counts.samples / self._maker.home.wavefront.paths.pixels
         return Progress(mean, end, counts.samples, counts.rays, seconds, self.active, noise)
 
     def cancel(self, *, discard: bool = False) -> None:
@@ -286,13 +289,13 @@ class FilmRenderer(FilmOwner, Pictures):
         handler, and waits for nothing.
         """
         if discard:
-            self._maker.leave()
+            self._maker.leave(True)
         self._stop.set()
 
     def _rest(self) -> None:
         """Note that no run is under way, nor to be stopped any more."""
         self._telling = False
-        self._maker.rest()
+        self._maker.leave(False)
         self._stop.clear()
 
     @healing

@@ -14,7 +14,6 @@ from typing import Any
 from numpy.typing import NDArray
 
 from clpt import device as dev
-from clpt.device import Device
 from clpt.errors import SceneError
 from clpt.render.contents import Contents
 from clpt.render.device_film import Apply, Changes, DeviceFilm
@@ -51,24 +50,19 @@ class Call:
 
 
 class Maker(ABC):
-    """Takes samples of a scene, and has their film.
+    """Takes samples of a scene, and has their film; what is not said otherwise is asked of `home`.
 
-    denoise: the denoiser that the film is for; start: when it was begun to
-    be made [s of time.perf_counter]. shows_meanwhile: whether
-    the film can be shown while samples are taken; is_always_whole: whether it can be saved then;
-    fills_gaps: whether a call takes the samples first that are missing before.
+    denoise: the denoiser that the film is for; start: when it was begun to be made [s of
+    time.perf_counter]. shows_meanwhile: whether the film can be shown while samples are taken;
+    adds_films: whether it is a sum of films, which can be saved meanwhile, and lacks samples before
+    others, which the next call takes first.
     """
 
     denoise: str | None = None
     start: float
-    shows_meanwhile = is_always_whole = fills_gaps = False
+    shows_meanwhile = adds_films = False
 
     # ---- what there is
-
-    @property
-    @abstractmethod
-    def scene(self) -> Scene:
-        """The scene that is rendered."""
 
     @property
     @abstractmethod
@@ -76,48 +70,44 @@ class Maker(ABC):
         """The film on the device where it is shown, and its noise is measured."""
 
     @property
-    @abstractmethod
-    def devices(self) -> tuple[Device, ...]:
-        """The devices of this machine that are in use."""
+    def scene(self) -> Scene:
+        """The scene that is rendered."""
+        return self.home.scene
 
     @property
-    @abstractmethod
+    def devices(self) -> tuple[dev.Device, ...]:
+        """The devices of this machine that are in use."""
+        return (self.home.device,)
+
+    @property
     def warnings(self) -> list[str]:
         """Warnings of the scene, and of who takes the samples, for people."""
+        return self.home.warnings
 
     @property
-    @abstractmethod
     def counts(self) -> Counts:
         """Counts of what has happened since the film was empty."""
+        return self.home.wavefront.counts
 
     @property
-    def pixels(self) -> int:
-        """The number of pixels that are sampled."""
-        return self.home.wavefront.paths.pixels
-
-    def mean(self, now: Contents) -> float:
-        """Return how many samples a pixel has in the mean; now: what the film holds."""
-        return self.counts.samples / self.pixels
-
-    @property
-    @abstractmethod
     def classes(self) -> tuple[Mapping[str, Plain], ...]:
         """The classes of the devices that took samples; equal ones give equal films."""
+        return (self.home.device_class(),)
 
     # ---- samples
 
-    @abstractmethod
     def after(self, events: dev.Events) -> None:
         """Let what follows come after events of the caller."""
+        self.home.wavefront.stream.after(events)
 
     @property
     def last(self) -> Any:
-        """The event of the last command that nobody has waited for, None where there is none."""
-        return None
+        """The event of the last command, None where that has been waited for."""
+        return self.home.wavefront.stream.last
 
-    @abstractmethod
     def prepare(self) -> None:
         """Get ready, so that the first samples come at once."""
+        self.home.wavefront.render_samples(0, 0)
 
     @abstractmethod
     def begin(self, call: Call, now: Contents, more: Contents) -> Settle:
@@ -134,15 +124,12 @@ class Maker(ABC):
         tick: is called all the while; if it returns False the call ends soon.
         """
 
-    def leave(self) -> None:  # noqa: B027
-        """Let a call that is told to stop leave its film as it is: nobody wants it any more."""
+    def leave(self, film: bool) -> None:  # noqa: B027
+        """Say whether a call that is told to stop may leave its film as it is, unfinished."""
 
-    def rest(self) -> None:  # noqa: B027
-        """Note that no call is under way."""
-
-    @abstractmethod
     def tracer(self) -> Tracer:
         """Return what adds selections of samples to the film."""
+        return Tracer(self.home.wavefront)
 
     def adaptively(self, arrays: Mapping[str, NDArray[Any]], first: int) -> Adaptive:
         """Return adaptive sampling of the film, which begins, or goes on from a state.
@@ -176,34 +163,34 @@ class Maker(ABC):
     def gather(self) -> None:  # noqa: B027
         """Bring the parts of the film together."""
 
-    @abstractmethod
     def words(self, *names: str) -> FilmState:
         """Return the film on the host; names: of the arrays that are wanted, by default all."""
+        return self.home.words(*names)
 
     @abstractmethod
     def put(self, state: FilmState, counts: Counts | None = None) -> None:
         """Let the film be another one, and with `counts` have these; that can be done again."""
 
-    @abstractmethod
     def shown(self) -> DeviceFilm:
         """Return the home, whose film is now the whole one; its parts are together before."""
+        return self.home
 
     @abstractmethod
     def hold(self, taken: Ranges) -> Held:
         """Keep a copy of the film as it is, of these samples. Raises MemoryBudgetError."""
 
-    @abstractmethod
     def empty(self, *, seed: int | None = None, recover: bool = False) -> None:
         """Let the film be empty; seed: of later samples; recover: from an error at any line."""
+        self.home.empty(seed=seed, recover=recover)
 
-    @abstractmethod
     def update(self, changes: Changes, events: dev.Events, apply: Apply) -> None:
         """Render another scene from now on.
 
         events: that arrays of the changes wait for; apply: calls what writes a change, see
         `FilmRenderer._apply`.
         """
+        self.home.update(changes, events, apply)
 
-    @abstractmethod
     def close(self) -> None:
         """Give back what it holds."""
+        self.home.close()
