@@ -118,8 +118,9 @@ SETTINGS = Record(
     planes=("integer", "planes of slots; those of different ones may render the same pixel"),
     halves=(
         "integer",
-        "2: even and odd samples have films of their own, and planes are even; else 1",
+        "2: even and odd samples have parts of the film of their own, and planes are even; else 1",
     ),
+    octaves=("integer", "2: so have samples of even and odd octaves, see kernels/film/film.cl"),
     seed=("natural", "seed of the sampler"),
     sample_bits=("integer", "base-2 logarithm of the samples of a pixel; zsobol"),
     max_depth=("integer", "most surfaces of a path, that of the light counted"),

@@ -194,6 +194,7 @@ class Resumable(DevicePictures):
             paper=tuple(map(tuple, white_paper(film, features.spectra.mode).tolist())),
             names=first.scene.lowered.layer_names,
             adaptive=self.scene.noise is not None or self._known.adaptive is not None,
+            octaves=self.scene.sampler.octaves * ("variance" in features.film.layers.names),
         )
 
 

@@ -133,7 +133,7 @@ class Wavefront:
 
         slots: paths in flight; looped: whether a kernel on the device runs all bounces. Each is
         chosen to suit the device where it is None. tree_quality: see clpt.bvh.build; halves:
-        whether even and odd samples are kept apart, as they are for the layer `variance`.
+        whether even and odd samples are kept apart.
 
         Raises as `Wavefront` does, SceneError for a layout that cannot hold the scene.
         """
@@ -148,10 +148,11 @@ class Wavefront:
         stream, buffers = device.Stream(on.queue), device.Buffers(on)
         padded_pixels = int(lowered.settings["padded_pixels"])
         footprint = lowered.features.footprint_words
-        halves = halves or "variance" in lowered.features.film.layers.names
         divided = divide_film(
             on.info, padded_pixels, buffers.limit, slots, looped, halves, footprint
         )
+        if "variance" in lowered.features.film.layers.names:
+            divided = replace(divided, octaves=2)
         scene = DeviceScene(stream, buffers, lowered, chosen, tree_quality)
         in_flight = _path_buffers(scene, lowered, divided)
         return cls(scene, in_flight, looped, tuning)
