@@ -38,6 +38,7 @@ from clpt.render.options import RenderOptions, check_changes, check_options, che
 from clpt.render.progress import Progress
 from clpt.render.resumable import Resumable
 from clpt.render.stats import RenderStats, collect
+from clpt.render.trials.trial import Ground, decided
 from clpt.render.wavefront import adaptive
 from clpt.render.wavefront.film_state import FilmState, join_ranges
 from clpt.render.wavefront.strategy import Tuning
@@ -45,6 +46,7 @@ from clpt.render.wavefront.tracer import Tracer, use_all_pixels
 from clpt.render.wavefront.wavefront import Counts, Wavefront
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
+from clpt.scene.integrators import Integrator
 from clpt.scene.lights import Light
 from clpt.scene.materials import Material
 from clpt.scene.params import fields_of, params
@@ -97,15 +99,18 @@ class Renderer(Resumable):
         if texture_budget is None:
             texture_budget = texture_budget_of(device)
         self._texture_budget, self._successors = texture_budget, Successors()
+        looped = options.get("looped", None if options.get("queue") is None else True)
+        tuning = Tuning(options.get("layout"), options.get("queued"), options.get("cancel_seconds"))
+        self._ground = Ground(device, tuning, looped)
         lowered = self._lower(scene)
         self._seconds["lower"] = time.perf_counter() - self._start
         self._opened: Wavefront | None = None
         self._opened = first = Wavefront.create(
             device,
             lowered,
-            Tuning(options.get("layout"), options.get("queued"), options.get("cancel_seconds")),
+            tuning,
             slots=options.get("slots"),
-            looped=options.get("looped", None if options.get("queue") is None else True),
+            looped=looped,
             tree_quality=options.get("tree_quality", "high"),
             halves=options.get("halves", False) or needs.halves(scene, self.denoise),
         )
@@ -480,9 +485,19 @@ class Renderer(Resumable):
             self._contents = put()
 
     def _lower(self, scene: Scene, former: Lowered | None = None) -> Lowered:
-        """Return the tables of a scene; former: of the scene before it."""
-        readable = resolve_device_arrays(scene, self.device.queue)
-        return lower(readable, self._texture_budget, former)
+        """Return the tables of a scene, for the way that is best; former: of the scene before it.
+
+        A trial may decide that, but not for pictures that people steer, who want to see one soon.
+        """
+        readable, budget = resolve_device_arrays(scene, self.device.queue), self._texture_budget
+        lowered = lower(readable, budget, former)
+        if not lowered.candidates or self._ground.tuning.cancel_seconds is not None:
+            return lowered
+
+        def lower_as(way: Integrator) -> Lowered:
+            return lower(dataclasses.replace(readable, integrator=way), budget, lowered)
+
+        return decided(self._ground, lowered, lower_as)
 
     def _edit(
         self,
