@@ -112,18 +112,24 @@ class Lowered:
 
 
 def lower(
-    scene: Scene, texture_budget: int | None = None, former: Lowered | None = None
+    scene: Scene,
+    texture_budget: int | None = None,
+    former: Lowered | None = None,
+    *,
+    anew: bool = False,
 ) -> Lowered:
     """Lower a scene.
 
     texture_budget: [bytes] for images, None for any number. former: of a scene that has much in
-    common with this one: it saves time, and what is "auto" stays as chosen. Arrays,
-    lights and images that are the same objects as then are taken to hold the same.
+    common with this one: it saves time, and what is "auto" stays as chosen, unless it is chosen
+    anew. Arrays, lights and images that are the same objects as then are taken to hold the same.
 
     Raises SceneError where the scene makes no sense: it names the shape, light or material.
     """
     cache = LoweringCache(former.cache if former else None)
-    before = Before(former.integrator, former.features.transport.lit_ghosts) if former else None
+    before = None
+    if former is not None and not anew:
+        before = Before(former.integrator, former.features.transport.lit_ghosts)
     return encode(analyse(scene, cache, before), cache, texture_budget)
 
 

@@ -27,8 +27,9 @@ class Film:
     """The film of a wavefront.
 
     settings: of the paths, which say the film's size and halves; features: which sums of a pixel it
-    has. size: width and height [pixels]; sums: the buffers that samples are added to, by the names
-    of the kernels' arguments; picture: (h, w, 4) float32, always the same memory.
+    has; picture: of a film whose place this one takes. size: width and height [pixels]; sums: the
+    buffers that samples are added to, by the names of the kernels' arguments; picture: (h, w, 4)
+    float32, always the same memory.
 
     Raises MemoryBudgetError.
     """
@@ -39,6 +40,7 @@ class Film:
         buffers: Buffers,
         settings: NDArray[np.void],
         features: Features,
+        picture: device.DeviceArray | None = None,
     ):
         self.stream, self._words = stream, features.film_words
         self._allocate = buffers.allocate
@@ -67,11 +69,13 @@ class Film:
             if count:
                 sums[name] = 4 * count * self._padded_pixels
         self.sums = {n: buffers.allocate(f"the {n}", size, advice) for n, size in sums.items()}
-        self._image = buffers.allocate("the image", 16 * pixels, advice)
         self._sum_bytes = sums
         self._held: dict[str, cl.Buffer] = {}
-        shape = (*self.size[::-1], 4)
-        self.picture = device.DeviceArray(stream.queue, shape, np.float32, data=self._image)
+        if picture is None:
+            image = buffers.allocate("the image", 16 * pixels, advice)
+            shape = (*self.size[::-1], 4)
+            picture = device.DeviceArray(stream.queue, shape, np.float32, data=image)
+        self.picture, self._image = picture, picture.base_data
         self._written: cl.Event | None = None  # of the last command that wrote `picture`
 
     @property

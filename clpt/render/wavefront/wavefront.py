@@ -61,7 +61,7 @@ class Wavefront:
     """A film of a scene on a device, and `render_samples`, which runs the bounce loop.
 
     scene, paths: what is on the device; looped: whether a kernel on the device runs the loop;
-    tuning: for the strategies of other lowerings.
+    tuning: for the strategies of other lowerings; picture: see `Film`.
 
     counts: of rays and samples; begun: whether paths may have begun since someone set it to False;
     leave: raised, it lets `render_samples` and the like leave paths in
@@ -76,13 +76,14 @@ class Wavefront:
         paths: PathBuffers,
         looped: bool,
         tuning: Tuning,
+        picture: device.DeviceArray | None = None,
     ):
         self.device, self.stream, self.buffers = scene.device, scene.stream, scene.buffers
         self.scene, self.paths, self.looped = scene, paths, looped
         self._tuning, self.lanes = tuning, self.device.lanes
         self.timings = Timings(self.device.queue)
         features = self.features
-        self.film = film = Film(self.stream, self.buffers, paths.settings, features)
+        self.film = film = Film(self.stream, self.buffers, paths.settings, features, picture)
         photons: Photons | None = None
         guide: Guide | None = None
         if features.transport.merged:
@@ -124,12 +125,14 @@ class Wavefront:
         looped: bool | None = None,
         tree_quality: bvh.Quality = "high",
         halves: bool = False,
+        picture: device.DeviceArray | None = None,
     ) -> Wavefront:
         """Return a wavefront of a lowered scene, which others may render too.
 
         slots: paths in flight; looped: whether a kernel on the device runs all bounces. Each is
         chosen to suit the device where it is None. tree_quality: see clpt.bvh.build; halves:
-        whether even and odd samples are kept apart, as they are for the layer `variance`.
+        whether even and odd samples are kept apart, as they are for the layer `variance`; picture:
+        that of a film whose place this one's takes.
 
         Raises as `Wavefront` does, SceneError for a layout that cannot hold the scene.
         """
@@ -154,7 +157,7 @@ class Wavefront:
         in_flight = PathBuffers(
             stream, buffers, lowered, divided, blocks, chosen.queued, in_blocks=on.lanes == 1
         )
-        return cls(scene, in_flight, looped, tuning)
+        return cls(scene, in_flight, looped, tuning, picture)
 
     @property
     def counts(self) -> Counts:

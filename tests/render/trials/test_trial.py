@@ -17,7 +17,7 @@ from clpt.scene.integrators import Auto, Integrator, Path
 from clpt.scene.media import Homogeneous
 from tests.pictures.support import assert_agree, blocks, with_film
 from tests.pictures.transport.test_guiding import slit
-from tests.pictures.transport.test_hybrid import caustic, narrow
+from tests.pictures.transport.test_hybrid import caustic, lamp, narrow
 
 AUTO = Path(light_paths="auto", max_depth=5)
 WAYS = [(0.5, False), (0, False), (0, True)]
@@ -156,11 +156,21 @@ def test_pictures_that_people_steer_have_no_trial(monkeypatch: pytest.MonkeyPatc
     assert not steered._features.transport.guided
 
 
+def broad() -> Scene:
+    """A caustic of a lamp so large that all ways find it."""
+    scene = caustic()
+    return dataclasses.replace(scene, shapes=[*scene.shapes[:2], lamp(0.3, 30.0)])
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("little")
-@pytest.mark.parametrize("scene", [slit(), caustic()], ids=["slit", "caustic"])
+@pytest.mark.parametrize("scene", [slit(), broad()], ids=["slit", "caustic"])
 def test_what_a_trial_decides_has_no_bias(scene: Scene) -> None:
-    """Each exposure has its own seed and so its own trial; `path` with light paths is beside it."""
+    """Each exposure has its own seed and so its own trial; `path` with light paths is beside it.
+
+    See tests/pictures/support.py for the significance.
+    """
+    assert len(ways(long(scene))) > 1
     reference = dataclasses.replace(scene, integrator=Path(light_paths=1, max_depth=6))
     auto = dataclasses.replace(scene, integrator=Path(light_paths="auto", max_depth=6))
     made = []
