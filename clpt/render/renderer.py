@@ -32,6 +32,7 @@ from clpt.render.editing.scene_edit import (
     match_replacements,
     resolve_device_arrays,
 )
+from clpt.render.film.saved_film import Origin
 from clpt.render.film_renderer import Watch, checked_number, next_range
 from clpt.render.locking import healing, synchronized
 from clpt.render.lowering.scene import Lowered, lower
@@ -578,6 +579,24 @@ class Renderer(Resumable):
 
         return write, [*lowered.warnings, *remarks]
 
+    @synchronized
+    def _follow(self, origin: Origin) -> None:
+        """See `FilmRenderer._follow`."""
+        way = self._other_way(origin)
+        if way is None:
+            return
+        former = self._wavefront.scene.lowered
+        lowered = self._lower(self.scene, dataclasses.replace(former, integrator=way))
+        if rebuild.has_other_paths(former, lowered):
+            self._take(self._exchanged(lowered), self.scene, {}, self.warnings, motion=False)
+
+    def _other_way(self, origin: Origin) -> Integrator | None:
+        """Return the integrator that made a film of the scene, if another one was chosen here."""
+        own = self._origin()
+        if not self.scene.integrator.leaves_choice or own.settings == origin.settings:
+            return None
+        return None if own.scene.differences(origin.scene) else origin.way
+
     def _exchanged(self, lowered: Lowered) -> Callable[[], None]:
         """Return what puts a wavefront whose film has another form in the place of this one.
 
@@ -588,14 +607,11 @@ class Renderer(Resumable):
         refused = rebuild.refusal(first.scene.lowered, lowered)
         if refused is not None:
             raise refused
-        try:
-            second = self._create(lowered, picture=first.film.picture)
-            second.prepare()
-        except BaseException:
-            first.accumulate_film()
-            raise
+        second = self._create(lowered)
+        second.prepare()
 
         def take() -> None:
+            second.show_in(first.film.picture)
             self._opened, self._resolve = second, None
 
         return take

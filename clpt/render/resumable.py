@@ -154,6 +154,7 @@ class Resumable(DevicePictures):
     @synchronized
     def _restore(self, saved: SavedFilm) -> None:
         """Go on from a saved film, as `load_state` does. Raises SceneError."""
+        self._follow(saved.origin)
         saved.check_fits(self._origin(), self.film_state())
         adaptive = None
         if saved.adaptive:

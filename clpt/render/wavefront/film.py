@@ -27,7 +27,7 @@ class Film:
     """The film of a wavefront.
 
     settings: of the paths, which say the film's size and halves; features: which sums of a pixel it
-    has; picture: of a film whose place this one takes. size: width and height [pixels]; sums: the
+    has. size: width and height [pixels]; sums: the
     buffers that samples are added to, by the names of the kernels' arguments; picture: (h, w, 4)
     float32, always the same memory.
 
@@ -40,7 +40,6 @@ class Film:
         buffers: Buffers,
         settings: NDArray[np.void],
         features: Features,
-        picture: device.DeviceArray | None = None,
     ):
         self.stream, self._words = stream, features.film_words
         self._allocate = buffers.allocate
@@ -71,12 +70,14 @@ class Film:
         self.sums = {n: buffers.allocate(f"the {n}", size, advice) for n, size in sums.items()}
         self._sum_bytes = sums
         self._held: dict[str, cl.Buffer] = {}
-        if picture is None:
-            image = buffers.allocate("the image", 16 * pixels, advice)
-            shape = (*self.size[::-1], 4)
-            picture = device.DeviceArray(stream.queue, shape, np.float32, data=image)
-        self.picture, self._image = picture, picture.base_data
+        self._image = buffers.allocate("the image", 16 * pixels, advice)
+        shape = (*self.size[::-1], 4)
+        self.picture = device.DeviceArray(stream.queue, shape, np.float32, data=self._image)
         self._written: cl.Event | None = None  # of the last command that wrote `picture`
+
+    def show_in(self, picture: device.DeviceArray) -> None:
+        """Let `picture` be another film's, of the same size."""
+        self.picture, self._image = picture, picture.base_data
 
     @property
     def arguments(self) -> dict[str, Any]:

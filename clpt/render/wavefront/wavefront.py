@@ -61,7 +61,7 @@ class Wavefront:
     """A film of a scene on a device, and `render_samples`, which runs the bounce loop.
 
     scene, paths: what is on the device; looped: whether a kernel on the device runs the loop;
-    tuning: for the strategies of other lowerings; picture: see `Film`.
+    tuning: for the strategies of other lowerings.
 
     counts: of rays and samples; begun: whether paths may have begun since someone set it to False;
     leave: raised, it lets `render_samples` and the like leave paths in
@@ -70,26 +70,16 @@ class Wavefront:
     Raises MemoryBudgetError, KernelBuildError, DeviceError.
     """
 
-    def __init__(
-        self,
-        scene: DeviceScene,
-        paths: PathBuffers,
-        looped: bool,
-        tuning: Tuning,
-        picture: device.DeviceArray | None = None,
-    ):
+    def __init__(self, scene: DeviceScene, paths: PathBuffers, looped: bool, tuning: Tuning):
         self.device, self.stream, self.buffers = scene.device, scene.stream, scene.buffers
         self.scene, self.paths, self.looped = scene, paths, looped
         self._tuning, self.lanes = tuning, self.device.lanes
         self.timings = Timings(self.device.queue)
         features = self.features
-        self.film = film = Film(self.stream, self.buffers, paths.settings, features, picture)
-        photons: Photons | None = None
-        guide: Guide | None = None
-        if features.transport.merged:
-            photons = Photons(self.stream, self.buffers, paths.settings)
-        if features.transport.guided:
-            guide = Guide(self.stream, paths)
+        self.film = film = Film(self.stream, self.buffers, paths.settings, features)
+        merged, guided = features.transport.merged, features.transport.guided
+        photons = Photons(self.stream, self.buffers, paths.settings) if merged else None
+        guide = Guide(self.stream, paths) if guided else None
         self.photons, self.guide = photons, guide
         own = (photons.arguments if photons else {}) | (guide.arguments if guide else {})
         # What follows knows nothing of this wavefront: memory is given back without a collector.
@@ -125,14 +115,12 @@ class Wavefront:
         looped: bool | None = None,
         tree_quality: bvh.Quality = "high",
         halves: bool = False,
-        picture: device.DeviceArray | None = None,
     ) -> Wavefront:
         """Return a wavefront of a lowered scene, which others may render too.
 
         slots: paths in flight; looped: whether a kernel on the device runs all bounces. Each is
         chosen to suit the device where it is None. tree_quality: see clpt.bvh.build; halves:
-        whether even and odd samples are kept apart, as they are for the layer `variance`; picture:
-        that of a film whose place this one's takes.
+        whether even and odd samples are kept apart, as they are for the layer `variance`.
 
         Raises as `Wavefront` does, SceneError for a layout that cannot hold the scene.
         """
@@ -157,7 +145,7 @@ class Wavefront:
         in_flight = PathBuffers(
             stream, buffers, lowered, divided, blocks, chosen.queued, in_blocks=on.lanes == 1
         )
-        return cls(scene, in_flight, looped, tuning, picture)
+        return cls(scene, in_flight, looped, tuning)
 
     @property
     def counts(self) -> Counts:
@@ -227,6 +215,11 @@ class Wavefront:
         self._bind_film()
         for loop in self._all_loops:
             loop.bind_again()
+
+    def show_in(self, picture: device.DeviceArray) -> None:
+        """Let the picture of the film be in the memory of another one's, of the same size."""
+        self.film.show_in(picture)
+        self.bind_again(rebuilt=False)
 
     def auxiliary_kernel(
         self, texts: dict[str, device.Source], name: str, **more: object

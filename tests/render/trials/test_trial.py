@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import pathlib as files
 from typing import Any
 
 import numpy as np
@@ -146,6 +147,32 @@ def test_a_film_is_that_of_the_way(monkeypatch: pytest.MonkeyPatch, guiding: boo
     assert origin["chosen.guiding"] is guiding
     crop = clpt.Renderer(with_film(scene, crop=(3, 2, 7, 5)), narrow())
     assert crop._features.transport.guided == guiding
+
+
+@pytest.mark.usefixtures("little")
+@pytest.mark.parametrize("several", [False, True], ids=["renderer", "several devices"])
+def test_a_film_is_gone_on_with_in_its_way(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: files.Path, several: bool
+) -> None:
+    """More samples are wanted than at first, so that there is a trial; and the other way round."""
+    monkeypatch.setattr(trial, "GUIDED_RAY", 0.0)
+    scene, file = dataclasses.replace(slit(), integrator=Auto()), tmp_path / "a.film"
+
+    def made(worth: int) -> clpt.Renderer | clpt.MultiRenderer:
+        monkeypatch.setattr(guides, "WORTH", worth)
+        return clpt.MultiRenderer(scene, [narrow()]) if several else clpt.Renderer(scene, narrow())
+
+    for first, guiding in ((1 << 40, False), (1, True)):
+        with made(first) as begun:
+            begun.run(3)
+            begun.save_state(file)
+        told = dataclasses.replace(scene, integrator=Path(light_paths=0, guiding=guiding))
+        with made((1 << 40) // first) as renderer, clpt.Renderer(told, narrow()) as whole:
+            renderer.run(1)
+            renderer.load_state(file)
+            renderer.run(4)
+            whole.run(7)
+            assert np.array_equal(renderer.image(), whole.image())
 
 
 @pytest.mark.usefixtures("little")
