@@ -267,6 +267,7 @@ class Queries:
             "MOVES_INSTANCES": 0,
             "INSTANCE_ROW_WORDS": INSTANCE.words,
             "LANES": 1,
+            "WIDE8_LEVELS": int(not self.device.info.is_cpu),
         }
         return build(self.device, assemble(root, texts, defines))
 

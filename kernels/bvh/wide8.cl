@@ -10,7 +10,11 @@
 /* What is added to offsets for rounding. The products o * r and plane * r are wrong by 2^-24 of themselves at
  * most; they differ by the distance, errors of which RAY_WIDER looks after. */
 #define WIDE8_PRODUCTS 0x1p-22f
+#if WIDE8_LEVELS
+#define WIDE8_STACK (BVH_LEVELS - 1) /* each level above the last leaves a node waiting, with its children */
+#else
 #define WIDE8_STACK (7 * BVH_DEPTH + 8) /* each node above leaves 7 children waiting */
+#endif
 
 typedef struct {
     float tmin;
@@ -102,6 +106,96 @@ inline TriHit wide8_hit(global const float *leaves, uint slot, float t, const Wi
     return tri_hit(t, u, v, as_uint(b[72]), as_uint(b[80]), v0, e1, e2);
 }
 
+#if WIDE8_LEVELS
+#define WIDE8_LESSER(type, i, j)             \
+    {                                        \
+        type lesser = min(k.s##i, k.s##j);   \
+        k.s##j = max(k.s##i, k.s##j);        \
+        k.s##i = lesser;                     \
+    }
+
+/* Of the children `m` that are met the slots, three bits each, the nearest lowest, under a bit that ends them. They
+ * are sorted by a network (Knuth 1998, sec. 5.3.4), by where the ray enters but for 7 parts in 2^23. */
+inline uint wide8_by_entry(float8 entry, Mask8 m)
+{
+    const uint8 slots = (uint8)(0, 1, 2, 3, 4, 5, 6, 7);
+    uint8 k = ((uint8)(m) >> slots & 1u) != 0u ? (as_uint8(entry) & ~7u) | slots : (uint8)(~0u);
+    WIDE8_LESSER(uint4, 0145, 2367)
+    WIDE8_LESSER(uint4, 0123, 4567)
+    WIDE8_LESSER(uint4, 0246, 1357)
+    WIDE8_LESSER(uint2, 23, 45)
+    WIDE8_LESSER(uint2, 13, 46)
+    WIDE8_LESSER(uint4, 1350, 2467)
+    uint4 two = (k.even & 7u) | (k.odd & 7u) << 3;
+    uint ends = 1u << 3 * popcount(m);
+    return ((two.x | two.y << 6 | two.z << 12 | two.w << 18) & (ends - 1)) | ends;
+}
+
+/* The same of the last child first, which promises most. */
+inline uint wide8_by_promise(Mask8 m)
+{
+    uint list = 1;
+    for (uint i = 0; i < 8; i++) list = m >> i & 1 ? list << 3 | i : list;
+    return list;
+}
+
+/* The word of the first child of a list, which has one; the others are left waiting with their node. */
+inline uint wide8_first(global const float *nodes, uint node, uint list, ulong *waiting, uint *waits)
+{
+    if (list >> 3 > 1) waiting[(*waits)++] = (ulong)(list >> 3) << 32 | node;
+    return as_uint(nodes[(ulong)node * 64 + 48 + (list & 7)]);
+}
+
+/* From a node to the first child of a list, or to one that waits if there is none. 0 if nothing waits. */
+inline int wide8_follow(global const float *nodes, uint node, uint list, ulong *waiting, uint *waits, uint *at)
+{
+    if (list == 1) {
+        if (!*waits) return 0;
+        ulong top = waiting[--*waits];
+        node = (uint)top;
+        list = (uint)(top >> 32);
+    }
+    *at = wide8_first(nodes, node, list, waiting, waits);
+    return 1;
+}
+
+/* Whether the ray meets one child's box between tmin and t; box: its place in the node. */
+inline int wide8_enters(global const float *box, const Wide8Ray *r, float t)
+{
+    float x = box[8 * r->nx] * r->rx + r->px, far_x = box[8 * (r->nx ^ 1)] * r->fx + r->gx;
+    float y = box[8 * r->ny] * r->ry + r->py, far_y = box[8 * (r->ny ^ 1)] * r->fy + r->gy;
+    float z = box[8 * r->nz] * r->rz + r->pz, far_z = box[8 * (r->nz ^ 1)] * r->fz + r->gz;
+    return fmax(fmax(x, y), fmax(z, r->tmin)) <= fmin(fmin(far_x, far_y), fmin(far_z, t));
+}
+
+/* From a node down to the nearest leaf, or to a node of which no child is met; what it comes to is
+ * returned. */
+inline uint wide8_descend(global const float *nodes, const Wide8Ray *r, float t, uint at, ulong *waiting,
+                          uint *waits)
+{
+    while (!(at & BVH_LEAF)) {
+        float8 entry;
+        Mask8 m = wide8_boxes(nodes + (ulong)at * 64, r, t, &entry);
+        if (!m) break;
+        at = wide8_first(nodes, at, wide8_by_entry(entry, m), waiting, waits);
+    }
+    return at;
+}
+
+/* The last that waits and is nearer than t, in `at`; 0 if none is. */
+inline int wide8_next(global const float *nodes, const Wide8Ray *r, ulong *waiting, uint *waits, float t, uint *at)
+{
+    uint node, list;
+    do {
+        if (!*waits) return 0;
+        ulong top = waiting[--*waits];
+        node = (uint)top;
+        list = (uint)(top >> 32);
+        *at = wide8_first(nodes, node, list, waiting, waits);
+    } while (!wide8_enters(nodes + (ulong)node * 64 + (list & 7), r, t));
+    return 1;
+}
+#else
 /* The nearest of the children `m` of a node that are met, of which there is one at least, by their words and
  * entry distances. The others are left waiting in descending order: entry distance, as bits, above the word,
  * so that both are compared at once. */
@@ -141,24 +235,9 @@ inline uint wide8_descend(global const float *nodes, const Wide8Ray *r, float t,
     return at;
 }
 
-/* Tests a block; a hit that is nearer than t becomes t and, by its slot, best. */
-inline void wide8_nearer(global const float *leaves, uint block, const Wide8Ray *r, float *t, uint *best)
-{
-    union { float8 v; float at[8]; } q;
-    float8 det;
-    Mask8 m = wide8_triangles(leaves + (ulong)block * 88, r, *t, &q.v, &det);
-    if (m) q.v /= det;
-    for (; m; m &= m - 1) {
-        uint i = mask8_first(m);
-        if (q.at[i] < *t) {
-            *t = q.at[i];
-            *best = block * 8 + i;
-        }
-    }
-}
-
 /* The last that waits and is nearer than t, in `at`; 0 if none is. */
-inline int wide8_next(const ulong *waiting, uint *waits, float t, uint *at)
+inline int wide8_next(global const float *nodes, const Wide8Ray *r, const ulong *waiting, uint *waits, float t,
+                      uint *at)
 {
     uint n = *waits;
     do {
@@ -168,21 +247,6 @@ inline int wide8_next(const ulong *waiting, uint *waits, float t, uint *at)
     *waits = n;
     *at = (uint)waiting[n];
     return 1;
-}
-
-inline TriHit wide8_closest(global const float *nodes, global const float *leaves, float ox, float oy,
-                            float oz, float dx, float dy, float dz, float tmin, float tmax)
-{
-    if (!ray_finite(ox, oy, oz, dx, dy, dz)) return tri_miss(tmax);
-    Wide8Ray r = wide8_ray(ox, oy, oz, dx, dy, dz, tmin);
-    ulong waiting[WIDE8_STACK];
-    uint n = 0, at = 0, best = BVH_MISS;
-    float t = tmax;
-    do {
-        at = wide8_descend(nodes, &r, t, at, waiting, &n);
-        if (at & BVH_LEAF) wide8_nearer(leaves, at & ~BVH_LEAF, &r, &t, &best);
-    } while (wide8_next(waiting, &n, t, &at));
-    return best == BVH_MISS ? tri_miss(tmax) : wide8_hit(leaves, best, t, &r);
 }
 
 /* From a node of which the children `m` are met to the last of them, which promises most; to one that waits
@@ -204,12 +268,70 @@ inline int wide8_last(global const float *nodes, uint node, Mask8 m, uint *waiti
     return 1;
 }
 
+#endif
+
+/* Tests a block; a hit that is nearer than t becomes t and, by its slot, best. */
+inline void wide8_nearer(global const float *leaves, uint block, const Wide8Ray *r, float *t, uint *best)
+{
+    union { float8 v; float at[8]; } q;
+#if WIDE8_LEVELS
+    union { float8 v; float at[8]; } det;
+    Mask8 m = wide8_triangles(leaves + (ulong)block * 88, r, *t, &q.v, &det.v);
+    for (uint i = 0; i < 8; i++) { /* all of them: no array is indexed at run time */
+        float near = m >> i & 1 ? q.at[i] / det.at[i] : INFINITY;
+        *best = near < *t ? block * 8 + i : *best;
+        *t = near < *t ? near : *t;
+    }
+#else
+    float8 det;
+    Mask8 m = wide8_triangles(leaves + (ulong)block * 88, r, *t, &q.v, &det);
+    if (m) q.v /= det;
+    for (; m; m &= m - 1) {
+        uint i = mask8_first(m);
+        if (q.at[i] < *t) {
+            *t = q.at[i];
+            *best = block * 8 + i;
+        }
+    }
+#endif
+}
+
+inline TriHit wide8_closest(global const float *nodes, global const float *leaves, float ox, float oy,
+                            float oz, float dx, float dy, float dz, float tmin, float tmax)
+{
+    if (!ray_finite(ox, oy, oz, dx, dy, dz)) return tri_miss(tmax);
+    Wide8Ray r = wide8_ray(ox, oy, oz, dx, dy, dz, tmin);
+    ulong waiting[WIDE8_STACK];
+    uint n = 0, at = 0, best = BVH_MISS;
+    float t = tmax;
+    do {
+        at = wide8_descend(nodes, &r, t, at, waiting, &n);
+        if (at & BVH_LEAF) wide8_nearer(leaves, at & ~BVH_LEAF, &r, &t, &best);
+    } while (wide8_next(nodes, &r, waiting, &n, t, &at));
+    return best == BVH_MISS ? tri_miss(tmax) : wide8_hit(leaves, best, t, &r);
+}
+
 /* Whether anything is between tmin and tmax. */
 inline int wide8_occluded(global const float *nodes, global const float *leaves, float ox, float oy,
                           float oz, float dx, float dy, float dz, float tmin, float tmax)
 {
     if (!ray_finite(ox, oy, oz, dx, dy, dz)) return 0;
     Wide8Ray r = wide8_ray(ox, oy, oz, dx, dy, dz, tmin);
+#if WIDE8_LEVELS
+    ulong waiting[WIDE8_STACK];
+    uint n = 0, at = 0, list;
+    float8 unused[2];
+    do {
+        list = 1;
+        if (at & BVH_LEAF) {
+            global const float *block = leaves + (ulong)(at & ~BVH_LEAF) * 88;
+            if (wide8_triangles(block, &r, tmax, &unused[0], &unused[1])) return 1;
+        } else {
+            list = wide8_by_promise(wide8_boxes(nodes + (ulong)at * 64, &r, tmax, &unused[0]));
+        }
+    } while (wide8_follow(nodes, at, list, waiting, &n, &at));
+    return 0;
+#else
     uint waiting[BVH_DEPTH], n = 0, at = 0;
     Mask8 sets[BVH_DEPTH], m;
     float8 unused[2];
@@ -223,4 +345,5 @@ inline int wide8_occluded(global const float *nodes, global const float *leaves,
         }
     } while (wide8_last(nodes, at, m, waiting, sets, &n, &at));
     return 0;
+#endif
 }

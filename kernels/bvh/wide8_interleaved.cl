@@ -54,7 +54,7 @@ inline int wide8_step(global const float *nodes, global const float *leaves, Wid
         if (m)
             at = wide8_nearest((global const uint *)(node + 48), entry.at, m, s->waiting.nearest, &s->waits);
     }
-    if (!m && !wide8_next(s->waiting.nearest, &s->waits, s->t, &at)) return 0;
+    if (!m && !wide8_next(nodes, &s->ray, s->waiting.nearest, &s->waits, s->t, &at)) return 0;
     s->at = at;
     wide8_fetch(nodes, leaves, at);
     return 1;

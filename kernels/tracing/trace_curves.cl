@@ -55,7 +55,7 @@ inline void curve_ray_visit(CurveTree tree, CurveRay *r, uint at)
 inline int curve_ray_next(CurveTree tree, CurveRay *r)
 {
     uint at;
-    if (!wide8_next(r->waiting, &r->waits, r->t, &at)) return 0;
+    if (!wide8_next(tree.nodes, &r->ray, r->waiting, &r->waits, r->t, &at)) return 0;
     curve_ray_visit(tree, r, at);
     return 1;
 }

@@ -183,7 +183,11 @@ def _static(texts: dict[str, device.Source]) -> dict[str, device.Source]:
 
 def _defines(features: Features, lanes: int) -> flags.Defines:
     """Return what all programs of a scene define; lanes: paths that a work-item shades."""
-    return {**flags.of_scene(features), "SLAB_BLOCK": SLAB_BLOCK if lanes == 1 else 0}
+    return {
+        **flags.of_scene(features),
+        "SLAB_BLOCK": SLAB_BLOCK if lanes == 1 else 0,
+        "WIDE8_LEVELS": int(lanes == 1),
+    }
 
 
 def _source(
