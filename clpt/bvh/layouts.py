@@ -243,6 +243,12 @@ BOX_LAYOUTS: dict[str, Callable[[Building, int, cl.Buffer], Packed]] = {
     "compact": compact_boxes,
 }
 
+# Files of kernels that take the place of others where a ray goes alone on a device without vectors.
+ALONE = {
+    "bvh/mask8.cl": ("bvh/mask8_bits.cl",),
+    "bvh/wide8_waiting.cl": ("bvh/wide8_levels.cl",),
+}
+
 TREES = tuple(name for name in LAYOUTS if name in BOX_LAYOUTS)  # all but brute force
 
 

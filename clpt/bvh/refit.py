@@ -79,9 +79,7 @@ def rebuild_boxes(building: Building, tree: Bvh, boxes: cl.Buffer) -> cl.Event |
         own = Building(building.device, building.stream)  # with a memory count of its own
         items, extents = trees.items_of_boxes(own, tree.count, boxes)
         if tree.parts[0].binary is None:
-            built = trees.over(
-                own, tree.count, items, extents, SHAPES_LEAF, depth=SHAPES_DEPTH
-            )
+            built = trees.over(own, tree.count, items, extents, SHAPES_LEAF, depth=SHAPES_DEPTH)
             _adopt_binary(own, tree, built)
         else:
             _adopt_wide(own, tree, trees.over(own, tree.count, items, extents, 1))

@@ -13,7 +13,7 @@ import pyopencl as cl
 from numpy.typing import NDArray
 from pyopencl.array import Array
 
-from ..bvh import TREES, choose_tree, traversal_text
+from ..bvh import ALONE, TREES, choose_tree, traversal_text
 from ..device import (
     BoundKernel,
     Device,
@@ -261,13 +261,13 @@ class Queries:
             "generated/instance_traversal.cl": self._instances_text(),
             "generated/motion.cl": "",  # instances stand still
             "generated/keyed_layout.cl": "",
+            **({} if self.device.info.is_cpu else ALONE),
         }
         defines = {
             "USES_INSTANCES": int(self.instanced),
             "MOVES_INSTANCES": 0,
             "INSTANCE_ROW_WORDS": INSTANCE.words,
             "LANES": 1,
-            "WIDE8_LEVELS": int(not self.device.info.is_cpu),
         }
         return build(self.device, assemble(root, texts, defines))
 

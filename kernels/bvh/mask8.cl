@@ -1,17 +1,7 @@
 /* Eight truth values as bits, the first and the last of them.
  *
- * On x86 the sign bits of a vector are one instruction away; elsewhere eight bytes of a ulong serve, and where rays go
- * alone, and vectors are taken apart, eight bits.
+ * On x86 the sign bits of a vector are one instruction away; elsewhere eight bytes of a ulong serve.
  */
-#if WIDE8_LEVELS
-typedef uint Mask8;
-inline Mask8 mask8(int8 m)
-{
-    int8 bits = m & (int8)(1, 2, 4, 8, 16, 32, 64, 128);
-    int4 four = bits.lo | bits.hi;
-    return (uint)(four.x | four.y | four.z | four.w);
-}
-#else
 #if defined(__AVX__) && defined(__has_builtin)
 #if __has_builtin(__builtin_ia32_movmskps256) && __has_builtin(__builtin_ctz)
 #define MASK8_NATIVE
@@ -30,5 +20,4 @@ inline Mask8 mask8(int8 m) { return as_ulong(convert_char8(m)) & 0x0101010101010
 inline uint mask8_first(Mask8 m) { return (uint)(63 - clz(m & -m)) >> 3; }
 inline uint mask8_last(Mask8 m) { return (uint)(63 - clz(m)) >> 3; }
 inline Mask8 mask8_without(Mask8 m, uint i) { return m ^ 1ul << 8 * i; }
-#endif
 #endif

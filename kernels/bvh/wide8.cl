@@ -1,6 +1,7 @@
 /* Traversal of the 8-wide tree that bvh/collapse.cl makes, one ray a work-item: the layout for CPUs.
  *
- * A node's eight boxes, and a block's eight triangles, are tested at once in float8.
+ * A node's eight boxes, and a block's eight triangles, are tested at once in float8. What waits is kept by
+ * bvh/wide8_waiting.cl, or where vectors are taken apart, as on a GPU, by bvh/wide8_levels.cl in its place.
  */
 #include "bvh/hit.cl"
 #include "bvh/mask8.cl"
@@ -10,11 +11,6 @@
 /* What is added to offsets for rounding. The products o * r and plane * r are wrong by 2^-24 of themselves at
  * most; they differ by the distance, errors of which RAY_WIDER looks after. */
 #define WIDE8_PRODUCTS 0x1p-22f
-#if WIDE8_LEVELS
-#define WIDE8_STACK (BVH_LEVELS - 1) /* each level above the last leaves a node waiting, with its children */
-#else
-#define WIDE8_STACK (7 * BVH_DEPTH + 8) /* each node above leaves 7 children waiting */
-#endif
 
 typedef struct {
     float tmin;
@@ -106,119 +102,7 @@ inline TriHit wide8_hit(global const float *leaves, uint slot, float t, const Wi
     return tri_hit(t, u, v, as_uint(b[72]), as_uint(b[80]), v0, e1, e2);
 }
 
-#if WIDE8_LEVELS
-#define WIDE8_LESSER(type, i, j)             \
-    {                                        \
-        type lesser = min(k.s##i, k.s##j);   \
-        k.s##j = max(k.s##i, k.s##j);        \
-        k.s##i = lesser;                     \
-    }
-
-/* Of the children `m` that are met the slots, three bits each, the nearest lowest, under a bit that ends them. They
- * are sorted by a network (Knuth 1998, sec. 5.3.4), by where the ray enters but for 7 parts in 2^23. */
-inline uint wide8_by_entry(float8 entry, Mask8 m)
-{
-    const uint8 slots = (uint8)(0, 1, 2, 3, 4, 5, 6, 7);
-    uint8 k = ((uint8)(m) >> slots & 1u) != 0u ? (as_uint8(entry) & ~7u) | slots : (uint8)(~0u);
-    WIDE8_LESSER(uint4, 0145, 2367)
-    WIDE8_LESSER(uint4, 0123, 4567)
-    WIDE8_LESSER(uint4, 0246, 1357)
-    WIDE8_LESSER(uint2, 23, 45)
-    WIDE8_LESSER(uint2, 13, 46)
-    WIDE8_LESSER(uint4, 1350, 2467)
-    uint4 two = (k.even & 7u) | (k.odd & 7u) << 3;
-    uint ends = 1u << 3 * popcount(m);
-    return ((two.x | two.y << 6 | two.z << 12 | two.w << 18) & (ends - 1)) | ends;
-}
-
-/* The same of the last child first, which promises most. */
-inline uint wide8_by_promise(Mask8 m)
-{
-    uint list = 1;
-    for (uint i = 0; i < 8; i++) list = m >> i & 1 ? list << 3 | i : list;
-    return list;
-}
-
-/* The word of the first child of a list, which has one; the others are left waiting with their node. */
-inline uint wide8_first(global const float *nodes, uint node, uint list, ulong *waiting, uint *waits)
-{
-    if (list >> 3 > 1) waiting[(*waits)++] = (ulong)(list >> 3) << 32 | node;
-    return as_uint(nodes[(ulong)node * 64 + 48 + (list & 7)]);
-}
-
-/* From a node to the first child of a list, or to one that waits if there is none. 0 if nothing waits. */
-inline int wide8_follow(global const float *nodes, uint node, uint list, ulong *waiting, uint *waits, uint *at)
-{
-    if (list == 1) {
-        if (!*waits) return 0;
-        ulong top = waiting[--*waits];
-        node = (uint)top;
-        list = (uint)(top >> 32);
-    }
-    *at = wide8_first(nodes, node, list, waiting, waits);
-    return 1;
-}
-
-/* Whether the ray meets one child's box between tmin and t; box: its place in the node. */
-inline int wide8_enters(global const float *box, const Wide8Ray *r, float t)
-{
-    float x = box[8 * r->nx] * r->rx + r->px, far_x = box[8 * (r->nx ^ 1)] * r->fx + r->gx;
-    float y = box[8 * r->ny] * r->ry + r->py, far_y = box[8 * (r->ny ^ 1)] * r->fy + r->gy;
-    float z = box[8 * r->nz] * r->rz + r->pz, far_z = box[8 * (r->nz ^ 1)] * r->fz + r->gz;
-    return fmax(fmax(x, y), fmax(z, r->tmin)) <= fmin(fmin(far_x, far_y), fmin(far_z, t));
-}
-
-/* From a node down to the nearest leaf, or to a node of which no child is met; what it comes to is
- * returned. */
-inline uint wide8_descend(global const float *nodes, const Wide8Ray *r, float t, uint at, ulong *waiting,
-                          uint *waits)
-{
-    while (!(at & BVH_LEAF)) {
-        float8 entry;
-        Mask8 m = wide8_boxes(nodes + (ulong)at * 64, r, t, &entry);
-        if (!m) break;
-        at = wide8_first(nodes, at, wide8_by_entry(entry, m), waiting, waits);
-    }
-    return at;
-}
-
-/* The last that waits and is nearer than t, in `at`; 0 if none is. */
-inline int wide8_next(global const float *nodes, const Wide8Ray *r, ulong *waiting, uint *waits, float t, uint *at)
-{
-    uint node, list;
-    do {
-        if (!*waits) return 0;
-        ulong top = waiting[--*waits];
-        node = (uint)top;
-        list = (uint)(top >> 32);
-        *at = wide8_first(nodes, node, list, waiting, waits);
-    } while (!wide8_enters(nodes + (ulong)node * 64 + (list & 7), r, t));
-    return 1;
-}
-#else
-/* The nearest of the children `m` of a node that are met, of which there is one at least, by their words and
- * entry distances. The others are left waiting in descending order: entry distance, as bits, above the word,
- * so that both are compared at once. */
-inline uint wide8_nearest(global const uint *words, const uint *entry, Mask8 m, ulong *waiting, uint *waits)
-{
-    uint i = mask8_first(m);
-    m &= m - 1;
-    if (!m) return words[i];
-    ulong near = (ulong)entry[i] << 32 | words[i];
-    uint base = *waits, n = base;
-    do { /* the nearest goes on */
-        i = mask8_first(m);
-        m &= m - 1;
-        ulong c = (ulong)entry[i] << 32 | words[i];
-        ulong far = max(near, c);
-        near = min(near, c);
-        uint k = n++;
-        for (; k > base && waiting[k - 1] < far; k--) waiting[k] = waiting[k - 1];
-        waiting[k] = far;
-    } while (m);
-    *waits = n;
-    return (uint)near;
-}
+#include "bvh/wide8_waiting.cl"
 
 /* From a node down to the nearest leaf, or to a node of which no child is met; what it comes to is
  * returned. */
@@ -227,73 +111,11 @@ inline uint wide8_descend(global const float *nodes, const Wide8Ray *r, float t,
 {
     while (!(at & BVH_LEAF)) {
         union { float8 v; uint at[8]; } entry;
-        global const float *node = nodes + (ulong)at * 64;
-        Mask8 m = wide8_boxes(node, r, t, &entry.v);
+        Mask8 m = wide8_boxes(nodes + (ulong)at * 64, r, t, &entry.v);
         if (!m) break;
-        at = wide8_nearest((global const uint *)(node + 48), entry.at, m, waiting, waits);
+        at = wide8_nearest(nodes, at, entry.at, m, waiting, waits);
     }
     return at;
-}
-
-/* The last that waits and is nearer than t, in `at`; 0 if none is. */
-inline int wide8_next(global const float *nodes, const Wide8Ray *r, const ulong *waiting, uint *waits, float t,
-                      uint *at)
-{
-    uint n = *waits;
-    do {
-        if (!n) return 0;
-        n--;
-    } while (as_float((uint)(waiting[n] >> 32)) >= t);
-    *waits = n;
-    *at = (uint)waiting[n];
-    return 1;
-}
-
-/* From a node of which the children `m` are met to the last of them, which promises most; to one that waits
- * if there is none. The others wait as a set, with their node. 0 if nothing waits. */
-inline int wide8_last(global const float *nodes, uint node, Mask8 m, uint *waiting, Mask8 *sets, uint *waits,
-                      uint *at)
-{
-    uint n = *waits;
-    if (!m) {
-        if (!n) return 0;
-        node = waiting[--n];
-        m = sets[n];
-    }
-    uint i = mask8_last(m);
-    *at = as_uint(nodes[(ulong)node * 64 + 48 + i]);
-    waiting[n] = node;
-    sets[n] = mask8_without(m, i);
-    *waits = n + (sets[n] != 0);
-    return 1;
-}
-
-#endif
-
-/* Tests a block; a hit that is nearer than t becomes t and, by its slot, best. */
-inline void wide8_nearer(global const float *leaves, uint block, const Wide8Ray *r, float *t, uint *best)
-{
-    union { float8 v; float at[8]; } q;
-#if WIDE8_LEVELS
-    union { float8 v; float at[8]; } det;
-    Mask8 m = wide8_triangles(leaves + (ulong)block * 88, r, *t, &q.v, &det.v);
-    for (uint i = 0; i < 8; i++) { /* all of them: no array is indexed at run time */
-        float near = m >> i & 1 ? q.at[i] / det.at[i] : INFINITY;
-        *best = near < *t ? block * 8 + i : *best;
-        *t = near < *t ? near : *t;
-    }
-#else
-    float8 det;
-    Mask8 m = wide8_triangles(leaves + (ulong)block * 88, r, *t, &q.v, &det);
-    if (m) q.v /= det;
-    for (; m; m &= m - 1) {
-        uint i = mask8_first(m);
-        if (q.at[i] < *t) {
-            *t = q.at[i];
-            *best = block * 8 + i;
-        }
-    }
-#endif
 }
 
 inline TriHit wide8_closest(global const float *nodes, global const float *leaves, float ox, float oy,
@@ -317,23 +139,9 @@ inline int wide8_occluded(global const float *nodes, global const float *leaves,
 {
     if (!ray_finite(ox, oy, oz, dx, dy, dz)) return 0;
     Wide8Ray r = wide8_ray(ox, oy, oz, dx, dy, dz, tmin);
-#if WIDE8_LEVELS
-    ulong waiting[WIDE8_STACK];
-    uint n = 0, at = 0, list;
-    float8 unused[2];
-    do {
-        list = 1;
-        if (at & BVH_LEAF) {
-            global const float *block = leaves + (ulong)(at & ~BVH_LEAF) * 88;
-            if (wide8_triangles(block, &r, tmax, &unused[0], &unused[1])) return 1;
-        } else {
-            list = wide8_by_promise(wide8_boxes(nodes + (ulong)at * 64, &r, tmax, &unused[0]));
-        }
-    } while (wide8_follow(nodes, at, list, waiting, &n, &at));
-    return 0;
-#else
-    uint waiting[BVH_DEPTH], n = 0, at = 0;
-    Mask8 sets[BVH_DEPTH], m;
+    WIDE8_SETS
+    uint at = 0;
+    Mask8 m;
     float8 unused[2];
     do {
         m = 0;
@@ -343,7 +151,6 @@ inline int wide8_occluded(global const float *nodes, global const float *leaves,
         } else {
             m = wide8_boxes(nodes + (ulong)at * 64, &r, tmax, &unused[0]);
         }
-    } while (wide8_last(nodes, at, m, waiting, sets, &n, &at));
+    } while (WIDE8_LAST(nodes, at, m, &at));
     return 0;
-#endif
 }

@@ -57,14 +57,9 @@ inline TriHit wide8_keyed_closest(global const float *nodes, global const float 
     do {
         while (!(at & BVH_LEAF)) {
             union { float8 v; uint at[8]; } entry;
-            global const float *node = nodes + (ulong)at * KEYED_NODE;
-            Mask8 m = wide8_keyed_boxes(node, share, &r, t, &entry.v);
+            Mask8 m = wide8_keyed_boxes(nodes + (ulong)at * KEYED_NODE, share, &r, t, &entry.v);
             if (!m) break;
-#if WIDE8_LEVELS
-            at = wide8_first(nodes, at, wide8_by_entry(entry.v, m), waiting, &n);
-#else
-            at = wide8_nearest((global const uint *)(node + 48), entry.at, m, waiting, &n);
-#endif
+            at = wide8_nearest(nodes, at, entry.at, m, waiting, &n);
         }
         if (!(at & BVH_LEAF)) continue;
         union { float8 v; float at[8]; } q;
@@ -78,11 +73,7 @@ inline TriHit wide8_keyed_closest(global const float *nodes, global const float 
             t = q.at[i];
             best = block * 8 + i;
         }
-#if WIDE8_LEVELS
-    } while (wide8_follow(nodes, at, 1, waiting, &n, &at));
-#else
-    } while (wide8_next(nodes, &r, waiting, &n, t, &at));
-#endif
+    } while (wide8_later(nodes, waiting, &n, t, &at));
     return best == BVH_MISS ? tri_miss(tmax) : wide8_keyed_hit(leaves, share, best, t, &r);
 }
 
@@ -91,23 +82,9 @@ inline int wide8_keyed_occluded(global const float *nodes, global const float *l
 {
     if (!ray_finite(o.x, o.y, o.z, d.x, d.y, d.z)) return 0;
     Wide8Ray r = wide8_ray(o.x, o.y, o.z, d.x, d.y, d.z, tmin);
-#if WIDE8_LEVELS
-    ulong waiting[WIDE8_STACK];
-    uint n = 0, at = 0, list;
-    float8 unused[2];
-    do {
-        list = 1;
-        if (at & BVH_LEAF) {
-            global const float *block = leaves + (ulong)(at & ~BVH_LEAF) * KEYED_LEAF;
-            if (wide8_keyed_block(block, share, &r, tmax, &unused[0], &unused[1])) return 1;
-        } else {
-            list = wide8_by_promise(wide8_keyed_boxes(nodes + (ulong)at * KEYED_NODE, share, &r, tmax, &unused[0]));
-        }
-    } while (wide8_follow(nodes, at, list, waiting, &n, &at));
-    return 0;
-#else
-    uint waiting[BVH_DEPTH], n = 0, at = 0;
-    Mask8 sets[BVH_DEPTH], m;
+    WIDE8_SETS
+    uint at = 0;
+    Mask8 m;
     float8 unused[2];
     do {
         m = 0;
@@ -117,7 +94,6 @@ inline int wide8_keyed_occluded(global const float *nodes, global const float *l
         } else {
             m = wide8_keyed_boxes(nodes + (ulong)at * KEYED_NODE, share, &r, tmax, &unused[0]);
         }
-    } while (wide8_last(nodes, at, m, waiting, sets, &n, &at));
+    } while (WIDE8_LAST(nodes, at, m, &at));
     return 0;
-#endif
 }

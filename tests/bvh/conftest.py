@@ -8,6 +8,7 @@ import pytest
 
 from clpt import bvh
 from clpt import device as dev
+from clpt.bvh import layouts
 
 TREE = """
 #include "bvh/{layout}.cl"
@@ -79,8 +80,8 @@ def trace(device) -> Callable:
     def program(layout: str, lanes: int) -> dev.Program:
         if (layout, lanes) not in programs:
             text = BRUTE if layout == "brute" else TREE.format(layout=layout)
-            defines = {"LANES": lanes, "WIDE8_LEVELS": int(lanes == 1)}
-            source = dev.assemble("test", {"test": text}, defines)
+            alone = layouts.ALONE if lanes == 1 else {}
+            source = dev.assemble("test", {"test": text, **alone}, {"LANES": lanes})
             programs[layout, lanes] = dev.build(device, source)
         return programs[layout, lanes]
 

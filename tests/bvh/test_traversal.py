@@ -84,7 +84,7 @@ def test_agrees_with_reference(device, trace, reference, layout, lanes, count):
 
 @pytest.mark.parametrize(("layout", "lanes"), [("wide8", 1), ("wide8", 8), ("compact", 1)])
 def test_the_deepest_trees(device, trace, layout, lanes):
-    """Triangles that shrink by .6 make 41 levels of wide nodes, if each takes what costs the least."""
+    """Triangles that shrink by .6: trees of the least cost have up to 41 levels."""
     sizes = (0.6 ** (np.arange(2000) % 200))[:, None, None]
     corners = np.array([[1, 1, 1], [1.2, 1, 1], [1, 1.2, 1]])
     triangles = (sizes * corners).astype(np.float32)
