@@ -142,14 +142,13 @@ inline int wide8_occluded(global const float *nodes, global const float *leaves,
     WIDE8_SETS
     uint at = 0;
     Mask8 m;
-    float8 unused[2];
+    float8 unused;
     do {
         m = 0;
         if (at & BVH_LEAF) {
-            global const float *block = leaves + (ulong)(at & ~BVH_LEAF) * 88;
-            if (wide8_triangles(block, &r, tmax, &unused[0], &unused[1])) return 1;
+            if (wide8_meets(leaves, at & ~BVH_LEAF, &r, tmax)) return 1;
         } else {
-            m = wide8_boxes(nodes + (ulong)at * 64, &r, tmax, &unused[0]);
+            m = wide8_boxes(nodes + (ulong)at * 64, &r, tmax, &unused);
         }
     } while (WIDE8_LAST(nodes, at, m, &at));
     return 0;

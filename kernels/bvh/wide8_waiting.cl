@@ -78,3 +78,10 @@ inline void wide8_nearer(global const float *leaves, uint block, const Wide8Ray 
         }
     }
 }
+
+/* Whether the ray meets a triangle of a block. */
+inline int wide8_meets(global const float *leaves, uint block, const Wide8Ray *r, float t)
+{
+    float8 unused[2];
+    return wide8_triangles(leaves + (ulong)block * 88, r, t, &unused[0], &unused[1]) != 0;
+}
