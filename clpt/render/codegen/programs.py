@@ -205,7 +205,7 @@ def _source(
 def _shared(features: Features, layout: str) -> Files:
     """The generated files that are the same for all programs of a scene."""
     return {
-        **shapes.virtual_files(),
+        **shapes.virtual_files(features),
         **rough_coat_table.virtual_files(),
         **lights.virtual_files(),
         **signatures.virtual_files(features, layout),
