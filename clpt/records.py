@@ -365,7 +365,11 @@ TREE_BITS = Constants(
     leaf=(0x80000000, "it names an item, no node"),
 )
 TREE_SIZES = Constants(
-    "BVH_", "Sizes of trees.", depth=(48, "most levels of a leaf below the root")
+    "BVH_",
+    "Sizes of trees.",
+    depth=(48, "most levels of a leaf below the root"),
+    levels=(16, "most levels of nodes 8 wide: a third of that"),
+    shapes_depth=(32, "most levels of a leaf below the root of a binary tree over shapes"),
 )
 TREE_REACHES = Constants(
     "BVH_",

@@ -67,12 +67,16 @@ class Film:
             if count:
                 sums[name] = 4 * count * self._padded_pixels
         self.sums = {n: buffers.allocate(f"the {n}", size, advice) for n, size in sums.items()}
-        self._image = buffers.allocate("the image", 16 * pixels, advice)
         self._sum_bytes = sums
         self._held: dict[str, cl.Buffer] = {}
+        self._image = buffers.allocate("the image", 16 * pixels, advice)
         shape = (*self.size[::-1], 4)
         self.picture = device.DeviceArray(stream.queue, shape, np.float32, data=self._image)
         self._written: cl.Event | None = None  # of the last command that wrote `picture`
+
+    def show_in(self, picture: device.DeviceArray) -> None:
+        """Let `picture` be another film's, of the same size."""
+        self.picture, self._image = picture, picture.base_data
 
     @property
     def arguments(self) -> dict[str, Any]:
