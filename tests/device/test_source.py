@@ -15,7 +15,7 @@ def test_the_kernels_are_found():
 def test_a_kernel_file_is_named_by_its_path():
     source = assemble("root", {"root": '#include "core/lanes.cl"\nreal after;'}, {"LANES": 1})
     assert source.files == ("core/lanes.cl", "root")
-    assert '#line 1 "kernels/core/lanes.cl"' in source.text
+    assert '"kernels/core/lanes.cl"\n/* Lanes: ' in source.text
     assert source.text.endswith('#line 2 "root"\nreal after;\n')
 
 
@@ -40,6 +40,17 @@ def test_defines_come_first_if_the_text_names_them():
     defines = {"N": "K", "K": 3, "M": "uint", "NONE": 0}
     text = assemble("a", {"a": "M x = N;"}, defines).text
     assert text == '#define N K\n#define K 3\n#define M uint\n#line 1 "a"\nM x = N;\n'
+
+
+def test_a_comment_at_a_files_head_stands_in_front_of_what_is_left_of_it():
+    """Of the root it is first of all; rows behind it have the numbers that they have in files."""
+    tail = "\n#define NO 1\n\nint x;"
+    virtual = {"a": '/* A. */\n#include "b"' + tail, "b": '/* B. */\n#include "c"' + tail}
+    source = assemble("a", {**virtual, "c": "int c;"})
+    lines = ["/* A. */", '#line 1 "c"', "int c;", '#line 4 "b"', "/* B. */", "int x;"]
+    assert source.text.splitlines() == ['#line 1 "a"', *lines, '#line 5 "a"', "int x;"]
+    assert source.place(7) == ("b", 5)
+    assert source.files == ("a", "c", "b")
 
 
 USED = """\
@@ -73,7 +84,7 @@ def test_what_nothing_names_is_left_out():
     without = USED.replace("constant float table[2][2] = {{1.0f, 2.0f}, {3.0f, 4.0f}};\n", "\n")
     head, rest = without.split("#define UNUSED")
     number = USED.splitlines().index("/* The kernel. */") + 1
-    kernel = rest[rest.index("\n/* The kernel") :].replace("/* The", f"#line {number}\n/* The")
+    kernel = rest[rest.index("\n/* The kernel") + 1 :].replace("/* The", f"#line {number}\n/* The")
     assert text == f'#line 1 "a"\n{head}{kernel}'
     assert assemble("a", {"a": USED}, library=True).text == f'#line 1 "a"\n{USED}'
 
