@@ -283,9 +283,7 @@ class Record:
         return f"#define load_{name}(s, at) {value}\n{store}"
 
 
-def row_words(
-    table: str, at: str, count: int, many: bool = False
-) -> tuple[list[str], list[str]]:
+def row_words(table: str, at: str, count: int, many: bool = False) -> tuple[list[str], list[str]]:
     """Return statements that read `count` words from `at` on, per lane, and each word's name.
 
     Four at a time, see kernels/core/rows.cl; the last four may be some of those before. many: lanes

@@ -12,7 +12,7 @@ from typing import NoReturn
 from ..errors import KernelBuildError
 from ..records import constant_files
 from .conditions import OPENING, Macros, taken
-from .definitions import Paragraph, macro, named, paragraphs, whole
+from .definitions import Paragraph, macro, named, paragraphs, whole, with_gaps
 from .text_rows import Row, rows_of
 
 _GENERATED = "generated/"  # begins the names of files that are made for a scene
@@ -242,7 +242,9 @@ class _Assembly:
         defines = [macro(name, value) for name, value in self.defines.items()]
         own = [one for _, ps in self.pieces for p in ps for one in p.definitions]
         stay = named([*defines, *own]) | {*(defines if self.library else ())}
-        left = [(file, [p.left(stay) for p in ps]) for file, ps in self.pieces]
+        made = [ps for file, ps in self.pieces if file.generated]
+        rows = with_gaps(stay, (one for ps in made for p in ps for one in p.definitions))
+        left = [(file, [p.left(rows) for p in ps]) for file, ps in self.pieces]
         text = _Text([row.text for one in defines if one in stay for row in one.rows])
         root = self.pieces[0][0]
         if any(rows for file, found in left if file is root for rows, _ in found):

@@ -53,6 +53,19 @@ def test_a_comment_at_a_files_head_stands_in_front_of_what_is_left_of_it():
     assert source.files == ("a", "c", "b")
 
 
+def test_members_in_memory_that_nothing_names_are_gaps():
+    """The others lie where they lay; a struct of lanes, or one that a file has, stays as it is."""
+    made = "generated/s"
+    members = "    {0} a; /* A. */\n    {0} b[3];\n    {0} c;\n    {0} d;\n"
+    words, lanes = (f"typedef struct {{\n{members.format(name)}}} S;\n" for name in ("int", "real"))
+    kernel = f'#include "{made}"\nkernel void run(global S *s) {{ s->c = 1; }}\n'
+    text = assemble("a", {"a": kernel, made: words}).text
+    rows = ["    int unused_0[4];", "    int c;", "    int unused_1[1];", "} S;"]
+    assert text.splitlines()[2:6] == rows
+    assert lanes in assemble("a", {"a": kernel, made: lanes}).text
+    assert words in assemble("a", {"a": words + kernel, made: ""}).text
+
+
 USED = """\
 /* Of one. */
 real one(real x);
