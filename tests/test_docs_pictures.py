@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
@@ -11,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageFilter
 
 from clpt.scene import KINDS
 from clpt.scene.params import Kind
@@ -42,11 +43,11 @@ def test_the_picture_of_a_kind_shows_it(table):
     for name, picture in table.pictures().items():
         category, kind = name.split("/")
         shown = {p.kind for p in _parts(picture.scene()) if isinstance(p, _base(category))}
-        image = np.asarray(Image.open(table.FOLDER / f"{name}.png").convert("RGB"), float)
+        image = np.asarray(Image.open(table.file(name)).convert("RGB"), float)
         if kind not in shown:
             wrong.append(f"{name}: its scene has none")
         if not 20.0 < image.mean() < 235.0 or image.std() <= 15.0:
-            wrong.append(f"{name}.png: black, blown out or even")
+            wrong.append(f"{name}: black, blown out or even")
     asked = "mend docs/pictures, then run python -m docs.pictures with these names"
     assert not wrong, "\n  ".join([asked, *wrong])
 
@@ -68,8 +69,25 @@ def test_the_gallery_has_every_scene():
         assert f"clpt render scenes/{picture.parent.name}" in page
 
 
-def test_pictures_are_small():
-    assert sum(f.stat().st_size for f in (ROOT / "docs/pictures").rglob("*.png")) < 2.5e6
+def test_pictures_of_the_gallery_are_clean():
+    """Grain: how far a pixel is from the median of 3x3; fireflies: those that are far above it."""
+    page = (ROOT / "docs/gallery.md").read_text("utf-8").split("## Every kind")[0]
+    noisy = []
+    for name in re.findall(r"!\[[^\]]*\]\((\S+\.(?:png|jpg))\)", page):
+        image = Image.open(ROOT / "docs" / name).convert("L")
+        near = image.filter(ImageFilter.MedianFilter(3))
+        above = np.asarray(image, float) - np.asarray(near, float)
+        grain, fireflies = np.median(np.abs(above)), (above > 50.0).mean()
+        if grain > 3.0 or fireflies > 0.0025:
+            noisy.append(f"{name}: grain {grain:.1f}, fireflies {fireflies:.2%}")
+    assert noisy == []
+
+
+def test_pictures_are_small_and_have_all_their_colours():
+    files = [f for f in (ROOT / "docs/pictures").rglob("*") if f.suffix in (".png", ".webp")]
+    assert sum(f.stat().st_size for f in files) < 3.5e6
+    drawings = {"lens_planar.png"}
+    assert {f.name for f in files if Image.open(f).mode == "P"} <= drawings
 
 
 def _base(category: str) -> type[Kind]:

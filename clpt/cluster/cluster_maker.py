@@ -26,6 +26,7 @@ from clpt.render.wavefront.tracer import Selection
 from clpt.render.wavefront.wavefront import Counts
 from clpt.scene import Scene
 from clpt.scene.fingerprint import Plain
+from clpt.scene.integrators import Integrator
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,6 +240,9 @@ class ClusterMaker(HostMaker):
             self._home = None
         else:
             self._home.empty()
+
+    def follow(self, way: Integrator, apply: Apply) -> None:
+        """Leave it to the workers, which agree on a way."""
 
     def close(self) -> None:
         """Give back what this machine holds; workers keep the scene until another needs room."""

@@ -12,7 +12,7 @@ from clpt.errors import SceneError
 from clpt.render.device_film import DeviceFilm
 from clpt.render.wavefront.film_state import FilmState, Ranges, join_ranges
 from clpt.render.wavefront.tracer import OnBatch, Selection, use_all_pixels
-from clpt.render.wavefront.wavefront import Counts
+from clpt.render.wavefront.wavefront import Counts, Wavefront
 
 _Made = TypeVar("_Made")
 
@@ -42,8 +42,8 @@ class DeviceWorker:
 
     name: for people; film: its own; unsaved: the selections and ranges of samples that it holds,
     and nothing else does; shown: the film that it was made to be, if any; is_other: whether it may
-    be another one than that of `unsaved`; paths: that it traced;
-    rate: of paths [1/s], 0 when not known.
+    be another one than that of `unsaved`; paths: that it traced; rate: of paths [1/s], 0 when not
+    known.
     """
 
     def __init__(self, name: str, film: DeviceFilm):
@@ -54,7 +54,7 @@ class DeviceWorker:
         self.is_other = False
         self.paths, self.rate = 0, 0.0
         self.past = Counts()  # before the film was emptied
-        self._selection: Selection | None = None
+        self._selected: tuple[Selection, Wavefront] | None = None
 
     @property
     def counts(self) -> Counts:
@@ -73,9 +73,10 @@ class DeviceWorker:
     def do(self, selection: Selection, first: int, end: int, on_batch: OnBatch) -> bool:
         """Add samples first to end - 1 to the film; return whether it was not stopped."""
         wavefront = self.film.wavefront
-        if selection is not self._selection:
+        former, by = self._selected or (None, None)
+        if selection is not former or by is not wavefront:
             selection.prepare(wavefront)
-        self._selection = selection
+        self._selected = selection, wavefront
         return selection.add(wavefront, first, end, on_batch)
 
     def take(self) -> FilmState:
@@ -93,7 +94,7 @@ class DeviceWorker:
 
     def use_all_pixels(self) -> None:
         """Let later samples be of every pixel."""
-        self._selection = None
+        self._selected = None
         use_all_pixels(self.film.wavefront)
 
     def show(self, state: FilmState) -> None:

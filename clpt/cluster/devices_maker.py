@@ -24,6 +24,7 @@ from clpt.render.wavefront.tracer import Selection
 from clpt.render.wavefront.wavefront import Counts
 from clpt.scene import Scene
 from clpt.scene.fingerprint import Plain
+from clpt.scene.integrators import Integrator
 
 
 class DevicesMaker(HostMaker):
@@ -231,15 +232,17 @@ class DevicesMaker(HostMaker):
 
     def update(self, changes: Changes, events: dev.Events, apply: Apply) -> None:
         """Render another scene from now on, which is lowered once for all devices."""
-
-        def write(write: Callable[[], None], *, again: bool = False) -> None:
-            write()
-
         share = Once()
-        apply(
-            lambda: self._on_each(lambda one: one.update(changes, events, write, share)),
-            refusals=(Exception,),
-        )
+        self._write(lambda one: one.update(changes, events, _written, share), apply)
+
+    def follow(self, way: Integrator, apply: Apply) -> None:
+        """Render in another way, which made a film that is gone on with."""
+        share = Once()
+        self._write(lambda one: one.follow(way, _written, share), apply)
+
+    def _write(self, action: Callable[[DeviceFilm], None], apply: Apply) -> None:
+        """Change the scene on every device at once."""
+        apply(lambda: self._on_each(action), refusals=(Exception,))
 
     def close(self) -> None:
         """Give the memory of all devices back."""
@@ -267,3 +270,8 @@ class DevicesMaker(HostMaker):
             if isinstance(result, BaseException):
                 worker.unsaved.clear()  # of the picture that ends
                 self.crew.drop(worker, result)
+
+
+def _written(write: Callable[[], None], *, again: bool = False) -> None:
+    """Write what changes on a device, within the change of all devices."""
+    write()

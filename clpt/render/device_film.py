@@ -41,6 +41,7 @@ from clpt.render.film.picture_form import PictureForm
 from clpt.render.film.saved_film import Origin
 from clpt.render.lowering.scene import Lowered, lower
 from clpt.render.options import RenderOptions
+from clpt.render.trials.trial import Ground, decided
 from clpt.render.wavefront.film_state import DIMENSIONS, FilmState, Ranges
 from clpt.render.wavefront.strategy import Tuning
 from clpt.render.wavefront.tracer import use_all_pixels
@@ -48,7 +49,7 @@ from clpt.render.wavefront.wavefront import Wavefront
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
 from clpt.scene.fingerprint import Fingerprint, Plain, fingerprint
-from clpt.scene.integrators import PIXELWISE
+from clpt.scene.integrators import PIXELWISE, Integrator
 from clpt.scene.lights import Light
 from clpt.scene.materials import Material
 from clpt.scene.params import fields_of, params
@@ -109,18 +110,22 @@ class DeviceFilm:
         if texture_budget is None:
             texture_budget = texture_budget_of(device)
         self._texture_budget, self._successors = texture_budget, Successors()
-        lowered = self._lower(scene, share)
-        self.seconds["lower"] = time.perf_counter() - start
-        self._opened: Wavefront | None = None
-        self._opened = first = Wavefront.create(
+        looped = options.get("looped", None if options.get("queue") is None else True)
+        tuning = Tuning(options.get("layout"), options.get("queued"), options.get("cancel_seconds"))
+        self._ground = Ground(device, tuning, looped)
+        self._create = partial(
+            Wavefront.create,
             device,
-            lowered,
-            Tuning(options.get("layout"), options.get("queued"), options.get("cancel_seconds")),
+            tuning=tuning,
             slots=options.get("slots"),
-            looped=options.get("looped", None if options.get("queue") is None else True),
+            looped=looped,
             tree_quality=options.get("tree_quality", "high"),
             halves=options.get("halves", False) or needs.halves(scene, denoise),
         )
+        lowered = self._lower(scene, share)
+        self.seconds["lower"] = time.perf_counter() - start
+        self._opened: Wavefront | None = None
+        self._opened = first = self._create(lowered)
         first.prepare()
         self.built = device.builds.programs - before[0], device.builds.cached - before[1]
         self.seconds["programs"] = first.program_seconds
@@ -235,12 +240,27 @@ class DeviceFilm:
 
         apply(take, again=True)
 
-    def _lower(self, scene: Scene, share: Share | None, former: Lowered | None = None) -> Lowered:
-        """Return the tables of a scene; former: of the scene before it."""
+    def _lower(
+        self, scene: Scene, share: Share | None, former: Lowered | None = None, *,
+        anew: bool = False,
+    ) -> Lowered:  # fmt: skip
+        """Return the tables of a scene, for the way that is best; former: of the scene before it.
+
+        anew: choose the way anew. A trial may decide, but not for pictures that people steer: they
+        want to see something soon, and what is chosen stays.
+        """
+        steered = self._ground.tuning.cancel_seconds is not None
 
         def make() -> Lowered:
-            readable = resolve_device_arrays(scene, self.device.queue)
-            return lower(readable, self._texture_budget, former)
+            readable, budget = resolve_device_arrays(scene, self.device.queue), self._texture_budget
+            lowered = lower(readable, budget, former, anew=anew and not steered)
+            if not lowered.candidates or steered:
+                return lowered
+
+            def lower_as(way: Integrator) -> Lowered:
+                return lower(replace(readable, integrator=way), budget, lowered)
+
+            return decided(self._ground, lowered, lower_as)
 
         if share is None:
             return make()
@@ -317,15 +337,52 @@ class DeviceFilm:
         for event in events or ():
             dev.wait(event)
         shown, remarks = between(self.scene, scene) if changes.motion else (scene, [])
-        first = self.wavefront
-        lowered = self._lower(shown, share, first.scene.lowered)
-        take = rebuild.prepare(first, lowered, changes.scene is None)
+        first, whole = self.wavefront, changes.scene is not None
+        former = first.scene.lowered
+        lowered = self._lower(shown, share, former, anew=whole)
+        if rebuild.has_other_paths(former, lowered):
+            take = self._exchanged(lowered)
+        else:
+            take = rebuild.prepare(first, lowered, refit=not whole)
 
         def write() -> None:
             take()
             self._moving = None
 
         return write, [*lowered.warnings, *remarks]
+
+    def other_way(self, origin: Origin) -> Integrator | None:
+        """Return the integrator that made a film of the scene, if another one was chosen here."""
+        own = self.origin()
+        if not self.scene.integrator.leaves_choice or own.settings == origin.settings:
+            return None
+        return None if own.scene.differences(origin.scene) else origin.way
+
+    def follow(self, way: Integrator, apply: Apply, share: Share | None = None) -> None:
+        """Render in another way, if its film has another form; see `update`."""
+        former = self.wavefront.scene.lowered
+        lowered = self._lower(self.scene, share, replace(former, integrator=way))
+        if rebuild.has_other_paths(former, lowered):
+            apply(self._exchanged(lowered), again=True)
+
+    def _exchanged(self, lowered: Lowered) -> Callable[[], None]:
+        """Return what puts a wavefront whose film has another form in the place of this one.
+
+        The memory of the picture stays. Raises as `Wavefront.create`, and SceneError for a film
+        of another size; nothing has changed then.
+        """
+        first = self.wavefront
+        refused = rebuild.refusal(first.scene.lowered, lowered)
+        if refused is not None:
+            raise refused
+        second = self._create(lowered)
+        second.prepare()
+
+        def take() -> None:
+            second.show_in(first.film.picture)
+            self._opened, self._moving = second, None
+
+        return take
 
     # ---- what the film is of
 
@@ -339,6 +396,7 @@ class DeviceFilm:
         settings: dict[str, Plain] = {
             "chosen.integrator": lowered.integrator.kind,
             "chosen.light_paths": float(lowered.settings["light_paths"]),
+            "chosen.guiding": bool(features.transport.guided),
             "chosen.splatting": features.film.filter.reach > 0,
             "chosen.texels": int(lowered.tables["texels"].size),
             "halves": first.film.halves == 2,
@@ -381,6 +439,7 @@ class DeviceFilm:
             paper=tuple(map(tuple, white_paper(film, features.spectra.mode).tolist())),
             names=first.scene.lowered.layer_names,
             adaptive=self.scene.noise is not None,
+            octaves=self.scene.sampler.octaves * ("variance" in features.film.layers.names),
         )
 
 

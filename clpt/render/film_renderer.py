@@ -10,6 +10,7 @@ import dataclasses
 import logging
 import time
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -353,10 +354,11 @@ class FilmRenderer(FilmOwner, Pictures):
         the shape, its name, or its index in `scene.shapes`. A shape or material that the renderer
         had at first remains the key of whatever has replaced it. scene: another scene of the same
         film, for any other change; arrays and images that it shares with the present one are taken
-        to be unchanged. motion: what changes place, of shapes, lights and the camera, moves from
-        where it was to where it is, and so do vertices, while the shutter of the camera is open;
-        the next update goes on from there. wait_for: events of the caller that come first. The
-        scene is lowered again then, and once more after.
+        to be unchanged, and what is "auto" is chosen anew, as edits alone do not. motion: what
+        changes place, of shapes, lights and the camera, moves from where it was to where it is, and
+        so do vertices, while the shutter of the camera is open; the next update goes on from there.
+        wait_for: events of the caller that come first. The scene is lowered again then, and once
+        more after.
 
         The first of three ways that is possible is taken:
 
@@ -390,20 +392,21 @@ class FilmRenderer(FilmOwner, Pictures):
         self,
         write: Callable[[], None],
         *,
+        what: str = "update",
         again: bool = False,
         refusals: tuple[type[BaseException], ...] = (),
     ) -> None:
         """Change the scene, and begin at the first sample.
 
-        write: writes the change; again: whether it may be called once more after an error;
-        refusals: errors of it that leave all as it was.
+        write: writes the change; what: that is, for people; again: whether it may be called once
+        more after an error; refusals: errors of it that leave all as it was.
         """
 
         def put(_: BaseException | None = None) -> Contents:
             write()
             return self._emptied()
 
-        change = self._change("update", put if again else None, heals=False)
+        change = self._change(what, put if again else None, heals=False)
         with change, change.beginning_unless(*refusals):
             self._contents = put()
 
@@ -539,10 +542,21 @@ class FilmRenderer(FilmOwner, Pictures):
         return SavedFilm(film, self._origin(), self._form, dict(vars(counts)), **so_far)
 
     @synchronized
+    def _follow(self, origin: Origin) -> None:
+        """Render in the way that made a film, if that can be; the film may be empty then.
+
+        What is "auto" may depend on how many samples are wanted, which the film did not know.
+        """
+        way = self._maker.home.other_way(origin)
+        if way is not None:
+            self._maker.follow(way, partial(self._apply, what="load_state"))
+
+    @synchronized
     def _restore(self, saved: SavedFilm) -> None:
         """Go on from a saved film, as `load_state` does. Raises SceneError."""
-        saved.check_fits(self._origin(), self._maker.home.words())
         self._settled  # noqa: B018
+        self._follow(saved.origin)
+        saved.check_fits(self._origin(), self._maker.home.words())
         chosen = self._maker.adaptively(saved.adaptive, 0) if saved.adaptive else None
         restored = Contents(saved.film.taken, chosen, saved.sessions)
         self._put("load_state", saved.film, restored, Counts(**saved.counts))

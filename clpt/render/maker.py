@@ -23,6 +23,7 @@ from clpt.render.wavefront.tracer import Tracer
 from clpt.render.wavefront.wavefront import Counts
 from clpt.scene import Scene
 from clpt.scene.fingerprint import Plain
+from clpt.scene.integrators import Integrator
 
 Settle = Callable[[BaseException | None], Contents]
 
@@ -190,6 +191,10 @@ class Maker(ABC):
         `FilmRenderer._apply`.
         """
         self.home.update(changes, events, apply)
+
+    def follow(self, way: Integrator, apply: Apply) -> None:
+        """Render in another way, which made a film that is gone on with; see `update`."""
+        self.home.follow(way, apply)
 
     def close(self) -> None:
         """Give back what it holds."""

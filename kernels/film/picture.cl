@@ -1,13 +1,14 @@
-/* What pictures read of a film: its sums as numbers. Halves: the films of even and of odd samples, from the first one
- * that is wanted to the one before `end`; a film that is not divided is one half. For work-items of one lane. */
+/* What pictures read of a film: its sums over all parts, as numbers. For work-items of one lane. */
 #include "film/film.cl"
+#define FILM_PARTS (settings->halves * settings->octaves) /* film/work_list.cl */
 
-/* One sum over halves, as a number. sum: its first word in the first half; size: words of a half. */
-inline float halves_sum(global const uint *sum, size_t stream, size_t size, int2 halves)
+/* One sum as a number. sum: its first word in the first part. */
+inline float parts_sum(global const Settings *settings, global const uint *sum)
 {
+    size_t stream = settings->padded_pixels;
     Fixed total = fixed_zero();
-    for (int i = halves.x; i < halves.y; i++) {
-        global const uint *word = sum + i * size;
+    for (int i = 0; i < FILM_PARTS; i++) {
+        global const uint *word = sum + i * FILM_WORDS * stream;
         Fixed f = {word[0], word[stream], word[2 * stream]};
         total = fixed_add(total, f);
     }
@@ -15,20 +16,19 @@ inline float halves_sum(global const uint *sum, size_t stream, size_t size, int2
 }
 
 /* A pixel's three sums, in the group of words that begins at `group`. */
-inline vec3 film_sum(global const Settings *settings, global const uint *film, int pixel_index, int2 halves, int group)
+inline vec3 film_sum(global const Settings *settings, global const uint *film, int pixel_index, int group)
 {
-    size_t stream = settings->padded_pixels, size = FILM_WORDS * stream;
-    global const uint *first = film + group * stream + pixel_index;
-    return v3(halves_sum(first, stream, size, halves), halves_sum(first + 3 * stream, stream, size, halves),
-              halves_sum(first + 6 * stream, stream, size, halves));
+    size_t stream = settings->padded_pixels;
+    global const uint *at = film + group * stream + pixel_index;
+    return v3(parts_sum(settings, at), parts_sum(settings, at + 3 * stream), parts_sum(settings, at + 6 * stream));
 }
 
 /* How many samples a pixel has. */
-inline uint film_samples(global const Settings *settings, global const uint *film, int pixel_index, int2 halves)
+inline uint film_samples(global const Settings *settings, global const uint *film, int pixel_index)
 {
-    size_t stream = settings->padded_pixels;
+    size_t stream = settings->padded_pixels, at = FILM_SAMPLES * stream + pixel_index;
     uint samples = 0;
-    for (int i = halves.x; i < halves.y; i++) samples += film[(i * FILM_WORDS + FILM_SAMPLES) * stream + pixel_index];
+    for (int i = 0; i < FILM_PARTS; i++) samples += film[i * FILM_WORDS * stream + at];
     return samples;
 }
 
@@ -42,7 +42,7 @@ inline uint film_samples(global const Settings *settings, global const uint *fil
 #if LIGHT_PATHS
 #define SAMPLES light_paths
 #else
-#define SAMPLES (float)film_samples(settings, film, pixel_index, halves)
+#define SAMPLES (float)film_samples(settings, film, pixel_index)
 #endif
 
 #if SUMS_LIGHT_PATHS
@@ -54,12 +54,10 @@ inline float light_paths_mean(float light_paths, float samples)
 #endif
 
 /* One over what a pixel's sums are divided by: its samples, or, of samples that serve several pixels, their weight. */
-inline float film_mean(global const Settings *settings, global const uint *film, int pixel_index, int2 halves,
-                       float samples)
+inline float film_mean(global const Settings *settings, global const uint *film, int pixel_index, float samples)
 {
 #if FILM_WEIGHTS
-    size_t stream = settings->padded_pixels;
-    samples = halves_sum(film + FILM_WEIGHT * stream + pixel_index, stream, FILM_WORDS * stream, halves);
+    samples = parts_sum(settings, film + FILM_WEIGHT * (size_t)settings->padded_pixels + pixel_index);
 #endif
     return samples > 0.0f ? 1.0f / samples : 0.0f;
 }

@@ -11,6 +11,15 @@ inline integer slot_plane(global const Settings *settings, integer slot)
     return divide(slot, settings->per_plane);
 }
 
+/* The part of the film that a sample goes to: there is one, but where even and odd samples are kept apart, or octaves:
+ * samples from 2^k to before 2^(k + 1), of which those of even and of odd k have a part each. */
+inline integer film_part(global const Settings *settings, integer sample)
+{
+    integer part = sample & (settings->halves - 1);
+    if (settings->octaves > 1) part += (clz(sample) & 1) * settings->halves;
+    return part;
+}
+
 /* How far after `first` the first sample is that belongs to a plane. */
 inline integer plane_ahead(integer plane, int planes, int first)
 {
@@ -42,7 +51,6 @@ inline integer work_list_next(global const Settings *settings, global const uint
 }
 
 typedef struct {
-    integer plane;               /* of the slot */
     integer pixel_index, sample; /* what comes next */
     mask leaves;                 /* the slot leaves the pixel that it had, if it had one */
     mask done;                   /* it leaves, and its list is at its end */
@@ -55,7 +63,7 @@ inline NextSample next_sample(global const Settings *settings, global const uint
 {
     int planes = settings->planes, per_plane = settings->per_plane;
     integer plane = slot_plane(settings, slot), ahead = plane_ahead(plane, planes, samples.x);
-    NextSample n = {plane, pixel_index, sample + planes, (integer)(0), (integer)(0)};
+    NextSample n = {pixel_index, sample + planes, (integer)(0), (integer)(0)};
     integer left = work_list_end(settings, work_list, pixel_index, samples.y) - sample; /* sums may leave an int */
     n.leaves = ended & (!begun | (left <= planes));
     if (any(n.leaves)) {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,11 +23,14 @@ LONG_UNITS = (2.0**8, 2.0**-16, 2.0**-40)
 GROUP = "light_"  # begins the name of a group's picture
 
 
-def layers_of(arrays: Mapping[str, Words], picture: Pictures) -> dict[str, Image]:
+def layers_of(
+    arrays: Mapping[str, Words], picture: Pictures, variance: Callable[[], Image]
+) -> dict[str, Image]:
     """Return the layers of a film by name, (h, w, 1 to 12) float32.
 
-    arrays: its words, as `FilmState` has them; picture: its other pictures. Where nothing was seen,
-    as in the sky, a layer is 0, an id -1. `light_groups` becomes a layer light_NAME for each group.
+    arrays: its words, as `FilmState` has them; picture: its other pictures; variance: makes
+    the layer of that name. Where nothing was seen, as in the sky, a layer is 0, an id -1.
+    `light_groups` becomes a layer light_NAME for each group.
     """
     made: dict[str, Image] = {}
     form = picture._form
@@ -43,8 +46,7 @@ def layers_of(arrays: Mapping[str, Words], picture: Pictures) -> dict[str, Image
         elif name == "samples":
             made[name] = picture.samples_per_pixel()[..., None]
         elif name == "variance":
-            even, odd = picture.halves()
-            made[name] = ((even - odd) / np.float32(2.0)) ** 2
+            made[name] = variance()
         else:
             made[name] = sampled[name]
     return made
