@@ -258,7 +258,7 @@ class DeviceFilm:
                 return lowered
 
             def lower_as(way: Integrator) -> Lowered:
-                return lower(replace(readable, integrator=way), budget, lowered)
+                return lower(readable, budget, replace(lowered, integrator=way))
 
             return decided(self._ground, lowered, lower_as)
 
