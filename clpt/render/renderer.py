@@ -501,7 +501,7 @@ class Renderer(Resumable):
             return lowered
 
         def lower_as(way: Integrator) -> Lowered:
-            return lower(dataclasses.replace(readable, integrator=way), budget, lowered)
+            return lower(readable, budget, dataclasses.replace(lowered, integrator=way))
 
         return decided(self._ground, lowered, lower_as)
 

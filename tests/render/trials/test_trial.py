@@ -72,6 +72,15 @@ def test_an_edit_has_no_trial() -> None:
     assert lower(scene, former=lower(scene)).candidates == ()
 
 
+def test_a_guide_that_nobody_asked_for_learns_for_long() -> None:
+    scene = long(caustic())
+    *_, guided = lower(scene).candidates
+    former = dataclasses.replace(lower(scene), integrator=guided)
+    assert lower(scene, former=former).settings["guide_paths"] == guides.LONG_PATHS
+    asked = dataclasses.replace(scene, integrator=guided)
+    assert lower(asked).settings["guide_paths"] == guides.PATHS
+
+
 def made_up(monkeypatch: pytest.MonkeyPatch, noise: dict[tuple[Any, bool], float]) -> list[Any]:
     """Let trials find these variances at equal rays; return what is tried, as it is."""
     asked: list[Any] = []
@@ -120,6 +129,7 @@ def test_no_guide_is_compiled_where_there_is_little_noise(monkeypatch: pytest.Mo
 def little(monkeypatch: pytest.MonkeyPatch) -> None:
     """Trials of few samples, in which guides learn from few light paths."""
     monkeypatch.setattr(guides, "PATHS", 1 << 12)
+    monkeypatch.setattr(guides, "LONG_PATHS", 1 << 12)
     monkeypatch.setattr(guides, "WORTH", 1)
     monkeypatch.setattr(trial, "ROUNDS", 2)
     monkeypatch.setattr(trial, "SAMPLES", 4)
