@@ -32,6 +32,12 @@ BOTH = tuple(f"integrator/{name}.cl" for name in ("path", "particle_tracer", "bo
 
 Files = dict[str, str | device.Part | tuple[str, ...]]
 
+# Files of kernels that take the place of others where a work-item shades one path.
+_ALONE: device.Virtual = {
+    **bvh.ALONE,
+    "core/texels_between.cl": ("core/texels_in_turn.cl",),
+}
+
 
 def sources(
     features: Features, layout: str, lanes: int, *, queued: bool, interleaved: bool = False
@@ -181,6 +187,7 @@ def _static(texts: dict[str, device.Source]) -> dict[str, device.Source]:
     return {name: text.with_static() for name, text in texts.items()}
 
 
+@functools.lru_cache(maxsize=8)
 def _defines(features: Features, lanes: int) -> flags.Defines:
     """Return what all programs of a scene define; lanes: paths that a work-item shades."""
     return {**flags.of_scene(features), "SLAB_BLOCK": SLAB_BLOCK if lanes == 1 else 0}
@@ -198,12 +205,17 @@ def _source(
     """The text of a program; stage: its file, if it is not called so; part: of a loop."""
     own: flags.Defines = {"PART": f"loop_{name}"} if part else {}
     given = {"LANES": lanes, "QUEUED": 0, **own, **defines}
-    alone = bvh.ALONE if given["SLAB_BLOCK"] else {}  # a CPU's rays go alone, too
+    alone = _ALONE if given["SLAB_BLOCK"] else {}  # a CPU's rays go alone, too
     return device.assemble(f"stage/{stage or name}.cl", {**virtual, **alone}, given)
 
 
 def _shared(features: Features, layout: str) -> Files:
-    """The generated files that are the same for all programs of a scene."""
+    """The generated files that are the same for all programs of a scene, as a dict of one's own."""
+    return dict(_generated(features, layout))
+
+
+@functools.lru_cache(maxsize=4)
+def _generated(features: Features, layout: str) -> Files:
     return {
         **shapes.virtual_files(features),
         **rough_coat_table.virtual_files(),
