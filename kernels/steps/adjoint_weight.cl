@@ -7,7 +7,7 @@ inline Spectrum adjoint_weight(Vertex v, Scattering scatter, BsdfSample bs, mask
     Spectrum carried = spectrum_scale(bs.weight, adjoint);
     if (!BSDF_IS_PHASE && BSDF_CHROMATIC) { /* eta differs between the wavelengths */
         mask spread = next & ((bs.lobe & LOBE_DELTA) == 0);
-        Spectrum f = bsdf_eval(scatter.bsdf, bs.wi, scatter.wo);
+        Spectrum f = bsdf_pair(scatter.bsdf, bs.wi, scatter.wo, spectrum_of(1.0f)).f;
         Spectrum exact = spectrum_scale(f, leaves / sel(spread, bs.pdf, (real)(1.0f)));
         carried = spectrum_sel(spread, exact, carried);
     }

@@ -1,2 +1,7 @@
 /* Stands for steps/join_camera.cl where light paths leave photons alone, or a material sends light one way only. */
-#define join_camera(scene, shadow, at, active, v, scatter, rival, arrives) ((integer)(0))
+inline integer join_camera(Scene scene, Slab shadow, uint at, mask active, Vertex v, Scattering *scatter, Rival rival,
+                           real arrives)
+{
+    bsdf_ask(scene, scatter, scatter->wo, 1);
+    return 0;
+}

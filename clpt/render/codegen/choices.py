@@ -214,17 +214,22 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
     "generated/rival_steps.cl": lambda f, cls: (
         *either(f.transport.merged, "lighting/rivals_merging.cl"),
         *either(f.transport.joined and not cls.delta, "lighting/rivals_camera.cl"),
-        *either(
-            flags.is_chromatic(f, cls) and (f.told_dispersion or cls.is_phase),
-            "lighting/rival_pdf.cl",
-        ),
     ),
     "generated/hero_steps.cl": lambda f, cls: (
         *either(
             f.ratios and flags.is_chromatic(f, cls) and f.spectra.spectral, "path/hero_weighs.cl"
         ),
         *either(f.told_dispersion, "path/hero_alone.cl"),
+        *(
+            either(
+                flags.is_chromatic(f, cls) and (f.told_dispersion or cls.is_phase),
+                "lighting/rival_pdf.cl",
+            )
+            if f.transport.balanced and not flags.is_null(f, cls)
+            else ("lighting/rival_pdf_unasked.cl",)
+        ),
     ),
+    "generated/pair.cl": lambda f, cls: ("path/pair.cl",),
     "generated/guide.cl": lambda f, cls: (
         ("guiding/guided_vertex.cl",)
         if flags.is_guided(f, cls) and not f.transport.light_paths
