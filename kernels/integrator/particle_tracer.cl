@@ -24,7 +24,9 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
     real arrives = 1.0f / max_r(VERTEX_COSINE(v.s.n, v.d), (real)(1e-6f));
     Rival rival = rival_of_emission(scene, path, at, v, vertex_hemisphere(scene, scatter.shading.frame, scatter.wo));
 
-    v.state += join_camera(scene, shadow, at, active, v, &scatter, rival, arrives);
+    CameraJoint joint = join_camera_seek(scene, v, scatter);
+    bsdf_ask(scene, scatter, join_camera_to(joint, scatter), 1);
+    v.state += join_camera(scene, shadow, at, active, v, scatter, rival, joint, arrives);
 
     vec2 uv = sampler_pair(sampler, scatter.dimension + DIMENSION_BSDF);
     BsdfSample bs = hero_sample(scatter.bsdf, scatter.wo, v3(uv.x, uv.y, scatter.choice.y), &ratio);

@@ -27,7 +27,9 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     merge_at_vertex(scene, path, at, met, v, scatter, rival, ratio SHADE_PASSED);
     Guided guided = guide_at(scene, guide, v.s, v.d);
 
-    NextEvent event = next_event(scene, next, v, &scatter, rival, guided, ratio SHADE_PASSED);
+    NextEvent event = next_event_seek(scene, next, v, scatter);
+    bsdf_ask(scene, scatter, next_event_wi(event, scatter), 0);
+    event = next_event_weigh(scene, event, v, scatter, rival, guided, ratio SHADE_PASSED);
     BsdfSample bs = onward_sample(scatter, guide, guided, &ratio);
     v.state += next_event_keep(scene, path, shadow, at, active, v, event);
 

@@ -1,30 +1,38 @@
 /* Next-event estimation: a point of a light is chosen, and a ray toward it waits in the shadow slab. */
 typedef struct {
-    mask shine; /* the material sends light from there on */
+    mask shine; /* the material sends light from there on; before it is asked, what may */
     LightSample ls;
+    vec3 wi; /* toward it, in shading.frame */
     Spectrum value;
 } NextEvent;
+#define next_event_wi(e, scatter) ((e).wi)
 
-inline NextEvent next_event(Scene scene, mask next, Vertex v, Scattering *scatter, Rival rival, Guided guided,
-                            Spectrum ratio SHADE_ARGS)
+/* Chooses the point. */
+inline NextEvent next_event_seek(Scene scene, mask next, Vertex v, Scattering scatter)
 {
     NextEvent e;
-    Frame frame = scatter->shading.frame;
-    vec3 hemisphere = vertex_hemisphere(scene, frame, scatter->wo);
-    vec2 point = sampler_pair(scatter->sampler, scatter->dimension + DIMENSION_LIGHT);
-    mask seeks = next & !vertex_sealed(v);
+    Frame frame = scatter.shading.frame;
+    vec3 hemisphere = vertex_hemisphere(scene, frame, scatter.wo);
+    vec2 point = sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_LIGHT);
+    e.shine = next & !vertex_sealed(v);
     e.ls = light_sample_nothing();
-    if (!(BSDF_ABSORBS || BSDF_IS_SEALED) || any(seeks))
-        e.ls = common_light_sample(scene, v.s.p, hemisphere, scatter->choice.x, point, scatter->lambdas);
-    vec3 wi = to_frame(frame, e.ls.wi);
-    bsdf_ask(scene, scatter, wi, 0);
-    BsdfPair pair = bsdf_pair(scatter->bsdf, scatter->wo, wi, ratio);
-    Spectrum f = spectrum_scale(pair.f, shading_frame_share(scatter->shading, e.ls.wi));
+    if (!(BSDF_ABSORBS || BSDF_IS_SEALED) || any(e.shine))
+        e.ls = common_light_sample(scene, v.s.p, hemisphere, scatter.choice.x, point, scatter.lambdas);
+    e.wi = to_frame(frame, e.ls.wi);
+    return e;
+}
+
+/* Weighs its light. */
+inline NextEvent next_event_weigh(Scene scene, NextEvent e, Vertex v, Scattering scatter, Rival rival, Guided guided,
+                                  Spectrum ratio SHADE_ARGS)
+{
+    BsdfPair pair = bsdf_pair(scatter.bsdf, scatter.wo, e.wi, ratio);
+    Spectrum f = spectrum_scale(pair.f, shading_frame_share(scatter.shading, e.ls.wi));
     real w = event_weight(scene, rival, v.s, e.ls, pair, guided_pdf(guide, guided, e.ls.wi, pair.pdf));
-    e.shine = seeks & (e.ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
+    e.shine = e.shine & (e.ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
     w = w / sel(e.shine, fabs(e.ls.pdf), (real)(1.0f));
     e.value = spectrum_scale(spectrum_mul(spectrum_mul(v.beta, f), e.ls.radiance), w);
-    e.value = vertex_beyond(scene, v, e.ls.wi, e.ls.t, scatter->lambdas, e.value);
+    e.value = vertex_beyond(scene, v, e.ls.wi, e.ls.t, scatter.lambdas, e.value);
     return e;
 }
 
