@@ -17,6 +17,7 @@ def main() -> None:
     allocator.collect_later()
     # PoCL compiles a kernel once for its binary, and once more for each size of groups, if it may
     os.environ.setdefault("POCL_WORK_GROUP_SPECIALIZATION", "0")
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # numpy's threads take .04 s to start
     try:
         stopping.raise_at_signals()
         status = run(sys.argv[1:])

@@ -123,20 +123,17 @@ class Record:
     def __init__(self, name: str, doc: str, **members: tuple[str, str] | tuple[str, str, str]):
         self.name, self.doc = name, doc
         self.members: tuple[Member, ...] = ()
+        self.words = 0  # of 4 bytes
         for member, (kind, text, *nothing) in members.items():
             if kind not in TYPES:
                 raise ValueError(f"{name}.{member}: {kind!r} is none of {', '.join(TYPES)}")
             self.members += (Member(member, kind, text, self.words, *nothing),)
+            self.words += self.members[-1].words
 
     @property
     def snake_name(self) -> str:
         """The name as the kernels' functions have it: LightRow is light_row."""
         return _snake(self.name)
-
-    @property
-    def words(self) -> int:
-        """Size in 4-byte words."""
-        return sum(m.words for m in self.members)
 
     @property
     def step(self) -> int:
@@ -175,10 +172,13 @@ class Record:
     def _struct(self, rows: list[str]) -> str:
         return "\n".join([f"/* {self.doc} */", "typedef struct {", *rows, f"}} {self.name};", ""])
 
-    def row_text(self) -> str:
-        """Return the lane struct and `name_row(table, at)`; `at`: a row's first word, per lane."""
+    def row_text(self, many: bool = False) -> str:
+        """Return the lane struct and `name_row(table, at)`; `at`: a row's first word, per lane.
+
+        many: see `row_words`.
+        """
         lower = self.snake_name
-        body, words = row_words("table", "at", self.words)
+        body, words = row_words("table", "at", self.words, many)
         body = [f"    {row}" for row in body]
         for m in self.members:
             if m.type == "vec3":
@@ -280,15 +280,18 @@ class Record:
         return f"#define load_{name}(s, at) {value}\n{store}"
 
 
-def row_words(table: str, at: str, count: int) -> tuple[list[str], list[str]]:
+def row_words(table: str, at: str, count: int, many: bool = False) -> tuple[list[str], list[str]]:
     """Return statements that read `count` words from `at` on, per lane, and each word's name.
 
-    Four at a time, see kernels/core/rows.cl; the last four may be some of those before.
+    Four at a time, see kernels/core/rows.cl; the last four may be some of those before. many: lanes
+    mostly read different rows, so that asking whether they read the same one costs more than it
+    saves.
     """
+    read = "gather_w4" if many else "row4"
     if count < 4:
         return [], [f"gather_w({table}, {at} + {i})" for i in range(count)]
     firsts = [*range(0, count - 4, 4), count - 4]
-    rows = [f"vec4 words{first} = row4({table} + {first}, {at});" for first in firsts]
+    rows = [f"vec4 words{first} = {read}({table} + {first}, {at});" for first in firsts]
     names = {first + i: f"words{first}.{c}" for first in firsts for i, c in enumerate("xyzw")}
     return rows, [names[i] for i in range(count)]
 

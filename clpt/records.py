@@ -118,8 +118,9 @@ SETTINGS = Record(
     planes=("integer", "planes of slots; those of different ones may render the same pixel"),
     halves=(
         "integer",
-        "2: even and odd samples have films of their own, and planes are even; else 1",
+        "2: even and odd samples have parts of the film of their own, and planes are even; else 1",
     ),
+    octaves=("integer", "2: so have samples of even and odd octaves, see kernels/film/film.cl"),
     seed=("natural", "seed of the sampler"),
     sample_bits=("integer", "base-2 logarithm of the samples of a pixel; zsobol"),
     max_depth=("integer", "most surfaces of a path, that of the light counted"),
@@ -364,7 +365,11 @@ TREE_BITS = Constants(
     leaf=(0x80000000, "it names an item, no node"),
 )
 TREE_SIZES = Constants(
-    "BVH_", "Sizes of trees.", depth=(48, "most levels of a leaf below the root")
+    "BVH_",
+    "Sizes of trees.",
+    depth=(48, "most levels of a leaf below the root"),
+    levels=(16, "most levels of nodes 8 wide: a third of that"),
+    shapes_depth=(32, "most levels of a leaf below the root of a binary tree over shapes"),
 )
 TREE_REACHES = Constants(
     "BVH_",

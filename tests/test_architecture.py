@@ -54,7 +54,13 @@ MAY_IMPORT = {
 }
 OPENCL = {"device", "bvh", "denoise", "rays", "render"}  # only these import pyopencl
 # clpt/render/<room>: arrows point down; rooms of one floor do not know each other.
-FLOORS = ({"contract"}, {"analysis"}, {"lowering", "codegen"}, {"wavefront"}, {"editing", "film"})
+FLOORS = (
+    {"contract"},
+    {"analysis"},
+    {"lowering", "codegen"},
+    {"wavefront"},
+    {"editing", "film", "trials"},
+)
 # clpt/cli/<room>: the same; commands stand on top of all.
 FLOORS_OF_COMMANDS = (
     {"process"}, {"printing", "options"}, {"opening"}, {"files"}, {"plots"}, {"render", "view"},

@@ -12,10 +12,11 @@ from .build import (
     outgrows_caches,
 )
 from .building import Building
-from .layouts import LAYOUTS, TREES, shapes_layout, traversal_text
+from .layouts import ALONE, LAYOUTS, TREES, shapes_layout, traversal_text
 from .refit import rebuild_boxes, refit, refit_boxes
 
 __all__ = [
+    "ALONE",
     "LAYOUTS",
     "TREES",
     "Building",

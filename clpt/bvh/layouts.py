@@ -10,7 +10,7 @@ import numpy as np
 import pyopencl as cl
 
 from ..choices import Quality
-from ..records import TREE_BITS
+from ..records import TREE_BITS, TREE_SIZES
 from . import tree, wide
 from .building import Building
 
@@ -21,6 +21,7 @@ _BINARY_LEAF = 4  # triangles of a leaf, at most
 _BLOCK = 8
 _COMPACT_LEAF = 3  # triangles of a leaf, at most; kernels/bvh/compact.cl counts them in 3 bits
 SHAPES_LEAF = 2  # boxes of a leaf of "shapes_binary", at most
+SHAPES_DEPTH = TREE_SIZES["shapes_depth"]
 _LEAF = TREE_BITS["leaf"]
 
 
@@ -127,7 +128,7 @@ def binary_boxes(building: Building, count: int, boxes: cl.Buffer, leaf_size: in
     indices = building.allocate(4 * count)
     if count:
         items, parts = tree.items_of_boxes(building, count, boxes)
-        built = tree.over(building, count, items, parts, leaf_size)
+        built = tree.over(building, count, items, parts, leaf_size, depth=SHAPES_DEPTH)
         building.run_each("bvh/pack.cl", "pack_indices", count, items=items, indices=indices)
         return Packed({"nodes": built.nodes, "indices": indices}, _binary_part(building, built))
     nodes = building.upload(np.array([0, 0, 0, _LEAF, 0, 0, 0, 0]), np.uint32)  # nothing in it
@@ -240,6 +241,12 @@ BOX_LAYOUTS: dict[str, Callable[[Building, int, cl.Buffer], Packed]] = {
     "binary": binary_boxes,
     "wide8": wide8_boxes,
     "compact": compact_boxes,
+}
+
+# Files of kernels that take the place of others where a ray goes alone on a device without vectors.
+ALONE = {
+    "bvh/mask8.cl": ("bvh/mask8_bits.cl",),
+    "bvh/wide8_waiting.cl": ("bvh/wide8_levels.cl",),
 }
 
 TREES = tuple(name for name in LAYOUTS if name in BOX_LAYOUTS)  # all but brute force

@@ -15,7 +15,7 @@ from . import tree as trees
 from . import wide
 from .build import Bvh
 from .building import Building
-from .layouts import SHAPES_LEAF, refit_nodes
+from .layouts import SHAPES_DEPTH, SHAPES_LEAF, refit_nodes
 
 _ROOT = "bvh/refit.cl"
 _NO_TRIANGLES = {"vertices": None, "faces": None, "leaves": None}
@@ -79,7 +79,7 @@ def rebuild_boxes(building: Building, tree: Bvh, boxes: cl.Buffer) -> cl.Event |
         own = Building(building.device, building.stream)  # with a memory count of its own
         items, extents = trees.items_of_boxes(own, tree.count, boxes)
         if tree.parts[0].binary is None:
-            built = trees.over(own, tree.count, items, extents, SHAPES_LEAF)
+            built = trees.over(own, tree.count, items, extents, SHAPES_LEAF, depth=SHAPES_DEPTH)
             _adopt_binary(own, tree, built)
         else:
             _adopt_wide(own, tree, trees.over(own, tree.count, items, extents, 1))

@@ -8,10 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pyopencl as cl
 
+from ..records import TREE_SIZES
 from . import curve
 from .building import Building
 
 _BUILD, _PACK, _REINSERT = "bvh/build.cl", "bvh/pack.cl", "bvh/reinsert.cl"
+_DEPTH = TREE_SIZES["depth"]
 _RUN = 2048  # items whose bounds one work-item finds
 _SUBTREES = 64  # for each compute unit, so that they even out
 _CPU_UNITS = 16  # those of any CPU: the order of reinsertion, and so the tree, follows from them
@@ -69,13 +71,15 @@ def over(
     parts: cl.Buffer,
     leaf_size: int,
     at_once: int = 1,
+    depth: int = _DEPTH,
 ) -> Tree:
     """Build over items by the surface area heuristic; they are put in the order of the leaves.
 
     leaf_size: items of a leaf, at most; at_once: items that are tested in the time of one, a
-    power of two.
+    power of two; depth: most levels of a leaf below the root, enough for a balanced tree.
     """
-    return _divided(building, count, items, parts, leaf_size=leaf_size, at_once=at_once, runs=0)
+    cut = {"leaf_size": leaf_size, "at_once": at_once.bit_length() - 1, "runs": 0, "depth": depth}
+    return _divided(building, count, items, parts, cut)
 
 
 def reinserted(building: Building, tree: Tree) -> Tree:
@@ -106,30 +110,24 @@ def over_runs(
 ) -> Tree:
     """As `over`, by the same heuristic over leaves that are runs of a space-filling curve."""
     n, ordered, runs, parts = curve.runs(building, count, items, parts, leaf_size)
-    tree = _divided(building, n, runs, parts, leaf_size=1, at_once=1, runs=1)
+    cut = {"leaf_size": 1, "at_once": 0, "runs": 1, "depth": _DEPTH}
+    tree = _divided(building, n, runs, parts, cut)
     return replace(tree, items=ordered)
 
 
 def _divided(
-    building: Building,
-    count: int,
-    items: cl.Buffer,
-    parts: cl.Buffer,
-    *,
-    leaf_size: int,
-    at_once: int,
-    runs: int,
+    building: Building, count: int, items: cl.Buffer, parts: cl.Buffer, cut: dict[str, int]
 ) -> Tree:
+    """Build over items; cut: the arguments of kernels/bvh/build.cl that say where they are cut."""
     info = building.device.info
     wanted = _SUBTREES * (_CPU_UNITS if info.is_cpu else info.compute_units)
-    levels = int(math.log2(max(1, min(wanted, count // leaf_size))))
+    levels = int(math.log2(max(1, min(wanted, count // cut["leaf_size"]))))
     ranges = building.allocate(16 * (2 << levels))
     extents = building.allocate(64 * (2 << levels))
     nodes = building.allocate(64 * count)
     heap = {"ranges": ranges, "extents": extents}
     root = {"parts": parts, "n_parts": parts.size // 64, "count": count}
     building.run(_BUILD, "build_root", 1, **root, **heap)
-    cut = {"leaf_size": leaf_size, "at_once": at_once.bit_length() - 1, "runs": runs}
     shared = {"items": items, "nodes": nodes, **cut, **heap}
     for level in range(levels):
         building.run(_BUILD, "build_level", 1 << level, begin=(1 << level) - 1, **shared)

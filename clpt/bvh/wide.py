@@ -60,7 +60,8 @@ def collapse(building: Building, built: Tree) -> Collapse:
     roots, firsts = building.allocate(4 * n), building.allocate(8 * n)
     leaf_roots, totals = building.allocate(4 * n), building.allocate(4 * (4 + _DEEPEST))
     numbers = {"roots": roots, "firsts": firsts, "leaf_roots": leaf_roots, "totals": totals}
-    building.run(_ROOT, "collapse_number", 1, nodes=built.nodes, costs=costs, **numbers)
+    binary = {"nodes": built.nodes, "costs": costs, "count": 2 * n}
+    building.run(_ROOT, "collapse_number", 1, **binary, **numbers)
     return Collapse(built, costs, occlusion, roots, firsts, leaf_roots, totals)
 
 

@@ -15,7 +15,7 @@ from clpt.render.lowering.scene import Lowered
 from clpt.render.renderer import Renderer
 from clpt.render.wavefront.film_state import FilmState, Ranges, join_ranges
 from clpt.render.wavefront.tracer import OnBatch, Selection
-from clpt.render.wavefront.wavefront import Counts
+from clpt.render.wavefront.wavefront import Counts, Wavefront
 from clpt.scene import Scene
 from clpt.scene.materials import Material
 
@@ -56,9 +56,9 @@ class SharingRenderer(Renderer):
         """As for `Renderer`; the crew uses its film without a change, so it may need to recover."""
         return super()._emptied(recover=True)
 
-    def _lower(self, scene: Scene, former: Lowered | None = None) -> Lowered:
+    def _lower(self, scene: Scene, former: Lowered | None = None, *, anew: bool = False) -> Lowered:
         lower = super()._lower
-        lowered = self.shared("lowered", lambda: lower(scene, former))
+        lowered = self.shared("lowered", lambda: lower(scene, former, anew=anew))
         if lowered.zero_copy:
             raise SceneError("arrays in the memory of one device are not there for the others")
         return lowered
@@ -90,7 +90,7 @@ class DeviceWorker:
         self.shows = False
         self.paths, self.rate = 0, 0.0
         self.past = Counts()  # before the film was emptied
-        self._selection: Selection | None = None
+        self._selected: tuple[Selection, Wavefront] | None = None
 
     @property
     def counts(self) -> Counts:
@@ -108,9 +108,10 @@ class DeviceWorker:
     def do(self, selection: Selection, first: int, end: int, on_batch: OnBatch) -> bool:
         """Add samples first to end - 1 to the film; return whether it was not stopped."""
         wavefront = self.renderer._wavefront
-        if selection is not self._selection:
+        former, by = self._selected or (None, None)
+        if selection is not former or by is not wavefront:
             selection.prepare(wavefront)
-        self._selection = selection
+        self._selected = selection, wavefront
         return selection.add(wavefront, first, end, on_batch)
 
     def take(self) -> FilmState:

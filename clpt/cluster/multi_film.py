@@ -175,6 +175,8 @@ class MultiFilm(DevicePictures):
     def _restore(self, saved: SavedFilm) -> None:
         """Go on from a saved film, as `load_state` does. Raises SceneError."""
 
+        self._follow(saved.origin)
+
         def load(first: DeviceWorker) -> FilmState:
             first.renderer._restore(saved)
             return first.renderer.film_state()

@@ -22,6 +22,7 @@ from clpt.errors import DeviceError
 from clpt.render.contents import Contents
 from clpt.render.contract.features import Features
 from clpt.render.editing.scene_edit import MaterialKey, ShapeKey
+from clpt.render.film.saved_film import Origin
 from clpt.render.film_renderer import Watch
 from clpt.render.locking import healing, synchronized
 from clpt.render.options import RenderOptions, check_options, check_scene
@@ -253,9 +254,26 @@ class MultiRenderer(MultiFilm):
                 scene=scene, motion=motion,
             ).wait()  # fmt: skip
 
-        with self._change("update", heals=False) as change:
+        self._begin_anew("update", edit)
+
+    @synchronized
+    def _follow(self, origin: Origin) -> None:
+        """See `FilmRenderer._follow`."""
+        if self._crew.first.renderer._other_way(origin) is None:
+            return
+        shared = Once()
+
+        def follow(renderer: SharingRenderer) -> None:
+            renderer.shared = shared
+            renderer._follow(origin)
+
+        self._begin_anew("load_state", follow)
+
+    def _begin_anew(self, what: str, action: Callable[[SharingRenderer], None]) -> None:
+        """Do something on every device that empties the film."""
+        with self._change(what, heals=False) as change:
             with change.beginning_unless(Exception):
-                self._on_each(edit)
+                self._on_each(action)
             self._forget()
             self._crew.clear_counts()
             self._contents = Contents()

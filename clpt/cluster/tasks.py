@@ -59,18 +59,14 @@ class _Job:
         self._selection: Selection | None = None
 
     def shows(self, scene: Scene) -> bool:
-        """Let the renderer take another scene; return whether it could.
-
-        What "auto" chose for the scene before stays in a renderer, and may not suit this one.
-        """
-        if scene.integrator.leaves_choice:
-            return False
+        """Let the renderer take another scene; return whether it could."""
         try:
             self.renderer.update(scene=scene)
             self.renderer.prepare()
         except (SceneError, MemoryBudgetError) as error:
             log.debug("a renderer cannot take the next scene: %s", error)
             return False
+        self._tracer = self.renderer._tracer()
         return True
 
     def block(

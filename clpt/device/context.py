@@ -34,6 +34,7 @@ log = logging.getLogger(__name__)
 ENVIRONMENT = "CLPT_DEVICE"
 GROUPS = ("all", "gpu")  # of devices, for `choose_all`
 _ORDER = ("gpu", "accelerator", "cpu")
+_CLOSE = 1.1  # seconds of a trial over the least, up to which runtimes are as fast
 _TRIAL = "__kernel void trial(__global uint *out) { out[get_global_id(0)] = 7u; }"
 
 
@@ -226,8 +227,8 @@ def choose(
     a process that was forked has another one.
 
     None takes the environment variable CLPT_DEVICE if it is set, and otherwise the first device
-    that works: GPUs, then accelerators, then CPUs; of a CPU's runtimes the one that is the fastest
-    in a short trial, which is made once and remembered in clpt's cache folder.
+    that works: GPUs, then accelerators, then CPUs; of a CPU's runtimes PoCL, or one that is faster
+    by a tenth in a short trial, which is made once and remembered in clpt's cache folder.
 
     threads: how many cores of a CPU take part at most, by default all.
 
@@ -342,19 +343,22 @@ def by_preference(infos: tuple[DeviceInfo, ...]) -> list[DeviceInfo]:
 def _by_speed(
     infos: list[DeviceInfo],
 ) -> tuple[list[DeviceInfo], dict[DeviceInfo, float]]:
-    """Put the fastest one first if the first device is a CPU that others serve too.
+    """Put the best one first if the first device is a CPU that others serve too.
 
-    Their seconds in a trial too, which are empty where there was none, or it failed.
+    It is PoCL, unless another one is faster by more than a trial scatters: of two that are as fast,
+    chance would choose, and PoCL reads what it has kept sooner. Their seconds in the trial too,
+    which are empty where there was none, or it failed.
     """
     peers = [info for info in infos if _same_processor(info, infos[0])]
     if len(peers) < 2:
         return infos, {}
     runtimes = [f"{i.label} {i.version} {i.driver} {i.compute_units}" for i in peers]
-    taken = speed_trial.remembered(runtimes, lambda number: _measured(peers[number]))
+    taken = speed_trial.remembered(runtimes, lambda: _measured(peers))
     if taken is None:
         return infos, {}
     seconds = dict(zip(peers, taken, strict=True))
-    ranked = sorted(peers, key=seconds.__getitem__)
+    close = _CLOSE * min(taken)
+    ranked = sorted(peers, key=lambda i: (seconds[i] > close, not i.is_pocl, seconds[i]))
     return ranked + [info for info in infos if info not in ranked], seconds
 
 
@@ -364,9 +368,9 @@ def _same_processor(one: DeviceInfo, other: DeviceInfo) -> bool:
     return one.is_cpu and other.is_cpu and (a.endswith(b) or b.endswith(a))
 
 
-def _measured(info: DeviceInfo) -> float:
-    """Time a trial on a device [s], in the process's own context; raises what drivers raise."""
-    return speed_trial.measure(_first(info).queue, info.lanes)
+def _measured(infos: Sequence[DeviceInfo]) -> list[float]:
+    """Time a trial on devices [s], in the process's own contexts; raises what drivers raise."""
+    return speed_trial.measure([(_first(info).queue, info.lanes) for info in infos])
 
 
 def trial(info: DeviceInfo) -> str | None:
@@ -451,7 +455,7 @@ def _reason(
 ) -> str:
     if info in seconds:
         taken = ", ".join(f"{1e3 * s:.2f} ms by {i.platform}" for i, s in seconds.items())
-        return f"the fastest runtime of this CPU in a short trial, remembered: {taken}"
+        return f"in a short trial no runtime of this CPU was faster by a tenth, remembered: {taken}"
     if len(infos) == 1:
         return "the only device"
     peers = [other for other in infos if other.kind == info.kind]

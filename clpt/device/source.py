@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import NoReturn
 
 from ..errors import KernelBuildError
@@ -136,10 +136,10 @@ def assemble(
 @cache
 def _text(folder: Path, name: str) -> str:
     """A file's text. Raises OSError where there is none inside of the folder."""
-    path = (folder / name).resolve()
-    if not path.is_relative_to(folder.resolve()):
+    inside = PurePath(name)
+    if inside.is_absolute() or ".." in inside.parts:
         raise FileNotFoundError(name)
-    return path.read_text(encoding="utf-8")
+    return (folder / inside).read_text(encoding="utf-8")
 
 
 class _BadRow(Exception):

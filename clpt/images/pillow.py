@@ -6,11 +6,12 @@ another program; the formats are always named here.
 
 from __future__ import annotations
 
+import importlib
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,6 +29,7 @@ if TYPE_CHECKING:  # else imported where it is used, for many pictures are EXR o
     from PIL.ImageFile import ImageFile
 
 FORMATS = ("PNG", "JPEG", "TGA", "BMP", "WEBP", "GIF", "TIFF")
+PLUGINS = ("Png", "Jpeg", "Tga", "Bmp", "WebP", "Gif", "Tiff")  # Pillow's modules of these
 SUFFIXES = (".png", ".jpg", ".jpeg", ".tga", ".bmp", ".webp", ".gif", ".tif", ".tiff")
 NAMES = {"WEBP": "WebP"}  # of formats, where people write them in another way
 ORIENTATION = 0x0112  # the tag of Exif
@@ -93,6 +95,7 @@ def _opened(source: Source, formats: Sequence[str]) -> Iterator[ImageFile]:
     """The only place that has Pillow open an image."""
     from PIL import Image, UnidentifiedImageError
 
+    _know_formats()
     file, data = (source, None) if isinstance(source, Path) else (None, BytesIO(source))
     try:
         with Image.open(file or data, formats=formats) as image:  # type: ignore[arg-type]
@@ -106,6 +109,13 @@ def _opened(source: Source, formats: Sequence[str]) -> Iterator[ImageFile]:
         what = f"{file.suffix} images" if file else "images"
         message = f"has more than the {most} pixels that are read of {what}"
         raise SceneError(message, file=file) from None
+
+
+@cache
+def _know_formats() -> None:
+    """Import Pillow's modules of FORMATS; else it imports all of its own for those it lacks."""
+    for name in PLUGINS:
+        importlib.import_module(f"PIL.{name}ImagePlugin")
 
 
 def _bytes(image: ImageFile) -> int:

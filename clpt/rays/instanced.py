@@ -176,7 +176,7 @@ class InstancedAccel(Queries):
                 '#include "core/rows.cl"',
                 '#include "core/math.cl"',
                 "typedef struct { global const uint *instances; } Scene;",
-                INSTANCE.row_text(),
+                INSTANCE.row_text(many=True),
                 f'#include "tracing/instances_{self.layout}.cl"\n',
             ]
         )

@@ -13,7 +13,7 @@ import pyopencl as cl
 from numpy.typing import NDArray
 from pyopencl.array import Array
 
-from ..bvh import TREES, choose_tree, traversal_text
+from ..bvh import ALONE, TREES, choose_tree, traversal_text
 from ..device import (
     BoundKernel,
     Device,
@@ -261,6 +261,7 @@ class Queries:
             "generated/instance_traversal.cl": self._instances_text(),
             "generated/motion.cl": "",  # instances stand still
             "generated/keyed_layout.cl": "",
+            **({} if self.device.info.is_cpu else ALONE),
         }
         defines = {
             "USES_INSTANCES": int(self.instanced),

@@ -243,6 +243,12 @@ class FilmRenderer(FilmOwner, Pictures):
     def _restore(self, saved: SavedFilm) -> None:
         """Go on from a saved film, as `load_state` does. Raises SceneError."""
 
+    def _follow(self, origin: Origin) -> None:
+        """Render in the way that made a film, if that can be; the film may be empty then.
+
+        What is "auto" may depend on how many samples are wanted, which the film did not know.
+        """
+
     def denoised(self, method: str | None = None) -> Image:
         """The picture so far without most of its noise, as `image` returns it.
 

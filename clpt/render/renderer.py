@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import itertools
 import logging
 import time
@@ -31,6 +32,7 @@ from clpt.render.editing.scene_edit import (
     match_replacements,
     resolve_device_arrays,
 )
+from clpt.render.film.saved_film import Origin
 from clpt.render.film_renderer import Watch, checked_number, next_range
 from clpt.render.locking import healing, synchronized
 from clpt.render.lowering.scene import Lowered, lower
@@ -38,6 +40,7 @@ from clpt.render.options import RenderOptions, check_changes, check_options, che
 from clpt.render.progress import Progress
 from clpt.render.resumable import Resumable
 from clpt.render.stats import RenderStats, collect
+from clpt.render.trials.trial import Ground, decided
 from clpt.render.wavefront import adaptive
 from clpt.render.wavefront.film_state import FilmState, join_ranges
 from clpt.render.wavefront.strategy import Tuning
@@ -45,6 +48,7 @@ from clpt.render.wavefront.tracer import Tracer, use_all_pixels
 from clpt.render.wavefront.wavefront import Counts, Wavefront
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
+from clpt.scene.integrators import Integrator
 from clpt.scene.lights import Light
 from clpt.scene.materials import Material
 from clpt.scene.params import fields_of, params
@@ -97,18 +101,22 @@ class Renderer(Resumable):
         if texture_budget is None:
             texture_budget = texture_budget_of(device)
         self._texture_budget, self._successors = texture_budget, Successors()
-        lowered = self._lower(scene)
-        self._seconds["lower"] = time.perf_counter() - self._start
-        self._opened: Wavefront | None = None
-        self._opened = first = Wavefront.create(
+        looped = options.get("looped", None if options.get("queue") is None else True)
+        tuning = Tuning(options.get("layout"), options.get("queued"), options.get("cancel_seconds"))
+        self._ground = Ground(device, tuning, looped)
+        self._create = functools.partial(
+            Wavefront.create,
             device,
-            lowered,
-            Tuning(options.get("layout"), options.get("queued"), options.get("cancel_seconds")),
+            tuning=tuning,
             slots=options.get("slots"),
-            looped=options.get("looped", None if options.get("queue") is None else True),
+            looped=looped,
             tree_quality=options.get("tree_quality", "high"),
             halves=options.get("halves", False) or needs.halves(scene, self.denoise),
         )
+        lowered = self._lower(scene)
+        self._seconds["lower"] = time.perf_counter() - self._start
+        self._opened: Wavefront | None = None
+        self._opened = first = self._create(lowered)
         first.prepare()
         self._built = device.builds.programs - before[0], device.builds.cached - before[1]
         self._seconds["programs"] = first.program_seconds
@@ -403,10 +411,11 @@ class Renderer(Resumable):
         the shape, its name, or its index in `scene.shapes`. A shape or material that the renderer
         had at first remains the key of whatever has replaced it. scene: another scene of the same
         film, for any other change; arrays and images that it shares with the present one are taken
-        to be unchanged. motion: what changes place, of shapes, lights and the camera, moves from
-        where it was to where it is, and so do vertices, while the shutter of the camera is open;
-        the next update goes on from there. wait_for: events of the caller that come first. The
-        scene is lowered again then, and once more after.
+        to be unchanged, and what is "auto" is chosen anew, as edits alone do not. motion: what
+        changes place, of shapes, lights and the camera, moves from where it was to where it is, and
+        so do vertices, while the shutter of the camera is open; the next update goes on from there.
+        wait_for: events of the caller that come first. The scene is lowered again then, and once
+        more after.
 
         The first of three ways that is possible is taken:
 
@@ -439,7 +448,7 @@ class Renderer(Resumable):
         write = self._patch(new) if quick and not transforms and not vertices else None
         warnings = self.warnings
         if write is None:
-            write, warnings = self._rebuild(new, events, refit=scene is None, motion=motion)
+            write, warnings = self._rebuild(new, events, whole=scene is not None, motion=motion)
         self._take(write, new, replaced, warnings, motion=motion)
         return self._last
 
@@ -479,10 +488,22 @@ class Renderer(Resumable):
         with self._change("update", put, heals=False):
             self._contents = put()
 
-    def _lower(self, scene: Scene, former: Lowered | None = None) -> Lowered:
-        """Return the tables of a scene; former: of the scene before it."""
-        readable = resolve_device_arrays(scene, self.device.queue)
-        return lower(readable, self._texture_budget, former)
+    def _lower(self, scene: Scene, former: Lowered | None = None, *, anew: bool = False) -> Lowered:
+        """Return the tables of a scene, for the way that is best; former: of the scene before it.
+
+        anew: choose the way anew. A trial may decide, but not for pictures that people steer: they
+        want to see something soon, and what is chosen stays.
+        """
+        steered = self._ground.tuning.cancel_seconds is not None
+        readable, budget = resolve_device_arrays(scene, self.device.queue), self._texture_budget
+        lowered = lower(readable, budget, former, anew=anew and not steered)
+        if not lowered.candidates or steered:
+            return lowered
+
+        def lower_as(way: Integrator) -> Lowered:
+            return lower(dataclasses.replace(readable, integrator=way), budget, lowered)
+
+        return decided(self._ground, lowered, lower_as)
 
     def _edit(
         self,
@@ -534,25 +555,66 @@ class Renderer(Resumable):
         return bodies_around(readable, matter_of, lowered.cache) != lowered.around
 
     def _rebuild(
-        self, scene: Scene, events: list[cl.Event], *, refit: bool, motion: bool
+        self, scene: Scene, events: list[cl.Event], *, whole: bool, motion: bool
     ) -> tuple[Callable[[], None], list[str]]:
         """Lower a scene; return what lets it be rendered, see `rebuild.prepare`, and its warnings.
 
-        events: that arrays on the device wait for, which may be read. motion: things move to it
-        from where they are in the present scene.
+        events: that arrays on the device wait for, which may be read. whole: it is another scene
+        rather than an edited one. motion: things move to it from where they are in the present one.
         """
         for event in events:
             dev.wait(event)
         shown, remarks = between(self.scene, scene) if motion else (scene, [])
         first = self._wavefront
-        lowered = self._lower(shown, first.scene.lowered)
-        take = rebuild.prepare(first, lowered, refit)
+        former = first.scene.lowered
+        lowered = self._lower(shown, former, anew=whole)
+        if rebuild.has_other_paths(former, lowered):
+            take = self._exchanged(lowered)
+        else:
+            take = rebuild.prepare(first, lowered, refit=not whole)
 
         def write() -> None:
             take()
             self._moving = None
 
         return write, [*lowered.warnings, *remarks]
+
+    @synchronized
+    def _follow(self, origin: Origin) -> None:
+        """See `FilmRenderer._follow`."""
+        way = self._other_way(origin)
+        if way is None:
+            return
+        former = self._wavefront.scene.lowered
+        lowered = self._lower(self.scene, dataclasses.replace(former, integrator=way))
+        if rebuild.has_other_paths(former, lowered):
+            self._take(self._exchanged(lowered), self.scene, {}, self.warnings, motion=False)
+
+    def _other_way(self, origin: Origin) -> Integrator | None:
+        """Return the integrator that made a film of the scene, if another one was chosen here."""
+        own = self._origin()
+        if not self.scene.integrator.leaves_choice or own.settings == origin.settings:
+            return None
+        return None if own.scene.differences(origin.scene) else origin.way
+
+    def _exchanged(self, lowered: Lowered) -> Callable[[], None]:
+        """Return what puts a wavefront whose film has another form in the place of this one.
+
+        The memory of the picture stays. Raises as `Wavefront.create`, and SceneError for a film
+        of another size; nothing has changed then.
+        """
+        first = self._wavefront
+        refused = rebuild.refusal(first.scene.lowered, lowered)
+        if refused is not None:
+            raise refused
+        second = self._create(lowered)
+        second.prepare()
+
+        def take() -> None:
+            second.show_in(first.film.picture)
+            self._opened, self._resolve = second, None
+
+        return take
 
     @property
     @synchronized

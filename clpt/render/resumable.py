@@ -100,6 +100,7 @@ class Resumable(DevicePictures):
         settings: dict[str, Plain] = {
             "chosen.integrator": lowered.integrator.kind,
             "chosen.light_paths": float(lowered.settings["light_paths"]),
+            "chosen.guiding": bool(features.transport.guided),
             "chosen.splatting": features.film.filter.reach > 0,
             "chosen.texels": int(lowered.tables["texels"].size),
             "halves": first.film.halves == 2,
@@ -153,6 +154,7 @@ class Resumable(DevicePictures):
     @synchronized
     def _restore(self, saved: SavedFilm) -> None:
         """Go on from a saved film, as `load_state` does. Raises SceneError."""
+        self._follow(saved.origin)
         saved.check_fits(self._origin(), self.film_state())
         adaptive = None
         if saved.adaptive:
@@ -194,6 +196,7 @@ class Resumable(DevicePictures):
             paper=tuple(map(tuple, white_paper(film, features.spectra.mode).tolist())),
             names=first.scene.lowered.layer_names,
             adaptive=self.scene.noise is not None or self._known.adaptive is not None,
+            octaves=self.scene.sampler.octaves * ("variance" in features.film.layers.names),
         )
 
 

@@ -203,7 +203,7 @@ class RenderLoop:
         if self._slow_previews == 2 and self._divider < DIVIDERS[-1]:
             fitting = self._divider * math.sqrt(took / SLOW)
             self._resize_preview(next((n for n in DIVIDERS if n >= fitting), DIVIDERS[-1]))
-            self._follow(self._preview)  # now, not in a drag
+            self._preview.follow(self.scene)  # now, not in a drag; by the kernels that it had
             self._previews_left = 0
             return
         finer = finer_divider(self._divider, first_divider(self.scene))
@@ -212,7 +212,7 @@ class RenderLoop:
         self._fast_previews = self._fast_previews + 1 if fast else 0
         if self._fast_previews >= FAST_PREVIEWS and not self._previews_left:  # not in a drag
             self._resize_preview(finer)
-            self._follow(self._preview)
+            self._preview.follow(self.scene)
 
     def _make_whole(self, scene: Scene) -> Renderer:
         return self._whole(scene, denoise=self._limits)

@@ -20,7 +20,6 @@ from clpt.formats.native import reference
 from . import sheet, table
 
 DOCS = Path(__file__).parents[1]
-LARGE = 26_000  # bytes
 
 
 def main(names: list[str]) -> None:
@@ -29,9 +28,9 @@ def main(names: list[str]) -> None:
         if names and name not in names and name.split("/")[0] not in names:
             continue
         began = time.time()
-        file = table.FOLDER / f"{name}.png"
+        file = table.file(name)
         file.parent.mkdir(parents=True, exist_ok=True)
-        save(render(picture), file)
+        render(picture).save(file, quality=90, method=6)
         size, took = file.stat().st_size / 1e3, time.time() - began
         print(f"{name}: {size:.0f} kB, {took:.0f} s", flush=True)
     captions = {name: picture.caption for name, picture in pictures.items()}
@@ -46,14 +45,6 @@ def render(picture: table.Picture) -> Image.Image:
         renderer.run(picture.spp)
         image = renderer.image()
     return Image.fromarray(images.to_srgb8(image).repeat(picture.zoom, 0).repeat(picture.zoom, 1))
-
-
-def save(image: Image.Image, file: Path) -> None:
-    """Write the picture; where its file would be large, with 256 colours of its own."""
-    image.save(file, optimize=True)
-    if file.stat().st_size > LARGE:
-        few = image.quantize(256, Image.Quantize.MAXCOVERAGE, 3, dither=Image.Dither.NONE)
-        few.save(file, optimize=True)
 
 
 if __name__ == "__main__":

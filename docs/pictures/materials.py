@@ -41,10 +41,12 @@ from clpt.scene.materials import (
 )
 from clpt.transforms import look_at, rotate, scale, translate
 
-from .studio import BLACK, PLACES, Picture, arc, knob, lathe, panel, studio
+from .studio import BLACK, LARGE, PLACES, Picture, arc, knob, lathe, panel, studio
 
 RED, CREAM, BLUE = (0.62, 0.08, 0.05), (0.75, 0.68, 0.55), (0.05, 0.16, 0.45)
 GREEN, ORANGE, PAPER = (0.06, 0.36, 0.14), (0.7, 0.25, 0.05), (0.8, 0.68, 0.5)
+
+GOLD = RoughConductor(metal="gold", roughness=0.2)
 
 Shapes = list[shapes.Shape]
 
@@ -103,23 +105,31 @@ def disc(material: Material, x: float) -> Shapes:
     return [shapes.Disk(material=material, to_world=place)]
 
 
-def tuft(material: Material, x: float) -> Shapes:
-    """Two thousand strands on a ball, combed down by gravity."""
+def tress(material: Material, x: float) -> Shapes:
+    """A lock of three thousand strands that hang in waves, held by a clasp."""
     random = np.random.default_rng(7)
-    out = random.normal(size=(2000, 3))
-    out /= np.linalg.norm(out, axis=1, keepdims=True)
-    along = np.linspace(0.0, 1.0, 5)[:, None]
-    bend = random.normal(0.0, 0.05, (2000, 1, 3)) * along**2
-    points = out[:, None] * (0.36 + 0.34 * along) + bend - [0.0, 0.16, 0.0] * along**2
-    width = np.broadcast_to(0.008 * (1.0 - 0.7 * along), (2000, 5, 1))
+    count, along = 3000, np.linspace(0.0, 1.0, 16)
+    spread = np.sqrt(random.random((count, 1))) * (0.1 + 0.22 * np.sin(2.4 * along) ** 0.8)
+    angle = 2.0 * np.pi * random.random((count, 1)) + random.normal(0.0, 0.15, (count, 1)) * along
+    length = 1.42 + random.normal(0.0, 0.06, (count, 1))
+    wave = 0.07 * along * np.sin(15.0 * along + random.normal(0.0, 0.35, (count, 1)))
+    radius = np.broadcast_to(0.0042 * (1.0 - 0.6 * along), (count, 16))
+    points = np.stack(
+        [
+            x + spread * np.cos(angle) + wave,
+            1.62 - length * along,
+            0.7 * spread * np.sin(angle) + 0.5 * wave,
+            radius,
+        ],
+        axis=-1,
+    )
     return [
-        shapes.Curves(
-            points=np.concatenate([points, width], -1).reshape(-1, 4),
-            lengths=[5] * 2000,
-            material=material,
-            to_world=translate([x, 0.82, 0]),
+        shapes.Curves(points=points.reshape(-1, 4), lengths=[16] * count, material=material),
+        shapes.Cylinder(p0=(x, 1.52, 0.0), p1=(x, 1.68, 0.0), radius=0.125, material=GOLD),
+        shapes.Disk(
+            to_world=translate([x, 1.68, 0.0]) @ rotate([1, 0, 0], -90) @ scale(0.125),
+            material=GOLD,
         ),
-        shapes.Sphere(center=(x, 0.82, 0), radius=0.36, material=Diffuse(reflectance=0.05)),
     ]
 
 
@@ -324,7 +334,9 @@ MATERIALS = {
     "hair": three(
         "`sigma_a` of blond, red and black hair.",
         *each(Hair, "sigma_a", (pigment(0.2, 0.1), pigment(0.1, 1.2), pigment(3.0, 0.2))),
-        thing=tuft,
+        thing=tress,
+        spp=128,
+        size=LARGE,
         integrator=DEEP,
     ),
     "measured": three(

@@ -23,7 +23,7 @@ def sheet() -> str:
     parts = [INTRODUCTION]
     for category, entries in PICTURES.items():
         cells = [
-            f"[![{kind}](pictures/kinds/{category}/{kind}.png)](scene_format.md#{kind})<br>"
+            f"[![{kind}](pictures/kinds/{category}/{kind}.webp)](scene_format.md#{kind})<br>"
             f"[`{kind}`](scene_format.md#{kind})"
             for kind in entries
         ]

@@ -15,7 +15,7 @@ from clpt.transforms import look_at, rotate, scale, translate
 Array = NDArray[np.float64]
 UP = (0.0, 1.0, 0.0)
 WHITE = (1.0, 1.0, 1.0)
-WIDE, SMALL = (300, 132), (192, 144)  # of a picture [pixels]
+WIDE, LARGE, SMALL = (300, 132), (600, 264), (192, 144)  # of a picture [pixels]
 PLACES = (-1.42, 0.0, 1.42)  # x of three things that stand side by side
 GREY = materials.Diffuse(reflectance=(0.42, 0.46, 0.5))
 BLACK = materials.Diffuse(reflectance=0.0)

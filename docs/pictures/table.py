@@ -29,5 +29,10 @@ PICTURES = {
 }
 
 
+def file(name: str) -> Path:
+    """Return where the picture of a kind is stored."""
+    return FOLDER / f"{name}.webp"
+
+
 def pictures() -> dict[str, Picture]:
     return {f"{category}/{kind}": p for category, ps in PICTURES.items() for kind, p in ps.items()}

@@ -20,6 +20,7 @@ typedef struct {
     uint leaf_size; /* items of a leaf, at most */
     uint at_once;   /* items that are tested in the time of one, as a power of two */
     uint runs;      /* are the items runs of bvh/curve.cl? Each is a leaf then */
+    uint depth;     /* most levels of a leaf below the root */
 } Build;
 
 inline float build_reach(float8 scene)
@@ -147,7 +148,7 @@ inline uint build_cut(const Build *b, Range r, float8 span, Extent *left, Extent
     uint mid = r.first;
     uint levels = 32 - clz(r.count - 1); /* of a balanced tree */
     float4 extent = -span.hi - span.lo;
-    if (r.depth + levels < BVH_DEPTH) {
+    if (r.depth + levels < b->depth) {
         float4 scale = extent > 0.0f ? (build_bins(r.count) * 0.999999f) / extent : (float4)(0.0f);
         int2 plane = build_plane(b, r.first, r.count, span.lo, scale);
         if (plane.x >= 0) mid = build_divide(b->items, r, plane.x, plane.y, span, scale, left, right);
@@ -198,10 +199,10 @@ kernel NO_VECTORIZE void build_root(global const Extent *restrict parts, uint n_
 /* Ranges from `begin` on in the heap, a level of it. Those with no items are no ranges. */
 kernel NO_VECTORIZE void build_level(global float8 *restrict items, global float8 *restrict nodes,
                                      global Range *restrict ranges, global Extent *restrict extents,
-                                     uint begin, uint leaf_size, uint at_once, uint runs)
+                                     uint begin, uint leaf_size, uint at_once, uint runs, uint depth)
 {
     uint k = begin + get_global_id(0);
-    Build b = {items, nodes, build_reach(extents[0].bounds), leaf_size, at_once, runs};
+    Build b = {items, nodes, build_reach(extents[0].bounds), leaf_size, at_once, runs, depth};
     Range r = ranges[k], children[2] = {{0, 0, 0, 0}, {0, 0, 0, 0}};
     Extent sides[2];
     if (r.count && build_range(&b, r, extents[k], 0, children, sides)) {
@@ -215,9 +216,9 @@ kernel NO_VECTORIZE void build_level(global float8 *restrict items, global float
 kernel NO_VECTORIZE void build_subtree(global float8 *restrict items, global float8 *restrict nodes,
                                        global const Range *restrict ranges,
                                        global const Extent *restrict extents, uint begin, uint leaf_size,
-                                       uint at_once, uint runs)
+                                       uint at_once, uint runs, uint depth)
 {
-    Build b = {items, nodes, build_reach(extents[0].bounds), leaf_size, at_once, runs};
+    Build b = {items, nodes, build_reach(extents[0].bounds), leaf_size, at_once, runs, depth};
     Range waiting[BVH_DEPTH];
     Extent waiting_halves[BVH_DEPTH];
     int n = 0;

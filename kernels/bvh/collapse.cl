@@ -19,6 +19,7 @@
 #define COLLAPSE_AHEAD 4 /* blocks */
 #define COLLAPSE_NODE_COST 1.0f
 #define COLLAPSE_BLOCK_COST 1.0f
+#define COLLAPSE_EVENLY (4 << 18 | 3 << 15 | 3 << 12 | 2 << 9 | 2 << 6 | 1 << 3 | 1) /* choices: half to each child */
 
 /* The chance that a random line through the node's box meets a triangle in it: area of one side over
  * a quarter of the box's surface times one half (Cauchy); dependence among them is neglected. */
@@ -107,16 +108,11 @@ kernel NO_VECTORIZE void collapse_level(global float8 *restrict nodes,
 }
 
 /* Numbers the wide nodes and blocks, level by level: a node's child nodes, and its blocks, have
- * neighbouring numbers. roots, leaf_roots: the binary node of each; firsts: a node's first child node
- * and first block. totals: nodes, blocks, levels, as a float the tree's cost for a line that meets its
- * box, and the first node of each level. */
-kernel NO_VECTORIZE void collapse_number(global const float8 *restrict nodes,
-                                         global const float8 *restrict costs, global uint *restrict roots,
-                                         global uint2 *restrict firsts, global uint *restrict leaf_roots,
-                                         global uint *restrict totals)
+ * neighbouring numbers. For the rest see collapse_number. */
+inline void collapse_levels(global const float8 *nodes, global const float8 *costs, global uint *roots,
+                            global uint2 *firsts, global uint *leaf_roots, global uint *totals)
 {
     uint children[8], n_nodes = 1, n_blocks = 0, levels = 0, below = 0;
-    float area = node_half_area(nodes[0]);
     roots[0] = 0;
     for (uint at = 0; at < n_nodes; at++) {
         if (at == below) {
@@ -135,6 +131,23 @@ kernel NO_VECTORIZE void collapse_number(global const float8 *restrict nodes,
     totals[0] = n_nodes;
     totals[1] = n_blocks;
     totals[2] = levels;
+}
+
+/* roots, leaf_roots: the binary node of each wide node and block; firsts: a node's first child node and first
+ * block. totals: nodes, blocks, levels, as a float the tree's cost for a line that meets its box, and the first
+ * node of each level. If the tree of least cost has more levels than the stacks of traversals, every node takes
+ * what is three levels below it instead. count: of `costs`. */
+kernel NO_VECTORIZE void collapse_number(global const float8 *restrict nodes, global float8 *restrict costs,
+                                         uint count, global uint *restrict roots,
+                                         global uint2 *restrict firsts, global uint *restrict leaf_roots,
+                                         global uint *restrict totals)
+{
+    float area = node_half_area(nodes[0]);
+    collapse_levels(nodes, costs, roots, firsts, leaf_roots, totals);
+    if (totals[2] > BVH_LEVELS) {
+        for (uint i = 0; i < count; i++) ((global uint *)(costs + i))[7] = COLLAPSE_EVENLY;
+        collapse_levels(nodes, costs, roots, firsts, leaf_roots, totals);
+    }
     totals[3] = as_uint(area > 0.0f ? ((global const float *)costs)[0] / area : 0.0f);
 }
 

@@ -16,6 +16,7 @@
 #include "bvh/ray.cl"
 #include "bvh/shear.cl"
 
+#define COMPACT_STACK (BVH_LEVELS - 1) /* below the root a level has one group at most */
 #define COMPACT_NODES 0xff000000u /* of a group: the slots with nodes that wait */
 
 typedef struct {
@@ -29,7 +30,7 @@ typedef struct {
  * parent; of y the highest byte says which of them wait, in the ray's order, and the lowest which there are, by
  * slot. */
 typedef struct {
-    uint2 group, waiting[BVH_DEPTH];
+    uint2 group, *waiting; /* COMPACT_STACK of them */
     uint waits;
 } CompactState;
 
@@ -42,10 +43,10 @@ inline CompactRay compact_ray(float ox, float oy, float oz, float dx, float dy, 
     return r;
 }
 
-inline void compact_start(CompactState *state)
+inline CompactState compact_start(uint2 *waiting)
 {
-    state->group = (uint2)(0u, 0x80000000u);
-    state->waits = 0;
+    CompactState state = {(uint2)(0u, 0x80000000u), waiting, 0};
+    return state;
 }
 
 inline float4 compact_min(float4 a, float4 b) { return a < b ? a : b; }
@@ -171,11 +172,10 @@ inline TriHit compact_closest(global const float *nodes, global const float *lea
     if (!ray_finite(ox, oy, oz, dx, dy, dz)) return tri_miss(tmax);
     CompactRay r = compact_ray(ox, oy, oz, dx, dy, dz, tmin);
     Shear shear = shear_make(ox, oy, oz, dx, dy, dz);
-    CompactState state;
-    uint2 items;
+    uint2 waiting[COMPACT_STACK], items;
+    CompactState state = compact_start(waiting);
     uint best = BVH_MISS;
     float t = tmax, u = 0.0f, v = 0.0f;
-    compact_start(&state);
     while (compact_next(nodes, &r, t, &state, &items)) {
         while (items.y) {
             uint item = compact_item(&items);
@@ -199,10 +199,9 @@ inline int compact_occluded(global const float *nodes, global const float *leave
     if (!ray_finite(ox, oy, oz, dx, dy, dz)) return 0;
     CompactRay r = compact_ray(ox, oy, oz, dx, dy, dz, tmin);
     Shear shear = shear_make(ox, oy, oz, dx, dy, dz);
-    CompactState state;
-    uint2 items;
+    uint2 waiting[COMPACT_STACK], items;
+    CompactState state = compact_start(waiting);
     int met = 0;
-    compact_start(&state);
     while (compact_next(nodes, &r, tmax, &state, &items)) {
         while (items.y) {
             float at, u, v;

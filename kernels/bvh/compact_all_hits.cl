@@ -9,10 +9,9 @@ inline uint compact_all_hits(global const float *nodes, global const float *leav
     if (!ray_finite(ox, oy, oz, dx, dy, dz)) return 0;
     CompactRay r = compact_ray(ox, oy, oz, dx, dy, dz, tmin);
     Shear shear = shear_make(ox, oy, oz, dx, dy, dz);
-    CompactState state;
-    uint2 items;
+    uint2 waiting[COMPACT_STACK], items;
+    CompactState state = compact_start(waiting);
     uint found = 0;
-    compact_start(&state);
     while (compact_next(nodes, &r, tmax, &state, &items)) {
         while (items.y) {
             float t, u, v;

@@ -71,9 +71,8 @@ inline TriHit compact_keyed_trace(global const float *nodes, global const float 
     if (!ray_finite(o.x, o.y, o.z, d.x, d.y, d.z)) return hit;
     CompactRay r = compact_ray(o.x, o.y, o.z, d.x, d.y, d.z, tmin);
     Shear shear = shear_make(o.x, o.y, o.z, d.x, d.y, d.z);
-    CompactState state;
-    uint2 items;
-    compact_start(&state);
+    uint2 waiting[COMPACT_STACK], items;
+    CompactState state = compact_start(waiting);
     while (compact_keyed_next(nodes, count, share, &r, hit.t, &state, &items)) {
         while (items.y) {
             global const float *record = leaves + (ulong)compact_item(&items) * count * KEYED_LEAF;

@@ -1,5 +1,5 @@
-/* Traversal of a binary tree over shapes: see bvh/shapes.cl. What waits is a node with where the ray enters it, so
- * that each box is tested once. */
+/* Traversal of a binary tree over shapes: see bvh/shapes.cl. A box is tested again when what waits
+ * has its turn, for which its memory is read anyway: so a level takes 4 bytes of the stack. */
 #include "bvh/hit.cl"
 #include "bvh/ray.cl"
 
@@ -8,8 +8,7 @@ inline uint shapes_trace(global const float *nodes, global const uint *indices, 
 {
     Ray ray = ray_make(o.x, o.y, o.z, d.x, d.y, d.z, tmin);
     global const float8 *tree = (global const float8 *)nodes;
-    uint waiting[BVH_DEPTH + 1], n = 0, found = BVH_MISS, at = 0;
-    float entry[BVH_DEPTH + 1];
+    uint waiting[BVH_SHAPES_DEPTH], n = 0, found = BVH_MISS, at = 0;
     if (ray_enter(&ray, tree[0], *t) == INFINITY) return BVH_MISS;
     for (;;) {
         float8 node = tree[at];
@@ -24,16 +23,13 @@ inline uint shapes_trace(global const float *nodes, global const uint *indices, 
             if (near < INFINITY) {
                 uint nearer = left <= right ? 0 : 1;
                 at = link + nearer;
-                if (far < INFINITY) {
-                    waiting[n] = link + 1 - nearer;
-                    entry[n++] = far;
-                }
+                if (far < INFINITY) waiting[n++] = link + 1 - nearer;
                 continue;
             }
         }
         do {
             if (!n) return found;
             at = waiting[--n];
-        } while (entry[n] > *t);
+        } while (ray_enter(&ray, tree[at], *t) == INFINITY);
     }
 }

@@ -15,6 +15,6 @@ inline uint shapes_trace(global const float *nodes, global const uint *indices, 
         if (!shape_intersect(table, prim, o, d, tmin, t)) continue;
         found = prim;
         if (first_only) return found;
-    } while (wide8_next(waiting, &n, *t, &at));
+    } while (wide8_next(nodes, &ray, waiting, &n, *t, &at));
     return found;
 }

@@ -1,6 +1,7 @@
 /* Traversal of the 8-wide tree that bvh/collapse.cl makes, one ray a work-item: the layout for CPUs.
  *
- * A node's eight boxes, and a block's eight triangles, are tested at once in float8.
+ * A node's eight boxes, and a block's eight triangles, are tested at once in float8. What waits is kept by
+ * bvh/wide8_waiting.cl, or where vectors are taken apart, as on a GPU, by bvh/wide8_levels.cl in its place.
  */
 #include "bvh/hit.cl"
 #include "bvh/mask8.cl"
@@ -10,7 +11,6 @@
 /* What is added to offsets for rounding. The products o * r and plane * r are wrong by 2^-24 of themselves at
  * most; they differ by the distance, errors of which RAY_WIDER looks after. */
 #define WIDE8_PRODUCTS 0x1p-22f
-#define WIDE8_STACK (7 * BVH_DEPTH + 8) /* each node above leaves 7 children waiting */
 
 typedef struct {
     float tmin;
@@ -102,29 +102,7 @@ inline TriHit wide8_hit(global const float *leaves, uint slot, float t, const Wi
     return tri_hit(t, u, v, as_uint(b[72]), as_uint(b[80]), v0, e1, e2);
 }
 
-/* The nearest of the children `m` of a node that are met, of which there is one at least, by their words and
- * entry distances. The others are left waiting in descending order: entry distance, as bits, above the word,
- * so that both are compared at once. */
-inline uint wide8_nearest(global const uint *words, const uint *entry, Mask8 m, ulong *waiting, uint *waits)
-{
-    uint i = mask8_first(m);
-    m &= m - 1;
-    if (!m) return words[i];
-    ulong near = (ulong)entry[i] << 32 | words[i];
-    uint base = *waits, n = base;
-    do { /* the nearest goes on */
-        i = mask8_first(m);
-        m &= m - 1;
-        ulong c = (ulong)entry[i] << 32 | words[i];
-        ulong far = max(near, c);
-        near = min(near, c);
-        uint k = n++;
-        for (; k > base && waiting[k - 1] < far; k--) waiting[k] = waiting[k - 1];
-        waiting[k] = far;
-    } while (m);
-    *waits = n;
-    return (uint)near;
-}
+#include "bvh/wide8_waiting.cl"
 
 /* From a node down to the nearest leaf, or to a node of which no child is met; what it comes to is
  * returned. */
@@ -133,41 +111,11 @@ inline uint wide8_descend(global const float *nodes, const Wide8Ray *r, float t,
 {
     while (!(at & BVH_LEAF)) {
         union { float8 v; uint at[8]; } entry;
-        global const float *node = nodes + (ulong)at * 64;
-        Mask8 m = wide8_boxes(node, r, t, &entry.v);
+        Mask8 m = wide8_boxes(nodes + (ulong)at * 64, r, t, &entry.v);
         if (!m) break;
-        at = wide8_nearest((global const uint *)(node + 48), entry.at, m, waiting, waits);
+        at = wide8_nearest(nodes, at, entry.at, m, waiting, waits);
     }
     return at;
-}
-
-/* Tests a block; a hit that is nearer than t becomes t and, by its slot, best. */
-inline void wide8_nearer(global const float *leaves, uint block, const Wide8Ray *r, float *t, uint *best)
-{
-    union { float8 v; float at[8]; } q;
-    float8 det;
-    Mask8 m = wide8_triangles(leaves + (ulong)block * 88, r, *t, &q.v, &det);
-    if (m) q.v /= det;
-    for (; m; m &= m - 1) {
-        uint i = mask8_first(m);
-        if (q.at[i] < *t) {
-            *t = q.at[i];
-            *best = block * 8 + i;
-        }
-    }
-}
-
-/* The last that waits and is nearer than t, in `at`; 0 if none is. */
-inline int wide8_next(const ulong *waiting, uint *waits, float t, uint *at)
-{
-    uint n = *waits;
-    do {
-        if (!n) return 0;
-        n--;
-    } while (as_float((uint)(waiting[n] >> 32)) >= t);
-    *waits = n;
-    *at = (uint)waiting[n];
-    return 1;
 }
 
 inline TriHit wide8_closest(global const float *nodes, global const float *leaves, float ox, float oy,
@@ -181,27 +129,8 @@ inline TriHit wide8_closest(global const float *nodes, global const float *leave
     do {
         at = wide8_descend(nodes, &r, t, at, waiting, &n);
         if (at & BVH_LEAF) wide8_nearer(leaves, at & ~BVH_LEAF, &r, &t, &best);
-    } while (wide8_next(waiting, &n, t, &at));
+    } while (wide8_next(nodes, &r, waiting, &n, t, &at));
     return best == BVH_MISS ? tri_miss(tmax) : wide8_hit(leaves, best, t, &r);
-}
-
-/* From a node of which the children `m` are met to the last of them, which promises most; to one that waits
- * if there is none. The others wait as a set, with their node. 0 if nothing waits. */
-inline int wide8_last(global const float *nodes, uint node, Mask8 m, uint *waiting, Mask8 *sets, uint *waits,
-                      uint *at)
-{
-    uint n = *waits;
-    if (!m) {
-        if (!n) return 0;
-        node = waiting[--n];
-        m = sets[n];
-    }
-    uint i = mask8_last(m);
-    *at = as_uint(nodes[(ulong)node * 64 + 48 + i]);
-    waiting[n] = node;
-    sets[n] = mask8_without(m, i);
-    *waits = n + (sets[n] != 0);
-    return 1;
 }
 
 /* Whether anything is between tmin and tmax. */
@@ -210,17 +139,17 @@ inline int wide8_occluded(global const float *nodes, global const float *leaves,
 {
     if (!ray_finite(ox, oy, oz, dx, dy, dz)) return 0;
     Wide8Ray r = wide8_ray(ox, oy, oz, dx, dy, dz, tmin);
-    uint waiting[BVH_DEPTH], n = 0, at = 0;
-    Mask8 sets[BVH_DEPTH], m;
-    float8 unused[2];
+    WIDE8_SETS
+    uint at = 0;
+    Mask8 m;
+    float8 unused;
     do {
         m = 0;
         if (at & BVH_LEAF) {
-            global const float *block = leaves + (ulong)(at & ~BVH_LEAF) * 88;
-            if (wide8_triangles(block, &r, tmax, &unused[0], &unused[1])) return 1;
+            if (wide8_meets(leaves, at & ~BVH_LEAF, &r, tmax)) return 1;
         } else {
-            m = wide8_boxes(nodes + (ulong)at * 64, &r, tmax, &unused[0]);
+            m = wide8_boxes(nodes + (ulong)at * 64, &r, tmax, &unused);
         }
-    } while (wide8_last(nodes, at, m, waiting, sets, &n, &at));
+    } while (WIDE8_LAST(nodes, at, m, &at));
     return 0;
 }

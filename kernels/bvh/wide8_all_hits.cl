@@ -8,7 +8,7 @@ inline uint wide8_all_hits(global const float *nodes, global const float *leaves
 {
     if (!ray_finite(ox, oy, oz, dx, dy, dz)) return 0;
     Wide8Ray r = wide8_ray(ox, oy, oz, dx, dy, dz, tmin);
-    uint waiting[WIDE8_STACK];
+    uint waiting[7 * BVH_LEVELS + 8];
     uint n = 1, found = 0;
     waiting[0] = 0;
     while (n) {

@@ -49,12 +49,10 @@ inline int wide8_step(global const float *nodes, global const float *leaves, Wid
         wide8_nearer(leaves, at & ~BVH_LEAF, &s->ray, &s->t, &s->best);
     } else {
         union { float8 v; uint at[8]; } entry;
-        global const float *node = nodes + (ulong)at * 64;
-        m = wide8_boxes(node, &s->ray, s->t, &entry.v);
-        if (m)
-            at = wide8_nearest((global const uint *)(node + 48), entry.at, m, s->waiting.nearest, &s->waits);
+        m = wide8_boxes(nodes + (ulong)at * 64, &s->ray, s->t, &entry.v);
+        if (m) at = wide8_nearest(nodes, at, entry.at, m, s->waiting.nearest, &s->waits);
     }
-    if (!m && !wide8_next(s->waiting.nearest, &s->waits, s->t, &at)) return 0;
+    if (!m && !wide8_later(nodes, s->waiting.nearest, &s->waits, s->t, &at)) return 0;
     s->at = at;
     wide8_fetch(nodes, leaves, at);
     return 1;

@@ -57,10 +57,9 @@ inline TriHit wide8_keyed_closest(global const float *nodes, global const float 
     do {
         while (!(at & BVH_LEAF)) {
             union { float8 v; uint at[8]; } entry;
-            global const float *node = nodes + (ulong)at * KEYED_NODE;
-            Mask8 m = wide8_keyed_boxes(node, share, &r, t, &entry.v);
+            Mask8 m = wide8_keyed_boxes(nodes + (ulong)at * KEYED_NODE, share, &r, t, &entry.v);
             if (!m) break;
-            at = wide8_nearest((global const uint *)(node + 48), entry.at, m, waiting, &n);
+            at = wide8_nearest(nodes, at, entry.at, m, waiting, &n);
         }
         if (!(at & BVH_LEAF)) continue;
         union { float8 v; float at[8]; } q;
@@ -74,7 +73,7 @@ inline TriHit wide8_keyed_closest(global const float *nodes, global const float 
             t = q.at[i];
             best = block * 8 + i;
         }
-    } while (wide8_next(waiting, &n, t, &at));
+    } while (wide8_later(nodes, waiting, &n, t, &at));
     return best == BVH_MISS ? tri_miss(tmax) : wide8_keyed_hit(leaves, share, best, t, &r);
 }
 
@@ -83,8 +82,9 @@ inline int wide8_keyed_occluded(global const float *nodes, global const float *l
 {
     if (!ray_finite(o.x, o.y, o.z, d.x, d.y, d.z)) return 0;
     Wide8Ray r = wide8_ray(o.x, o.y, o.z, d.x, d.y, d.z, tmin);
-    uint waiting[BVH_DEPTH], n = 0, at = 0;
-    Mask8 sets[BVH_DEPTH], m;
+    WIDE8_SETS
+    uint at = 0;
+    Mask8 m;
     float8 unused[2];
     do {
         m = 0;
@@ -94,6 +94,6 @@ inline int wide8_keyed_occluded(global const float *nodes, global const float *l
         } else {
             m = wide8_keyed_boxes(nodes + (ulong)at * KEYED_NODE, share, &r, tmax, &unused[0]);
         }
-    } while (wide8_last(nodes, at, m, waiting, sets, &n, &at));
+    } while (WIDE8_LAST(nodes, at, m, &at));
     return 0;
 }

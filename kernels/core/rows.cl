@@ -1,9 +1,11 @@
 /* Words that follow one another in a table, lane by lane: table[at], table[at + 1] and so on; an idle lane's index must
- * be valid: give 0. Processors that gather do so by pairs of words: 10 instructions for four words of 16 lanes. Others
- * read the words of a lane at once and transpose them in registers, which are 100 instructions to compile, but half of
- * the time of reading word by word. gather_w4 is gather4 of a table of words. */
+ * be valid: give 0. `gather2` to `gather4` read the words of a lane at once and transpose them in registers, which takes
+ * half of the time of reading word by word. gather_w4 is gather4 of a table of words.
+ *
+ * `row4` is gather_w4 for tables of few rows, of which all lanes mostly read one: its words then come by broadcast. Else
+ * processors that gather do so by pairs of words, which are slower than a transposition, but 10 instructions in the
+ * place of 100, of which programs have many. */
 #if LANES == 1
-#define row4 gather_w4
 inline vec2 gather2(global const float *p, integer at)
 {
     vec2 r = {p[at], p[at + 1]};
@@ -19,38 +21,7 @@ inline vec4 gather4(global const float *p, integer at)
     vec4 r = {p[at], p[at + 1], p[at + 2], p[at + 3]};
     return r;
 }
-#elif defined(NATIVE_PAIRS)
-inline vec2 gather2(global const float *p, integer at)
-{
-    real a = NATIVE_PAIRS(p, at.lo), b = NATIVE_PAIRS(p, at.hi);
-    vec2 r = {(real)(a.even, b.even), (real)(a.odd, b.odd)};
-    return r;
-}
-inline vec3 gather3(global const float *p, integer at)
-{
-    vec2 xy = gather2(p, at);
-    vec3 r = {xy.x, xy.y, gather(p + 2, at)};
-    return r;
-}
-inline vec4 gather4(global const float *p, integer at)
-{
-    vec2 xy = gather2(p, at), zw = gather2(p + 2, at);
-    vec4 r = {xy.x, xy.y, zw.x, zw.y};
-    return r;
-}
-/* Of a row that a record has. Where a scene has few of a kind all lanes mostly read one row, whose words then come
- * without a gather. */
-inline vec4 row4_alike(global const uint *table, integer at)
-{
-    global const float *row = (global const float *)table;
-    if (any(at != at.s0)) return gather4(row, at);
-    row += at.s0;
-    vec4 r = {(real)(row[0]), (real)(row[1]), (real)(row[2]), (real)(row[3])};
-    return r;
-}
-#define row4 row4_alike
 #else
-#define row4 gather_w4
 #define ROW_2(i) vload2(0, p + at.s##i)
 #define ROW_3(i) (float4)(vload3(0, p + at.s##i), 0.0f)
 #define ROW_4(i) vload4(0, p + at.s##i)
@@ -96,3 +67,21 @@ inline vec4 gather4(global const float *p, integer at)
 #undef ROW_QUARTERS
 #endif
 inline vec4 gather_w4(global const uint *p, integer at) { return gather4((global const float *)p, at); }
+
+#ifdef NATIVE_PAIRS
+inline vec4 row4(global const uint *table, integer at)
+{
+    global const float *row = (global const float *)table;
+    if (any(at != at.s0)) {
+        real a = NATIVE_PAIRS(row, at.lo), b = NATIVE_PAIRS(row, at.hi);
+        real c = NATIVE_PAIRS(row + 2, at.lo), d = NATIVE_PAIRS(row + 2, at.hi);
+        vec4 r = {(real)(a.even, b.even), (real)(a.odd, b.odd), (real)(c.even, d.even), (real)(c.odd, d.odd)};
+        return r;
+    }
+    row += at.s0;
+    vec4 r = {(real)(row[0]), (real)(row[1]), (real)(row[2]), (real)(row[3])};
+    return r;
+}
+#else
+#define row4 gather_w4
+#endif

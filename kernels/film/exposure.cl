@@ -53,7 +53,7 @@ inline void exposure_cover(Slab path, uint at, mask m, real weight)
 }
 
 /* Adds finished samples. */
-inline void exposure_add(Scene scene, Slab path, uint at, BEGIN_ARGS, mask m, integer plane, integer pixel_index,
+inline void exposure_add(Scene scene, Slab path, uint at, BEGIN_ARGS, mask m, integer part, integer pixel_index,
                          integer sample, Light light)
 {
     exposure_sum(path, at, counters, m, light.value, light.small);
@@ -61,13 +61,14 @@ inline void exposure_add(Scene scene, Slab path, uint at, BEGIN_ARGS, mask m, in
     exposure_cover(path, at, m & light.covers, load_path_weight(path, at));
 #endif
 #if USES_BANDS
-    integer full = bands_add(scene, bands, m, plane, pixel_index, light.radiance, light.lambdas, light.scale);
+    integer full = bands_add(scene, bands, m, part, pixel_index, light.radiance, light.lambdas, light.scale);
     count(counters, COUNTER_FULL, m & (full > 0), full);
 #endif
 }
 
-/* Gives the film what was summed where slots `leave` their pixels, and begins again at 0 where they `enter` others. */
-inline void exposure_leave(Scene scene, Slab path, uint at, BEGIN_ARGS, mask leave, mask enter, integer plane,
+/* Gives a part of the film what was summed where slots `leave` it or their pixels, and begins again at 0 where they
+ * `enter` others. */
+inline void exposure_leave(Scene scene, Slab path, uint at, BEGIN_ARGS, mask leave, mask enter, integer part,
                            integer pixel_index)
 {
     Natural3 low = load_path_low(path, at), middle = load_path_middle(path, at), high = load_path_high(path, at), none;
@@ -82,6 +83,6 @@ inline void exposure_leave(Scene scene, Slab path, uint at, BEGIN_ARGS, mask lea
     e.covered = load_path_covered(path, at);
     store_path_covered(path, at, enter, fixed_zero());
 #endif
-    integer full = film_add(scene.settings, film, leave, plane, pixel_index, e);
+    integer full = film_add(scene.settings, film, leave, part, pixel_index, e);
     count(counters, COUNTER_FULL, leave & (full > 0), full);
 }

@@ -39,26 +39,35 @@ typedef struct {
 #endif
 } Exposure;
 
-/* The first word of a pixel's group in the half of the film that a plane's samples go to: even or odd ones, where these
- * are kept apart and planes are an even number; else the only one. */
-inline size_t film_at(global const Settings *settings, int plane, int pixel_index)
+/* The part of the film that a sample goes to: there is one, but where even and odd samples are kept apart, or octaves:
+ * samples from 2^k to before 2^(k + 1), of which those of even and of odd k have a part each. */
+inline integer film_part(global const Settings *settings, integer sample)
 {
-    int half_film = plane & (settings->halves - 1);
-    return (size_t)(half_film * FILM_WORDS + FILM_GROUP) * settings->padded_pixels + pixel_index;
+    integer part = sample & (settings->halves - 1);
+    if (settings->octaves > 1) part += (clz(sample) & 1) * settings->halves;
+    return part;
+}
+
+inline int film_parts(global const Settings *settings) { return settings->halves * settings->octaves; }
+
+/* The first word of a pixel's group in a part of the film. */
+inline size_t film_at(global const Settings *settings, int part, int pixel_index)
+{
+    return (size_t)(part * FILM_WORDS + FILM_GROUP) * settings->padded_pixels + pixel_index;
 }
 
 /* Adds what slots have summed to their pixels. Returns how many sums are full, lane by lane. A loop, as its text for
  * every lane would take longer to compile than to run. */
-inline integer film_add(global const Settings *settings, global uint *film, mask m, integer plane,
+inline integer film_add(global const Settings *settings, global uint *film, mask m, integer part,
                         integer pixel_index, Exposure e)
 {
     size_t stream = settings->padded_pixels;
     integer full = 0;
-    const int *at_lane = (const int *)&m, *planes = (const int *)&plane, *pixels = (const int *)&pixel_index;
+    const int *at_lane = (const int *)&m, *parts = (const int *)&part, *pixels = (const int *)&pixel_index;
     const uint *words = (const uint *)&e; /* as the members of Exposure lie in memory, LANES numbers each */
     for (int i = 0; i < LANES; i++) {
         if (!at_lane[i]) continue;
-        global uint *at = film + film_at(settings, planes[i], pixels[i]);
+        global uint *at = film + film_at(settings, parts[i], pixels[i]);
         uint count = 0;
         sums_add_word(at + FILM_SAMPLES * stream, words[FILM_SAMPLES * LANES + i]);
         UNROLLED
@@ -73,12 +82,12 @@ inline integer film_add(global const Settings *settings, global uint *film, mask
 }
 
 /* Counts a sample in each pixel where something else adds its value. */
-inline void film_count(global const Settings *settings, global uint *film, mask m, integer plane, integer pixel_index)
+inline void film_count(global const Settings *settings, global uint *film, mask m, integer part, integer pixel_index)
 {
-    const int *at_lane = (const int *)&m, *planes = (const int *)&plane, *pixels = (const int *)&pixel_index;
+    const int *at_lane = (const int *)&m, *parts = (const int *)&part, *pixels = (const int *)&pixel_index;
     for (int i = 0; i < LANES; i++)
         if (at_lane[i])
-            sums_add_word(film + film_at(settings, planes[i], pixels[i]) + FILM_SAMPLES * settings->padded_pixels, 1u);
+            sums_add_word(film + film_at(settings, parts[i], pixels[i]) + FILM_SAMPLES * settings->padded_pixels, 1u);
 }
 
 #include "generated/counter_numbers.cl"

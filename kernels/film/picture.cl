@@ -1,12 +1,11 @@
-/* What pictures read of a film: its sums as numbers. Halves: the films of even and of odd samples, from the first one
- * that is wanted to the one before `end`; a film that is not divided is one half. For work-items of one lane. */
+/* What pictures read of a film: its sums over all parts, as numbers. For work-items of one lane. */
 #include "film/film.cl"
 
-/* One sum over halves, as a number. sum: its first word in the first half; size: words of a half. */
-inline float halves_sum(global const uint *sum, size_t stream, size_t size, int2 halves)
+/* One sum as a number. sum: its first word in the first part; size: words of a part. */
+inline float parts_sum(global const uint *sum, size_t stream, size_t size, int parts)
 {
     Fixed total = fixed_zero();
-    for (int i = halves.x; i < halves.y; i++) {
+    for (int i = 0; i < parts; i++) {
         global const uint *word = sum + i * size;
         Fixed f = {word[0], word[stream], word[2 * stream]};
         total = fixed_add(total, f);
@@ -15,20 +14,22 @@ inline float halves_sum(global const uint *sum, size_t stream, size_t size, int2
 }
 
 /* A pixel's three sums, in the group of words that begins at `group`. */
-inline vec3 film_sum(global const Settings *settings, global const uint *film, int pixel_index, int2 halves, int group)
+inline vec3 film_sum(global const Settings *settings, global const uint *film, int pixel_index, int group)
 {
     size_t stream = settings->padded_pixels, size = FILM_WORDS * stream;
+    int parts = film_parts(settings);
     global const uint *first = film + group * stream + pixel_index;
-    return v3(halves_sum(first, stream, size, halves), halves_sum(first + 3 * stream, stream, size, halves),
-              halves_sum(first + 6 * stream, stream, size, halves));
+    return v3(parts_sum(first, stream, size, parts), parts_sum(first + 3 * stream, stream, size, parts),
+              parts_sum(first + 6 * stream, stream, size, parts));
 }
 
 /* How many samples a pixel has. */
-inline uint film_samples(global const Settings *settings, global const uint *film, int pixel_index, int2 halves)
+inline uint film_samples(global const Settings *settings, global const uint *film, int pixel_index)
 {
     size_t stream = settings->padded_pixels;
     uint samples = 0;
-    for (int i = halves.x; i < halves.y; i++) samples += film[(i * FILM_WORDS + FILM_SAMPLES) * stream + pixel_index];
+    for (int i = 0; i < film_parts(settings); i++)
+        samples += film[(i * FILM_WORDS + FILM_SAMPLES) * stream + pixel_index];
     return samples;
 }
 
@@ -42,7 +43,7 @@ inline uint film_samples(global const Settings *settings, global const uint *fil
 #if LIGHT_PATHS
 #define SAMPLES light_paths
 #else
-#define SAMPLES (float)film_samples(settings, film, pixel_index, halves)
+#define SAMPLES (float)film_samples(settings, film, pixel_index)
 #endif
 
 #if SUMS_LIGHT_PATHS
@@ -54,12 +55,11 @@ inline float light_paths_mean(float light_paths, float samples)
 #endif
 
 /* One over what a pixel's sums are divided by: its samples, or, of samples that serve several pixels, their weight. */
-inline float film_mean(global const Settings *settings, global const uint *film, int pixel_index, int2 halves,
-                       float samples)
+inline float film_mean(global const Settings *settings, global const uint *film, int pixel_index, float samples)
 {
 #if FILM_WEIGHTS
     size_t stream = settings->padded_pixels;
-    samples = halves_sum(film + FILM_WEIGHT * stream + pixel_index, stream, FILM_WORDS * stream, halves);
+    samples = parts_sum(film + FILM_WEIGHT * stream + pixel_index, stream, FILM_WORDS * stream, film_parts(settings));
 #endif
     return samples > 0.0f ? 1.0f / samples : 0.0f;
 }

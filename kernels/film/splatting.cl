@@ -56,7 +56,7 @@ inline uint footprint_sum(global uint *sum, size_t stream, long v)
 }
 
 /* Adds a footprint around the pixel (x, y) to the film and empties it. Returns how many sums are full. */
-inline uint footprint_leave(global const Settings *settings, global uint *film, global long4 *own, int plane, int x,
+inline uint footprint_leave(global const Settings *settings, global uint *film, global long4 *own, int part, int x,
                             int y)
 {
     size_t stream = settings->padded_pixels;
@@ -69,7 +69,7 @@ inline uint footprint_leave(global const Settings *settings, global uint *film, 
         if (v.w && px >= 0 && px < settings->width && py >= 0 && py < settings->height) {
             int column = px + settings->margin, row = py + settings->margin;
             int tile = (row >> 2) * settings->tiles_x + (column >> 2);
-            global uint *at = film + film_at(settings, plane, tile * 16 + (row & 3) * 4 + (column & 3));
+            global uint *at = film + film_at(settings, part, tile * 16 + (row & 3) * 4 + (column & 3));
             full += footprint_sum(at, stream, v.x) + footprint_sum(at + 3 * stream, stream, v.y) +
                     footprint_sum(at + 6 * stream, stream, v.z) + footprint_sum(at + FILM_WEIGHT * stream, stream, v.w);
 #if USES_ALPHA
@@ -81,20 +81,20 @@ inline uint footprint_leave(global const Settings *settings, global uint *film, 
     return full;
 }
 
-/* Gives the film what slots have summed around a pixel, where they `leave` it. */
-inline void exposure_leave(Scene scene, Slab path, uint at, BEGIN_ARGS, mask leave, mask enter, integer plane,
+/* Gives a part of the film what slots have summed around a pixel, where they `leave` it. */
+inline void exposure_leave(Scene scene, Slab path, uint at, BEGIN_ARGS, mask leave, mask enter, integer part,
                            integer pixel_index)
 {
     integer x, y, full = 0;
     pixel_place(scene.settings, pixel_index, &x, &y);
     natural taken = load_path_samples(path, at);
-    const int *at_lane = (const int *)&leave, *planes = (const int *)&plane, *pixels = (const int *)&pixel_index;
+    const int *at_lane = (const int *)&leave, *parts = (const int *)&part, *pixels = (const int *)&pixel_index;
     const int *columns = (const int *)&x, *rows = (const int *)&y;
     for (int i = 0; i < LANES; i++) {
         if (!at_lane[i]) continue;
-        global uint *own = film + film_at(scene.settings, planes[i], pixels[i]);
+        global uint *own = film + film_at(scene.settings, parts[i], pixels[i]);
         sums_add_word(own + FILM_SAMPLES * (size_t)scene.settings->padded_pixels, ((const uint *)&taken)[i]);
-        ((int *)&full)[i] = (int)footprint_leave(scene.settings, film, footprint_of(footprints, at, i), planes[i],
+        ((int *)&full)[i] = (int)footprint_leave(scene.settings, film, footprint_of(footprints, at, i), parts[i],
                                                  columns[i], rows[i]);
     }
     store_path_samples(path, at, leave | enter, (natural)(0u));
@@ -102,7 +102,7 @@ inline void exposure_leave(Scene scene, Slab path, uint at, BEGIN_ARGS, mask lea
 }
 
 /* Adds finished samples. */
-inline void exposure_add(Scene scene, Slab path, uint at, BEGIN_ARGS, mask m, integer plane, integer pixel_index,
+inline void exposure_add(Scene scene, Slab path, uint at, BEGIN_ARGS, mask m, integer part, integer pixel_index,
                          integer sample, Light light)
 {
     Sampler sampler = pixel_sampler(scene.settings, load_path_pixel_key(path, at), sample);
@@ -116,7 +116,7 @@ inline void exposure_add(Scene scene, Slab path, uint at, BEGIN_ARGS, mask m, in
 #else
     mask at_once = bright;
 #endif
-    if (any(at_once)) full = spread_add(scene, SPREAD_PASSED, at_once, bright, plane, s, light);
+    if (any(at_once)) full = spread_add(scene, SPREAD_PASSED, at_once, bright, part, s, light);
     count(counters, COUNTER_FULL, m & (full > 0), full);
     natural taken = load_path_samples(path, at) + 1u;
     store_path_samples(path, at, m, taken);
@@ -131,5 +131,5 @@ inline void exposure_add(Scene scene, Slab path, uint at, BEGIN_ARGS, mask m, in
         footprint_add(own, s.across, s.down, i, (float4)(r[i], g[i], b[i], 1.0f), ((const float *)&covers)[i]);
     }
     mask many = m & (taken >= FOOTPRINT_SAMPLES);
-    if (any(many)) exposure_leave(scene, path, at, BEGIN_PASSED, many, mask_of(0), plane, pixel_index);
+    if (any(many)) exposure_leave(scene, path, at, BEGIN_PASSED, many, mask_of(0), part, pixel_index);
 }

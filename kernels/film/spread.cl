@@ -72,7 +72,7 @@ inline mask spread_pixel(global const Settings *settings, Spread s, int i, integ
 
 /* Adds light to the pixels whose filters hold its point, where m; to their sums of colours only where `colours`.
  * Returns how many sums are full, lane by lane. */
-inline integer spread_add(Scene scene, SPREAD_ARGS, mask m, mask colours, integer plane, Spread s, Light light)
+inline integer spread_add(Scene scene, SPREAD_ARGS, mask m, mask colours, integer part, Spread s, Light light)
 {
     integer full = 0;
     ROLLED
@@ -88,9 +88,9 @@ inline integer spread_add(Scene scene, SPREAD_ARGS, mask m, mask colours, intege
 #if USES_ALPHA
         e.covered = fixed_of(sel(light.covers, f, (real)(0.0f)));
 #endif
-        full += film_add(scene.settings, film, there & colours, plane, pixel_index, e);
+        full += film_add(scene.settings, film, there & colours, part, pixel_index, e);
 #if USES_BANDS
-        full += bands_add(scene, bands, there, plane, pixel_index, light.radiance, light.lambdas, light.scale * f);
+        full += bands_add(scene, bands, there, part, pixel_index, light.radiance, light.lambdas, light.scale * f);
 #endif
     }
     return full;

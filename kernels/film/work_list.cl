@@ -42,7 +42,6 @@ inline integer work_list_next(global const Settings *settings, global const uint
 }
 
 typedef struct {
-    integer plane;               /* of the slot */
     integer pixel_index, sample; /* what comes next */
     mask leaves;                 /* the slot leaves the pixel that it had, if it had one */
     mask done;                   /* it leaves, and its list is at its end */
@@ -55,7 +54,7 @@ inline NextSample next_sample(global const Settings *settings, global const uint
 {
     int planes = settings->planes, per_plane = settings->per_plane;
     integer plane = slot_plane(settings, slot), ahead = plane_ahead(plane, planes, samples.x);
-    NextSample n = {plane, pixel_index, sample + planes, (integer)(0), (integer)(0)};
+    NextSample n = {pixel_index, sample + planes, (integer)(0), (integer)(0)};
     integer left = work_list_end(settings, work_list, pixel_index, samples.y) - sample; /* sums may leave an int */
     n.leaves = ended & (!begun | (left <= planes));
     if (any(n.leaves)) {

@@ -20,7 +20,7 @@
 #define GUIDE_EVEN 0.5f /* light from everywhere that is expected beside what is known, over that */
 #define GUIDE_STRAIGHT 4.0f /* the same of what comes straight from lights, which may be from anywhere above */
 #define GUIDE_COSINE 0.1f /* the least by which flux is divided for radiance */
-#define GUIDE_LEAST 0.3f /* chance that a path goes on */
+#define GUIDE_LEAST 0.5f /* chance that a path goes on */
 #define GUIDE_FACES 0x01000193 /* sets the faces of a cell apart, in its hash */
 
 /* Where the row of a point begins. n: normal, on the side from which it is seen. */
@@ -65,7 +65,6 @@ inline Guided guide_at(Scene scene, global const uint *guide, Surface s, vec3 d)
     g.row = 0;
     g.light = 0.0f;
     g.even = 0.0f;
-    if (scene.settings->guide_paths == 0) return g; /* as a pilot has decided */
     g.row = guide_row(scene, s.p, sel3(dot3(s.n, d) < 0.0f, s.n, neg3(s.n)));
     g.light = gather((global const float *)guide, g.row + GUIDE_BINS - 1);
     real straight = gather((global const float *)guide, guide_straight(scene, g.row));

@@ -18,7 +18,7 @@
 /* A colour or spectrum that stands in `textures` in the five words that parameters have. */
 inline Spectrum texture_constant(Scene scene, integer at, Wavelengths lambdas)
 {
-    vec4 words = gather_w4(scene.textures, at);
+    vec4 words = row4(scene.textures, at);
     integer source = gather_i(scene.textures, at + 4);
     Spectrum value = spectrum_constant(words, lambdas);
     mask tabulated = source < 0;
@@ -32,7 +32,7 @@ inline vec3 texture_transformed(Scene scene, integer transform, vec3 p)
     real r[3];
     for (int i = 0; i < 3; i++) {
         integer at = transform + 4 * i;
-        vec4 row = gather_w4(scene.textures, at);
+        vec4 row = row4(scene.textures, at);
         r[i] = dot3(v3(row.x, row.y, row.z), p) + row.w;
     }
     return v3(r[0], r[1], r[2]);

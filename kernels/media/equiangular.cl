@@ -20,7 +20,7 @@ inline Equiangular equiangular(Scene scene, vec3 o, vec3 d, real end, real sigma
     for (int i = 0; i + 1 < MEDIUM_AIMS; i++) {
         row = row + sel_i(u >= as_float(scene.media[4 * i + 3]), (integer)(4), (integer)(0));
     }
-    vec4 aim = gather_w4(scene.media, row);
+    vec4 aim = row4(scene.media, row);
     vec3 to = sub3(v3(aim.x, aim.y, aim.z), o);
     real far2 = dot3(to, to);
     Equiangular e;

@@ -10,11 +10,10 @@ kernel void accumulate(global const Settings *settings, global const uint *film,
     int x = get_global_id(0), y = get_global_id(1);
     if (x < settings->width && y < settings->height) {
         int pixel_index = film_pixel_index(settings, x, y);
-        int2 halves = (int2)(0, settings->halves);
-        float count = SAMPLES, mean = film_mean(settings, film, pixel_index, halves, count);
-        vec3 v = scale3(film_sum(settings, film, pixel_index, halves, 0), mean);
+        float count = SAMPLES, mean = film_mean(settings, film, pixel_index, count);
+        vec3 v = scale3(film_sum(settings, film, pixel_index, 0), mean);
 #if SUMS_LIGHT_PATHS
-        vec3 brought = film_sum(settings, film, pixel_index, halves, FILM_GROUP_WORDS);
+        vec3 brought = film_sum(settings, film, pixel_index, FILM_GROUP_WORDS);
         v = add3(v, scale3(brought, light_paths_mean(light_paths, count)));
 #endif
         global float *pixel = image + 4 * ((size_t)y * settings->width + x);

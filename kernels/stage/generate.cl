@@ -24,7 +24,7 @@
 #include "generated/layer_sums.cl"
 
 /* Adds the finished paths to the sums of their pixels. What is not finite counts as black, at its own wavelength. */
-inline void add_sample(Scene scene, Slab path, uint at, BEGIN_ARGS, PathEnd end, integer slot, integer pixel_index,
+inline void add_sample(Scene scene, Slab path, uint at, BEGIN_ARGS, PathEnd end, integer part, integer pixel_index,
                        integer sample)
 {
     Wavelengths lambdas = load_path_lambdas(path, at);
@@ -47,7 +47,7 @@ inline void add_sample(Scene scene, Slab path, uint at, BEGIN_ARGS, PathEnd end,
         value = sel3(rejected, v3(0.0f, 0.0f, 0.0f), value);
     }
     Light light = {value, small, !(end.missed & (end.depth == 0)), radiance, lambdas, scale};
-    exposure_add(scene, path, at, BEGIN_PASSED, finished, slot_plane(scene.settings, slot), pixel_index, sample, light);
+    exposure_add(scene, path, at, BEGIN_PASSED, finished, part, pixel_index, sample, light);
     path_end_count(counters, end, end.depth + load_path_nulls(path, at));
 }
 
@@ -96,14 +96,16 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
     if (sky_due(end)) {
         integer slot = LANE_INDEX + (int)at;
         integer pixel_index = load_path_pixel_index(path, at), sample = load_path_sample(path, at);
-        add_sample(scene, path, at, BEGIN_PASSED, end, slot, pixel_index, sample);
+        integer part = film_part(settings, sample);
+        add_sample(scene, path, at, BEGIN_PASSED, end, part, pixel_index, sample);
         mask unseen = end.ended & end.begun & (end.depth == 0);
         layers_count(scene, path, at, layers, unseen);
         layers_of_sky(scene, path, at, layers, unseen);
         NextSample next = next_sample(settings, work_list, samples, slot, end.ended, end.begun, pixel_index, sample);
-        if (any(next.leaves)) {
+        mask turns = end.ended & !next.leaves & (film_part(settings, next.sample) != part);
+        if (any(next.leaves | turns)) {
             mask leaves = next.leaves & end.begun, enters = next.leaves & !next.done;
-            exposure_leave(scene, path, at, BEGIN_PASSED, leaves, enters, next.plane, pixel_index);
+            exposure_leave(scene, path, at, BEGIN_PASSED, leaves | turns, enters | turns, part, pixel_index);
             store_path_pixel_index(path, at, enters, next.pixel_index);
             store_path_pixel_key(path, at, enters, pixel_key(settings, next.pixel_index));
         }

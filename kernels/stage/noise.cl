@@ -32,12 +32,11 @@ kernel void noise(global const Settings *settings, global const uint *film, glob
         for (int i = 0; i < 16 && active_cells[2 * square + colour]; i++) {
             int x = column * 4 + (i & 3), y = row * 4 + (i >> 2), pixel_index = tile * 16 + i;
             if (((x + y) & 1) != colour || x >= settings->width || y >= settings->height) continue;
-            int2 halves = (int2)(0, settings->halves);
-            float samples = (float)film_samples(settings, film, pixel_index, halves);
+            float samples = (float)film_samples(settings, film, pixel_index);
 #if SUMS_LIGHT_PATHS
             if (group) samples = light_paths;
 #endif
-            vec3 v = scale3(film_sum(settings, film, pixel_index, halves, group), 1.0f / fmax(samples, 1.0f));
+            vec3 v = scale3(film_sum(settings, film, pixel_index, group), 1.0f / fmax(samples, 1.0f));
 #if SPECTRUM_SIZE == 3
             float now = 0.2126f * v.x + 0.7152f * v.y + 0.0722f * v.z;
 #else

@@ -31,7 +31,7 @@ STAGE(splat)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)
         real scale = settings->film_scale;
         vec3 colour = scale3(film_value(scene, value, lambdas), scale);
         mask accepted = arrives & film_accepts(colour);
-        integer plane = slot_plane(settings, LANE_INDEX + (int)at);
+        integer part = film_part(settings, load_path_sample(path, at));
         vec2 seen = load_shadow_film(shadow, at);
         seen.x = sel(accepted, seen.x, (real)(0.0f));
         seen.y = sel(accepted, seen.y, (real)(0.0f));
@@ -47,7 +47,7 @@ STAGE(splat)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)
             light_layers_sum(scene, there, pixel_index, surfaces, row, LIGHT_LAYERS, scale3(colour, f), light_layers);
         }
 #endif
-        integer full = spread_add(scene, SPREAD_PASSED, accepted, accepted, plane, spread, light);
+        integer full = spread_add(scene, SPREAD_PASSED, accepted, accepted, part, spread, light);
         count(counters, COUNTER_REJECTED, arrives & !accepted, (integer)(1));
         count(counters, COUNTER_FULL, accepted & (full > 0), full);
     }

@@ -1,10 +1,11 @@
 /* A trial of a runtime, in a few milliseconds: what takes the time of rendering, with no scene.
  *
- * A work-item has LANES paths. At each bounce they are scattered in lanes, by a normal and a colour that are
- * gathered, as in shading; then each goes down through boxes in float8, as in bvh/wide8.cl. What comes out only
+ * A work-item has LANES paths. At each bounce they are scattered in lanes, by a normal and a colour from rows of
+ * words, as in shading; then each goes down through boxes in float8, as in bvh/wide8.cl. What comes out only
  * keeps the compiler from leaving that out. table: TRIAL_NODES nodes of 64 floats in [0, 1).
  */
 #include "core/lanes.cl"
+#include "core/rows.cl"
 #include "core/math.cl"
 #include "core/random.cl"
 #include "core/frame.cl"
@@ -47,13 +48,14 @@ kernel NO_VECTORIZE void trial(global const float *table, global float *out)
     integer at = as_integer(state % (natural)(TRIAL_NODES));
     real beta = (real)(1.0f);
     for (uint bounce = 0; bounce < TRIAL_BOUNCES; bounce++) {
-        vec3 n = v3(gather(table, 64 * at), gather(table, 64 * at + 1), gather(table, 64 * at + 2));
-        real colour = gather(table, 64 * at + 3), alpha = gather(table, 64 * at + 4);
+        vec4 a = gather4(table, 64 * at), b = gather4(table, 64 * at + 4);
+        vec3 n = v3(a.x, a.y, a.z), e = gather3(table, 64 * at + 8);
+        real colour = a.w, alpha = b.x;
         state = hash_natural(state + bounce);
         vec2 u = {unit_interval(state), unit_interval(hash_natural(state))};
         vec3 wi = cosine_hemisphere(u);
         real lobe = exp_r(-sqr(wi.x) / (sqr(alpha) + 0.01f)) + sqrt_r(colour * wi.z);
-        beta *= sel(u.x < 0.5f, lobe, pow_r(wi.z, alpha));
+        beta *= sel(u.x < 0.5f, lobe, pow_r(wi.z, alpha)) * (b.y + b.z * e.x + b.w * e.y + e.z);
         vec3 d = to_world(frame_of(normalize3(n)), wi);
         d = v3(1.0f / d.x, 1.0f / d.y, 1.0f / d.z);
 #define DESCEND(i) LANE(at, i) = (int)trial_descend(table, (uint)LANE(at, i), LANE(d.x, i), LANE(d.y, i), LANE(d.z, i));

@@ -29,7 +29,7 @@ Spectrum marble_reflectance(Marble t, Scene scene, TexturePoint point, Wavelengt
     marble_weights(along, weights);
     Spectrum sum = spectrum_of(0.0f);
     for (int i = 0; i < 4; i++) {
-        vec4 colour = gather_w4(scene.textures, t.colours + 5 * (segment + i));
+        vec4 colour = row4(scene.textures, t.colours + 5 * (segment + i));
         sum = spectrum_madd(spectrum_constant(colour, lambdas), weights[i], sum);
     }
     return sum;

@@ -8,10 +8,9 @@ inline uint instances_trace(global const float *nodes, global const float *leave
                             TriHit *hit, int first_only)
 {
     CompactRay ray = compact_ray(o.x, o.y, o.z, d.x, d.y, d.z, tmin);
-    CompactState state;
-    uint2 items;
+    uint2 waiting[COMPACT_STACK], items;
+    CompactState state = compact_start(waiting);
     uint nearest = BVH_MISS;
-    compact_start(&state);
     while (compact_next(instance_nodes, &ray, hit->t, &state, &items)) {
         while (items.y) {
             uint row = compact_item(&items);

@@ -16,6 +16,6 @@ inline uint instances_trace(global const float *nodes, global const float *leave
         if (!(at & BVH_LEAF) || !instance_meet(nodes, leaves, scene, row, o, d, tmin, hit, first_only)) continue;
         nearest = row;
         if (first_only) return nearest;
-    } while (wide8_next(waiting, &n, hit->t, &at));
+    } while (wide8_next(instance_nodes, &ray, waiting, &n, hit->t, &at));
     return nearest;
 }

@@ -55,7 +55,7 @@ inline void curve_ray_visit(CurveTree tree, CurveRay *r, uint at)
 inline int curve_ray_next(CurveTree tree, CurveRay *r)
 {
     uint at;
-    if (!wide8_next(r->waiting, &r->waits, r->t, &at)) return 0;
+    if (!wide8_later(tree.nodes, r->waiting, &r->waits, r->t, &at)) return 0;
     curve_ray_visit(tree, r, at);
     return 1;
 }
@@ -65,11 +65,9 @@ inline int curve_ray_step(CurveTree tree, CurveRay *r)
 {
     if (r->at & BVH_LEAF) return curve_ray_next(tree, r);
     union { float8 v; uint at[8]; } entry;
-    global const float *node = tree.nodes + (ulong)r->at * 64;
-    Mask8 m = wide8_boxes(node, &r->ray, r->t, &entry.v);
+    Mask8 m = wide8_boxes(tree.nodes + (ulong)r->at * 64, &r->ray, r->t, &entry.v);
     if (!m) return curve_ray_next(tree, r);
-    global const uint *words = (global const uint *)(node + 48);
-    curve_ray_visit(tree, r, wide8_nearest(words, entry.at, m, r->waiting, &r->waits));
+    curve_ray_visit(tree, r, wide8_nearest(tree.nodes, r->at, entry.at, m, r->waiting, &r->waits));
     return 1;
 }
 

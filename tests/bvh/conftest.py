@@ -8,6 +8,7 @@ import pytest
 
 from clpt import bvh
 from clpt import device as dev
+from clpt.bvh import layouts
 
 TREE = """
 #include "bvh/{layout}.cl"
@@ -70,20 +71,23 @@ def device() -> dev.Device:
 
 @pytest.fixture(scope="session")
 def trace(device) -> Callable:
-    """trace(bvh, rays, lanes=8) -> hits (n,) HIT, occluded (n,) bool; rays: o tmin d tmax."""
+    """trace(bvh, rays, lanes=8) -> hits (n,) HIT, occluded (n,) bool; rays: o tmin d tmax.
+
+    A ray through a tree goes alone; lanes of 1 choose the form for GPUs.
+    """
     programs = {}
 
     def program(layout: str, lanes: int) -> dev.Program:
         if (layout, lanes) not in programs:
             text = BRUTE if layout == "brute" else TREE.format(layout=layout)
-            source = dev.assemble("test", {"test": text}, {"LANES": lanes})
+            alone = layouts.ALONE if lanes == 1 else {}
+            source = dev.assemble("test", {"test": text, **alone}, {"LANES": lanes})
             programs[layout, lanes] = dev.build(device, source)
         return programs[layout, lanes]
 
     def run(tree: bvh.Bvh, rays: np.ndarray, lanes: int = 8) -> tuple[np.ndarray, np.ndarray]:
-        n = len(rays)
-        lanes = lanes if tree.layout == "brute" else 1
-        padded = np.zeros((-(-n // lanes) * lanes, 8), np.float32)
+        n, side = len(rays), lanes if tree.layout == "brute" else 1
+        padded = np.zeros((-(-n // side) * side, 8), np.float32)
         padded[:n] = rays
         flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
         buffer = cl.Buffer(device.context, flags, hostbuf=padded)
@@ -94,7 +98,7 @@ def trace(device) -> Callable:
             if tree.layout == "brute":
                 arguments["count"] = max(tree.count, 1)
             bound = program(tree.layout, lanes).kernel(kernel).bind(**arguments)
-            bound.enqueue(device.queue, (len(padded) // lanes,), (1,))
+            bound.enqueue(device.queue, (len(padded) // side,), (1,))
             result = np.empty(len(padded), dtype)
             cl.enqueue_copy(device.queue, result, hits)
             results.append(result[:n])

@@ -14,6 +14,7 @@ LAYOUTS = [
     pytest.param("brute", 16, marks=pytest.mark.slow),
     ("binary", 1),
     ("wide8", 1),
+    ("wide8", 8),
     ("compact", 1),
 ]
 COUNTS = [1, 2, 3, 8, 9, 50, 1000]
@@ -26,7 +27,7 @@ COUNTED = [
     for i, count in enumerate(COUNTS)
     for group in (
         [("brute", 1), ("brute", 8), ("brute", 16)],
-        [("binary", 1), ("wide8", 1), ("compact", 1)],
+        [("binary", 1), ("wide8", 1), ("compact", 1), ("wide8", 8)],
     )
     for k, (layout, lanes) in enumerate(group)
 ]
@@ -79,6 +80,27 @@ def test_agrees_with_reference(device, trace, reference, layout, lanes, count):
     u, v = hits["u"][same, None], hits["v"][same, None]
     points = rays[same, :3] + nearest[same, None] * rays[same, 4:7]
     np.testing.assert_allclose(corners[:, 0] + u * e1 + v * e2, points, atol=5e-4)
+
+
+@pytest.mark.parametrize(("layout", "lanes"), [("wide8", 1), ("wide8", 8), ("compact", 1)])
+def test_the_deepest_trees(device, trace, layout, lanes):
+    """Triangles that shrink by .6: trees of the least cost have up to 41 levels."""
+    sizes = (0.6 ** (np.arange(2000) % 200))[:, None, None]
+    corners = np.array([[1, 1, 1], [1.2, 1, 1], [1, 1.2, 1]])
+    triangles = (sizes * corners).astype(np.float32)
+    tree = bvh.build(device, *mesh(triangles), layout=layout, quality="fast")
+    rng = np.random.default_rng(5)
+    size = sizes[rng.integers(0, 40, 4000), 0]
+    points = size * ([1, 1, 1] + [0.25, 0.25, 0] * (rng.random((4000, 3)) - 0.2))
+    d = size * ([0.3, 0.2, 1.0] + 0.2 * rng.random((4000, 3)))
+    ends = np.zeros((4000, 1)), np.full((4000, 1), 1.5)
+    rays = np.concatenate([points - d, ends[0], d, ends[1]], 1).astype(np.float32)
+    hits, occluded = trace(tree, rays, lanes)
+    truth, _ = trace(bvh.build(device, *mesh(triangles), layout="brute"), rays)
+    met = truth["prim"] != MISS
+    assert 0.1 < met.mean() < 0.9
+    np.testing.assert_array_equal(occluded, met)
+    np.testing.assert_allclose(hits["t"], truth["t"], rtol=1e-5)
 
 
 @pytest.mark.parametrize(("layout", "lanes"), LAYOUTS)

@@ -1,4 +1,4 @@
-"""Freed memory goes back to the system, and cycles are collected, though not while clpt begins."""
+"""Freed memory goes back; cycles are collected, though not while clpt begins or ends."""
 
 from __future__ import annotations
 
@@ -77,3 +77,23 @@ assert gc.get_threshold() == usual and not gc.callbacks
 
 def test_cycles_are_collected_as_usual_once_there_are_many_objects():
     subprocess.run([sys.executable, "-c", CYCLES], check=True)
+
+
+ENDED = """
+import atexit
+from clpt.cli.process import allocator
+class Told:
+    def __init__(self):
+        self.own = self
+    def __del__(self):
+        print("collected")
+atexit.register(print, "before")
+allocator.collect_later()
+cycle = Told()
+atexit.register(print, "exit")
+"""
+
+
+def test_no_cycles_are_sought_when_the_process_ends():
+    done = subprocess.run([sys.executable, "-c", ENDED], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["exit", "before"]

@@ -403,8 +403,12 @@ def test_a_worker_s_renderer_keeps_no_choice_of_another_scene():
     with_ball = PLANS["rgb"].scene
     without = dataclasses.replace(with_ball, shapes=with_ball.shapes[:-1])
     job = tasks._Job(without, [dev.choose()], {})
-    assert not job.renderer._form.weighed
-    assert not job.shows(with_ball)
-    fixed = [dataclasses.replace(one, integrator=PathTracing(light_paths=0)) for one in (
-        without, with_ball)]  # fmt: skip
-    assert tasks._Job(fixed[0], [dev.choose()], {}).shows(fixed[1])
+    for scene in (with_ball, without):
+        job.block(0, 1, None, lambda: True)
+        assert job.shows(scene)
+        assert job.renderer._form.weighed == (scene is with_ball)
+        made = tasks._Job(scene, [dev.choose()], {})
+        blocks = [
+            tasks.state_from_arrays(one.block(2, 4, None, lambda: True)) for one in (job, made)
+        ]
+        check_film(*blocks)

@@ -30,15 +30,15 @@ def tried(monkeypatch) -> list[str]:
     """The platforms that were tried, with seconds as in `SECONDS`."""
     platforms: list[str] = []
 
-    def measured(info: DeviceInfo) -> float:
-        platforms.append(info.platform)
-        return SECONDS[info.platform]
+    def measured(infos: list[DeviceInfo]) -> list[float]:
+        platforms.extend(info.platform for info in infos)
+        return [SECONDS[info.platform] for info in infos]
 
     monkeypatch.setattr(context, "_measured", measured)
     return platforms
 
 
-def fails(info: DeviceInfo) -> float:
+def fails(infos: list[DeviceInfo]) -> list[float]:
     raise RuntimeError("broken")
 
 
@@ -48,6 +48,24 @@ def test_the_fastest_runtime_is_taken_and_remembered(runtimes, tried):
         assert choice.info.platform == "Beta"
         assert "3.00 ms by Alpha, 1.00 ms by Beta" in choice.reason
     assert tried == ["Alpha", "Beta"]
+
+
+@pytest.mark.parametrize(
+    ("alpha", "pocl", "taken"),
+    [(1.0, 1.05, "Beta"), (1.05, 1.0, "Beta"), (1.0, 1.2, "Alpha"), (1.2, 1.0, "Beta")],
+)
+def test_of_two_that_are_as_fast_chance_does_not_choose(
+    runtimes, tried, monkeypatch, alpha, pocl, taken
+):
+    """The times of a trial scatter; PoCL is taken unless the other one is faster by a tenth."""
+    monkeypatch.setitem(SECONDS, "Alpha", 1e-3 * alpha)
+    monkeypatch.setitem(SECONDS, "Beta", 1e-3 * pocl)
+    there = [
+        dataclasses.replace(info, version="OpenCL 3.0 PoCL 7" if info.index == 1 else "OpenCL 3.0")
+        for info in runtimes
+    ]
+    monkeypatch.setattr(context, "devices", lambda: tuple(there))
+    assert context.selection().info.platform == taken
 
 
 def test_a_new_driver_is_tried(runtimes, tried, monkeypatch):
@@ -75,7 +93,7 @@ def test_without_a_question_there_is_no_trial(runtimes, tried, monkeypatch, case
 def test_a_trial_that_failed_leaves_the_first_and_is_not_made_again(runtimes, monkeypatch):
     monkeypatch.setattr(context, "_measured", fails)
     assert context.selection().info.platform == "Alpha"
-    monkeypatch.setattr(context, "_measured", lambda info: pytest.fail("tried again"))
+    monkeypatch.setattr(context, "_measured", lambda infos: pytest.fail("tried again"))
     assert context.selection().info.platform == "Alpha"
 
 
@@ -86,4 +104,5 @@ def test_without_a_cache_there_is_no_trial(runtimes, tried, monkeypatch):
 
 
 def test_a_trial_takes_time(device):
-    assert 0.0 < speed_trial.measure(device.queue, device.lanes) < 60.0
+    for seconds in speed_trial.measure([(device.queue, device.lanes), (device.queue, 8)]):
+        assert 0.0 < seconds < 60.0

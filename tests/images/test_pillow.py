@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import logging
 import struct
+import subprocess
+import sys
 from io import BytesIO
 
 import numpy as np
@@ -240,3 +242,17 @@ def test_gltf_has_profiles_passed_over(tmp_path):
     image = images.decoded(path.read_bytes(), ("PNG",), profiled=False)
     assert (image.is_profiled, image.notes_of(False)) == (False, ())
     assert image.values[0, 0].tolist() == [128, 64, 32]
+
+
+def test_modules_of_other_formats_are_not_imported(tmp_path):
+    """Pillow imports all of its own for a format that it has not met."""
+    path = tmp_path / "image.tga"
+    Image.fromarray(np.zeros((4, 4, 3), np.uint8)).save(path)
+    code = (
+        "import sys; from pathlib import Path; from clpt.images import pillow; "
+        "pillow.read(Path(sys.argv[1])); print('PIL.PdfImagePlugin' in sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "False"

@@ -304,7 +304,7 @@ def before_update(scene: Scene) -> Scene:
         former = lower(other)
     except SceneError:  # as a box is open without its lid
         return scene
-    return scene if refusal(former, lower(scene, former=former)) else other
+    return scene if refusal(former, lower(scene, former=former, anew=True)) else other
 
 
 def updated(scene: Scene, samples: int) -> Values:

@@ -16,8 +16,9 @@ from clpt.view.target import Change
 from tests.view.test_session import Audience, small
 
 
-def test_previews_become_finer_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    """By a clock of the test: a second a look makes them coarser, none lets them be as before."""
+@pytest.fixture
+def steps(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """A clock of the test: each look at it takes the last of these steps [s]."""
     now, steps = 0.0, [0.0]
 
     def look() -> float:
@@ -25,8 +26,29 @@ def test_previews_become_finer_again(monkeypatch: pytest.MonkeyPatch) -> None:
         now += steps[-1]
         return now
 
-    clock = SimpleNamespace(perf_counter=look)
-    monkeypatch.setattr(render_loop, "time", clock)
+    monkeypatch.setattr(render_loop, "time", SimpleNamespace(perf_counter=look))
+    return steps
+
+
+def test_a_slow_drag_prepares_no_kernels(steps: list[float]) -> None:
+    """Coarser previews have the kernels of finer ones: nobody is told that kernels are prepared."""
+    outlet: Any = Audience()
+    loop = RenderLoop(small(), device.choose(), outlet, Display())
+    steps.append(1.0)
+    try:
+        for step in range(4):
+            camera = dataclasses.replace(loop.scene.camera, fov=40.0 + step)
+            loop.begin(dataclasses.replace(loop.scene, camera=camera), Change(camera=camera))
+            while loop._previews_left:
+                loop.advance()
+    finally:
+        loop.close()
+    assert outlet.frames[-1][0]["divider"] > outlet.frames[0][0]["divider"]
+    assert [m["phase"] for m in outlet.messages if "phase" in m].count("preparing") == 1
+
+
+def test_previews_become_finer_again(steps: list[float]) -> None:
+    """A second a look makes them coarser, none lets them be as before."""
     scene = small()
     outlet: Any = Audience()
     loop = RenderLoop(scene, device.choose(), outlet, Display())

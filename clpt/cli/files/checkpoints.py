@@ -109,6 +109,7 @@ def check(
 def go_on(renderer: AnyRenderer, saved: SavedFilm, path: Path, note: Callable[[str], None]) -> None:
     """Let a renderer go on from a film, and say so. Raises SceneError, which says what differs."""
     known = len(renderer.warnings)
+    renderer._follow(saved.origin)
     refuse(saved.origin.differences(renderer._origin()), path)
     renderer._restore(saved)
     note(f"goes on from {path}: {summary(saved)}")

@@ -242,7 +242,7 @@ def _picture(category: str, cls: type[Kind]) -> str:
     caption = _captions().get(f"{category}/{cls.kind}")
     if caption is None:
         return ""
-    shown = f"![{category} {cls.kind}](pictures/kinds/{category}/{cls.kind}.png)"
+    shown = f"![{category} {cls.kind}](pictures/kinds/{category}/{cls.kind}.webp)"
     return f"\n{shown}\n\n*{caption}*\n"
 
 

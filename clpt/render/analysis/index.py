@@ -36,8 +36,8 @@ class SceneIndex:
     order that material words count; normal_mapped: whether a material has a normal or a bump map;
     warnings: of instances that became triangles; motions: what moves; lit_media: why no paths can
     start at some light in a medium, "" if they can; lit_before: whether light paths were ghosts of
-    a lens before an edit, whose film has sums for them or none; piloted: whether a pilot decides on
-    guiding, as nobody has asked for it.
+    a lens before an edit, whose film has sums for them or none; candidates: integrators between
+    which a trial decides, the one that was chosen first; none where there is no trial.
     """
 
     scene: Scene
@@ -50,7 +50,7 @@ class SceneIndex:
     motions: Motions
     lit_media: str = UNKNOWN
     lit_before: bool | None = None
-    piloted: bool = False
+    candidates: tuple[Integrator, ...] = ()
 
     @classmethod
     def of(cls, scene: Scene) -> SceneIndex:

@@ -119,7 +119,7 @@ def _tree_text() -> list[str]:
     """Nodes of the tree over lights, and how one goes down in it."""
     node = light_records.NODE
     return [
-        node.row_text(),
+        node.row_text(many=True),
         f"#define LIGHT_NODE_WORDS {node.words}",
         f"#define LIGHT_TREE_WIDTH {WIDTH}",
         f"#define LIGHT_TREE_LINE {LINE}",

@@ -229,13 +229,14 @@ def _source(
     """The text of a program; stage: its file, if it is not called so; part: of a loop."""
     own: flags.Defines = {"PART": f"loop_{name}"} if part else {}
     given = {"LANES": lanes, "QUEUED": 0, **own, **defines}
-    return device.assemble(f"stage/{stage or name}.cl", virtual, given)
+    alone = bvh.ALONE if given["SLAB_BLOCK"] else {}  # a CPU's rays go alone, too
+    return device.assemble(f"stage/{stage or name}.cl", {**virtual, **alone}, given)
 
 
 def _shared(features: Features, layout: str) -> Files:
     """The generated files that are the same for all programs of a scene."""
     return {
-        **shapes.virtual_files(),
+        **shapes.virtual_files(features),
         **rough_coat_table.virtual_files(),
         **lights.virtual_files(),
         **signatures.virtual_files(features, layout),

@@ -10,10 +10,11 @@ from clpt.render.contract.features import Features
 _FIRST = next(m.word for m in ROWS["curve"].members if m.name == "first")
 
 
-def virtual_files() -> dict[str, str]:
+def virtual_files(features: Features) -> dict[str, str]:
     """Return what shapes give, and generated/shape/<kind>.cl: struct, loader and functions."""
     files = {f"generated/{record.snake_name}.cl": record.select_text() for record in VALUES}
-    structs = {kind: record.row_text() for kind, record in ROWS.items()}
+    many = not features.lights.few
+    structs = {kind: record.row_text(many and kind == "triangle") for kind, record in ROWS.items()}
     structs |= {kind: f'#include "generated/shape/{one}.cl"\n' for kind, one in ONE_OF.items()}
     for kind, struct in structs.items():
         files[f"generated/shape/{kind}.cl"] = f'{struct}#include "shape/{kind}.cl"\n'

@@ -63,7 +63,8 @@ def scene_text(unused: Container[str] = (), features: Features | None = None) ->
     """
     without = () if features is None or features.film.layers.present else LAYER_SETTINGS
     slabs = [record.slab_text(unused) for record in SLABS]
-    rows = [record.row_text() for record in (SHAPE, INSTANCE, LIGHT)]
+    many_lights = features is not None and not features.lights.few
+    rows = [SHAPE.row_text(), INSTANCE.row_text(many=True), LIGHT.row_text(many_lights)]
     members = [
         f"    global const {element} *{name}; /* {doc} */"
         for name, (element, doc) in TABLES.items()

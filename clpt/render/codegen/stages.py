@@ -102,7 +102,7 @@ def photon_text(features: Features) -> str:
         i for i, cls in enumerate(features.materials.leaves) if flags.gathers_photons(features, cls)
     ]
     met = " | ".join(f"((kind) == {kind})" for kind in [*kinds, MIXTURE])
-    return f"""{PHOTON.row_text()}{PHOTON.keep_text()}#define PHOTON_WORDS {PHOTON.words}
+    return f"""{PHOTON.row_text(many=True)}{PHOTON.keep_text()}#define PHOTON_WORDS {PHOTON.words}
 #define photon_met(kind) ({met})
 """
 

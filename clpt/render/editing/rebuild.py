@@ -26,12 +26,7 @@ MOST_WRITES = 64  # beyond which the whole range between the first and the last 
 OF_FILM = (
     "width", "height", "margin", "crop_x", "crop_y", "film_width", "film_height", "bands", "alpha",
 )  # fmt: skip
-OF_PATHS = {
-    "light_paths": "light paths",
-    "guide_paths": "guiding",
-    "photon_places": "photons",
-    "photon_pixels": "photons",
-}
+OF_PATHS = ("light_paths", "guide_paths", "photon_places", "photon_pixels")
 
 
 @dataclass(frozen=True)
@@ -65,8 +60,8 @@ def prepare(wavefront: Wavefront, lowered: Lowered, refit: bool = False) -> Call
     if the features differ, trees if triangles or boxes do; of tables the words that differ are
     written. The picture is then that of a new renderer.
 
-    Raises SceneError as `refusal` says, KernelBuildError, MemoryBudgetError; nothing has changed
-    then.
+    The paths are of the same kinds, see `has_other_paths`. Raises SceneError as `refusal` says,
+    KernelBuildError, MemoryBudgetError; nothing has changed then.
     """
     scene, paths = wavefront.scene, wavefront.paths
     refused = refusal(scene.lowered, lowered)
@@ -102,13 +97,12 @@ def refusal(former: Lowered, new: Lowered) -> SceneError | None:
     layers, others = former.features.film.layers, new.features.film.layers
     if (layers.names, layers.light_groups) != (others.names, others.light_groups):
         return SceneError("other layers need a new Renderer", where="film.layers")
-    changed = next((what for name, what in OF_PATHS.items() if old[name] != now[name]), None)
-    if changed is None:
-        return None
-    had, has = former.features.media.present, new.features.media.present
-    cause = f", as the scene has {'media now' if has else 'no media now'}" if had != has else ""
-    message = f"{changed} must stay as before, and would not{cause}; make a new Renderer"
-    return SceneError(message, where=f"integrator {new.integrator.kind}")
+    return None
+
+
+def has_other_paths(former: Lowered, new: Lowered) -> bool:
+    """Return whether a lowering asks for other kinds of paths, so for a film of another form."""
+    return any(former.settings[name] != new.settings[name] for name in OF_PATHS)
 
 
 def _changes(wavefront: Wavefront, lowered: Lowered, refit: bool) -> _Changes:

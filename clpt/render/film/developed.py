@@ -55,12 +55,36 @@ class Developed(Still):
     def halves(self) -> tuple[Image, Image]:
         """The pictures of the even and of the odd samples. Raises SceneError without."""
         words = self._film.words
+        if self._form.octaves:
+            words = add_films(*np.split(words, 2))
         if len(words) != 2:
             raise SceneError(
                 "even and odd samples are not kept apart; give Renderer halves=True, or render "
                 "with --denoise statistical"
             )
         return self._colours(words[0]), self._colours(words[1])
+
+    def variance(self) -> Image:
+        """Return an estimate of the variance of each pixel's mean, (h, w, 3) float32.
+
+        If a pixel's samples are of weight a in one part of the film and b in the other, the squared
+        difference of both means times a b / (a + b)^2 is the variance of the mean of all, without
+        bias where samples are independent. Even and odd octaves tell a little more of points that
+        are spread evenly: `Sampler.octaves` times that. Where a part is empty the value itself
+        stands in the place of the difference.
+        """
+        parts = [self._sum(part) for part in np.split(self._film.words, 2)]
+        divisors = [self._divisor(words) for words in parts]
+        shares = divisors[0] * divisors[1] * _inverse(sum(divisors, start=np.float32(0.0))) ** 2
+        first, second = (self._to_output(self._seen(words)) for words in parts)
+        apart = np.where(shares > 0, shares / np.float32(self._form.octaves or 1.0), 1.0)
+        found = apart[..., None] * (first - second) ** 2
+        if self._form.weighed:
+            counts = [self._light_paths(words) for words in parts]
+            share = counts[0] * counts[1] / max(sum(counts), 1e-30) ** 2
+            first, second = (self._to_output(self._brought(words)) for words in parts)
+            found += np.float32(share or 1.0) * (first - second) ** 2
+        return found.astype(np.float32)
 
     def samples_per_pixel(self) -> Image:
         """Return how many samples each pixel has, (h, w) float32."""
@@ -73,16 +97,29 @@ class Developed(Still):
     @cached_property
     def _words(self) -> Words:
         """The words of all samples, (10 to 26, h, w)."""
-        total, *others = self._film.words
-        for half in others:
-            total = add_films(total, half)
+        return self._sum(self._film.words)
+
+    def _sum(self, films: Words) -> Words:
+        """The words (10 to 26, h, w) of all samples of some parts of the film."""
+        total, *others = films
+        for part in others:
+            total = add_films(total, part)
         return np.asarray(total)
 
     def _colours(self, words: Words) -> Image:
-        first, second, third = _sums(words, 0) * self._mean(words)
-        if self._form.weighed:
-            brought = _sums(words, light_group(len(words))) * self._light_mean(words)
-            first, second, third = first + brought[0], second + brought[1], third + brought[2]
+        values = self._seen(words)
+        return self._to_output(values + self._brought(words) if self._form.weighed else values)
+
+    def _seen(self, words: Words) -> Image:
+        """The means of samples in the film's three channels, (3, h, w)."""
+        return _sums(words, 0) * _inverse(self._divisor(words))
+
+    def _brought(self, words: Words) -> Image:
+        """What weighed light paths bring beside them."""
+        return _sums(words, light_group(len(words))) * self._light_mean(words)
+
+    def _to_output(self, values: Image) -> Image:
+        first, second, third = values
         rows = np.array(self._form.to_output, np.float32)
         return np.stack([a * first + b * second + c * third for a, b, c in rows], axis=2)
 
@@ -108,9 +145,13 @@ class Developed(Still):
 
     def _mean(self, words: Words) -> Image:
         """Return one over the divisor of each pixel's sums, 0 where that is 0."""
-        weighed = self._form.weights
-        by = numbers(words[FILM_WORDS:][:SUM_WORDS]) if weighed else self._samples(words)
-        return _inverse(by)
+        return _inverse(self._divisor(words))
+
+    def _divisor(self, words: Words) -> Image:
+        """What each pixel's sums are divided by: samples, or their weight."""
+        if self._form.weights:
+            return numbers(words[FILM_WORDS:][:SUM_WORDS])
+        return self._samples(words)
 
     def _light_mean(self, words: Words) -> Image:
         """Return one over the number of light paths; 0 in pixels without samples of the camera."""

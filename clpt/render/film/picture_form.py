@@ -19,7 +19,8 @@ class PictureForm:
     start at lights; weighed: some do, beside the camera's; weights: samples serve several pixels;
     paper: the matrix (3, 3) from sums of layers that are colours to the output space, see
     `clpt.render.film.layers.white_paper`; names: what layers tell of; adaptive: whether pixels may
-    differ in their numbers of samples; the others are those of `clpt.scene.Film`.
+    differ in their numbers of samples; octaves: that of the sampler where octaves of samples are
+    kept apart, else 0; the others are those of `clpt.scene.Film`.
     """
 
     to_output: tuple[tuple[float, ...], ...]
@@ -36,6 +37,7 @@ class PictureForm:
     paper: tuple[tuple[float, ...], ...] = ()
     names: LayerNames = LayerNames()
     adaptive: bool = False
+    octaves: float = 0.0
 
     @property
     def band_centres(self) -> NDArray[np.float64]:

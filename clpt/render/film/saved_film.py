@@ -15,6 +15,7 @@ from clpt.render.film.picture_form import PictureForm
 from clpt.render.film.pictures import Pictures
 from clpt.render.wavefront.film_state import FilmState, Ranges
 from clpt.scene.fingerprint import Fingerprint, Plain
+from clpt.scene.integrators import Integrator, Path, Vcm
 
 MOST_NAMED = 8  # differences that an error names
 
@@ -53,6 +54,17 @@ class Origin:
         if self.kernels != other.kernels:
             found.append(f"kernels: of clpt {self.clpt} -> others, of clpt {other.clpt}")
         return found
+
+    @property
+    def way(self) -> Integrator | None:
+        """The integrator, without its depths, if it is one that may have been chosen."""
+        names = ("integrator", "light_paths", "guiding")
+        kind, paths, guiding = (self.settings.get(f"chosen.{name}") for name in names)
+        if kind == Vcm.kind:
+            return Vcm(light_paths=int(paths or 1))
+        if kind == Path.kind:
+            return Path(light_paths=float(paths or 0), guiding=bool(guiding))
+        return None
 
     def check_same(self, other: Origin) -> None:
         """Raise SceneError, which says what differs, if the samples of another film are others."""

@@ -68,9 +68,10 @@ class Lowered:
     where an instance's tree begins is filled in when trees are built. zero_copy: tables that are
     the caller's buffers. owners: of each row of `shapes`. layer_names: what layers tell of.
     glass_rows: of the camera, see `lower_camera`. integrator: of the scene, or what was chosen;
-    reason: why, "" where there was no choice. encoder: what made the tables, for values that are
-    edited. cache: what the next lowering need not make again. around: media at the camera, or the
-    matter of bodies. device_grids: densities whose bricks kernels put into `images`.
+    reason: why, "" where there was no choice; candidates: see `SceneIndex`. encoder: what made the
+    tables, for values that are edited. cache: what the next lowering need not make again. around:
+    media at the camera, or the matter of bodies. device_grids: densities whose bricks kernels put
+    into `images`.
     """
 
     features: Features
@@ -88,6 +89,7 @@ class Lowered:
     warnings: tuple[str, ...]
     integrator: Integrator
     reason: str
+    candidates: tuple[Integrator, ...]
     encoder: Encoder
     cache: LoweringCache
     around: tuple[Any, ...] = ()
@@ -110,18 +112,24 @@ class Lowered:
 
 
 def lower(
-    scene: Scene, texture_budget: int | None = None, former: Lowered | None = None
+    scene: Scene,
+    texture_budget: int | None = None,
+    former: Lowered | None = None,
+    *,
+    anew: bool = False,
 ) -> Lowered:
     """Lower a scene.
 
     texture_budget: [bytes] for images, None for any number. former: of a scene that has much in
-    common with this one: it saves time, and what is "auto" stays as chosen. Arrays,
-    lights and images that are the same objects as then are taken to hold the same.
+    common with this one: it saves time, and what is "auto" stays as chosen, unless it is chosen
+    anew. Arrays, lights and images that are the same objects as then are taken to hold the same.
 
     Raises SceneError where the scene makes no sense: it names the shape, light or material.
     """
     cache = LoweringCache(former.cache if former else None)
-    before = Before(former.integrator, former.features.transport.lit_ghosts) if former else None
+    before = None
+    if former is not None and not anew:
+        before = Before(former.integrator, former.features.transport.lit_ghosts)
     return encode(analyse(scene, cache, before), cache, texture_budget)
 
 
@@ -179,6 +187,7 @@ def encode(found: Analysis, cache: LoweringCache, texture_budget: int | None = N
         warnings=warnings,
         integrator=index.integrator,
         reason=found.reason,
+        candidates=index.candidates,
         around=found.around,
         encoder=encoder,
         cache=cache,

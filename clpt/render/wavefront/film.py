@@ -26,7 +26,7 @@ SIDE_BY_SIDE = ("layers", "mattes")  # whose pixels have their words together
 class Film:
     """The film of a wavefront.
 
-    settings: of the paths, which say the film's size and halves; features: which sums of a pixel it
+    settings: of the paths, which say the film's size and parts; features: which sums of a pixel it
     has. size: width and height [pixels]; sums: the buffers that samples are added to, by the names
     of the kernels' arguments; picture: (h, w, 4) float32, always the same memory.
 
@@ -46,11 +46,12 @@ class Film:
         self.band_count = int(settings["bands"]) if features.film.bands else 0
         self._band_sums = self.band_count * features.film_groups  # of a pixel
         self.halves = int(settings["halves"])
+        self._parts = self.halves * int(settings["octaves"])
         self._settings, self._padded_pixels = settings, int(settings["padded_pixels"])
         x, y = work_list.pixels(settings)
         self._inside = work_list.inside(settings)
         self._at = (y * self.size[0] + x)[self._inside]  # in a picture, of each of these
-        words = 4 * self._padded_pixels * self.halves
+        words = 4 * self._padded_pixels * self._parts
         pixels, advice = math.prod(self.size), "lower the image's size"
         sums = {"film": self._words * words}
         if features.film.bands:
@@ -67,12 +68,16 @@ class Film:
             if count:
                 sums[name] = 4 * count * self._padded_pixels
         self.sums = {n: buffers.allocate(f"the {n}", size, advice) for n, size in sums.items()}
-        self._image = buffers.allocate("the image", 16 * pixels, advice)
         self._sum_bytes = sums
         self._held: dict[str, cl.Buffer] = {}
+        self._image = buffers.allocate("the image", 16 * pixels, advice)
         shape = (*self.size[::-1], 4)
         self.picture = device.DeviceArray(stream.queue, shape, np.float32, data=self._image)
         self._written: cl.Event | None = None  # of the last command that wrote `picture`
+
+    def show_in(self, picture: device.DeviceArray) -> None:
+        """Let `picture` be another film's, of the same size."""
+        self.picture, self._image = picture, picture.base_data
 
     @property
     def arguments(self) -> dict[str, Any]:
@@ -88,26 +93,26 @@ class Film:
 
     @property
     def group_bytes(self) -> int:
-        """The size of a group of words of all pixels, in all halves."""
-        return 4 * GROUP_WORDS * self._padded_pixels * self.halves
+        """The size of a group of words of all pixels, in all parts."""
+        return 4 * GROUP_WORDS * self._padded_pixels * self._parts
 
     def copy_group(self, first: int, into: cl.Buffer) -> None:
         """Enqueue that a buffer of `group_bytes` gets a group, a pixel's words from `first` on."""
-        size = self.group_bytes // self.halves
-        for half in range(self.halves):
-            at = self._word_at(half, first)
-            offsets = {"src_offset": at, "dst_offset": half * size, "byte_count": size}
+        size = self.group_bytes // self._parts
+        for part in range(self._parts):
+            at = self._word_at(part, first)
+            offsets = {"src_offset": at, "dst_offset": part * size, "byte_count": size}
             self.stream.copy(into, self.sums["film"], **offsets)
 
     def set_group(self, first: int, words: cl.Buffer | None) -> None:
         """Enqueue that a group is what `copy_group` took, or without that 0."""
-        size = self.group_bytes // self.halves
-        for half in range(self.halves):
-            at = self._word_at(half, first)
+        size = self.group_bytes // self._parts
+        for part in range(self._parts):
+            at = self._word_at(part, first)
             if words is None:
                 self.stream.fill(self.sums["film"], 0, at, size)
             else:
-                offsets = {"src_offset": half * size, "dst_offset": at, "byte_count": size}
+                offsets = {"src_offset": part * size, "dst_offset": at, "byte_count": size}
                 self.stream.copy(self.sums["film"], words, **offsets)
 
     def accumulate(self, kernel: device.BoundKernel) -> cl.Event:
@@ -138,11 +143,11 @@ class Film:
         """An array of `FilmState`, perhaps of no words."""
         width, height = self.size
         if name == "words":
-            film = self._planes("film", self.halves * self._words, held)
-            return film.reshape(self.halves, -1, height, width)
+            film = self._planes("film", self._parts * self._words, held)
+            return film.reshape(self._parts, -1, height, width)
         if name == "bands":
-            bands = self._planes("bands", self.halves * SUM_WORDS * self._band_sums, held)
-            return bands.reshape(self.halves, self._band_sums, SUM_WORDS, height, width)
+            bands = self._planes("bands", self._parts * SUM_WORDS * self._band_sums, held)
+            return bands.reshape(self._parts, self._band_sums, SUM_WORDS, height, width)
         if name not in self.sums:
             return NONE[name]
         if name == "layers":
@@ -187,11 +192,11 @@ class Film:
     def count_samples(self, group: int) -> int:
         """Return how many samples the film has in a group of words; wait for it."""
         count, words = 0, np.empty(self._padded_pixels, np.uint32)
-        for half in range(self.halves):
-            at = self._word_at(half, group + SAMPLES_WORD)
+        for part in range(self._parts):
+            at = self._word_at(part, group + SAMPLES_WORD)
             count += int(self.stream.read(self.sums["film"], words, at).sum(dtype=np.uint64))
         return count
 
-    def _word_at(self, half: int, word: int) -> int:
+    def _word_at(self, part: int, word: int) -> int:
         """Return the place where a word of the pixels begins [bytes]."""
-        return 4 * (half * self._words + word) * self._padded_pixels
+        return 4 * (part * self._words + word) * self._padded_pixels

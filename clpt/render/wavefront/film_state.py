@@ -41,18 +41,18 @@ class FilmState:
     A sum is 96 bits in two's complement, three words with the lowest first, in units of 2^-48. So
     two states of different samples merge to the state of one run, to the bit, in any order.
 
-    words: (halves, 10 to 26, h, w) uint32; of each pixel three sums, and the number of its samples;
+    words: (parts, 10 to 26, h, w) uint32; of each pixel three sums, and the number of its samples;
     then, where samples serve all pixels whose filters hold them, a sum of the filter's values, and
     with alpha a sum of what is covered; then, where light paths are weighed, three sums of theirs,
     and how many began at the pixel's number.
-    halves: 2 where even and odd samples are kept apart, else 1. bands: (halves, sums, 3, h, w)
-    uint32, a sum for each band, then, where light paths are weighed, one of theirs for each; sums
-    may be 0. taken: first and end of each range of sample
-    numbers that were taken, ascending and apart. scale: of a value of 1, a power of two that
-    follows from the film's exposure and the scene's light. layers: (words, h, w) uint32, those of
-    the first samples, see kernels/film/layers.cl; light_layers: (sums, 3, h, w)
-    uint32; mattes: (lists, slots, h, w) uint32, names and how often they were met, the first ones
-    of the scene.
+    parts: one; twice as many where even and odd samples are kept apart, and twice as many where
+    octaves are, see `film_part` in kernels/film/film.cl. bands: (parts, sums, 3, h, w) uint32, a
+    sum for each band, then, where light paths are weighed, one of theirs for each; sums may be 0.
+    taken: first and end of each range of sample numbers that were taken, ascending and apart.
+    scale: of a value of 1, a power of two that follows from the film's exposure and the scene's
+    light. layers: (words, h, w) uint32, those of the first samples, see kernels/film/layers.cl;
+    light_layers: (sums, 3, h, w) uint32; mattes: (lists, slots, h, w) uint32, names and how often
+    they were met, the first ones of the scene.
     """
 
     words: Words

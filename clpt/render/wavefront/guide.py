@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 from clpt import device
@@ -17,40 +16,22 @@ GROUP = 8  # work-items of a group
 class Guide:
     """The sums of a guide, and whether it is `trained` on the present scene.
 
-    paths: whose directions are guided. piloted: whether a pilot decides; arguments: of kernels, by
-    name; first: the sample of each pixel from which on the guide is used, if it `pays`.
+    paths: whose directions are guided. arguments: of kernels, by name.
     """
 
     def __init__(self, stream: device.Stream, paths: PathBuffers):
-        self.stream, self._paths = stream, paths
-        self.trained, self.pays = False, True
+        self.stream, self._paths, self.trained = stream, paths, False
         settings = paths.settings
         self._learns_from = int(settings["guide_paths"])
-        self.piloted = self._learns_from == guides.PILOTED_PATHS
         self._rows = int(settings["photon_cells"])
         self._bytes = 4 * self._rows * (guides.BINS + 1)
         guide = paths.buffers.allocate("the guide", self._bytes)
         self.arguments: dict[str, Any] = {"guide": guide}
-        size = int(settings["film_width"]) * int(settings["film_height"])
-        self.first = -(-guides.PILOT_BEGINS // size) if self.piloted else 0
 
     @property
     def samples(self) -> int:
         """The light paths for each pixel from which it learns."""
         return -(-self._learns_from // self._paths.pixels)
-
-    def parts(self, first: int, end: int) -> Iterator[tuple[int, int]]:
-        """Divide samples first to end - 1 into those without the guide and those with it."""
-        if first < self.first:
-            yield first, min(end, self.first)
-        if end > self.first or first == end:
-            yield max(first, self.first), max(end, self.first)
-
-    def use(self, paths: PathBuffers, *, on: bool) -> None:
-        """Enqueue that paths follow the guide from now on, or that they do not."""
-        settings = paths.settings.copy()
-        settings["guide_paths"] = self._learns_from if on else 0
-        paths.set_settings(settings)
 
     def clear(self) -> None:
         """Enqueue that it knows nothing."""

@@ -39,12 +39,14 @@ class Slots:
     """The number of paths in flight: slots of each plane, and planes.
 
     The slots of a plane share the pixels of the film; planes share the samples of a pixel. halves:
-    2 where even and odd samples are kept apart, and planes are an even number; else 1.
+    2 where even and odd samples are kept apart, and planes are an even number; else 1. octaves: 2
+    where octaves of samples are, see kernels/film/film.cl; else 1.
     """
 
     per_plane: int
     planes: int
     halves: int = 1
+    octaves: int = 1
 
     @property
     def total(self) -> int:
@@ -204,6 +206,7 @@ class PathBuffers:
         changed = settings.copy()
         changed["per_plane"], changed["planes"] = self._slots.per_plane, self._slots.planes
         changed["slots"], changed["halves"] = self._slots.total, self._slots.halves
+        changed["octaves"] = self._slots.octaves
         leave = np.count_nonzero(work_list.sampled(changed) < changed["photon_pixels"])
         groups = max(int(changed["wavelength_groups"]), 1)
         changed["photon_paths"] = leave * int(changed["light_paths"]) / groups

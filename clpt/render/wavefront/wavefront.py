@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,13 +22,13 @@ from clpt.device.timing import Timings
 from clpt.render.codegen import programs
 from clpt.render.contract.features import Features
 from clpt.render.lowering.scene import Lowered
-from clpt.render.wavefront import pilot, strategy
+from clpt.render.wavefront import strategy
 from clpt.render.wavefront.bounce_loop import BounceLoop, Ending, Kernels, Step
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.render.wavefront.film import Film
 from clpt.render.wavefront.film_state import SAMPLES_WORD
 from clpt.render.wavefront.guide import Guide
-from clpt.render.wavefront.path_buffers import COUNTERS, PathBuffers, Slots, divide_film
+from clpt.render.wavefront.path_buffers import COUNTERS, PathBuffers, divide_film
 from clpt.render.wavefront.photons import Photons
 from clpt.render.wavefront.strategy import UNTUNED, Strategy, Tuning
 
@@ -61,7 +61,7 @@ class Wavefront:
     """A film of a scene on a device, and `render_samples`, which runs the bounce loop.
 
     scene, paths: what is on the device; looped: whether a kernel on the device runs the loop;
-    tuning: for the strategies of other lowerings; pilot_of: whose guide it tries, on a small film.
+    tuning: for the strategies of other lowerings.
 
     counts: of rays and samples; begun: whether paths may have begun since someone set it to False;
     leave: raised, it lets `render_samples` and the like leave paths in
@@ -70,28 +70,17 @@ class Wavefront:
     Raises MemoryBudgetError, KernelBuildError, DeviceError.
     """
 
-    def __init__(
-        self,
-        scene: DeviceScene,
-        paths: PathBuffers,
-        looped: bool,
-        tuning: Tuning,
-        pilot_of: Wavefront | None = None,
-    ):
+    def __init__(self, scene: DeviceScene, paths: PathBuffers, looped: bool, tuning: Tuning):
         self.device, self.stream, self.buffers = scene.device, scene.stream, scene.buffers
         self.scene, self.paths, self.looped = scene, paths, looped
         self._tuning, self.lanes = tuning, self.device.lanes
         self.timings = Timings(self.device.queue)
         features = self.features
         self.film = film = Film(self.stream, self.buffers, paths.settings, features)
-        photons: Photons | None = None
-        guide: Guide | None = pilot_of.guide if pilot_of else None
-        if features.transport.merged:
-            photons = Photons(self.stream, self.buffers, paths.settings)
-        if features.transport.guided and guide is None:
-            guide = Guide(self.stream, paths)
-        self.photons = photons
-        self.guide: Guide | None = None if pilot_of else guide
+        merged, guided = features.transport.merged, features.transport.guided
+        photons = Photons(self.stream, self.buffers, paths.settings) if merged else None
+        guide = Guide(self.stream, paths) if guided else None
+        self.photons, self.guide = photons, guide
         own = (photons.arguments if photons else {}) | (guide.arguments if guide else {})
         # What follows knows nothing of this wavefront: memory is given back without a collector.
         self.kernels = Kernels(
@@ -100,8 +89,6 @@ class Wavefront:
                 **scene.arguments, **paths.arguments, **film.arguments, **own
             },
         )  # fmt: skip
-        if pilot_of:
-            self.kernels.programs = pilot_of.kernels.programs
         self.leave = device.Flag(self.device)
         self.begun = False
         self._in_flight: BounceLoop | None = None  # whose paths may not have ended
@@ -133,7 +120,7 @@ class Wavefront:
 
         slots: paths in flight; looped: whether a kernel on the device runs all bounces. Each is
         chosen to suit the device where it is None. tree_quality: see clpt.bvh.build; halves:
-        whether even and odd samples are kept apart, as they are for the layer `variance`.
+        whether even and odd samples are kept apart.
 
         Raises as `Wavefront` does, SceneError for a layout that cannot hold the scene.
         """
@@ -148,12 +135,17 @@ class Wavefront:
         stream, buffers = device.Stream(on.queue), device.Buffers(on)
         padded_pixels = int(lowered.settings["padded_pixels"])
         footprint = lowered.features.footprint_words
-        halves = halves or "variance" in lowered.features.film.layers.names
         divided = divide_film(
             on.info, padded_pixels, buffers.limit, slots, looped, halves, footprint
         )
+        if "variance" in lowered.features.film.layers.names:
+            divided = replace(divided, octaves=2)
         scene = DeviceScene(stream, buffers, lowered, chosen, tree_quality)
-        in_flight = _path_buffers(scene, lowered, divided)
+        share = strategy.loop_share(on)
+        blocks = -(-divided.total // share) * on.lanes if share > on.lanes else 0  # one each
+        in_flight = PathBuffers(
+            stream, buffers, lowered, divided, blocks, chosen.queued, in_blocks=on.lanes == 1
+        )
         return cls(scene, in_flight, looped, tuning)
 
     @property
@@ -225,6 +217,11 @@ class Wavefront:
         for loop in self._all_loops:
             loop.bind_again()
 
+    def show_in(self, picture: device.DeviceArray) -> None:
+        """Let the picture of the film be in the memory of another one's, of the same size."""
+        self.film.show_in(picture)
+        self.bind_again(rebuilt=False)
+
     def auxiliary_kernel(
         self, texts: dict[str, device.Source], name: str, **more: object
     ) -> device.BoundKernel:
@@ -232,20 +229,24 @@ class Wavefront:
         self.kernels.build(texts)
         return self.kernels.bind(name, name, **more)
 
-    def clear(self) -> None:
-        """Enqueue that the film is empty; the next sample is number 0."""
+    def clear(self, *, learned: bool = False) -> None:
+        """Enqueue that the film is empty; the next sample is number 0.
+
+        learned: what a guide has learned stays, which is of the seed that there was then.
+        """
         self._light_paths = 0  # that are in the film
         self._in_flight = None  # the next paths take the places of these
         self.paths.clear_counters()
         self._counted = np.zeros(len(COUNTERS), np.uint64), Counts()
         self.film.clear()
         if self.guide is not None:
-            self.guide.trained = False
+            self.guide.trained &= learned
 
     def enqueue(self, first: int, end: int) -> None:
         """Enqueue that samples first to end - 1 of every pixel are added; wait for nothing."""
         self.begun = True
-        for turn in self._turns(first, end) if self.photons else self._parts(first, end, True):
+        self.learn(looped=True)
+        for turn in self._turns(first, end) if self.photons else [(first, end)]:
             for loop in self.loops:
                 self._before(loop)
                 loop.enqueue(*turn)
@@ -356,8 +357,9 @@ class Wavefront:
             return wanted
 
         self.begun = True
-        parts = self._parts(first, end, self.looped)
-        return all(self._trace(loop, *part, count) for part in parts)
+        if first < end:
+            self.learn(looped=self.looped)
+        return self._trace(loop, first, end, count)
 
     def _trace(
         self, loop: BounceLoop, first: int, end: int, count: Callable[[NDArray[np.uint64]], bool]
@@ -373,56 +375,18 @@ class Wavefront:
         """All that trace paths."""
         return [*([self._trainer] if self._trainer else []), *self.loops]
 
-    def _parts(self, first: int, end: int, looped: bool) -> Iterator[tuple[int, int]]:
-        """Divide samples into those that are traced alike, and let the guide learn before them."""
+    def learn(self, *, looped: bool) -> None:
+        """Let a guide learn from light paths, if it has not; looped: and wait for nothing."""
         guide = self.guide
-        if guide is None or first == end:
-            yield first, end
+        if guide is None or guide.trained:
             return
-        for part in guide.parts(first, end):
-            if part[0] >= guide.first and not guide.trained:
-                self._train(guide, looped)
-            guide.use(self.paths, on=part[0] >= guide.first and guide.pays)
-            yield part
-
-    def _train(self, guide: Guide, looped: bool) -> None:
-        """Let the guide learn; where a pilot decides, wait for that."""
         assert self._trainer is not None, "who has a guide has what it learns from"
-        guide.use(self.paths, on=True)
         guide.clear()
         if looped:
             self._trainer.enqueue(0, guide.samples)
         else:
             self._trace(self._trainer, 0, guide.samples, lambda _: True)
         guide.sum(self.kernels)
-        if guide.piloted:
-            small = self._small()
-            cost = pilot.cost(small._trial(guide, on=False), small._trial(guide, on=True))
-            guide.pays = cost < pilot.PAYS
-            log.info("guiding has %.2f of the cost of a picture without, by a pilot", cost)
-
-    def _small(self) -> Wavefront:
-        """Return a wavefront of a small film of the scene, for a pilot."""
-        scene = self.scene
-        lowered = replace(scene.lowered, settings=pilot.settings(self.paths.settings))
-        padded = int(lowered.settings["padded_pixels"])
-        footprint = self.features.footprint_words
-        divided = divide_film(
-            self.device.info, padded, self.buffers.limit, padded, self.looped, footprint=footprint
-        )
-        paths = _path_buffers(scene, lowered, divided)
-        return Wavefront(scene, paths, self.looped, self._tuning, self)
-
-    def _trial(self, guide: Guide, *, on: bool) -> pilot.Trial:
-        """Return what a pilot finds on this film with a guide, or with it set aside."""
-        guide.use(self.paths, on=on)
-        before, pictures = self.counts.rays, []
-        for _ in range(pilot.ROUNDS):
-            self.film.clear()
-            self.paths.set_seed(int(self.paths.settings["seed"]) + 1)
-            self.render_from_camera(0, pilot.SAMPLES)
-            pictures.append(self.film.picture.get()[..., :3].astype(np.float64))
-        return pilot.Trial(np.array(pictures), self.counts.rays - before)
 
     def _before(self, loop: BounceLoop) -> None:
         """Enqueue what paths of a kind need of the photons of their pass."""
@@ -445,14 +409,3 @@ class Wavefront:
             gained["samples"] = 0
         sums = {name: value + gained[name] for name, value in vars(counts).items()}
         self._counted = counters, Counts(**sums)
-
-
-def _path_buffers(scene: DeviceScene, lowered: Lowered, slots: Slots) -> PathBuffers:
-    """Return buffers of the paths of a film of a scene, whose size `lowered` says."""
-    on, chosen = scene.device, scene.strategy
-    share = strategy.loop_share(on)
-    blocks = -(-slots.total // share) * on.lanes if share > on.lanes else 0  # one each
-    return PathBuffers(
-        scene.stream, scene.buffers, lowered, slots, blocks, chosen.queued,
-        in_blocks=on.lanes == 1,
-    )  # fmt: skip

@@ -21,11 +21,14 @@ from clpt.scene.integrators import (
     Auto,
     Box,
     Direct,
+    Independent,
     Mitchell,
     ParticleTracer,
     Path,
+    Sobol,
     Vcm,
     Whitted,
+    Zsobol,
 )
 from clpt.scene.layers import LAYERS
 from clpt.scene.lights import Area, Constant, Point
@@ -136,10 +139,9 @@ def test_the_picture_has_the_same_bits(how):
 @pytest.mark.slow
 @pytest.mark.parametrize("film", [{}, *FILTERED])
 def test_layers_have_the_same_bits_however_they_are_rendered(film):
-    """All but `variance`, whose halves are other ones."""
     splatting = film and "filtering" not in film
     how, names = (Path(light_paths=1), WITHOUT_LIGHT) if splatting else (CAMERA, LAYERS)
-    scene = room(how, layers=[name for name in names if name != "variance"], **film)
+    scene = room(how, layers=names, **film)
     once = layers_of(scene, 70)
     with clpt.Renderer(scene, looped=False, slots=128) as other:
         other.run(3)
@@ -150,6 +152,65 @@ def test_layers_have_the_same_bits_however_they_are_rendered(film):
     for name, values in once.items():
         np.testing.assert_array_equal(split[name], values)
     np.testing.assert_array_equal(layers_of(scene, 64)["depth"], once["depth"])  # of the first 64
+
+
+SAMPLERS = [Sobol(), *(pytest.param(s, marks=pytest.mark.slow) for s in (Zsobol(), Independent()))]
+SEEDS, TOLD = 24, (16, 24, 64)
+
+
+@pytest.mark.parametrize("sampler", SAMPLERS, ids=lambda s: s.kind)
+def test_variance_is_that_of_pictures(sampler):
+    """Told over true, as roots of means over the picture, by pictures of many seeds: within 15 %,
+    and 3.3 standard errors, by leaving out a seed after the other (a chance of 1 in 1000 each).
+
+    The square of half the difference of even and odd samples is 1.3 to 1.6 with Sobol points.
+    """
+    how = Path(max_depth=3, light_paths=0)  # without caustics, whose noise tells little
+    scene = room(how, layers=("variance",), width=24, height=16)
+    scene = dataclasses.replace(scene, sampler=sampler)
+    pictures = np.empty((SEEDS, len(TOLD), 16, 24, 3))
+    told = np.empty_like(pictures)
+    with clpt.Renderer(scene) as renderer:
+        for seed in range(SEEDS):
+            renderer.update(scene=dataclasses.replace(scene, seed=seed))
+            for i, samples in enumerate(TOLD):
+                renderer.run(samples - renderer.samples)
+                pictures[seed, i] = renderer.image()
+                told[seed, i] = renderer.layers()["variance"]
+
+    def ratio(kept: np.ndarray) -> np.ndarray:
+        over = 1.0 / (pictures.mean(axis=0) + 0.1) ** 2
+        true = pictures[kept].var(axis=0, ddof=1) * over
+        return np.sqrt((told[kept].mean(axis=0) * over).sum((1, 2, 3)) / true.sum((1, 2, 3)))
+
+    found = ratio(np.arange(SEEDS))
+    without = np.array([ratio(np.delete(np.arange(SEEDS), i)) for i in range(SEEDS)])
+    error = np.sqrt((SEEDS - 1) * without.var(axis=0))
+    print(found, error)
+    assert (np.abs(found - 1.0) < 0.15 + 3.3 * error).all(), (found, error)
+    assert (error < 0.05).all(), (found, error)
+
+
+def test_variance_and_halves():
+    """A film keeps octaves apart for one and parity for the other, at once: as each alone."""
+    scene, plain = room(layers=("variance",)), room()
+    with clpt.Renderer(scene, halves=True, slots=128) as both, clpt.Renderer(plain) as alone:
+        both.run(3)
+        both.run(8)
+        alone.run(11)
+        with pytest.raises(SceneError, match="halves=True"):
+            alone.halves()
+        np.testing.assert_array_equal(both.image(), alone.image())
+        assert len(both.film_state().words) == 4
+        variance, halves = both.layers()["variance"], both.halves()
+    with clpt.Renderer(plain, halves=True) as parity, clpt.Renderer(scene) as octaves:
+        parity.run(11)
+        octaves.run(11)
+        np.testing.assert_array_equal(octaves.layers()["variance"], variance)
+        with pytest.raises(SceneError, match="halves=True"):
+            octaves.halves()
+        for one, other in zip(parity.halves(), halves, strict=True):
+            np.testing.assert_array_equal(one, other)
 
 
 def test_a_mirror_shows_what_denoisers_need():

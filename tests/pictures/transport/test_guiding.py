@@ -16,11 +16,10 @@ from clpt import transforms as tf
 from clpt.errors import SceneError
 from clpt.render.analysis import guides
 from clpt.render.lowering.scene import lower
-from clpt.render.wavefront import pilot
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
 from clpt.scene.cameras import Orthographic, Perspective
-from clpt.scene.integrators import Auto, Gaussian, Path
+from clpt.scene.integrators import Gaussian, Path
 from clpt.scene.lights import Constant, Point
 from clpt.scene.shapes import Cube, Rectangle, Shape, Sphere
 from tests.pictures.support import assert_agree, assert_mean, blocks, exposures, with_film
@@ -184,63 +183,10 @@ def test_update_learns_again() -> None:
     renderer.update(scene=turned)
     renderer.run(3)
     assert np.array_equal(renderer.image(), picture(turned, 3))
-    with pytest.raises(SceneError, match="guiding must stay"):
-        renderer.update(scene=dataclasses.replace(turned, integrator=Path(light_paths=0)))
-
-
-def unasked(monkeypatch: pytest.MonkeyPatch, begins: int) -> Scene:
-    """A scene in which a pilot decides on guiding, after `begins` samples of a pixel."""
-    monkeypatch.setattr(guides, "PILOTED_PATHS", 1 << 12)
-    monkeypatch.setattr(guides, "PILOT_BEGINS", begins * 16 * 16)
-    monkeypatch.setattr(guides, "WORTH", 1)
-    return dataclasses.replace(slit(), integrator=Auto())
-
-
-def test_a_pilot_decides_the_same_however_samples_are_split(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Samples before the pilot are those of `path`; later ones are guided if it pays."""
-    scene = unasked(monkeypatch, 3)
-    costs = []
-    for limit in (np.inf, 0.0):
-        monkeypatch.setattr(pilot, "PAYS", limit)
-        whole = picture(scene, 7)
-        assert np.array_equal(picture(scene, 2, 5), whole)
-        renderer = clpt.Renderer(scene, narrow())
-        for samples in (5, 2):
-            event = renderer.step(samples)
-        event.wait()
-        assert np.array_equal(renderer.film.get()[..., :3], whole)
-        parts = [clpt.Renderer(scene, narrow(), first_sample=first) for first in (0, 4)]
-        for part, samples in zip(parts, (4, 3), strict=True):
-            part.run(samples)
-        parts[0].merge(parts[1].film_state())
-        assert np.array_equal(parts[0].image(), whole)
-        costs.append(whole)
-    assert not np.array_equal(*costs)
-    alone = dataclasses.replace(scene, integrator=Path(light_paths=0))
-    assert np.array_equal(picture(alone, 7), costs[1])
-    assert np.array_equal(picture(alone, 3), picture(scene, 3))
-
-
-def trial(variance: float, rays: int, seed: int) -> pilot.Trial:
-    drawn = np.random.default_rng(seed).normal(1.0, np.sqrt(variance), (4, 32, 64, 3))
-    return pilot.Trial(drawn, rays)
-
-
-def test_what_a_pilot_says_is_variance_times_rays() -> None:
-    """The ratio of two variances of 24,576 numbers is off by more than 6 % once in 1e5 times."""
-    told = pilot.cost(trial(0.04, 1000, 1), trial(0.01, 500, 2))
-    assert told == pytest.approx(pilot.RAY * 0.25 * 0.5, rel=0.06)
-    assert pilot.cost(trial(0.0, 1000, 1), trial(0.0, 500, 2)) == 1.0
-
-
-def test_few_samples_ask_no_pilot() -> None:
-    scene = dataclasses.replace(slit(), integrator=Auto())
-    assert not lower(scene).features.transport.guided
-    many = dataclasses.replace(scene, spp=guides.WORTH // 256)
-    assert lower(many).settings["guide_paths"] == guides.PILOTED_PATHS
-    assert not lower(dataclasses.replace(many, noise=0.1)).features.transport.guided
+    alone = dataclasses.replace(turned, integrator=Path(light_paths=0))
+    renderer.update(scene=alone)
+    renderer.run(3)
+    assert np.array_equal(renderer.image(), picture(alone, 3))
 
 
 def test_it_is_without_light_paths() -> None:

@@ -453,8 +453,12 @@ def test_update_keeps_both_kinds_of_paths() -> None:
     renderer.update(scene=turned)
     renderer.run(3)
     assert np.array_equal(renderer.image(), picture(turned, 3))
-    with pytest.raises(SceneError, match="light paths must stay"):
-        renderer.update(scene=with_light_paths(turned, 0))
+    shown, alone = renderer.film, with_light_paths(turned, 0)
+    for other in (alone, turned):
+        renderer.update(scene=other)
+        renderer.run(3)
+        assert np.array_equal(renderer.image(), picture(other, 3))
+    assert renderer.film is shown
 
 
 @pytest.mark.slow

@@ -28,7 +28,9 @@ PRICE = 1e-3  # of a sphere, over the area of all: what gains less is not cut
 PAD = 1.01  # radius over that of what is inside
 ROUNDING = 4e-6  # of the scene's coordinates, added to a radius
 
-# Pieces are (n, 10): three corners of a triangle, and how far around it a piece reaches [m].
+# Pieces are (n, 10): three corners of a triangle, and how far around it a piece reaches [m]. To be
+# cut they are columns (16, n), with their lowest and highest coordinates: numpy is slow along short
+# axes.
 
 
 def aims(index: SceneIndex, geometry: Geometry, scene_radius: float) -> NDArray[np.float32]:
@@ -132,7 +134,7 @@ def _placed(geometry: Geometry, pieces: Floats, prototype: int, moving: Collecti
     own = geometry.instances.prototypes == prototype
     rows = geometry.instances.rows[own]
     linear = np.linalg.inv(np.stack([rows[name] for name in "xyz"], axis=1).astype(np.float64))
-    centre, radius = np.split(_around(pieces), [3])
+    centre, radius = np.split(_around(_columns(pieces)), [3])
     placed = _pieces(linear @ centre + rows["origin"], np.linalg.norm(linear, 2, (1, 2)) * radius)
     ways = np.isin(rows["number"], list(moving))
     if ways.any():
@@ -141,70 +143,74 @@ def _placed(geometry: Geometry, pieces: Floats, prototype: int, moving: Collecti
     return placed
 
 
-def _corners(pieces: Floats) -> list[NDArray[np.float64]]:
-    """The three corners, (n, 3) each; numpy is slow along short axes."""
-    return np.split(pieces[:, :9], 3, axis=1)
+def _columns(pieces: Floats) -> Floats:
+    """The columns (16, n) of pieces."""
+    columns = np.empty((16, len(pieces)))
+    columns[:10] = pieces.T
+    (a, b, c), reach = columns[:9].reshape(3, 3, -1), columns[9]
+    columns[10:13] = np.minimum(np.minimum(a, b), c) - reach
+    columns[13:] = np.maximum(np.maximum(a, b), c) + reach
+    return columns
 
 
-def _ends(pieces: Floats) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The lowest and highest coordinates (n, 3) of pieces."""
-    (a, b, c), reach = _corners(pieces), pieces[:, 9:]
-    return np.minimum(np.minimum(a, b), c) - reach, np.maximum(np.maximum(a, b), c) + reach
-
-
-def _around(pieces: Floats) -> NDArray[np.float64]:
+def _around(columns: Floats) -> NDArray[np.float64]:
     """Centre and radius (4,) of a sphere around pieces: about the middle of their box."""
-    lows, highs = _ends(pieces)
-    centre = (lows.min(axis=0) + highs.max(axis=0)) / 2
-    away = [np.einsum("ij,ij->i", p - centre, p - centre) for p in _corners(pieces)]
-    return np.append(centre, max((np.sqrt(square) + pieces[:, 9]).max() for square in away))
+    centre = (columns[10:13].min(axis=1) + columns[13:].max(axis=1)) / 2
+    squares = (columns[:9].reshape(3, 3, -1) - centre[:, None]) ** 2
+    away = np.sqrt(squares[:, 0] + squares[:, 2] + squares[:, 1])
+    return np.append(centre, (away + columns[9]).max())
 
 
-def _cut(pieces: Floats) -> tuple[tuple[Floats, ...], bool]:
+def _cut(columns: Floats) -> tuple[tuple[Floats, ...], bool]:
     """Return pieces in two parts, and whether there is a wide gap between these.
 
     They are cut at a wide gap along an axis, else where the longest axis is halved.
     """
-    lows, highs = _ends(pieces)
+    lows, highs = columns[10:13], columns[13:]
+    number = columns.shape[1]
+    if number <= SEVERAL:
+        span = np.maximum(highs.max(axis=1) - lows.min(axis=1), 1e-30)
+        order = np.argsort(lows, axis=1)
+        reached = np.maximum.accumulate(np.take_along_axis(highs, order[:, :-1], axis=1), axis=1)
+        gaps = (np.take_along_axis(lows, order[:, 1:], axis=1) - reached) / span[:, None]
+        places = gaps.argmax(axis=1)
+        axis = min(range(3), key=lambda one: (-gaps[one, places[one]], places[one]))
+        if gaps[axis, places[axis]] > GAP:
+            left, right = np.split(order[axis], [places[axis] + 1])
+            return (columns[:, left], columns[:, right]), True
     middles = (lows + highs) / 2
-    if len(pieces) <= SEVERAL:
-        span = np.maximum(highs.max(axis=0) - lows.min(axis=0), 1e-30)
-        order = np.argsort(lows, axis=0)
-        reached = np.maximum.accumulate(np.take_along_axis(highs, order[:-1], axis=0), axis=0)
-        gaps = (np.take_along_axis(lows, order[1:], axis=0) - reached) / span
-        at, axis = np.unravel_index(gaps.argmax(), gaps.shape)
-        if gaps[at, axis] > GAP:
-            return (pieces[order[: at + 1, axis]], pieces[order[at + 1 :, axis]]), True
-    axis = np.ptp(middles, axis=0).argmax()
-    along = middles[:, axis]
+    along = middles[np.ptp(middles, axis=1).argmax()]
     low = along < (along.min() + along.max()) / 2
     if not low.any():  # all in one place
-        low = np.arange(len(pieces)) < len(pieces) // 2
-    return (pieces[low], pieces[~low]), False
+        low = np.arange(number) < number // 2
+    return (columns[:, low], columns[:, ~low]), False
 
 
 def _fewer(pieces: Floats) -> Floats:
     """Return one piece around all in each cell of a grid, where there are more than cells."""
     if len(pieces) <= CELLS**3:
         return pieces
-    lows, highs = _ends(pieces)
+    columns = _columns(pieces)
+    lows, highs = columns[10:13], columns[13:]
     middles = (lows + highs) / 2
-    least, span = middles.min(axis=0), np.maximum(np.ptp(middles, axis=0), 1e-30)
+    least = middles.min(axis=1, keepdims=True)
+    span = np.maximum(np.ptp(middles, axis=1, keepdims=True), 1e-30)
     cells = np.minimum((middles - least) / span * CELLS, CELLS - 1).astype(np.int64)
-    cells = cells @ np.array([CELLS * CELLS, CELLS, 1])
+    cells = np.array([CELLS * CELLS, CELLS, 1]) @ cells
     order = np.argsort(cells)
     firsts = np.flatnonzero(np.diff(cells[order], prepend=-1))
-    low, high = np.minimum.reduceat(lows[order], firsts), np.maximum.reduceat(highs[order], firsts)
-    return _in_boxes(np.stack([low, high], axis=1), False)
+    low = np.minimum.reduceat(lows[:, order], firsts, axis=1)
+    high = np.maximum.reduceat(highs[:, order], firsts, axis=1)
+    return _in_boxes(np.stack([low.T, high.T], axis=1), False)
 
 
 class _Cluster:
     """Some pieces, the sphere around them, and the clusters that they are cut into."""
 
-    def __init__(self, pieces: Floats):
-        self.sphere = _around(pieces)
+    def __init__(self, columns: Floats):
+        self.sphere = _around(columns)
         self.area = float(self.sphere[3] ** 2)
-        self.halves, self.gap = _cut(pieces) if len(pieces) > 1 else ((), False)
+        self.halves, self.gap = _cut(columns) if columns.shape[1] > 1 else ((), False)
         self.parts: list[_Cluster] = []
 
     def cut(self) -> list[_Cluster]:
@@ -224,7 +230,7 @@ class _Cluster:
 
 def _spheres(pieces: Floats) -> NDArray[np.float64]:
     """Spheres (k, 4) around pieces, at most MOST, whose disks have little area together."""
-    root, number = _Cluster(pieces), count()
+    root, number = _Cluster(_columns(pieces)), count()
     leaves: list[tuple[bool, float, int, _Cluster]] = []
     cut = [root]
     while cut or leaves:

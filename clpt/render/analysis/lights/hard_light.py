@@ -85,26 +85,29 @@ def decided(lit: Lit, former: Integrator | None = None) -> tuple[SceneIndex, str
         chosen, reason = Path(light_paths=0), "layers of light have no guides of noise"
     elif "light_groups" in index.layers and isinstance(chosen, Vcm):
         chosen, reason = Path(light_paths=chosen.light_paths), "photons do not know their group"
-    if former is None and not chosen.light_paths and _may_guide(index):
-        chosen, reason = Path(light_paths=0, guiding=True), f"{reason}; a pilot decides on guiding"
-    piloted = chosen.guiding
     if given.guiding:
         chosen, reason = Path(light_paths=0, guiding=True), "directions are guided"
-        piloted = False
     chosen = replace(chosen, **shared(given, chosen))
-    return replace(index, scene=replace(index.scene, integrator=chosen), piloted=piloted), reason
+    index = replace(index, scene=replace(index.scene, integrator=chosen))
+    return replace(index, candidates=_candidates(index, chosen) if former is None else ()), reason
 
 
-def _may_guide(index: SceneIndex) -> bool:
-    """Whether so many samples are to come that a pilot may ask whether guiding pays.
+def _candidates(index: SceneIndex, chosen: Integrator) -> tuple[Integrator, ...]:
+    """The integrators between which a trial may decide, the chosen one first; else none.
 
-    Where a limit of noise ends the picture nobody knows; and some scenes cannot have a guide.
+    It pays if many samples are to come. Where a limit of noise ends the picture nobody knows how
+    many; photons blur the picture, which no variance tells; and some scenes cannot have a guide.
     """
-    depth = index.integrator.max_depth
     samples = index.spp * index.film.width * index.film.height
-    hidden = index.has_media or index.lit_ghosts or not index.lights_reach
-    several = depth < 0 or depth > 2
-    return several and not hidden and not index.adaptive and samples >= guides.WORTH
+    if samples < guides.WORTH or index.adaptive or index.lit_ghosts or chosen.guiding:
+        return ()
+    if not isinstance(chosen, Path):
+        return ()
+    plain = [replace(chosen, light_paths=0)] if chosen.light_paths else []
+    several = chosen.max_depth < 0 or chosen.max_depth > 2
+    can_guide = several and not index.has_media
+    guided = [replace(chosen, light_paths=0, guiding=True)] if can_guide else []
+    return (chosen, *plain, *guided) if plain or guided else ()
 
 
 def _choice(lit: Lit) -> tuple[Integrator, str]:

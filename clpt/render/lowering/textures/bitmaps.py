@@ -36,6 +36,8 @@ from clpt.scene.textures import Bitmap
 NODES = np.array([400.0, 550.0, 700.0])  # [nm] of packed spectra, as in spectral_read.cl
 LARGEST = 2**31 - 1  # words in `images` that an index reaches
 THREADS = 8
+UNKNOWN, NEW, MADE = range(3)
+RUN = 64  # colours that are looked through together for new ones
 
 
 @dataclass
@@ -440,19 +442,20 @@ class _Spectra:
     """Packed spectra of colours of 8 bits a channel; each is made once, whatever images have it."""
 
     def __init__(self) -> None:
-        self.known = np.zeros(1 << 24, bool)
+        self.states = np.zeros(1 << 24, np.uint8)  # of each colour: UNKNOWN, NEW or MADE
         self.words = np.zeros((1 << 24, 2), np.uint32)  # pages that are not written take no memory
 
     def packed(self, codes: Words, curved: bool) -> Words:
         """Two words for each colour of `_codes`, (2 n,)."""
-        new = np.zeros(1 << 24, bool)
-        new[codes[~self.known[codes]]] = True
-        eighths = np.flatnonzero(new.view(np.uint64))  # few of them, so most pages are not touched
-        made = (8 * eighths[:, None] + np.arange(8)).reshape(-1)
-        made = made[new[made]]
+        new = codes[self.states[codes] == UNKNOWN]
+        self.states[new] = NEW
+        runs = np.zeros((1 << 24) // RUN, bool)
+        runs[new // np.uint32(RUN)] = True  # few of them, so most pages are not touched
+        made = (RUN * np.flatnonzero(runs)[:, None] + np.arange(RUN)).reshape(-1)
+        made = made[self.states[made] == NEW]
         channels = np.stack([made & 255, made >> 8 & 255, made >> 16], axis=1)
         self.words[made] = pack(spectra.uplift(_meaning(curved)[channels]))
-        self.known[made] = True
+        self.states[made] = MADE
         return self.words[codes].reshape(-1)
 
 

@@ -1,0 +1,95 @@
+"""The cost of a way to render a scene, told by small pictures: variance times counted rays.
+
+So no clock has a word in it. What counts is the variance of the mean of some samples, as these are
+spread evenly, and some ways spoil that.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.arrays import Floats
+
+PIXELS = 2048  # of the small film, about
+BLOCK = 8  # side of a block of pixels
+TRIM = 0.001  # share of the pixels that is left out, the worst
+ODD = 0.01  # the same, where the noise of ordinary pixels is asked for
+SURE = 3.0  # standard deviations
+LIGHT_RAY, GUIDED_RAY = 1.15, 1.5  # time of a ray over one of `path`, see bench/NOTES.md
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Pictures of a few samples each, (rounds, height, width, 3); rays of all, and of one the time
+    beside that of another trial's."""
+
+    pictures: Floats
+    rays: int
+    ray: float = 1.0
+
+
+def settings(of: NDArray[np.void]) -> NDArray[np.void]:
+    """Return the settings of a small film of the whole picture; of: those of the picture."""
+    small = of.copy()
+    width, height = int(of["film_width"]), int(of["film_height"])
+    scale = math.sqrt(PIXELS / (width * height))
+    width, height = (max(round(size * scale), BLOCK) for size in (width, height))
+    margin = int(of["margin"])
+    small["width"], small["height"] = small["film_width"], small["film_height"] = width, height
+    small["crop_x"] = small["crop_y"] = 0
+    small["tiles_x"] = -(-(width + 2 * margin) // 4)
+    small["padded_pixels"] = 16 * small["tiles_x"] * -(-(height + 2 * margin) // 4)
+    return small
+
+
+def variances(trials: Sequence[Trial], trim: float = TRIM) -> list[float]:
+    """Return the variance of a picture of each trial; all are of one scene, with as many rounds.
+
+    It is relative to the mean of a block of pixels, as that of a pixel is too noisy; trim: the
+    share of the pixels that is left out, the worst. What a trial has hardly ever found is no part
+    of the variance that it shows: so where another one has surely found more light in a block, its
+    variance there is at least what follows from finding that light once in all its samples.
+    """
+    spread = [_in_blocks(trial.pictures.var(axis=0, ddof=1)) for trial in trials]
+    means = [_in_blocks(trial.pictures.mean(axis=0)) for trial in trials]
+    around = np.mean([_of_blocks(mean) for mean in means], axis=0)
+    scale = np.maximum(around**2 + 1e-2 * around.mean() ** 2, 1e-300)
+    count = BLOCK**2 * len(trials[0].pictures)
+    found = []
+    for own, mean in zip(spread, means, strict=True):
+        least = np.zeros_like(around)
+        for other, more in zip(spread, means, strict=True):
+            missed = np.maximum(_of_blocks(more - mean), 0.0) ** 2
+            least = np.maximum(least, count * missed - SURE**2 * _of_blocks(own + other))
+        error = np.sort((np.maximum(own, least) / scale).mean(axis=-1), axis=None)
+        found.append(float(error[: math.ceil(error.size * (1.0 - trim))].mean()))
+    return found
+
+
+def _in_blocks(picture: Floats) -> Floats:
+    """Return whole blocks of a picture, (rows, BLOCK, columns, BLOCK, 3)."""
+    height, width = (size - size % BLOCK for size in picture.shape[:2])
+    return picture[:height, :width].reshape(height // BLOCK, BLOCK, width // BLOCK, BLOCK, 3)
+
+
+def _of_blocks(values: Floats) -> Floats:
+    """Return the means of blocks, (rows, 1, columns, 1, 3)."""
+    means: Floats = values.mean(axis=(1, 3), keepdims=True)
+    return means
+
+
+def costs(trials: Sequence[Trial]) -> list[float]:
+    """Return the variance times the time of the rays of each trial, over that of the first one.
+
+    1 for each where nothing is noisy.
+    """
+    found = [
+        variance * trial.rays * trial.ray
+        for variance, trial in zip(variances(trials), trials, strict=True)
+    ]
+    return [cost / found[0] if found[0] > 0.0 else 1.0 for cost in found]
