@@ -1,6 +1,6 @@
-/* A material whose functions are a part of their own in the loop of a CPU, as several kinds share a vertex: it is one of
- * `scene.kind` in all LANES paths. A vertex asks it once (`bsdf_ask`, path/pair_apart.cl), so that its parameters are
- * loaded once, and what a pair of directions and a sample have in common is computed once. */
+/* A material whose functions are a part of their own in the loop of a CPU, as several kinds share a vertex. It is of
+ * the kind `scene.kind` in all LANES paths. A vertex asks it once (`bsdf_ask`, path/pair_apart.cl), so that its
+ * parameters are loaded once, and what a pair of directions and a sample have in common is computed once. */
 typedef struct {
     integer row;
     TexturePoint point;

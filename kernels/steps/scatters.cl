@@ -1,6 +1,6 @@
 /* What a path keeps of how its next direction was chosen, to weigh the light that it meets there. */
-inline void path_scatters(Scene scene, Slab path, uint at, mask next, mask null, Vertex *v, Scattering scatter, Rival rival,
-                          BsdfSample bs, vec3 onward)
+inline void path_scatters(Scene scene, Slab path, uint at, mask next, mask null, Vertex *v, Scattering scatter,
+                          Rival rival, BsdfSample bs, vec3 onward)
 {
     mask scatters = next & !null, delta = (bs.lobe & LOBE_DELTA) != 0;
     path_scattered(path, at, scatters);

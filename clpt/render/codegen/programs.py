@@ -28,6 +28,7 @@ from clpt.render.codegen import (
 )
 from clpt.render.contract import custom_materials
 from clpt.render.contract.features import Features
+from clpt.scene.scatterer import Scatterer
 
 BOTH = tuple(f"integrator/{name}.cl" for name in ("path", "particle_tracer", "both"))
 
@@ -101,49 +102,40 @@ def _shading(
     texts = {}
     for vertex in vertices.vertices(features, lanes if part else 1):
         cls = vertices.leader(features, vertex)
-        own = {**files, **choices.material_files(features, cls)}
+        own = {**files, **choices.material_files(features, cls), **_material(features, cls)}
         if vertex.shared:
-            own["generated/bsdf.cl"] = vertices.calls_text(features, vertex)
-            own["generated/pair.cl"] = ("path/pair_apart.cl",)
+            own |= vertices.virtual_files(features, vertex)
             texts |= _materials(features, vertex, files, defines, lanes)
-        else:
-            own["generated/bsdf.cl"] = stages.bsdf_text(features, cls)
         if part:
             own["generated/common.cl"] = common.calls_text(common.shared(features, lanes))
         if cls.is_phase:
             own["generated/shading_frame.cl"] = ("path/phase_frame.cl",)
-        if cls.source is not None and not vertex.shared:
-            own[f"{cls.folder}/{cls.kind}.cl"] = custom_materials.text(cls)
-        kind = (
-            vertices.defines(features, vertex)
-            if vertex.shared
-            else {**flags.of_material(features, cls), "QUEUED": int(queued)}
-        )
+        kind = {**vertices.defines(features, vertex), "QUEUED": int(queued)}
         if part and bounce.has_both(features):
             own["generated/integrator.cl"] = BOTH
             kind["SHADES_BOTH"] = 1
-        name = vertex.program
-        texts[name] = _source(name, own, {**defines, **kind}, lanes, "shade", part=part)
+        given = {**defines, **kind}
+        texts[vertex.program] = _source(vertex.program, own, given, lanes, "shade", part=part)
     return texts
+
+
+def _material(features: Features, cls: type[Scatterer]) -> Files:
+    """The files of a kind's own functions."""
+    own: Files = {"generated/bsdf.cl": stages.bsdf_text(features, cls)}
+    if cls.source is not None:
+        own[f"{cls.folder}/{cls.kind}.cl"] = custom_materials.text(cls)
+    return own
 
 
 def _materials(
     features: Features, vertex: vertices.Vertex, files: Files, defines: flags.Defines, lanes: int
 ) -> dict[str, device.Source]:
-    """The parts of the kinds of a shared vertex."""
-    texts, of_vertex = {}, vertices.defines(features, vertex)
+    """The parts of the kinds of a shared vertex, by program name."""
+    texts = {}
     for cls in (features.materials.leaves[kind] for kind in vertex.kinds):
-        own = {
-            **files,
-            **choices.material_files(features, cls),
-            "generated/bsdf.cl": stages.bsdf_text(features, cls),
-            "generated/material_part.cl": vertices.part_text(features, cls),
-        }
-        if cls.source is not None:
-            own[f"{cls.folder}/{cls.kind}.cl"] = custom_materials.text(cls)
-        kind = flags.of_material(features, cls)
-        for name in vertices.OF_STRUCTS:
-            kind[name] = of_vertex[name]
+        own = {**files, **choices.material_files(features, cls), **_material(features, cls)}
+        own["generated/material_part.cl"] = vertices.part_text(features, cls)
+        kind = vertices.part_defines(features, vertex, cls)
         name = f"material_{cls.kind}"
         texts[name] = _source(name, own, {**defines, **kind}, lanes, "material")
     return texts

@@ -23,7 +23,7 @@ OF_STRUCTS = ("STOCHASTIC_FILTERING",)  # which structs follow that the vertex p
 
 @dataclass(frozen=True)
 class Vertex:
-    """What shades some kinds of a scene's materials: its program, and their numbers."""
+    """The program that shades some kinds of a scene's materials, and the numbers of the kinds."""
 
     program: str
     kinds: tuple[int, ...]
@@ -58,7 +58,7 @@ def _may_share(features: Features, cls: type[Scatterer]) -> bool:
 
 
 def _key(features: Features, cls: type[Scatterer]) -> object:
-    """What is equal for kinds of one vertex. A kind that does not shine may be asked whether it does."""
+    """Return a key that is equal for kinds of one vertex; whether they shine does not matter."""
     own = flags.of_material(features, cls)
     files = {
         name: tuple(file.replace("met_emission_none", "met_emission") for file in chosen)
@@ -74,18 +74,34 @@ def leader(features: Features, vertex: Vertex) -> type[Scatterer]:
     return max(classes, key=lambda cls: cls.kind in features.materials.shining)
 
 
-def defines(features: Features, vertex: Vertex) -> dict[str, str | int]:
-    """Return the flags of a shared vertex: what its kinds differ in follows from `scene.kind`."""
+def defines(features: Features, vertex: Vertex) -> flags.Defines:
+    """Return the flags of a vertex: what its kinds differ in follows from `scene.kind`."""
     each = [flags.of_material(features, features.materials.leaves[kind]) for kind in vertex.kinds]
-    found: dict[str, str | int] = {**each[0], "SHADES_SEVERAL": 1, "BSDF_KIND": "scene.kind"}
-    for name in ("BSDF_SHINES", "STOCHASTIC_FILTERING"):
+    if not vertex.shared:
+        return each[0]
+    # Of black materials a path's end is known late, when it has no light to carry.
+    found = {**each[0], "SHADES_SEVERAL": 1, "BSDF_KIND": "scene.kind", "BSDF_ABSORBS": 0}
+    for name in ("BSDF_SHINES", *OF_STRUCTS):
         found[name] = max(own[name] for own in each)
-    found["BSDF_ABSORBS"] = 0  # whether light is absorbed is known late
     for name in ("BSDF_TRANSMITS", "USES_CHOICE"):
         bits = sum(1 << kind for kind, own in zip(vertex.kinds, each, strict=True) if own[name])
         every = sum(1 << kind for kind in vertex.kinds)
         found[name] = int(bits > 0) if bits in (0, every) else f"((0x{bits:x} >> scene.kind) & 1)"
     return found
+
+
+def part_defines(features: Features, vertex: Vertex, cls: type[Scatterer]) -> flags.Defines:
+    """Return the flags of the part of a kind: structs that it is given are those of its vertex."""
+    whole = defines(features, vertex)
+    return {**flags.of_material(features, cls), **{name: whole[name] for name in OF_STRUCTS}}
+
+
+def virtual_files(features: Features, vertex: Vertex) -> dict[str, str | tuple[str, ...]]:
+    """Return the files that stand for those of a single kind."""
+    return {
+        "generated/bsdf.cl": _calls_text(features, vertex),
+        "generated/pair.cl": ("path/pair_apart.cl",),
+    }
 
 
 _READ = "Scene scene, integer row, TexturePoint point, Wavelengths lambdas"
@@ -113,7 +129,7 @@ class Own:
 
 
 def _functions(features: Features) -> list[Own]:
-    """What the parts of a scene's kinds have."""
+    """Return the functions that the parts of a scene's kinds have."""
     joined = any(own.transport.joined for own in features.passes)
     directions = (("vec3", "wo"), ("vec3", "wi"), ("vec3", "u"), ("uint", "adjoint"))
     answer = f"material_answer(m, wo, wi, u, {'adjoint' if joined else '0'})"
@@ -132,7 +148,7 @@ def part_text(features: Features, cls: type[Scatterer]) -> str:
     return "\n".join([*rows, ""])
 
 
-def calls_text(features: Features, vertex: Vertex) -> str:
+def _calls_text(features: Features, vertex: Vertex) -> str:
     """Return the material of a shared vertex: functions that call those of the kinds' parts."""
     classes = {kind: features.materials.leaves[kind] for kind in vertex.kinds}
     rows = []

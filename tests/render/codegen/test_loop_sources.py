@@ -15,7 +15,7 @@ import pytest
 
 import clpt
 from clpt.device import Source
-from clpt.render.codegen import common, flags, programs
+from clpt.render.codegen import common, flags, programs, vertices
 from clpt.render.contract.features import Features
 from clpt.render.lowering.scene import lower
 from clpt.scene.cameras import Perspective
@@ -86,6 +86,8 @@ def test_only_stages_are_seen_outside(name: str) -> None:
                     outside.append(private["PART"])
                 elif shared := re.match(r"COMMON\(\w+, (\w+)\)", head):
                     outside.append(f"loop_{shared[1]}")
+                elif apart := re.match(r"APART\(\w+, loop_(\w+)_answer\)", head):
+                    outside.append(f"loop_material_{apart[1]}")
                 else:
                     assert head.startswith("kernel "), f"{program}: {head} is not private"
                     outside.append(own)
@@ -117,7 +119,10 @@ def test_kinds_of_paths_share_what_is_the_same() -> None:
     """Light paths and photons add what only they have."""
     name = "scenes/bulb/scene.json"
     alone = features_of(name, PathTracer(light_paths=0))
-    shading = {f"shade_{kind}" for kind in alone.materials.kinds}
+    shared = vertices.vertices(alone, 8)
+    shading = {vertex.program for vertex in shared}
+    kinds = [kind for vertex in shared if vertex.shared for kind in vertex.kinds]
+    shading |= {f"material_{alone.materials.kinds[kind]}" for kind in kinds}
     camera = {"generate", "intersect", "shadow", "loop", "common", *shading}
     beside = {"emit", "splat"}
     assert programs.loop_sources(alone, "wide8", 8).keys() == camera
