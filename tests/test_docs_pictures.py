@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
@@ -11,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageFilter
 
 from clpt.scene import KINDS
 from clpt.scene.params import Kind
@@ -66,6 +67,20 @@ def test_the_gallery_has_every_scene():
         name = picture.relative_to(ROOT).as_posix()
         assert f"](../{name})" in page
         assert f"clpt render scenes/{picture.parent.name}" in page
+
+
+def test_pictures_of_the_gallery_are_clean():
+    """Grain: how far a pixel is from the median of 3x3; fireflies: those that are far above it."""
+    page = (ROOT / "docs/gallery.md").read_text("utf-8").split("## Every kind")[0]
+    noisy = []
+    for name in re.findall(r"!\[[^\]]*\]\((\S+\.(?:png|jpg))\)", page):
+        image = Image.open(ROOT / "docs" / name).convert("L")
+        near = image.filter(ImageFilter.MedianFilter(3))
+        above = np.asarray(image, float) - np.asarray(near, float)
+        grain, fireflies = np.median(np.abs(above)), (above > 50.0).mean()
+        if grain > 3.0 or fireflies > 0.0025:
+            noisy.append(f"{name}: grain {grain:.1f}, fireflies {fireflies:.2%}")
+    assert noisy == []
 
 
 def test_pictures_are_small_and_have_all_their_colours():

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Iterable, Sequence, Set
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -27,6 +27,10 @@ _CONSTANT = re.compile(
     r"(?:\[[^\]]*\]\s*)*=[^;]*;\s*\Z",
     re.DOTALL,
 )
+_IN_MEMORY = re.compile(  # a struct of words: `Record.uniform_text`
+    r"typedef struct \{\n(?:    (?:int|uint|float) \w+(?:\[\d+\])?; *\n)+\} \w+;"
+)
+_MEMBER = re.compile(r"    \w+ (?P<name>\w+)(?:\[(?P<size>\d+)\])?;")
 _KERNEL = re.compile(r"\b(?:__)?kernel\b")
 
 
@@ -74,9 +78,12 @@ class Paragraph:
     definitions: tuple[Definition, ...]
     apart: bool
 
-    def left(self, stay: Set[Definition]) -> tuple[list[Row], bool]:
-        """Return its rows without definitions that do not stay, and whether it is apart."""
-        own = [row for one in self.definitions if one in stay for row in one.printed]
+    def left(self, stay: Mapping[Definition, Sequence[Row]]) -> tuple[list[Row], bool]:
+        """Return its rows without definitions that do not stay, and whether it is apart.
+
+        stay: the rows of those that do.
+        """
+        own = [row for one in self.definitions for row in stay.get(one, ())]
         return [*self.comments, *own] if own else [], self.apart
 
 
@@ -180,6 +187,40 @@ def _name(code: str) -> frozenset[str]:
         if match and _is_one(code) and not _KERNEL.search(code, 0, match.start("name")):
             return frozenset((match["name"],))
     return frozenset()
+
+
+def with_gaps(
+    definitions: Set[Definition], made: Iterable[Definition]
+) -> dict[Definition, tuple[Row, ...]]:
+    """Return rows of definitions; of structs in memory without members that nothing names.
+
+    made: those of generated files, which have such structs. In the place of members that follow one
+    another stands one array, so that the others lie where they lay.
+    """
+    structs = {
+        one
+        for one in made
+        if one in definitions and _IN_MEMORY.fullmatch("\n".join(row.code for row in one.rows))
+    }
+    words = {word for one in definitions - structs for word in one.words}
+    return {one: _gaps(one, words) if one in structs else one.printed for one in definitions}
+
+
+def _gaps(struct: Definition, words: Set[str]) -> tuple[Row, ...]:
+    """Rows of a struct in memory, of which only members in `words` have names."""
+    rows: list[Row] = []
+    gap = count = 0
+    for row in struct.rows:
+        member = _MEMBER.match(row.code)
+        if member and member["name"] not in words:
+            gap += int(member["size"] or 1)
+            continue
+        if gap:
+            text = f"    int unused_{count}[{gap}];"
+            rows.append(Row(row.number, text, text))
+            gap, count = 0, count + 1
+        rows.append(row)
+    return tuple(rows)
 
 
 def _is_one(code: str) -> bool:

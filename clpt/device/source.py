@@ -12,7 +12,7 @@ from typing import NoReturn
 from ..errors import KernelBuildError
 from ..records import constant_files
 from .conditions import OPENING, Macros, taken
-from .definitions import Paragraph, macro, named, paragraphs, whole
+from .definitions import Paragraph, macro, named, paragraphs, whole, with_gaps
 from .text_rows import Row, rows_of
 
 _GENERATED = "generated/"  # begins the names of files that are made for a scene
@@ -242,13 +242,17 @@ class _Assembly:
         defines = [macro(name, value) for name, value in self.defines.items()]
         own = [one for _, ps in self.pieces for p in ps for one in p.definitions]
         stay = named([*defines, *own]) | {*(defines if self.library else ())}
-        left = [(file, [p.left(stay) for p in ps]) for file, ps in self.pieces]
-        files = {file for file, found in left if any(rows for rows, _ in found)}
+        made = [ps for file, ps in self.pieces if file.generated]
+        rows = with_gaps(stay, (one for ps in made for p in ps for one in p.definitions))
+        left = [(file, [p.left(rows) for p in ps]) for file, ps in self.pieces]
         text = _Text([row.text for one in defines if one in stay for row in one.rows])
+        root = self.pieces[0][0]
+        if any(rows for file, found in left if file is root for rows, _ in found):
+            text.add(root, root.header)
         for file, found in left:
-            if file in files and file.label not in text.files:
-                text.add(file, file.header)
             for rows, apart in found:
+                if rows and file.header and file.label not in text.files:
+                    text.begin(file, rows[0])
                 text.add(file, rows, apart)
         names = tuple(label.removeprefix("kernels/") for label in text.files)
         return Source(self.root, "\n".join([*text.rows, ""]), names)
@@ -276,6 +280,19 @@ class _Text:
         self.files: dict[str, None] = {}
         self._label, self._line = "", 0  # of the next row, as a compiler counts
 
+    def begin(self, file: _File, first: Row) -> None:
+        """Append the comment at a file's head in front of the first row that is left of the file.
+
+        It is numbered so that the row's number is right: no error is in a comment.
+        """
+        header = "\n".join([row.text for row in file.header])
+        lines = sum(row.lines for row in file.header)
+        apart = first.is_comment and first.number > lines + 1
+        self.files.setdefault(file.label)
+        self.rows += [f'#line {first.number - lines - apart} "{file.label}"', header]
+        self.rows += [""] * apart
+        self._label, self._line = file.label, first.number
+
     def add(self, file: _File, rows: Sequence[Row], apart: bool = False) -> None:
         """Append rows of a file; apart: with a blank row before them."""
         for row in rows:
@@ -298,6 +315,5 @@ class _Text:
         elif wanted == self._line + 1:
             self.rows.append("")
         elif wanted != self._line:
-            self.rows += [""] * apart
             self.rows.append(f"#line {wanted}")
         self._label, self._line = file.label, wanted

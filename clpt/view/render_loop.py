@@ -143,7 +143,8 @@ class RenderLoop:
             self._render_preview()
         elif self._wants_samples():
             self._render_pass()
-            if self._budget.due() or self._stale:
+            discarded = self._begins
+            if not discarded and (self._budget.due() or self._stale):
                 self._offer(self._full.follow(self.scene), 1)
         elif self._stale or not self._offered:
             self._offer(self._full.follow(self.scene), 1, rest=True)

@@ -41,9 +41,9 @@ def main(names: list[str]) -> None:
 
 
 def render(picture: table.Picture) -> Image.Image:
-    with clpt.Renderer(picture.scene()) as renderer:
+    with clpt.Renderer(picture.scene(), denoise=picture.denoise) as renderer:
         renderer.run(picture.spp)
-        image = renderer.image()
+        image = renderer.denoised() if picture.denoise else renderer.image()
     return Image.fromarray(images.to_srgb8(image).repeat(picture.zoom, 0).repeat(picture.zoom, 1))
 
 

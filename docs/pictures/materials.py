@@ -56,6 +56,7 @@ def three(
     *made: Material,
     thing: Callable[[Material, float], Shapes] = lambda material, x: [knob(material, x)],
     spp: int = 96,
+    denoise: str | None = None,
     **more: Any,
 ) -> Picture:
     """Things of three materials, from left to right; `more`: of the studio."""
@@ -64,7 +65,7 @@ def three(
         things = [thing(m, x) for m, x in zip(made, PLACES, strict=True)]
         return studio([shape for some in things for shape in some], **more)
 
-    return Picture(caption, scene, spp)
+    return Picture(caption, scene, spp, denoise=denoise)
 
 
 def each(kind: Callable[..., Material], name: str, values: Sequence[Any], **rest: Any) -> Any:
@@ -335,7 +336,8 @@ MATERIALS = {
         "`sigma_a` of blond, red and black hair.",
         *each(Hair, "sigma_a", (pigment(0.2, 0.1), pigment(0.1, 1.2), pigment(3.0, 0.2))),
         thing=tress,
-        spp=128,
+        spp=24,
+        denoise="oidn",
         size=LARGE,
         integrator=DEEP,
     ),

@@ -15,7 +15,7 @@ from clpt.transforms import look_at, rotate, scale, translate
 Array = NDArray[np.float64]
 UP = (0.0, 1.0, 0.0)
 WHITE = (1.0, 1.0, 1.0)
-WIDE, LARGE, SMALL = (300, 132), (600, 264), (192, 144)  # of a picture [pixels]
+WIDE, LARGE, SMALL = (300, 132), (450, 198), (192, 144)  # of a picture [pixels]
 PLACES = (-1.42, 0.0, 1.42)  # x of three things that stand side by side
 GREY = materials.Diffuse(reflectance=(0.42, 0.46, 0.5))
 BLACK = materials.Diffuse(reflectance=0.0)
@@ -29,6 +29,7 @@ class Picture:
     scene: Callable[[], Scene]
     spp: int = 64
     zoom: int = 1  # a pixel of the film becomes so many by so many
+    denoise: str | None = None  # the denoiser, or none
 
 
 def lathe(*pieces: Sequence[tuple[float, float]], around: int = 96) -> dict[str, Array]:

@@ -122,17 +122,10 @@ inline real grid_pdf(Scene scene, Grid g, integer receiver, integer row, integer
     return cell_density(g, w, at) * gather(scene.distributions, receiver + down + (down + band) * across + strip);
 }
 
-/* Radiance between four texels of four floats, the first of which begins at `first`. */
+/* Radiance of a texel of four floats, the first of which begins at `first`. */
 inline Spectrum texel_at(Scene scene, integer first, integer i, Wavelengths lambdas)
 {
     vec4 texel = gather4(scene.texels, first + 4 * i);
     return spectrum_light_texel(scene, texel.x, texel.y, texel.z, texel.w, lambdas);
 }
-inline Spectrum texels_between(Scene scene, integer first, integer i00, integer i10, integer i01, integer i11, vec2 at,
-                               Wavelengths lambdas)
-{
-    Spectrum sum = spectrum_scale(texel_at(scene, first, i00, lambdas), (1.0f - at.x) * (1.0f - at.y));
-    sum = spectrum_madd(texel_at(scene, first, i10, lambdas), at.x * (1.0f - at.y), sum);
-    sum = spectrum_madd(texel_at(scene, first, i01, lambdas), (1.0f - at.x) * at.y, sum);
-    return spectrum_madd(texel_at(scene, first, i11, lambdas), at.x * at.y, sum);
-}
+#include "core/texels_between.cl"

@@ -41,7 +41,7 @@ inline integer bands_add(Scene scene, global uint *bands, mask m, integer part, 
         integer band = max_i(min_i(to_integer((lambdas.c - lo) / width), last), (integer)(0));                        \
         real term = value.c * weight;                                                                                 \
         mask taken = m & (fabs(term) < FIXED_LARGEST);                                                                \
-        full += band_add(settings, bands, taken, part, band, pixel_index, fixed_of(sel(taken, term, (real)(0.0f)))); \
+        full += band_add(settings, bands, taken, part, band, pixel_index, fixed_of(sel(taken, term, (real)(0.0f))));  \
     }
     SPECTRUM_EACH(C)
 #undef C

@@ -39,17 +39,6 @@ typedef struct {
 #endif
 } Exposure;
 
-/* The part of the film that a sample goes to: there is one, but where even and odd samples are kept apart, or octaves:
- * samples from 2^k to before 2^(k + 1), of which those of even and of odd k have a part each. */
-inline integer film_part(global const Settings *settings, integer sample)
-{
-    integer part = sample & (settings->halves - 1);
-    if (settings->octaves > 1) part += (clz(sample) & 1) * settings->halves;
-    return part;
-}
-
-inline int film_parts(global const Settings *settings) { return settings->halves * settings->octaves; }
-
 /* The first word of a pixel's group in a part of the film. */
 inline size_t film_at(global const Settings *settings, int part, int pixel_index)
 {

@@ -1,12 +1,14 @@
 /* What pictures read of a film: its sums over all parts, as numbers. For work-items of one lane. */
 #include "film/film.cl"
+#define FILM_PARTS (settings->halves * settings->octaves) /* film/work_list.cl */
 
-/* One sum as a number. sum: its first word in the first part; size: words of a part. */
-inline float parts_sum(global const uint *sum, size_t stream, size_t size, int parts)
+/* One sum as a number. sum: its first word in the first part. */
+inline float parts_sum(global const Settings *settings, global const uint *sum)
 {
+    size_t stream = settings->padded_pixels;
     Fixed total = fixed_zero();
-    for (int i = 0; i < parts; i++) {
-        global const uint *word = sum + i * size;
+    for (int i = 0; i < FILM_PARTS; i++) {
+        global const uint *word = sum + i * FILM_WORDS * stream;
         Fixed f = {word[0], word[stream], word[2 * stream]};
         total = fixed_add(total, f);
     }
@@ -16,20 +18,17 @@ inline float parts_sum(global const uint *sum, size_t stream, size_t size, int p
 /* A pixel's three sums, in the group of words that begins at `group`. */
 inline vec3 film_sum(global const Settings *settings, global const uint *film, int pixel_index, int group)
 {
-    size_t stream = settings->padded_pixels, size = FILM_WORDS * stream;
-    int parts = film_parts(settings);
-    global const uint *first = film + group * stream + pixel_index;
-    return v3(parts_sum(first, stream, size, parts), parts_sum(first + 3 * stream, stream, size, parts),
-              parts_sum(first + 6 * stream, stream, size, parts));
+    size_t stream = settings->padded_pixels;
+    global const uint *at = film + group * stream + pixel_index;
+    return v3(parts_sum(settings, at), parts_sum(settings, at + 3 * stream), parts_sum(settings, at + 6 * stream));
 }
 
 /* How many samples a pixel has. */
 inline uint film_samples(global const Settings *settings, global const uint *film, int pixel_index)
 {
-    size_t stream = settings->padded_pixels;
+    size_t stream = settings->padded_pixels, at = FILM_SAMPLES * stream + pixel_index;
     uint samples = 0;
-    for (int i = 0; i < film_parts(settings); i++)
-        samples += film[(i * FILM_WORDS + FILM_SAMPLES) * stream + pixel_index];
+    for (int i = 0; i < FILM_PARTS; i++) samples += film[i * FILM_WORDS * stream + at];
     return samples;
 }
 
@@ -58,8 +57,7 @@ inline float light_paths_mean(float light_paths, float samples)
 inline float film_mean(global const Settings *settings, global const uint *film, int pixel_index, float samples)
 {
 #if FILM_WEIGHTS
-    size_t stream = settings->padded_pixels;
-    samples = parts_sum(film + FILM_WEIGHT * stream + pixel_index, stream, FILM_WORDS * stream, film_parts(settings));
+    samples = parts_sum(settings, film + FILM_WEIGHT * (size_t)settings->padded_pixels + pixel_index);
 #endif
     return samples > 0.0f ? 1.0f / samples : 0.0f;
 }

@@ -11,6 +11,15 @@ inline integer slot_plane(global const Settings *settings, integer slot)
     return divide(slot, settings->per_plane);
 }
 
+/* The part of the film that a sample goes to: there is one, but where even and odd samples are kept apart, or octaves:
+ * samples from 2^k to before 2^(k + 1), of which those of even and of odd k have a part each. */
+inline integer film_part(global const Settings *settings, integer sample)
+{
+    integer part = sample & (settings->halves - 1);
+    if (settings->octaves > 1) part += (clz(sample) & 1) * settings->halves;
+    return part;
+}
+
 /* How far after `first` the first sample is that belongs to a plane. */
 inline integer plane_ahead(integer plane, int planes, int first)
 {

@@ -1,5 +1,6 @@
 /* Shades the paths that met one kind of material. Built once per kind, so it holds no switch: LANES neighbouring slots,
- * in which other kinds are masked out, or, where QUEUED, one slot of the kind's queue. */
+ * in which other kinds are masked out, or, where QUEUED, one slot of the kind's queue. Where a text is whole, read it
+ * from its end: first the stage, then `integrator_vertex` above it, whose steps stand above that in their order. */
 #include "core/base.cl"
 #include "interface/stage.cl"
 #include "generated/merge_args.cl"

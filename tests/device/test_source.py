@@ -15,7 +15,7 @@ def test_the_kernels_are_found():
 def test_a_kernel_file_is_named_by_its_path():
     source = assemble("root", {"root": '#include "core/lanes.cl"\nreal after;'}, {"LANES": 1})
     assert source.files == ("core/lanes.cl", "root")
-    assert '#line 1 "kernels/core/lanes.cl"' in source.text
+    assert '"kernels/core/lanes.cl"\n/* Lanes: ' in source.text
     assert source.text.endswith('#line 2 "root"\nreal after;\n')
 
 
@@ -40,6 +40,30 @@ def test_defines_come_first_if_the_text_names_them():
     defines = {"N": "K", "K": 3, "M": "uint", "NONE": 0}
     text = assemble("a", {"a": "M x = N;"}, defines).text
     assert text == '#define N K\n#define K 3\n#define M uint\n#line 1 "a"\nM x = N;\n'
+
+
+def test_a_comment_at_a_files_head_stands_in_front_of_what_is_left_of_it():
+    """Of the root it is first of all; rows behind it have the numbers that they have in files."""
+    tail = "\n#define NO 1\n\nint x;"
+    virtual = {"a": '/* A. */\n#include "b"' + tail, "b": '/* B. */\n#include "c"' + tail}
+    source = assemble("a", {**virtual, "c": "int c;"})
+    lines = ["/* A. */", '#line 1 "c"', "int c;", '#line 4 "b"', "/* B. */", "int x;"]
+    assert source.text.splitlines() == ['#line 1 "a"', *lines, '#line 5 "a"', "int x;"]
+    assert source.place(7) == ("b", 5)
+    assert source.files == ("a", "c", "b")
+
+
+def test_members_in_memory_that_nothing_names_are_gaps():
+    """The others lie where they lay; a struct of lanes, or one that a file has, stays as it is."""
+    made = "generated/s"
+    members = "    {0} a; /* A. */\n    {0} b[3];\n    {0} c;\n    {0} d;\n"
+    words, lanes = (f"typedef struct {{\n{members.format(name)}}} S;\n" for name in ("int", "real"))
+    kernel = f'#include "{made}"\nkernel void run(global S *s) {{ s->c = 1; }}\n'
+    text = assemble("a", {"a": kernel, made: words}).text
+    rows = ["    int unused_0[4];", "    int c;", "    int unused_1[1];", "} S;"]
+    assert text.splitlines()[2:6] == rows
+    assert lanes in assemble("a", {"a": kernel, made: lanes}).text
+    assert words in assemble("a", {"a": words + kernel, made: ""}).text
 
 
 USED = """\
@@ -73,7 +97,7 @@ def test_what_nothing_names_is_left_out():
     without = USED.replace("constant float table[2][2] = {{1.0f, 2.0f}, {3.0f, 4.0f}};\n", "\n")
     head, rest = without.split("#define UNUSED")
     number = USED.splitlines().index("/* The kernel. */") + 1
-    kernel = rest[rest.index("\n/* The kernel") :].replace("/* The", f"#line {number}\n/* The")
+    kernel = rest[rest.index("\n/* The kernel") + 1 :].replace("/* The", f"#line {number}\n/* The")
     assert text == f'#line 1 "a"\n{head}{kernel}'
     assert assemble("a", {"a": USED}, library=True).text == f'#line 1 "a"\n{USED}'
 

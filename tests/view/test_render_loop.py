@@ -47,6 +47,24 @@ def test_a_slow_drag_prepares_no_kernels(steps: list[float]) -> None:
     assert [m["phase"] for m in outlet.messages if "phase" in m].count("preparing") == 1
 
 
+def test_a_picture_that_is_discarded_is_not_shown(steps: list[float]) -> None:
+    """What moves while a pass is made empties its film: no viewer sees that black picture."""
+    outlet: Any = Audience()
+    loop = RenderLoop(small(), device.choose(), outlet, Display())
+    steps.append(1.0)
+    try:
+        loop.renderer()
+        while loop._previews_left:
+            loop.advance()
+        loop.cancel(discard=True)
+        loop.advance()
+        loop.advance()
+    finally:
+        loop.close()
+    assert [(frame["samples"], frame["divider"]) for frame, _ in outlet.frames][-1] == (1, 1)
+    assert all(frame["samples"] > 0 for frame, _ in outlet.frames)
+
+
 def test_previews_become_finer_again(steps: list[float]) -> None:
     """A second a look makes them coarser, none lets them be as before."""
     scene = small()

@@ -34,6 +34,12 @@ BOTH = tuple(f"integrator/{name}.cl" for name in ("path", "particle_tracer", "bo
 
 Files = dict[str, str | device.Part | tuple[str, ...]]
 
+# Files of kernels that take the place of others where a work-item shades one path.
+_ALONE: device.Virtual = {
+    **bvh.ALONE,
+    "core/texels_between.cl": ("core/texels_in_turn.cl",),
+}
+
 
 def sources(
     features: Features, layout: str, lanes: int, *, queued: bool, interleaved: bool = False
@@ -221,7 +227,7 @@ def _source(
     """The text of a program; stage: its file, if it is not called so; part: of a loop."""
     own: flags.Defines = {"PART": f"loop_{name}"} if part else {}
     given = {"LANES": lanes, "QUEUED": 0, **own, **defines}
-    alone = bvh.ALONE if given["SLAB_BLOCK"] else {}  # a CPU's rays go alone, too
+    alone = _ALONE if given["SLAB_BLOCK"] else {}  # a CPU's rays go alone, too
     return device.assemble(f"stage/{stage or name}.cl", {**virtual, **alone}, given)
 
 

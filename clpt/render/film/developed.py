@@ -50,7 +50,7 @@ class Developed(Still):
 
     def layers(self) -> dict[str, Image]:
         """The layers by name, (h, w, 1 to 12) float32."""
-        return layers_of(self._film.arrays, self)
+        return layers_of(self._film.arrays, self, self._variance)
 
     def halves(self) -> tuple[Image, Image]:
         """The pictures of the even and of the odd samples. Raises SceneError without."""
@@ -64,7 +64,7 @@ class Developed(Still):
             )
         return self._colours(words[0]), self._colours(words[1])
 
-    def variance(self) -> Image:
+    def _variance(self) -> Image:
         """Return an estimate of the variance of each pixel's mean, (h, w, 3) float32.
 
         If a pixel's samples are of weight a in one part of the film and b in the other, the squared
@@ -115,7 +115,7 @@ class Developed(Still):
         return _sums(words, 0) * _inverse(self._divisor(words))
 
     def _brought(self, words: Words) -> Image:
-        """What weighed light paths bring beside them."""
+        """Return what weighed light paths bring beside them."""
         return _sums(words, light_group(len(words))) * self._light_mean(words)
 
     def _to_output(self, values: Image) -> Image:
@@ -148,7 +148,7 @@ class Developed(Still):
         return _inverse(self._divisor(words))
 
     def _divisor(self, words: Words) -> Image:
-        """What each pixel's sums are divided by: samples, or their weight."""
+        """Return the number of samples of each pixel, or their weight."""
         if self._form.weights:
             return numbers(words[FILM_WORDS:][:SUM_WORDS])
         return self._samples(words)

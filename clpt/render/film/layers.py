@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,24 +12,25 @@ from clpt.render.analysis.colour import output_matrix, sensor
 from clpt.render.contract.features.film import layer_places
 from clpt.render.film.cryptomatte import pairs_of
 from clpt.render.film.picture_form import PictureForm
+from clpt.render.film.pictures import Pictures
 from clpt.render.wavefront.film_state import numbers
 from clpt.scene.integrators import Film
 from clpt.scene.layers import LAYERS
 from clpt.spectra import cie
-
-if TYPE_CHECKING:
-    from clpt.render.film.developed import Developed
 
 UNITS = 2.0**22  # kernels/film/layers.cl
 LONG_UNITS = (2.0**8, 2.0**-16, 2.0**-40)
 GROUP = "light_"  # begins the name of a group's picture
 
 
-def layers_of(arrays: Mapping[str, Words], picture: Developed) -> dict[str, Image]:
+def layers_of(
+    arrays: Mapping[str, Words], picture: Pictures, variance: Callable[[], Image]
+) -> dict[str, Image]:
     """Return the layers of a film by name, (h, w, 1 to 12) float32.
 
-    arrays: its words, as `FilmState` has them; picture: its other pictures. Where nothing was seen,
-    as in the sky, a layer is 0, an id -1. `light_groups` becomes a layer light_NAME for each group.
+    arrays: its words, as `FilmState` has them; picture: its other pictures; variance: makes
+    the layer of that name. Where nothing was seen, as in the sky, a layer is 0, an id -1.
+    `light_groups` becomes a layer light_NAME for each group.
     """
     made: dict[str, Image] = {}
     form = picture._form
@@ -46,7 +46,7 @@ def layers_of(arrays: Mapping[str, Words], picture: Developed) -> dict[str, Imag
         elif name == "samples":
             made[name] = picture.samples_per_pixel()[..., None]
         elif name == "variance":
-            made[name] = picture.variance()
+            made[name] = variance()
         else:
             made[name] = sampled[name]
     return made
@@ -74,7 +74,7 @@ def _sampled(form: PictureForm, words: Words) -> dict[str, Image]:
     return made
 
 
-def _light(form: PictureForm, words: Words, picture: Developed) -> dict[str, dict[str, Image]]:
+def _light(form: PictureForm, words: Words, picture: Pictures) -> dict[str, dict[str, Image]]:
     """The pictures of each layer of light."""
     names = [name for name in form.layers if LAYERS[name].form == "light"]
     if not names:

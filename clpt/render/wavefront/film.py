@@ -51,12 +51,11 @@ class Film:
         x, y = work_list.pixels(settings)
         self._inside = work_list.inside(settings)
         self._at = (y * self.size[0] + x)[self._inside]  # in a picture, of each of these
-        words = 4 * self._padded_pixels * self._parts
         pixels, advice = math.prod(self.size), "lower the image's size"
-        sums = {"film": self._words * words}
+        sums = {"film": self._words * self._word_bytes}
         if features.film.bands:
             advice += " or the number of bands"
-            sums["bands"] = SUM_WORDS * self._band_sums * words
+            sums["bands"] = SUM_WORDS * self._band_sums * self._word_bytes
         layers = features.film.layers
         self._layer_words, self._mattes = layers.words, layers.matte_count
         self._light_sums = 3 * layers.light_pictures * features.film_groups
@@ -94,7 +93,11 @@ class Film:
     @property
     def group_bytes(self) -> int:
         """The size of a group of words of all pixels, in all parts."""
-        return 4 * GROUP_WORDS * self._padded_pixels * self._parts
+        return GROUP_WORDS * self._word_bytes
+
+    @property
+    def _word_bytes(self) -> int:
+        return 4 * self._padded_pixels * self._parts
 
     def copy_group(self, first: int, into: cl.Buffer) -> None:
         """Enqueue that a buffer of `group_bytes` gets a group, a pixel's words from `first` on."""

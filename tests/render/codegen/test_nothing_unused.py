@@ -60,23 +60,29 @@ def test_a_mean_takes_few_lines(mode: str) -> None:
     assert not re.search(r"\b(?:load|store)_(?:path|hit|shadow)_", text["accumulate"].text)
 
 
+def code_rows(text: str) -> list[str]:
+    """The rows of a text without comments."""
+    comment = re.compile(r"/\*.*?\*/", re.DOTALL)
+    return comment.sub(lambda found: "\n" * found[0].count("\n"), text).split("\n")
+
+
 def test_rows_are_at_their_lines() -> None:
-    """A row of a kernel file is the row of the file that a compiler names."""
+    """A row of a kernel file is the row of the file that a compiler names, but for comments."""
     features = features_of("scenes/god_rays/scene.json", "rgb")
     texts = programs.sources(features, "wide8", 8, queued=False)
     files: dict[str, list[str]] = {}
     compared = 0
     for text in texts.values():
         file, line = "", 0
-        for row in text.text.splitlines():
+        for row in code_rows(text.text):
             told = re.match(r'#line (\d+)(?: "([^"]*)")?', row)
             line = int(told[1]) if told else line + 1
             if told:
                 file, line = told[2] or file, line - 1
-            elif file.startswith("kernels/") and row and not row.startswith("#"):
+            elif file.startswith("kernels/") and row.strip() and not row.startswith("#"):
                 if file not in files:
                     path = device.kernels_folder().parent / file
-                    files[file] = path.read_text("utf-8").splitlines()
+                    files[file] = code_rows(path.read_text("utf-8"))
                 assert row.removeprefix("static ") == files[file][line - 1], (file, line)
                 compared += 1
     assert compared > 1000
