@@ -164,12 +164,6 @@ def stages_text(features: Features, layout: str, lanes: int, interleaved: bool) 
     return "\n".join([*rows, ""])
 
 
-def walks(features: Features) -> bool:
-    """Whether the camera's paths go from collision to collision in media."""
-    of_camera = not features.transport.light_paths
-    return of_camera and any(cls.is_phase for cls in features.materials.leaves)
-
-
 def _call(features: Features, own: Features, layout: str, stage: Stage) -> _Call:
     """The call of a stage for one kind of paths, whose features are `own`."""
     begin, join = begin_and_join(own)

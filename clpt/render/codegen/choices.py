@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from clpt import bvh
-from clpt.render.codegen import bounce, flags
+from clpt.render.codegen import flags
 from clpt.render.contract.features import Features
 from clpt.scene.scatterer import Scatterer
 
@@ -33,7 +33,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     ),
     "generated/bands.cl": lambda f, _: ("film/bands.cl",) * f.film.bands,
     "generated/integrator.cl": lambda f, _: (f"integrator/{f.transport.integrator}.cl",),
-    "generated/walk.cl": lambda f, _: either(bounce.walks(f), "path/walk.cl"),
+    "generated/walk.cl": lambda f, _: either(flags.walks(f), "path/walk.cl"),
     "generated/merging.cl": lambda f, _: either(f.transport.merged, "merging/area.cl"),
     "generated/cone.cl": lambda f, _: either(f.textures.mips, "path/cone.cl"),
     "generated/vertex_media.cl": lambda f, _: (
