@@ -184,7 +184,7 @@ def _call(features: Features, own: Features, layout: str, stage: Stage) -> _Call
 
 
 def _shade_call(features: Features, stage: Stage, args: list[tuple[str, str]]) -> _Call:
-    """The call of what shades a kind, maybe with others."""
+    """The call of the part that shades a kind, with others where they share a vertex."""
     leaves = features.materials.leaves
     for vertex in vertices.vertices(features, stage.lanes):
         if stage.program in (f"shade_{leaves[kind].kind}" for kind in vertex.kinds):

@@ -2,8 +2,8 @@
 
 Most of what shades a kind is the vertex of the path: light that is met and sought, weights against
 paths from the other end, roulette. Kinds for which that is the same are shaded by one part of the
-loop, and each has a part with what is its own: `FUNCTIONS`, which the vertex calls for LANES paths
-of one kind at once. In one lane, as on GPUs, each kind has a program with all of it.
+loop, and each has a part with what is its own, which the vertex calls for LANES paths of one kind
+at once. In one lane, as on GPUs, each kind has a program with all of it.
 """
 
 from __future__ import annotations
@@ -43,13 +43,13 @@ def vertices(features: Features, lanes: int) -> list[Vertex]:
         alike.setdefault(key, []).append(kind)
     found = []
     for kinds in alike.values():
-        shared = "_".join(leaves[kind].kind for kind in kinds)
-        found.append(Vertex(f"shade_{shared}", tuple(kinds)))
+        others = "_and_others" if len(kinds) > 1 else ""
+        found.append(Vertex(f"shade_{leaves[kinds[0]].kind}{others}", tuple(kinds)))
     return found
 
 
 def _may_share(features: Features, cls: type[Scatterer]) -> bool:
-    """Whether the vertex needs no more of a kind than `FUNCTIONS`."""
+    """Whether the vertex asks a kind once: photons, guides, hero wavelengths ask more often."""
     own = (flags.is_chromatic, flags.fluoresces, flags.is_guided, flags.between_bodies)
     merged = features.transport.merged and flags.gathers_photons(features, cls)
     turned = flags.has_lobe(features, cls, "clearcoat_apart")

@@ -145,7 +145,7 @@ def test_kinds_share_a_vertex_but_for_what_differs() -> None:
     assert [vertex.kinds for vertex in found] == [diffuse_and_plastic, dielectric]
     assert [vertex.kinds for vertex in vertices.vertices(features, 1)] == [(0,), (1,), (2,)]
     made = programs.loop_sources(features, "wide8", 8)
-    vertex = made["shade_diffuse_plastic"]
+    vertex = made["shade_diffuse_and_others"]
     assert "bsdf/plastic.cl" not in vertex.files and "path/vertex.cl" in vertex.files
     part = made["material_plastic"]
     assert "bsdf/plastic.cl" in part.files and "path/vertex.cl" not in part.files
