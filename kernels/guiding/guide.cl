@@ -17,7 +17,7 @@
 #include "guiding/bins.cl"
 #include "merging/cells.cl"
 
-#define GUIDE_EVEN 0.5f /* light from everywhere that is expected beside what is known, over that */
+#define GUIDE_EVEN 2.0f /* light from everywhere that is expected beside what is known, over that */
 #define GUIDE_STRAIGHT 4.0f /* the same of what comes straight from lights, which may be from anywhere above */
 #define GUIDE_COSINE 0.1f /* the least by which flux is divided for radiance */
 #define GUIDE_LEAST 0.5f /* chance that a path goes on */

@@ -37,7 +37,8 @@ class SceneIndex:
     warnings: of instances that became triangles; motions: what moves; lit_media: why no paths can
     start at some light in a medium, "" if they can; lit_before: whether light paths were ghosts of
     a lens before an edit, whose film has sums for them or none; candidates: integrators between
-    which a trial decides, the one that was chosen first; none where there is no trial.
+    which a trial decides, the one that was chosen first; none where there is no trial; long_guide:
+    whether a guide learns for long, as nobody has asked for it and many samples are to come.
     """
 
     scene: Scene
@@ -51,6 +52,7 @@ class SceneIndex:
     lit_media: str = UNKNOWN
     lit_before: bool | None = None
     candidates: tuple[Integrator, ...] = ()
+    long_guide: bool = False
 
     @classmethod
     def of(cls, scene: Scene) -> SceneIndex:
@@ -72,6 +74,11 @@ class SceneIndex:
             warnings=tuple(warnings),
             motions=motions,
         )
+
+    @property
+    def listed(self) -> Sequence[Shape]:
+        """The shapes as the scene lists them, instances among them."""
+        return self.scene.shapes
 
     @property
     def shining(self) -> tuple[str, ...]:

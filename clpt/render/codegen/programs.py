@@ -210,6 +210,7 @@ def _static(texts: dict[str, device.Source]) -> dict[str, device.Source]:
     return {name: text.with_static() for name, text in texts.items()}
 
 
+@functools.lru_cache(maxsize=8)
 def _defines(features: Features, lanes: int) -> flags.Defines:
     """Return what all programs of a scene define; lanes: paths that a work-item shades."""
     return {**flags.of_scene(features), "SLAB_BLOCK": SLAB_BLOCK if lanes == 1 else 0}
@@ -232,7 +233,12 @@ def _source(
 
 
 def _shared(features: Features, layout: str) -> Files:
-    """The generated files that are the same for all programs of a scene."""
+    """The generated files that are the same for all programs of a scene, as a dict of one's own."""
+    return dict(_generated(features, layout))
+
+
+@functools.lru_cache(maxsize=4)
+def _generated(features: Features, layout: str) -> Files:
     return {
         **shapes.virtual_files(features),
         **rough_coat_table.virtual_files(),

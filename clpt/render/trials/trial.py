@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from clpt import device
+from clpt.render.analysis import guides
 from clpt.render.lowering.scene import Lowered
 from clpt.render.trials import cost
 from clpt.render.trials.cost import GUIDED_RAY, LIGHT_RAY, Trial
@@ -69,8 +70,9 @@ def name_of(way: Integrator) -> str:
 
 def tried(ground: Ground, lowered: Lowered) -> Trial:
     """Return the pictures that a way makes of a scene, and what they took."""
-    transport = lowered.features.transport
-    small = replace(lowered, settings=cost.settings(lowered.settings))
+    transport, settings = lowered.features.transport, cost.settings(lowered.settings)
+    settings["guide_paths"] = min(settings["guide_paths"], guides.PATHS)  # it learns better later
+    small = replace(lowered, settings=settings)
     wavefront = Wavefront.create(
         ground.device, small, ground.tuning, looped=ground.looped, tree_quality="fast"
     )

@@ -72,6 +72,15 @@ def test_an_edit_has_no_trial() -> None:
     assert lower(scene, former=lower(scene)).candidates == ()
 
 
+def test_a_guide_that_nobody_asked_for_learns_for_long() -> None:
+    scene = long(caustic())
+    *_, guided = lower(scene).candidates
+    former = dataclasses.replace(lower(scene), integrator=guided)
+    assert lower(scene, former=former).settings["guide_paths"] == guides.LONG_PATHS
+    asked = dataclasses.replace(scene, integrator=guided)
+    assert lower(asked).settings["guide_paths"] == guides.PATHS
+
+
 def made_up(monkeypatch: pytest.MonkeyPatch, noise: dict[tuple[Any, bool], float]) -> list[Any]:
     """Let trials find these variances at equal rays; return what is tried, as it is."""
     asked: list[Any] = []
@@ -120,6 +129,7 @@ def test_no_guide_is_compiled_where_there_is_little_noise(monkeypatch: pytest.Mo
 def little(monkeypatch: pytest.MonkeyPatch) -> None:
     """Trials of few samples, in which guides learn from few light paths."""
     monkeypatch.setattr(guides, "PATHS", 1 << 12)
+    monkeypatch.setattr(guides, "LONG_PATHS", 1 << 12)
     monkeypatch.setattr(guides, "WORTH", 1)
     monkeypatch.setattr(trial, "ROUNDS", 2)
     monkeypatch.setattr(trial, "SAMPLES", 4)
@@ -139,14 +149,14 @@ def test_a_film_is_that_of_the_way(monkeypatch: pytest.MonkeyPatch, guiding: boo
     parts = [clpt.Renderer(scene, narrow(), first_sample=first) for first in (0, 4)]
     for part, samples in zip(parts, (4, 3), strict=True):
         part.run(samples)
-        assert part._features.transport.guided == guiding
+        assert part._wavefront.features.transport.guided == guiding
         assert "lowest" in part.stats.reason
     parts[0].merge(parts[1].film_state())
     assert np.array_equal(parts[0].image(), whole.image())
     origin = parts[0]._origin().settings
     assert origin["chosen.guiding"] is guiding
     crop = clpt.Renderer(with_film(scene, crop=(3, 2, 7, 5)), narrow())
-    assert crop._features.transport.guided == guiding
+    assert crop._wavefront.features.transport.guided == guiding
 
 
 @pytest.mark.usefixtures("little")
@@ -180,7 +190,7 @@ def test_pictures_that_people_steer_have_no_trial(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(trial, "GUIDED_RAY", 0.0)
     scene = dataclasses.replace(slit(), integrator=Auto())
     steered = clpt.Renderer(scene, narrow(), cancel_seconds=0.1)
-    assert not steered._features.transport.guided
+    assert not steered._wavefront.features.transport.guided
 
 
 def broad() -> Scene:

@@ -88,7 +88,8 @@ def decided(lit: Lit, former: Integrator | None = None) -> tuple[SceneIndex, str
     if given.guiding:
         chosen, reason = Path(light_paths=0, guiding=True), "directions are guided"
     chosen = replace(chosen, **shared(given, chosen))
-    index = replace(index, scene=replace(index.scene, integrator=chosen))
+    scene = replace(index.scene, integrator=chosen)
+    index = replace(index, scene=scene, long_guide=not given.guiding)
     return replace(index, candidates=_candidates(index, chosen) if former is None else ()), reason
 
 
