@@ -212,7 +212,7 @@ def with_gaps(
 
 
 def _pasted_members(row: Row, names: Iterable[str]) -> set[str]:
-    """Names among these that a macro pastes together behind a point or an arrow."""
+    """Return the names, of `names`, that a macro pastes together behind a point or an arrow."""
     arguments = {"", *_WORD.findall(row.macro[0])}
     found: set[str] = set()
     for begin, end in _PASTED_MEMBER.findall(row.code):
