@@ -105,7 +105,7 @@ def _shading(
 ) -> dict[str, device.Source]:
     """The texts that shade, see `sources`; part: of a loop, for all kinds of paths of the scene."""
     files, defines = _shared(features, layout), _defines(features, lanes)
-    texts = {}
+    texts: dict[str, device.Source] = {}
     for vertex in vertices.vertices(features, lanes if part else 1):
         cls = vertices.leader(features, vertex)
         own = {**files, **choices.material_files(features, cls), **_material(features, cls)}
