@@ -256,12 +256,15 @@ MATERIALS = {
     "thin_dielectric": three(
         "`int_ior` 1.2, 1.5 and 2.4: empty shells.",
         *each(ThinDielectric, "int_ior", (1.2, 1.5, 2.4)),
+        spp=64,
+        denoise="oidn",
         integrator=DEEP,
     ),
     "rough_dielectric": three(
         "`alpha_u` and `alpha_v` 0.03, 0.12 and 0.4.",
         *rough(RoughDielectric, 0.03, 0.12, 0.4, int_ior=1.5),
-        spp=160,
+        spp=64,
+        denoise="oidn",
         integrator=DEEP,
     ),
     "conductor": three(
