@@ -369,7 +369,7 @@ TREE_SIZES = Constants(
     "Sizes of trees.",
     depth=(48, "most levels of a leaf below the root"),
     levels=(16, "most levels of nodes 8 wide: a third of that"),
-    shapes_depth=(32, "most levels of a leaf below the root of a binary tree over shapes"),
+    shapes_depth=(30, "most levels of a leaf below the root of a binary tree over shapes"),
 )
 TREE_REACHES = Constants(
     "BVH_",

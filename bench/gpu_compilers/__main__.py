@@ -18,7 +18,7 @@ from rich.table import Table
 from bench import machine
 from bench.gpu_compilers import programs, results
 from bench.gpu_compilers.results import Row
-from bench.gpu_compilers.vendors import VENDORS, CompilerError, Vendor
+from bench.gpu_compilers.vendors import VENDORS, CompilerError, Vendor, fits
 
 
 def compiled(vendor: Vendor, device: str, program: programs.Program) -> Row:
@@ -63,6 +63,7 @@ def present() -> list[Vendor]:
 @click.option("--scene", "names", multiple=True, help="these alone")
 @click.option("--longest", type=int, help="so many of each stage and mode alone, the longest texts")
 @click.option("--seconds", type=float, help="after which no further program is compiled")
+@click.option("--fits", "fewest", is_flag=True, help="tell how few registers would do on NVIDIA's")
 @click.option("--keep", is_flag=True, help="write the page and the picture in bench/results")
 def main(
     json_file: Path | None,
@@ -70,12 +71,18 @@ def main(
     names: tuple[str, ...],
     longest: int | None,
     seconds: float | None,
+    fewest: bool,
     keep: bool,
 ) -> None:
     os.nice(5)
     given = programs.of_scenes(p for p in programs.scenes() if not names or p.name in names)
     if longest:
         given = programs.longest(given, longest)
+    if fewest:
+        for program in given:
+            count = fits(program.text, devices[0] if devices else "sm_89")
+            click.echo(f"{program.stage} {program.scene} {program.mode}: {count}")
+        return
     known = results.read(json_file) if json_file else []
     digests = {program.digest for program in given}
     rows = [row for row in known if row["digest"] in digests]

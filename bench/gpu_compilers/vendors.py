@@ -23,6 +23,7 @@ from pathlib import Path
 FOLDER = "GPU_COMPILERS"  # the variable that names where they were unpacked
 PLACES = ("usr/lib/llvm-19/bin", "usr/bin", "nvidia/*/bin", "usr/lib/clc")
 LANGUAGE = ("-x", "cl", "-cl-std=CL1.2", "-O3", "-w", "-nogpulib")
+ROUGHLY = ("-mllvm", "-nvptx-prec-divf32=1", "-Dsqrt=__nvvm_sqrt_approx_f")
 SECONDS = 300.0  # after which a compiler counts as hung
 
 
@@ -168,8 +169,7 @@ WARPS = {"sm_75": 32, "sm_80": 64, "sm_86": 48, "sm_89": 48, "sm_90": 64}
 def nvidia(text: str, device: str, folder: Path) -> Figures:
     """By clang, as PTX for the oldest device of all, and NVIDIA's assembler for this one."""
     began = time.perf_counter()
-    library = str(find("nvptx64--nvidiacl.bc"))
-    (folder / "k.ptx").write_text(_ptx(text, library), encoding="utf-8")
+    (folder / "k.ptx").write_text(_ptx(text), encoding="utf-8")
     said = run(folder, "ptxas", "-v", "-O3", f"-arch={device}", "k.ptx", "-o", "k.cubin")
     seconds = time.perf_counter() - began
     counts = (-1, -1, -1)
@@ -188,14 +188,44 @@ def nvidia(text: str, device: str, folder: Path) -> Figures:
     )
 
 
+def fits(text: str, device: str) -> int:
+    """Return the fewest registers, in eights, with which NVIDIA's assembler spills nothing.
+
+    Left alone it takes more than it needs; a driver is told by `-cl-nv-maxrregcount`. Divisions and
+    roots are only as exact as OpenCL C asks (2.5 and 3 ulp): exact ones are calls.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder, "k.ptx").write_text(_ptx(text, ROUGHLY), encoding="utf-8")
+        build = ("ptxas", "-v", "-O3", f"-arch={device}", "k.ptx", "-o", "k.cubin", "-maxrregcount")
+        few, enough = 2, 32  # eights
+        while few < enough:
+            middle = (few + enough) // 2
+            said = run(Path(folder), *build, str(min(8 * middle, 255)))
+            spills = most(r"(\d+) bytes spill stores", said) > 0
+            few, enough = (middle + 1, enough) if spills else (few, middle)
+        return 8 * few
+
+
 @functools.cache
-def _ptx(text: str, library: str) -> str:
+def _ptx(text: str, options: tuple[str, ...] = ()) -> str:
     """PTX of a text, once for all devices."""
+    library = str(find("nvptx64--nvidiacl.bc"))
     with tempfile.TemporaryDirectory() as folder:
         Path(folder, "k.cl").write_text(text, encoding="utf-8")
         linked = ("-Xclang", "-mlink-builtin-bitcode", "-Xclang", library)
         target = ("-target", "nvptx64-nvidia-nvcl", "-march=sm_75")
-        run(Path(folder), "clang", *target, *LANGUAGE, *linked, "-S", "-o", "k.ptx", "k.cl")
+        run(
+            Path(folder),
+            "clang",
+            *target,
+            *LANGUAGE,
+            *options,
+            *linked,
+            "-S",
+            "-o",
+            "k.ptx",
+            "k.cl",
+        )
         return Path(folder, "k.ptx").read_text(encoding="utf-8")
 
 

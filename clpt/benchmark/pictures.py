@@ -13,8 +13,8 @@ import numpy as np
 
 from clpt import bvh, device
 from clpt.errors import ClptError
+from clpt.render.device_film import kernels_digest
 from clpt.render.renderer import Renderer
-from clpt.render.resumable import kernels_digest
 from clpt.scene import Scene
 
 from . import agreement, rays, tiles

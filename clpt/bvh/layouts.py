@@ -244,7 +244,7 @@ BOX_LAYOUTS: dict[str, Callable[[Building, int, cl.Buffer], Packed]] = {
 }
 
 # Files of kernels that take the place of others where a ray goes alone on a device without vectors.
-ALONE = {
+ALONE: dict[str, tuple[str, ...]] = {
     "bvh/mask8.cl": ("bvh/mask8_bits.cl",),
     "bvh/wide8_waiting.cl": ("bvh/wide8_levels.cl",),
 }

@@ -15,13 +15,13 @@ from functools import partial
 from typing import NoReturn
 
 from clpt.cluster.blocks import Block, Blocks, WorkerRecord
-from clpt.cluster.device_worker import DeviceWorker, added
+from clpt.cluster.device_worker import DeviceWorker
 from clpt.cluster.sample_ranges import gaps
 from clpt.cluster.threads import TICK, Threads
 from clpt.errors import ClusterError
-from clpt.render.locking import Stop
+from clpt.render.maker import Held
 from clpt.render.wavefront.film_state import FilmState, Ranges, join_ranges
-from clpt.render.wavefront.tracer import Selection, use_all_pixels
+from clpt.render.wavefront.tracer import Selection
 from clpt.render.wavefront.wavefront import Counts
 
 log = logging.getLogger(__name__)
@@ -30,26 +30,19 @@ BLOCK_SECONDS = 1.0  # that a block should take
 SAVE_SECONDS = 60.0  # of a device's work, after which its film goes to the host: no more is lost
 
 
-class LostPicture(Exception):
-    """The device failed whose film held the whole picture."""
-
-
 class Crew:
     """Devices that work together.
 
     workers: those that have not failed; failed: the names and errors of the others. saved: the film
-    on the host of what they took, None for an empty one, and saved_ranges: its samples. lost:
-    selections and ranges of samples that no film holds any more. keeper: whose film holds the whole
-    picture beside its own samples, if there is one. stop: ends what is being done.
+    on the host of what they took, None for an empty one. lost: selections and ranges of samples
+    that no film holds any more.
     """
 
-    def __init__(self, workers: Iterable[DeviceWorker], stop: Stop):
-        self.workers, self.stop = list(workers), stop
+    def __init__(self, workers: Iterable[DeviceWorker]):
+        self.workers = list(workers)
         self.failed: list[tuple[DeviceWorker, BaseException]] = []
         self.saved: FilmState | None = None
-        self.saved_ranges: Ranges = ()
         self.lost: list[tuple[Selection, int, int]] = []
-        self.keeper: DeviceWorker | None = None
         self._lock = threading.RLock()
         self._changed = threading.Condition(self._lock)  # only threads of devices wait for it
         self._threads = Threads()
@@ -63,22 +56,17 @@ class Crew:
         return self.workers[0]
 
     @property
-    def has_losses(self) -> bool:
-        """Whether there are samples that no film holds any more."""
-        return bool(self.lost) or not (self.keeper is None or self.keeper in self.workers)
-
-    @property
     def counts(self) -> Counts:
         """Counts of all devices together, those that were dropped included."""
         total = self._past
         for worker in self.workers:
-            total = added(total, worker.counts)
+            total = total.plus(worker.counts)
         return total
 
     @property
     def ranges(self) -> Ranges:
-        """The samples that are in a film."""
-        ranges = self.saved_ranges
+        """The samples of all pixels that are in a film."""
+        ranges = () if self.saved is None else self.saved.taken
         for worker in self.workers:
             ranges = join_ranges(ranges, worker.ranges)
         return ranges
@@ -86,13 +74,13 @@ class Crew:
     @property
     def whole(self) -> Selection:
         """Samples of all pixels."""
-        return Selection("all", self.first.renderer._wavefront.paths.pixels)
+        return Selection("all", self.first.film.wavefront.paths.pixels)
 
     def run(self, selection: Selection, ranges: Ranges, tick: Callable[[], bool]) -> bool:
         """Add ranges of a selection's samples; return whether it was not stopped.
 
         tick: called all the while; if it returns False, devices stop. What it raises is raised when
-        they have. Raises ClusterError when no device is left, LostPicture without the keeper.
+        they have. Raises ClusterError when no device is left.
         """
         finished = self._share(selection, ranges, tick)
         while finished and self.lost:
@@ -135,15 +123,39 @@ class Crew:
         """Let later renders sample every pixel, after selections of some."""
         for worker in list(self.workers):
             try:
-                use_all_pixels(worker.renderer._wavefront)
+                worker.use_all_pixels()
             except Exception as error:
                 self.drop(worker, error)
 
-    def clear_counts(self) -> None:
-        """Count from zero, but for what films on devices have."""
-        self._past = Counts()
+    def count_from(self, counts: Counts) -> None:
+        """Count from these, when films on devices are empty."""
+        self._past = counts
         for worker in self.workers:
             worker.past = Counts()
+
+    def put(self, film: FilmState | None) -> None:
+        """Let a film be that of all devices."""
+        self.empty(self.workers)
+        self.lost.clear()
+        self.saved = film
+
+    def hold(self, taken: Ranges) -> Held:
+        """Keep copies of films on their devices. Raises ClusterError where one has failed."""
+        if self.lost:
+            raise ClusterError("a device has failed: others do its part first")
+        workers, saved = [worker for worker in self.workers if worker.unsaved], self.saved
+        for worker in workers:
+            worker.film.hold()
+
+        def read() -> FilmState:
+            total = saved
+            for worker in workers:
+                film = worker.film.words(held=True)
+                total = film if total is None else total.plus(film)
+            assert total is not None, "something is held"
+            return replace(total, taken=taken)
+
+        return Held(read, self.counts, taken)
 
     def drop(self, worker: DeviceWorker, error: BaseException) -> None:
         """Leave a device out from now on."""
@@ -152,11 +164,8 @@ class Crew:
                 return
             self.workers.remove(worker)
             self.failed.append((worker, error))
-            if worker is self.keeper:
-                self._threads.over = True
-            else:
-                self.lost += worker.unsaved
-            self._past = added(self._past, worker.past)
+            self.lost += worker.unsaved
+            self._past = self._past.plus(worker.past)
             self._tell()
         others = "others do its part" if self.workers else "no other is left"
         log.warning("%s failed and is left out, %s: %s", worker.name, others, error)
@@ -184,15 +193,13 @@ class Crew:
                     break
         finally:
             self.rest()
-        if self.keeper is not None and self.keeper not in self.workers:
-            raise LostPicture
         tick()
         if not self.workers:
             self._give_up()
         return blocks.done
 
     def _over(self, blocks: Blocks) -> bool:
-        return self._threads.over or self.stop.is_set() or blocks.done or not self.workers
+        return self._threads.over or blocks.done or not self.workers
 
     def rest(self) -> None:
         """Let devices end what they do, and wait for them."""
@@ -209,17 +216,17 @@ class Crew:
         """Take blocks until none is left: a device's thread, one of these."""
 
         def goes_on(_: object = None) -> bool:
-            return not (threads.over or self.stop.is_set())
+            return not threads.over
 
         try:
-            if worker.shows and worker is not self.keeper:
+            if worker.is_other:
                 worker.clear()
             while (block := self._next(worker, blocks, goes_on)) is not None:
                 began = time.perf_counter()
                 finished = worker.do(selection, block.first, block.end, goes_on)
                 seconds = time.perf_counter() - began
                 self._note(worker, blocks, selection, block, seconds, finished)
-                if worker.unsaved_seconds > SAVE_SECONDS and self.keeper is None:
+                if worker.unsaved_seconds > SAVE_SECONDS:
                     self._save(worker)
         except Exception as error:
             self.drop(worker, error)
@@ -265,4 +272,3 @@ class Crew:
         with self._lock:
             given = replace(state, taken=ranges)
             self.saved = given if self.saved is None else self.saved.merged(given)
-            self.saved_ranges = self.saved.taken

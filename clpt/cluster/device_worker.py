@@ -1,23 +1,18 @@
-"""A device that works on a picture with others: its renderer, and what only its own film holds."""
+"""A device that works on a picture with others: its maker, and what only its own film holds."""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any, TypeVar
 
 from clpt.cluster.threads import on_all
 from clpt.device import Device
 from clpt.errors import SceneError
-from clpt.render.contents import Contents
-from clpt.render.editing.scene_edit import MaterialKey, Replacements, ShapeKey
-from clpt.render.lowering.scene import Lowered
-from clpt.render.renderer import Renderer
+from clpt.render.device_film import DeviceFilm
 from clpt.render.wavefront.film_state import FilmState, Ranges, join_ranges
-from clpt.render.wavefront.tracer import OnBatch, Selection
+from clpt.render.wavefront.tracer import OnBatch, Selection, use_all_pixels
 from clpt.render.wavefront.wavefront import Counts, Wavefront
-from clpt.scene import Scene
-from clpt.scene.materials import Material
 
 _Made = TypeVar("_Made")
 
@@ -42,52 +37,21 @@ class Once:
             return self._made[key]
 
 
-class SharingRenderer(Renderer):
-    """A renderer whose scene is lowered and edited once for several devices.
-
-    shared: of all of them, another one for each change of the scene.
-    """
-
-    def __init__(self, scene: Scene, device: Device, shared: Once, **options: Any):
-        self.shared = shared
-        super().__init__(scene, device, **options)
-
-    def _emptied(self, *, recover: bool = False) -> Contents:
-        """As for `Renderer`; the crew uses its film without a change, so it may need to recover."""
-        return super()._emptied(recover=True)
-
-    def _lower(self, scene: Scene, former: Lowered | None = None, *, anew: bool = False) -> Lowered:
-        lower = super()._lower
-        lowered = self.shared("lowered", lambda: lower(scene, former, anew=anew))
-        if lowered.zero_copy:
-            raise SceneError("arrays in the memory of one device are not there for the others")
-        return lowered
-
-    def _edit(
-        self,
-        scene: Scene,
-        materials: Mapping[MaterialKey, Material] | None,
-        transforms: Mapping[ShapeKey, Any] | None,
-        vertices: Mapping[ShapeKey, Any] | None,
-    ) -> tuple[Scene, Replacements]:
-        edit = super()._edit
-        key = "edited", bool(materials), bool(transforms), bool(vertices)
-        return self.shared(key, lambda: edit(scene, materials, transforms, vertices))
-
-
 class DeviceWorker:
-    """A device with its renderer.
+    """A device that works with others.
 
-    name: for people; unsaved: the selections and ranges of samples that its film holds, and nothing
-    else does; shows: whether its film holds the whole picture, rather than these; paths: that it
-    traced; rate: of paths [1/s], 0 when not known.
+    name: for people; film: its own; unsaved: the selections and ranges of samples that it holds,
+    and nothing else does; shown: the film that it was made to be, if any; is_other: whether it may
+    be another one than that of `unsaved`; paths: that it traced; rate: of paths [1/s], 0 when not
+    known.
     """
 
-    def __init__(self, name: str, renderer: SharingRenderer):
-        self.name, self.renderer = name, renderer
+    def __init__(self, name: str, film: DeviceFilm):
+        self.name, self.film = name, film
         self.unsaved: list[tuple[Selection, int, int]] = []
         self.unsaved_seconds = 0.0
-        self.shows = False
+        self.shown: FilmState | None = None
+        self.is_other = False
         self.paths, self.rate = 0, 0.0
         self.past = Counts()  # before the film was emptied
         self._selected: tuple[Selection, Wavefront] | None = None
@@ -95,19 +59,20 @@ class DeviceWorker:
     @property
     def counts(self) -> Counts:
         """Counts of what the device has rendered so far."""
-        return added(self.past, self.renderer.counts)
+        return self.past.plus(self.film.wavefront.counts)
 
     @property
     def ranges(self) -> Ranges:
-        """The samples that only its film holds."""
+        """The samples of all pixels that only its film holds."""
         ranges: Ranges = ()
-        for _, first, end in self.unsaved:
-            ranges = join_ranges(ranges, ((first, end),))
+        for selection, first, end in self.unsaved:
+            if selection.paths == "all":
+                ranges = join_ranges(ranges, ((first, end),))
         return ranges
 
     def do(self, selection: Selection, first: int, end: int, on_batch: OnBatch) -> bool:
         """Add samples first to end - 1 to the film; return whether it was not stopped."""
-        wavefront = self.renderer._wavefront
+        wavefront = self.film.wavefront
         former, by = self._selected or (None, None)
         if selection is not former or by is not wavefront:
             selection.prepare(wavefront)
@@ -116,33 +81,28 @@ class DeviceWorker:
 
     def take(self) -> FilmState:
         """Return the film, and empty it."""
-        state = self.renderer.film_state()
+        state = self.film.words()
         self.clear()
         return state
-
-    def hold(self) -> None:
-        """Keep a copy of the film on the device, for `held`. Raises MemoryBudgetError."""
-        self.renderer._wavefront.film.hold()
-
-    def held(self) -> FilmState:
-        """Return what the film was at the last `hold`."""
-        return self.renderer._words((), held=True)
 
     def clear(self) -> None:
         """Empty the film."""
         self.past = self.counts
-        self.renderer._wavefront.clear()
-        self.unsaved, self.unsaved_seconds, self.shows = [], 0.0, False
+        self.film.wavefront.clear()
+        self.unsaved, self.unsaved_seconds, self.shown = [], 0.0, None
+        self.is_other = False
+
+    def use_all_pixels(self) -> None:
+        """Let later samples be of every pixel."""
+        self._selected = None
+        use_all_pixels(self.film.wavefront)
 
     def show(self, state: FilmState) -> None:
-        """Let the film hold a whole picture."""
-        self.renderer._set_words(state)
-        self.shows = True
-
-
-def added(a: Counts, b: Counts) -> Counts:
-    """Return the sums of what happened."""
-    return Counts(**{name: value + vars(b)[name] for name, value in vars(a).items()})
+        """Let the film be another one."""
+        if self.shown is not state:
+            self.is_other, self.shown = True, None  # wherever an error comes
+            self.film.put(state)
+            self.shown = state
 
 
 def device_names(devices: list[Device]) -> list[str]:

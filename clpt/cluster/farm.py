@@ -22,6 +22,7 @@ from clpt.cluster.sample_ranges import gaps
 from clpt.errors import ClusterError
 from clpt.render.wavefront.film_state import FilmState, Ranges
 from clpt.render.wavefront.tracer import Selection
+from clpt.render.wavefront.wavefront import Counts
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -43,12 +44,12 @@ MOST_FAILURES = 3  # of a block, before the render ends; of a worker in a row, b
 class Film:
     """A film that a worker sent.
 
-    counts: samples, rays, rejected, full; whole: whether all pixels have the samples of its ranges,
-    as they have unless a stop cut the block.
+    counts: of what the worker did, `closest` has rays of both kinds; whole: whether all pixels have
+    the samples of its ranges, as they have unless a stop cut the block.
     """
 
     state: FilmState
-    counts: dict[str, int]
+    counts: Counts
     whole: bool = True
 
 
@@ -251,7 +252,8 @@ class _Run:
         self.known.records[address].note(
             (block.end - block.first) * self.share, float(reply["seconds"])
         )
-        counts = {name: int(reply[name]) for name in ("samples", "rays", "rejected", "full")}
+        samples, rays, rejected, full = (int(reply[name]) for name in tasks.COUNTED)
+        counts = Counts(samples, closest=rays, rejected=rejected, full=full)
         return Film(state, counts, bool(reply["whole"]))
 
     def _fail(self, block: _Block, address: str, reply: tasks.Reply) -> None:

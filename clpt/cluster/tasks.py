@@ -22,8 +22,8 @@ from clpt import device as dev
 from clpt.cluster.bundle import Bundle, Store, canonical
 from clpt.cluster.multi_renderer import MultiRenderer
 from clpt.errors import ClptError, ClusterError, MemoryBudgetError, SceneError
+from clpt.render.device_film import kernels_digest
 from clpt.render.renderer import Renderer
-from clpt.render.resumable import kernels_digest
 from clpt.render.wavefront.film_state import DIMENSIONS, FilmState
 from clpt.render.wavefront.tracer import Paths, Selection
 from clpt.scene import Scene
@@ -34,6 +34,7 @@ log = logging.getLogger(__name__)
 VERSION = 3  # of what client and worker say to each other
 OPTIONS = ("halves", "layout", "queued", "looped", "slots", "texture_budget", "tree_quality")
 MOST_OPEN = 2  # jobs of a worker, each with its memory on the device
+COUNTED = ("samples", "rays", "rejected", "full")  # of what was done
 ENDS = np.dtype("<u4")  # of cells, where they travel
 
 Reply = dict[str, Any]
@@ -54,7 +55,7 @@ class _Job:
             if len(devices) > 1
             else Renderer(scene, devices[0], **options)
         )
-        self.options, self._tracer = options, self.renderer._tracer()
+        self.options, self._tracer = options, self.renderer._maker.tracer()
         self._packed: Reply | None = None  # the selection that was taken last
         self._selection: Selection | None = None
 
@@ -66,7 +67,7 @@ class _Job:
         except (SceneError, MemoryBudgetError) as error:
             log.debug("a renderer cannot take the next scene: %s", error)
             return False
-        self._tracer = self.renderer._tracer()
+        self._tracer = self.renderer._maker.tracer()
         return True
 
     def block(
@@ -94,10 +95,7 @@ class _Job:
             **state_to_arrays(state),
             "whole": whole,
             "seconds": time.perf_counter() - began,
-            **{
-                name: getattr(after, name) - getattr(before, name)
-                for name in ("samples", "rays", "rejected", "full")
-            },
+            **{name: getattr(after, name) - getattr(before, name) for name in COUNTED},
         }
 
 

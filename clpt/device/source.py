@@ -247,13 +247,13 @@ class _Assembly:
         left = [(file, [p.left(rows) for p in ps]) for file, ps in self.pieces]
         text = _Text([row.text for one in defines if one in stay for row in one.rows])
         root = self.pieces[0][0]
-        if any(rows for file, found in left if file is root for rows, _ in found):
+        if any(kept for file, found in left if file is root for kept, _ in found):
             text.add(root, root.header)
         for file, found in left:
-            for rows, apart in found:
-                if rows and file.header and file.label not in text.files:
-                    text.begin(file, rows[0])
-                text.add(file, rows, apart)
+            for kept, apart in found:
+                if kept and file.header and file.label not in text.files:
+                    text.begin(file, kept[0])
+                text.add(file, kept, apart)
         names = tuple(label.removeprefix("kernels/") for label in text.files)
         return Source(self.root, "\n".join([*text.rows, ""]), names)
 

@@ -1,31 +1,36 @@
-"""The base of all renderers, be it on a device, on several, or on a cluster.
+"""The base of renderers on a device, on several, and on a cluster.
 
-Samples are asked for here, and the film that they make is denoised, saved and gone on with. Heirs
-say who takes the samples.
+It asks a maker for samples, and the film that they make is developed, denoised, saved and gone
+on with.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import logging
 import time
-from abc import abstractmethod
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from clpt import device as dev
 from clpt import images
 from clpt.arrays import Image
 from clpt.choices import MOST_SAMPLES, Exposure
 from clpt.colour.view import View
-from clpt.errors import SceneError
-from clpt.render.contents import FilmOwner
-from clpt.render.contract.features import Features
+from clpt.denoise import needs
+from clpt.errors import ClptError, DeviceError, MemoryBudgetError, SceneError
+from clpt.render.contents import Change, Contents, FilmOwner
+from clpt.render.device_film import Changes
+from clpt.render.editing.scene_edit import MaterialKey, ShapeKey
 from clpt.render.film import film_file
 from clpt.render.film.denoised_picture import DenoisedPicture
 from clpt.render.film.developed import Developed
 from clpt.render.film.layer_channels import write_layers
+from clpt.render.film.picture_form import PictureForm
 from clpt.render.film.pictures import Pictures
 from clpt.render.film.saved_film import (
     Origin,
@@ -34,18 +39,22 @@ from clpt.render.film.saved_film import (
     classes_text,
     other_devices,
 )
-from clpt.render.locking import Stop, synchronized
+from clpt.render.locking import Stop, healing, synchronized
+from clpt.render.maker import Call, Discarded, Held, Maker, Settle
+from clpt.render.options import check_changes, check_scene
 from clpt.render.progress import Progress
+from clpt.render.stats import RenderStats, collect
 from clpt.render.wavefront import adaptive
-from clpt.render.wavefront.adaptive import Adaptive
-from clpt.render.wavefront.film_state import FilmState
-from clpt.render.wavefront.wavefront import Counts
+from clpt.render.wavefront.film_state import FilmState, join_ranges
+from clpt.render.wavefront.wavefront import Counts, Wavefront
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
 from clpt.scene.fingerprint import Plain
+from clpt.scene.materials import Material
 from clpt.version import VERSION
 
 if TYPE_CHECKING:
+    import pyopencl as cl
     from typing_extensions import Self
 
 
@@ -55,26 +64,43 @@ OnProgress = Callable[[Progress], bool | None]
 
 
 class FilmRenderer(FilmOwner, Pictures):
-    """Base of renderers: what adds samples of a scene to a film.
+    """Base of renderers: a film, whose samples come from a maker.
 
-    scene: that is rendered; warnings: for people; shows_meanwhile: whether there is a picture to
-    show while samples are taken.
+    maker: takes the samples; first_sample: the number of the first one.
     """
 
-    scene: Scene
-    warnings: list[str]
-    _shows_meanwhile = False
-
-    def __init__(self) -> None:
+    def __init__(self, maker: Maker, first_sample: int = 0):
         super().__init__()
+        self._maker, self.denoise = maker, maker.denoise
         self._stop = Stop()
-        self._first_sample = 0
-        self._start = time.perf_counter()
-        self._seconds: dict[str, float] = {}
+        self._first_sample = checked_number(first_sample)
+        self._seconds: dict[str, float] = {}  # to the first sample
         self._seconds_rendered = 0.0  # since the film was empty, or gone on with
         self._telling = False  # of progress, while samples are taken
+        self._told: list[str] = []  # warnings of what took samples before
+        self._held: tuple[Held, dict[str, Any]] | SavedFilm | None = None
 
     # ---- what there is
+
+    @property
+    def scene(self) -> Scene:
+        """The scene that is rendered."""
+        return self._maker.scene
+
+    @property
+    def warnings(self) -> list[str]:
+        """Warnings of the scene, and of those who take its samples, for people."""
+        return [*self._maker.warnings, *self._told]
+
+    @property
+    def device(self) -> dev.Device:
+        """The device that has `film`."""
+        return self._maker.home.device
+
+    @property
+    def devices(self) -> tuple[dev.Device, ...]:
+        """The devices of this machine that take part."""
+        return self._maker.devices
 
     @property
     def _device_text(self) -> str:
@@ -82,26 +108,37 @@ class FilmRenderer(FilmOwner, Pictures):
         return " and ".join(on.info.label for on in self.devices)
 
     @property
-    @abstractmethod
     def counts(self) -> Counts:
-        """Counts of what has happened so far."""
+        """Counts of samples and rays so far, and of those that the film refused."""
+        if self._closed:
+            raise self._closed_error()
+        return self._maker.counts
+
+    @property
+    @synchronized
+    def stats(self) -> RenderStats:
+        """Figures of the render so far: numbers of things, bytes by table and tree, seconds."""
+        home = self._maker.home
+        return collect(home.wavefront, *home.built, {**home.seconds, **self._seconds})
 
     @property
     def samples(self) -> int:
         """The number of the next sample: of all so far, where they began at number 0."""
         taken = self._known.taken
+        if self._maker.adds_films:
+            return self._first_sample + sum(end - first for first, end in taken)
         return taken[-1][1] if taken else self._first_sample
 
     @property
     def first_sample(self) -> int:
         """The number of the first sample of the film, or of the first one to come."""
         taken = self._known.taken
-        return taken[0][0] if taken else self._first_sample
+        return taken[0][0] if taken and not self._maker.adds_films else self._first_sample
 
     @property
     def active(self) -> float:
         """The share of the pixels that would get more samples, 1 but for `run` with `noise`."""
-        chosen = self._adaptive
+        chosen = self._known.adaptive
         return 1.0 if chosen is None else chosen.active
 
     @property
@@ -110,39 +147,39 @@ class FilmRenderer(FilmOwner, Pictures):
         return sum(session.seconds for session in self._known.sessions)
 
     @property
-    def _adaptive(self) -> Adaptive | None:
-        """Which pixels get more samples, None before that was asked."""
-        return self._known.adaptive
+    @synchronized
+    def _wavefront(self) -> Wavefront:
+        """The wavefront whose film holds the picture."""
+        return self._brought().shown().wavefront
 
-    def _progress_so_far(self, device: Mapping[str, Plain]) -> dict[str, Any]:
-        """Return what a saved film has beside its words and origin; device: the class it is of."""
-        now, chosen = self._settled, self._adaptive
-        session = Session(now.began, self._seconds_rendered, VERSION, device)
-        return {
-            "taken": now.taken,
-            "counts": dict(vars(self.counts)),
-            "sessions": (*now.sessions, session),
-            "adaptive": {} if chosen is None else chosen.arrays(),
-        }
+    def _check_open(self) -> None:
+        super()._check_open()
+        changes = isinstance(self._contents, Change)
+        if self._telling and changes and not self._maker.shows_meanwhile:
+            raise DeviceError("devices are at work; the picture is there when the run has ended")
 
-    @abstractmethod
-    def _origin(self) -> Origin:
-        """Return what the samples are of. Raises SceneError for a scene that cannot be read."""
-
-    def _warn_of_others(self, sessions: Iterable[Session], device: Mapping[str, Plain]) -> None:
-        """Warn where sessions had other classes of devices than this one."""
-        if others := other_devices(sessions, device):
-            self.warnings.append(classes_text(others))
-            log.warning("%s", self.warnings[-1])
+    def _warn_of_others(self) -> None:
+        """Warn where samples were taken by other classes of devices than now."""
+        sessions = self._known.sessions
+        for device in self._maker.classes if sessions else ():
+            others = other_devices(sessions, device)
+            if others and classes_text(others) not in self._told:
+                self._told.append(classes_text(others))
+                log.warning("%s", self._told[-1])
 
     # ---- samples
 
+    @synchronized
     def prepare(self) -> None:
-        """Get ready, so that the first samples come at once; others may do so by themselves."""
+        """Run every kernel of `run` once with nothing to do, and wait.
 
-    @abstractmethod
-    def update(self, *, camera: Camera | None = None, scene: Scene | None = None) -> Any:
-        """Render another scene from now on, or another camera, and begin again at sample 0."""
+        Many drivers compile a kernel to its end when it runs for the first time. The film and the
+        number of the next sample stay.
+        """
+        change, settle = self._adding("prepare", Call(self.samples, self.samples))
+        with change:
+            self._maker.prepare()
+            self._contents = settle(None)
 
     @synchronized
     def run(
@@ -166,10 +203,14 @@ class FilmRenderer(FilmOwner, Pictures):
             self._rest()
             return False
         if noise is not None:
-            noise = adaptive.checked(noise, self._features)
+            noise = adaptive.checked(noise, self._maker.home.wavefront.features)
         watch = Watch(self, progress, end)
+        finished = False
         try:
-            finished = self._add_samples(first, end, noise, watch)
+            finished = self._add_samples(Call(first, end, noise), watch)
+        except ClptError:
+            if watch.raised is None:
+                raise
         finally:
             self._seconds_rendered += watch.seconds
             self._rest()
@@ -177,28 +218,67 @@ class FilmRenderer(FilmOwner, Pictures):
             raise watch.raised
         return finished
 
-    @property
-    @abstractmethod
-    def _features(self) -> Features:
-        """The features of the scene."""
-
-    @abstractmethod
-    def _add_samples(self, first: int, end: int, noise: float | None, watch: Watch) -> bool:
-        """Add samples first to end - 1, or those of pixels with noise; return whether all were.
+    def _add_samples(self, call: Call, watch: Watch) -> bool:
+        """Add samples to all pixels, or to those with noise; return whether all were added.
 
         watch: called all the while.
         """
+        maker, now = self._maker, self._settled
+        if call.noise is not None and now.adaptive is None:
+            now = self._with_noise()
+        if maker.adds_films and now.adaptive is None:
+            return self._add_films(call, watch)
+        change, settle = self._adding("run", call)
+        with change:
+            try:
+                finished = maker.run(call, now.adaptive, watch)
+            except Discarded:
+                self._contents = self._emptied()
+                return False
+            self._contents = settle(None)
+        self._warn_of_others()
+        return finished
 
-    @property
-    @abstractmethod
-    def _pixels(self) -> int:
-        """The number of pixels that are sampled."""
+    def _with_noise(self) -> Contents:
+        """Begin adaptive sampling; return what the film then holds."""
+        taken = self._settled.taken
+        if self._maker.adds_films and len(taken) > 1:
+            message = "samples are missing before the last one; add them first, without noise"
+            raise SceneError(message, where="noise")
+        first = taken[-1][1] if taken else self._first_sample
+        begun = self._brought().adaptively({}, first)
+        self._contents = now = dataclasses.replace(self._settled, adaptive=begun)
+        return now
+
+    def _add_films(self, call: Call, watch: Watch) -> bool:
+        """Add samples to a film that is whole at any time, so that it can be saved meanwhile."""
+        settle = self._maker.begin(call, self._settled, self._settled)
+
+        def tick() -> bool:
+            self._contents = settle(None)
+            self._warn_of_others()
+            return watch()
+
+        try:
+            return self._maker.run(call, None, tick)
+        finally:
+            self._contents = settle(None)
+
+    def _adding(self, what: str, call: Call) -> tuple[Change, Settle]:
+        """Return the change of a film that samples are added to, and what it then holds."""
+        now = self._settled
+        taken = join_ranges(now.taken, ((call.first, call.end),))
+        settle = self._maker.begin(call, now, dataclasses.replace(now, taken=taken))
+        return self._change(what, settle), settle
 
     def _so_far(self, end: int, seconds: float) -> Progress:
         """Return how far a run is after some seconds; end: the number after its last sample."""
-        counts, chosen = self.counts, self._adaptive
-        mean = counts.samples / self._pixels
+        counts, chosen = self.counts, self._known.adaptive
         noise = None if chosen is None else chosen.level
+        if self._maker.adds_films and chosen is None:
+            mean = float(self.samples - self._first_sample)
+        else:
+            mean = counts.samples / self._maker.home.wavefront.paths.pixels
         return Progress(mean, end, counts.samples, counts.rays, seconds, self.active, noise)
 
     def cancel(self, *, discard: bool = False) -> None:
@@ -209,45 +289,279 @@ class FilmRenderer(FilmOwner, Pictures):
         `reset`. A step is not stopped. It may be called from anywhere, also from a signal's
         handler, and waits for nothing.
         """
+        if discard:
+            self._maker.leave(True)
         self._stop.set()
 
     def _rest(self) -> None:
         """Note that no run is under way, nor to be stopped any more."""
         self._telling = False
+        self._maker.leave(False)
         self._stop.clear()
 
+    @healing
+    def reset(
+        self,
+        wait_for: dev.Events = None,
+        *,
+        seed: int | None = None,
+        first_sample: int | None = None,
+    ) -> cl.Event:
+        """Enqueue that the film is emptied; the next sample is the first one again.
+
+        wait_for: events of the caller that come first. first_sample: its number from now on, by
+        default as before. seed: of the samples from now
+        on, which `self.scene` then has; by default as before. Raises SceneError for a seed that is
+        no whole number, and for a number that is too large.
+
+        A renderer that says it is broken is whole again then, unless it says otherwise.
+        """
+        if first_sample is not None:
+            first_sample = checked_number(first_sample)
+        if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int)):
+            raise SceneError(f"must be a whole number, not {seed!r}", where="seed")
+        broken = isinstance(self._contents, Change)
+        self._maker.after(wait_for)
+        with self._healing("reset", lambda _: self._emptied(recover=True)):
+            if first_sample is not None:
+                self._first_sample = first_sample
+            self._contents = self._emptied(seed=seed, recover=broken)
+        return self._maker.last
+
+    def _emptied(self, *, seed: int | None = None, recover: bool = False) -> Contents:
+        """Let the film be empty; return what it then holds; see `Maker.empty`."""
+        self._maker.empty(seed=seed, recover=recover)
+        self._held, self._seconds_rendered = None, 0.0
+        return Contents()
+
+    @synchronized
+    def update(
+        self,
+        *,
+        camera: Camera | None = None,
+        materials: Mapping[MaterialKey, Material] | None = None,
+        transforms: Mapping[ShapeKey, Any] | None = None,
+        vertices: Mapping[ShapeKey, Any] | None = None,
+        scene: Scene | None = None,
+        motion: bool = False,
+        wait_for: dev.Events = None,
+    ) -> cl.Event:
+        """Bring what changed to the device, and begin again at sample 0.
+
+        camera: another one. materials: by the material of the scene that they replace, or by a
+        shape's key. transforms: (4, 4) by shape; vertices: (n, 3) float32 by shape, of numpy or on
+        the device; of `Spheres` their centres, perhaps (n, 4) with the radii. The key of a shape is
+        the shape, its name, or its index in `scene.shapes`. A shape or material that the renderer
+        had at first remains the key of whatever has replaced it. scene: another scene of the same
+        film, for any other change; arrays and images that it shares with the present one are taken
+        to be unchanged, and what is "auto" is chosen anew, as edits alone do not. motion: what
+        changes place, of shapes, lights and the camera, moves from where it was to where it is, and
+        so do vertices, while the shutter of the camera is open; the next update goes on from there.
+        wait_for: events of the caller that come first. The scene is lowered again then, and once
+        more after.
+
+        The first of three ways that is possible is taken:
+
+        1. Shapes that only move do so on the device, where trees are refitted to them; nothing is
+           waited for. See clpt.render.editing.moving.
+        2. A camera of the same kind, and values of materials, take a few written words.
+        3. Else the scene is lowered again: tables are written where they differ, trees are built
+           where triangles do, kernels where others are needed.
+
+        Several devices take arrays of numpy. A cluster takes a camera or a scene. Both return None:
+        all is done.
+
+        `self.scene` is then the new scene, and the picture will be that of a new renderer. At level
+        DEBUG the logger `clpt.render.renderer` says why a quicker way was not taken.
+
+        Raises SceneError for what is not in the scene, or makes no sense in it, and for a film of
+        another size, TypeError for a scene that is none; nothing has changed then. Raises
+        MemoryBudgetError and KernelBuildError where the device cannot do what the new scene needs.
+        """
+        if scene is not None:
+            check_scene(scene)
+            scene = needs.prepared(scene, self.denoise)
+        check_changes(camera, materials=materials, transforms=transforms, vertices=vertices)
+        events = list(wait_for or ())
+        changes = Changes(camera, materials, transforms, vertices, scene, motion)
+        self._maker.after(events)
+        self._maker.update(changes, events, self._apply)
+        return self._maker.last
+
+    def _apply(
+        self,
+        write: Callable[[], None],
+        *,
+        what: str = "update",
+        again: bool = False,
+        refusals: tuple[type[BaseException], ...] = (),
+    ) -> None:
+        """Change the scene, and begin at the first sample.
+
+        write: writes the change; what: that is, for people; again: whether it may be called once
+        more after an error; refusals: errors of it that leave all as it was.
+        """
+
+        def put(_: BaseException | None = None) -> Contents:
+            write()
+            return self._emptied()
+
+        change = self._change(what, put if again else None, heals=False)
+        with change, change.beginning_unless(*refusals):
+            self._contents = put()
+
     # ---- the film, its pictures, and its files
+
+    def _brought(self) -> Maker:
+        """Return the maker, whose film is together."""
+        maker = self._maker
+        if not maker.is_scattered or isinstance(self._contents, Change):  # of who asks
+            return maker
+        now = self._settled
+
+        def finish(error: BaseException) -> Contents:
+            if isinstance(error, Exception):
+                return now  # the last device has failed
+            raise error  # samples may be in two films, or in none
+
+        with self._change("gathering of films", finish):
+            maker.gather()
+            self._contents = now
+        return maker
+
+    @synchronized
+    def film_state(self) -> FilmState:
+        """Return what the film holds, as whole numbers on the host; wait for it."""
+        taken = self._settled.taken
+        return dataclasses.replace(self._brought().words(), taken=taken)
 
     @synchronized
     def _developed(self, *words: str) -> Developed:
         """Return the pictures of the film as it is now, which then stay; see `Pictures`."""
-        return Developed(self.film_state(), self._form)
+        return Developed(self._brought().words(*words), self._form)
 
-    @abstractmethod
-    def film_state(self) -> FilmState:
-        """Return what the film holds, as whole numbers on the host; wait for it."""
+    @property
+    @synchronized
+    def _form(self) -> PictureForm:  # type: ignore[override]
+        """The way from the film's words to a picture."""
+        form = self._maker.home.form
+        with_noise = form.adaptive or self._known.adaptive is not None
+        return dataclasses.replace(form, adaptive=with_noise)
 
-    @abstractmethod
+    @synchronized
+    def _origin(self) -> Origin:
+        """Return what the samples are of. Raises SceneError for a scene that cannot be read."""
+        return self._maker.home.origin()
+
+    def _device_class(self) -> Mapping[str, Plain]:
+        """Return what decides the last bits of samples: equal classes give equal films."""
+        return self._maker.classes[0]
+
+    @synchronized
     def merge(self, state: FilmState) -> None:
-        """Add the samples of another film of the same scene to this one, and wait."""
+        """Add the samples of another film of the same scene to this one, and wait.
 
-    @abstractmethod
+        The picture is then that of one renderer that took them all, to the bit. To go on where a
+        state was taken, merge it into a new renderer. `self.samples` is then after the last one.
+
+        Raises SceneError if the film has another form, or a sample is in both: nothing has changed.
+        """
+        merged = self.film_state().merged(state)
+        after = dataclasses.replace(self._settled, taken=merged.taken, adaptive=None)
+        self._put("merge", merged, after)
+
+    def _put(
+        self, what: str, film: FilmState, after: Contents, counts: Counts | None = None
+    ) -> None:
+        """Let the film be another one, which may have counts; after: what it then holds."""
+
+        def put(_: BaseException | None = None) -> Contents:
+            self._maker.put(film, counts)
+            return after
+
+        with self._change(what, put):
+            self._contents = put()
+
+    @synchronized
     def _hold(self) -> None:
-        """Keep the film as it is now, for `saved_film`."""
+        """Keep a copy of the film where it is, as it is now, for `_saved_film`.
 
-    @abstractmethod
+        So a render that is stopped in the middle of a `run` can be saved as it was before: without
+        samples that some pixels have and others have not. Raises MemoryBudgetError.
+        """
+        so_far, self._held = self._progress(), None
+        try:
+            held = self._maker.hold(self._settled.taken)
+        except MemoryBudgetError:
+            raise
+        except Exception as error:
+            log.debug("a film cannot be held where it is: %s", error)
+            self._held = self._saved_film()
+        else:
+            self._held = held, so_far
+
+    @synchronized
     def _saved_film(self, *, held: bool = False) -> SavedFilm:
-        """Return the film with all that it takes to go on with it; held: as it was when held."""
+        """Return the film with all that it takes to go on with it; wait for the device.
 
-    @abstractmethod
-    def _restore(self, saved: SavedFilm) -> None:
-        """Go on from a saved film, as `load_state` does. Raises SceneError."""
+        held: as it was at the last `_hold`. Raises SceneError for a scene that cannot be read,
+        without a `_hold`, and where a device has failed since that had a part of the film.
+        """
+        if not held:
+            return self._saved(self.film_state(), self.counts, self._progress())
+        if self._held is None:
+            raise SceneError("no film is held")
+        if not isinstance(self._held, SavedFilm):
+            self._held = self._read(*self._held)
+        return self._held
 
+    def _read(self, held: Held, so_far: dict[str, Any]) -> SavedFilm:
+        """Bring what is held to the host."""
+        try:
+            return self._saved(held.read(), held.counts, so_far)
+        except MemoryError:
+            raise
+        except Exception as error:
+            if held.taken != self._known.taken:
+                message = f"a device has failed that had a part of the film: {error}"
+                raise SceneError(message) from error
+        return self._saved_film()  # nothing was added since
+
+    def _progress(self) -> dict[str, Any]:
+        """Return what a saved film has beside its words, counts and origin."""
+        now = self._settled
+        seconds = [self._seconds_rendered, *[0.0] * len(self._maker.classes)]  # each second once
+        sessions = [
+            Session(now.began, took, VERSION, device)
+            for device, took in zip(self._maker.classes, seconds, strict=False)
+        ]
+        arrays = {} if now.adaptive is None else self._maker.arrays_of(now.adaptive)
+        return {"sessions": (*now.sessions, *sessions), "adaptive": arrays}
+
+    def _saved(self, film: FilmState, counts: Counts, so_far: dict[str, Any]) -> SavedFilm:
+        return SavedFilm(film, self._origin(), self._form, dict(vars(counts)), **so_far)
+
+    @synchronized
     def _follow(self, origin: Origin) -> None:
         """Render in the way that made a film, if that can be; the film may be empty then.
 
         What is "auto" may depend on how many samples are wanted, which the film did not know.
         """
+        way = self._maker.home.other_way(origin)
+        if way is not None:
+            self._maker.follow(way, partial(self._apply, what="load_state"))
+
+    @synchronized
+    def _restore(self, saved: SavedFilm) -> None:
+        """Go on from a saved film, as `load_state` does. Raises SceneError."""
+        self._settled  # noqa: B018
+        self._follow(saved.origin)
+        saved.check_fits(self._origin(), self._maker.home.words())
+        chosen = self._maker.adaptively(saved.adaptive, 0) if saved.adaptive else None
+        restored = Contents(saved.film.taken, chosen, saved.sessions)
+        self._put("load_state", saved.film, restored, Counts(**saved.counts))
+        self._held, self._seconds_rendered = None, 0.0
+        self._warn_of_others()
 
     def denoised(self, method: str | None = None) -> Image:
         """The picture so far without most of its noise, as `image` returns it.
@@ -314,9 +628,16 @@ class FilmRenderer(FilmOwner, Pictures):
 
     # ---- the end
 
-    @abstractmethod
     def close(self) -> None:
-        """Give back what it holds; it is of no use afterwards."""
+        """Give the device's memory back; the renderer is of no use afterwards.
+
+        It waits for a `run` of another thread, not for what was enqueued. An array that the caller
+        still holds, such as `film`, keeps its memory. Dropping a renderer does the same.
+        """
+        with self._lock:
+            self._closed = True
+            self._contents, self._held = Contents(), None
+            self._maker.close()
 
     def __enter__(self) -> Self:
         return self
@@ -344,7 +665,7 @@ class Watch:
     def __call__(self, _: object = None) -> bool:
         renderer = self._renderer
         if renderer.counts.samples:
-            taken = time.perf_counter() - renderer._start
+            taken = time.perf_counter() - renderer._maker.start
             renderer._seconds.setdefault("first_sample", taken)
         if renderer._stop.is_set() or self._progress is None:
             return not renderer._stop.is_set()

@@ -50,14 +50,16 @@ class DeviceOwner:
         self._check_open()
 
 
-def synchronized(method: Callable[Concatenate[_S, _P], _R]) -> Callable[Concatenate[_S, _P], _R]:
+def synchronized(
+    method: Callable[Concatenate[_S, _P], _R], *, heals: bool = False
+) -> Callable[Concatenate[_S, _P], _R]:
     """Return a method for one thread at a time; it raises DeviceError after `close`, and where the
-    object is broken."""
+    object is broken, unless it heals that."""
 
     def locked(self: _S, /, *args: _P.args, **named: _P.kwargs) -> _R:
         inside = self._inside
         with self._lock:
-            self._check(inside)
+            (self._check_healing if heals else self._check)(inside)
             return method(self, *args, **named)
 
     functools.update_wrapper(locked, method)
@@ -66,15 +68,7 @@ def synchronized(method: Callable[Concatenate[_S, _P], _R]) -> Callable[Concaten
 
 def healing(method: Callable[Concatenate[_S, _P], _R]) -> Callable[Concatenate[_S, _P], _R]:
     """Return a method as `synchronized` does, which makes what is broken whole again."""
-
-    def locked(self: _S, /, *args: _P.args, **named: _P.kwargs) -> _R:
-        inside = self._inside
-        with self._lock:
-            self._check_healing(inside)
-            return method(self, *args, **named)
-
-    functools.update_wrapper(locked, method)
-    return locked
+    return synchronized(method, heals=True)
 
 
 class Stop:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Callable
 from typing import Any, ClassVar
 
@@ -16,8 +15,6 @@ from clpt.colour.view import View
 from clpt.render.film.resolve import Resolve, Screen
 from clpt.render.film_renderer import FilmRenderer
 from clpt.render.locking import synchronized
-from clpt.render.stats import RenderStats
-from clpt.render.wavefront.wavefront import Wavefront
 
 
 class DevicePictures(FilmRenderer):
@@ -28,18 +25,7 @@ class DevicePictures(FilmRenderer):
 
     _make_widget: ClassVar[Callable[..., Any]]
 
-    device: dev.Device
     _resolve: Resolve | None = None  # built when a picture is first resolved
-
-    @property
-    @abstractmethod
-    def _wavefront(self) -> Wavefront:
-        """The wavefront whose film holds the picture."""
-
-    @property
-    @abstractmethod
-    def stats(self) -> RenderStats:
-        """Figures of what the render took so far: numbers of things, bytes, seconds."""
 
     @property
     @synchronized
@@ -79,10 +65,12 @@ class DevicePictures(FilmRenderer):
         Returns the Array, whose `events` hold the event of the picture; for an Image the event.
         Raises DeviceError if the picture does not fit, UnknownKindError for names.
         """
-        if self._resolve is None:
-            self._resolve = Resolve(self.device, self._wavefront.stream)
+        wavefront = self._wavefront
+        picture = wavefront.film.picture
+        if self._resolve is None or self._resolve.stream is not wavefront.stream:
+            self._resolve = Resolve(wavefront.device, wavefront.stream)
         screen = Screen(exposure, tone, srgb, view, self.scene.film.output_space)
-        return self._resolve(self.film, into, screen, dtype=dtype, flip=flip, wait_for=wait_for)
+        return self._resolve(picture, into, screen, dtype=dtype, flip=flip, wait_for=wait_for)
 
     def widget(self, **options: Any) -> Any:
         """Return a widget for notebooks: the scene, rendered while it is watched and steered.
@@ -91,6 +79,11 @@ class DevicePictures(FilmRenderer):
         clpt.view.widget.Widget. Raises ClptError where clpt[notebook] is not installed.
         """
         return type(self)._make_widget(self.scene, self.device, **options)
+
+    def close(self) -> None:
+        """Give the device's memory back; see `FilmRenderer.close`."""
+        super().close()
+        self._resolve = None
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         """`image()`, for numpy.asarray(renderer): a copy, which waits."""

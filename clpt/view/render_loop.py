@@ -248,7 +248,7 @@ class RenderLoop:
                 self._rates = progress.paths / self.seconds, progress.rays / self.seconds
             if time.perf_counter() - self._told > STATUS_SECONDS:
                 self.tell(renderer)
-            if self.has_shown and renderer._shows_meanwhile:
+            if self.has_shown and renderer._maker.shows_meanwhile:
                 self.meanwhile()
                 if self._stale:
                     self._offer(renderer, 1)

@@ -33,30 +33,26 @@ inline real gather(global const float *p, integer at) { return p[at]; }
 inline integer gather_i(global const uint *p, integer at) { return as_int(p[at]); }
 inline integer gather_constant(constant uint *p, integer at) { return as_int(p[at]); }
 #else
+#define LOAD(i) r.s##i = p[at.s##i];
 inline real gather(global const float *p, integer at)
 {
     real r;
-#define LOAD(i) r.s##i = p[at.s##i];
     FOR_LANES(LOAD)
-#undef LOAD
     return r;
 }
 inline integer gather_i(global const uint *p, integer at)
 {
-    integer r;
-#define LOAD(i) r.s##i = as_int(p[at.s##i]);
+    natural r;
     FOR_LANES(LOAD)
-#undef LOAD
-    return r;
+    return as_integer(r);
 }
 inline integer gather_constant(constant uint *p, integer at)
 {
-    integer r;
-#define LOAD(i) r.s##i = as_int(p[at.s##i]);
+    natural r;
     FOR_LANES(LOAD)
-#undef LOAD
-    return r;
+    return as_integer(r);
 }
+#undef LOAD
 #endif
 
 #ifdef NATIVE_SCATTER

@@ -1,10 +1,10 @@
 /* Words that follow one another in a table, lane by lane: table[at], table[at + 1] and so on; an idle lane's index must
- * be valid: give 0. `gather2` to `gather4` read the words of a lane at once and transpose them in registers, which takes
- * half of the time of reading word by word. gather_w4 is gather4 of a table of words.
+ * be valid: give 0. `gather2` to `gather4` read the words of a lane at once and transpose them in registers, half of
+ * the time of reading word by word. gather_w4 is gather4 of a table of words.
  *
- * `row4` is gather_w4 for tables of few rows, of which all lanes mostly read one: its words then come by broadcast. Else
- * processors that gather do so by pairs of words, which are slower than a transposition, but 10 instructions in the
- * place of 100, of which programs have many. */
+ * `row4` is gather_w4 for tables of few rows, of which all lanes mostly read one: its words then come by broadcast.
+ * Else processors that gather do so by pairs of words: slower than a transposition, but 10 instructions in the place
+ * of 100, of which programs have many. */
 #if LANES == 1
 inline vec2 gather2(global const float *p, integer at)
 {
@@ -69,7 +69,7 @@ inline vec4 gather4(global const float *p, integer at)
 inline vec4 gather_w4(global const uint *p, integer at) { return gather4((global const float *)p, at); }
 
 #ifdef NATIVE_PAIRS
-inline vec4 row4(global const uint *table, integer at)
+inline vec4 row4_alike(global const uint *table, integer at)
 {
     global const float *row = (global const float *)table;
     if (any(at != at.s0)) {
@@ -82,6 +82,7 @@ inline vec4 row4(global const uint *table, integer at)
     vec4 r = {(real)(row[0]), (real)(row[1]), (real)(row[2]), (real)(row[3])};
     return r;
 }
+#define row4 row4_alike
 #else
 #define row4 gather_w4
 #endif

@@ -1,75 +1,48 @@
-/* Arithmetic of spectra, for either mode: component by component through SPECTRUM_EACH(F), which
- * expands F(x) F(y) F(z) and, in spectral mode, F(w). */
+/* Arithmetic of spectra, for either mode, component by component. FOURTH(value) is the last one of a list, in spectral
+ * mode alone; SPECTRUM_EACH(F) expands F(x) F(y) F(z) and, in that mode, F(w). */
 inline Spectrum spectrum_of(real v)
 {
-    Spectrum r;
-#define C(c) r.c = v;
-    SPECTRUM_EACH(C)
-#undef C
+    Spectrum r = {v, v, v FOURTH(v)};
     return r;
 }
 inline Spectrum spectrum_add(Spectrum a, Spectrum b)
 {
-    Spectrum r;
-#define C(c) r.c = a.c + b.c;
-    SPECTRUM_EACH(C)
-#undef C
+    Spectrum r = {a.x + b.x, a.y + b.y, a.z + b.z FOURTH(a.w + b.w)};
     return r;
 }
 inline Spectrum spectrum_sub(Spectrum a, Spectrum b)
 {
-    Spectrum r;
-#define C(c) r.c = a.c - b.c;
-    SPECTRUM_EACH(C)
-#undef C
+    Spectrum r = {a.x - b.x, a.y - b.y, a.z - b.z FOURTH(a.w - b.w)};
     return r;
 }
 inline Spectrum spectrum_mul(Spectrum a, Spectrum b)
 {
-    Spectrum r;
-#define C(c) r.c = a.c * b.c;
-    SPECTRUM_EACH(C)
-#undef C
+    Spectrum r = {a.x * b.x, a.y * b.y, a.z * b.z FOURTH(a.w * b.w)};
     return r;
 }
 inline Spectrum spectrum_div(Spectrum a, Spectrum b)
 {
-    Spectrum r;
-#define C(c) r.c = a.c / b.c;
-    SPECTRUM_EACH(C)
-#undef C
+    Spectrum r = {a.x / b.x, a.y / b.y, a.z / b.z FOURTH(a.w / b.w)};
     return r;
 }
 inline Spectrum spectrum_scale(Spectrum a, real s)
 {
-    Spectrum r;
-#define C(c) r.c = a.c * s;
-    SPECTRUM_EACH(C)
-#undef C
+    Spectrum r = {a.x * s, a.y * s, a.z * s FOURTH(a.w * s)};
     return r;
 }
 inline Spectrum spectrum_madd(Spectrum a, real s, Spectrum b) /* a s + b */
 {
-    Spectrum r;
-#define C(c) r.c = a.c * s + b.c;
-    SPECTRUM_EACH(C)
-#undef C
+    Spectrum r = {a.x * s + b.x, a.y * s + b.y, a.z * s + b.z FOURTH(a.w * s + b.w)};
     return r;
 }
 inline Spectrum spectrum_sel(mask m, Spectrum a, Spectrum b)
 {
-    Spectrum r;
-#define C(c) r.c = sel(m, a.c, b.c);
-    SPECTRUM_EACH(C)
-#undef C
+    Spectrum r = {sel(m, a.x, b.x), sel(m, a.y, b.y), sel(m, a.z, b.z) FOURTH(sel(m, a.w, b.w))};
     return r;
 }
 inline Spectrum spectrum_exp(Spectrum a)
 {
-    Spectrum r;
-#define C(c) r.c = exp_r(a.c);
-    SPECTRUM_EACH(C)
-#undef C
+    Spectrum r = {exp_r(a.x), exp_r(a.y), exp_r(a.z) FOURTH(exp_r(a.w))};
     return r;
 }
 inline Spectrum spectrum_clamped(Spectrum a) /* to [0, 1] */
@@ -80,23 +53,16 @@ inline Spectrum spectrum_clamped(Spectrum a) /* to [0, 1] */
 #undef C
     return r;
 }
-inline real spectrum_max(Spectrum a)
-{
-    real r = max_r(max_r(a.x, a.y), a.z);
-#if SPECTRUM_SIZE == 4
-    r = max_r(r, a.w);
-#endif
-    return r;
-}
+inline real spectrum_max(Spectrum a) { return SPECTRUM_MAX(a); }
 inline real spectrum_mean(Spectrum a) { return SPECTRUM_MEAN(a); }
 /* Whether the components differ: a dispersive index. By their bits, which compilers know to be the same where all are
  * one number; of numbers they do not, as NaN is not itself. */
 inline mask spectrum_varies(Spectrum a)
 {
     integer x = as_integer(a.x);
-    mask m = (as_integer(a.y) != x) | (as_integer(a.z) != x);
-#if SPECTRUM_SIZE == 4
-    m = m | (as_integer(a.w) != x);
-#endif
+    mask m = as_integer(a.y) != x;
+#define C(c) m = m | (as_integer(a.c) != x);
+    SPECTRUM_EACH(C)
+#undef C
     return m;
 }

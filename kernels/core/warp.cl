@@ -45,3 +45,8 @@ inline vec2 uniform_triangle(vec2 u)
     vec2 b = {1.0f - r, u.y * r};
     return b;
 }
+/* From area to solid angle: the pdf of a point at distance t whose normal leans by cos to wi. */
+inline real solid_angle_pdf(real pdf_area, real t, real cos_t)
+{
+    return pdf_area * t * t / max_r(cos_t, (real)(1e-9f));
+}

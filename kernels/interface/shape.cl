@@ -22,9 +22,3 @@ typedef struct {
     vec3 n; /* unit normal, toward the front */
     vec2 uv;
 } ShapeHit;
-
-/* From area to solid angle: the pdf of a point at distance t whose normal leans by cos to wi. */
-inline real solid_angle_pdf(real pdf_area, real t, real cos_t)
-{
-    return pdf_area * t * t / max_r(cos_t, (real)(1e-9f));
-}

@@ -46,7 +46,7 @@ inline mask grid_begin(Scene scene, integer name, vec3 o, vec3 d, real t, mask a
     w->packed = grid_packed(name);
     real lo = 0.0f, hi = t;
 #define AXIS(a, n)                                                            \
-    vec4 row_##a = row4(scene.materials, at + 4 + 4 * n);                \
+    vec4 row_##a = row4(scene.materials, at + 4 + 4 * n);                     \
     real top_##a = gather_w(scene.materials, at + 16 + n);                    \
     w->o.a = row_##a.x * o.x + row_##a.y * o.y + row_##a.z * o.z + row_##a.w; \
     w->d.a = row_##a.x * d.x + row_##a.y * d.y + row_##a.z * d.z;             \

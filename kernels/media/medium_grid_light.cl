@@ -76,7 +76,7 @@ inline GridWalk grid_point(Scene scene, integer name, integer number, vec3 p, ma
     w.nz = gather_i(scene.materials, at + 3);
     w.packed = grid_packed(name);
 #define AXIS(a, n)                                                            \
-    vec4 row_##a = row4(scene.materials, at + 4 + 4 * n);                \
+    vec4 row_##a = row4(scene.materials, at + 4 + 4 * n);                     \
     w.o.a = row_##a.x * p.x + row_##a.y * p.y + row_##a.z * p.z + row_##a.w;  \
     w.d.a = 0.0f;                                                             \
     w.inverse.a = 1.0f;

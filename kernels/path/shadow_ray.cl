@@ -3,6 +3,10 @@
 #include "generated/trace.cl"
 #include "tracing/passage.cl"
 #include "generated/transmittance.cl"
+#define ShadowPassage Passage
+#define shadow_most(passes) passage_most(passes)
+#define shadow_dims(light, passes) passage_dims(light, passes)
+#define shadow_adds(light, passes, sum) passage_adds(light, passes, sum)
 
 /* How much of the light between the two points of each active ray passes, 0 to 1. The rays wait no longer. */
 inline Passage shadow_ray_transmittance(TRACE_ARGS, Scene scene, Slab path, Slab shadow, uint at, real t, mask active)

@@ -2,6 +2,10 @@
 #include "interface/shape.cl"
 #include "generated/trace.cl"
 #include "generated/transmittance.cl"
+#define ShadowPassage Spectrum
+#define shadow_most(passes) spectrum_max(passes)
+#define shadow_dims(light, passes) spectrum_mul(light, passes)
+#define shadow_adds(light, passes, sum) spectrum_add(spectrum_mul(light, passes), sum)
 
 /* How much of the light between the two points of each active ray passes. The rays wait no longer. */
 inline Spectrum shadow_ray_transmittance(TRACE_ARGS, Scene scene, Slab path, Slab shadow, uint at, real t, mask active)

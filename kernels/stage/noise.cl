@@ -37,11 +37,7 @@ kernel void noise(global const Settings *settings, global const uint *film, glob
             if (group) samples = light_paths;
 #endif
             vec3 v = scale3(film_sum(settings, film, pixel_index, group), 1.0f / fmax(samples, 1.0f));
-#if SPECTRUM_SIZE == 3
-            float now = 0.2126f * v.x + 0.7152f * v.y + 0.0722f * v.z;
-#else
-            float now = v.y;
-#endif
+            float now = SPECTRUM_SIZE == 3 ? 0.2126f * v.x + 0.7152f * v.y + 0.0722f * v.z : v.y;
             float change = now - previous[pixel_index], before = previous[padded_pixels + pixel_index];
             if (samples > before) variance += change * change * before / (samples - before);
             pixels += 1.0f;

@@ -17,17 +17,10 @@ STAGE(splat)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)
     mask active = t > 0.0f;
     if (any(active)) {
         scene.time = load_path_time(path, at);
-#if SHADOW_MEDIA || FREE_PANES
-        Spectrum passes = shadow_ray_transmittance(TRACE_PASSED, scene, path, shadow, at, t, active);
-        mask arrives = active & (spectrum_max(passes) > 0.0f);
+        ShadowPassage passes = shadow_ray_transmittance(TRACE_PASSED, scene, path, shadow, at, t, active);
+        mask arrives = active & (shadow_most(passes) > 0.0f);
         Wavelengths lambdas = load_path_lambdas(path, at);
-        Spectrum value = spectrum_mul(load_shadow_value(shadow, at), passes);
-#else
-        real transmittance = shadow_ray_transmittance(TRACE_PASSED, scene, path, shadow, at, t, active);
-        mask arrives = active & (transmittance > 0.0f);
-        Wavelengths lambdas = load_path_lambdas(path, at);
-        Spectrum value = spectrum_scale(load_shadow_value(shadow, at), transmittance);
-#endif
+        Spectrum value = shadow_dims(load_shadow_value(shadow, at), passes);
         real scale = settings->film_scale;
         vec3 colour = scale3(film_value(scene, value, lambdas), scale);
         mask accepted = arrives & film_accepts(colour);

@@ -7,6 +7,7 @@
 #define passage_scale(a, x) spectrum_scale(a, x)
 #define passage_most(a) spectrum_max(a)
 #define passage_dims(light, a) spectrum_mul(light, a)
+#define passage_adds(light, a, sum) spectrum_add(spectrum_mul(light, a), sum)
 #else
 #define Passage real
 #define passage_of(x) ((real)(x))
@@ -15,4 +16,5 @@
 #define passage_scale(a, x) ((a) * (x))
 #define passage_most(a) (a)
 #define passage_dims(light, a) spectrum_scale(light, a)
+#define passage_adds(light, a, sum) spectrum_madd(light, a, sum)
 #endif

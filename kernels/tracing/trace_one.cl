@@ -21,15 +21,10 @@ inline TraceHit trace_closest(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real far,
 #if USES_ANALYTIC
     uint shape = shapes_closest(shape_nodes, shape_indices, scene, o.x, o.y, o.z, d.x, d.y, d.z, 0.0f, &h.t);
     if (shape != BVH_MISS) {
-        h.prim = as_int(shape);
-        h.shape = shape_row_of(scene, h.prim);
-        ShapeHit s = shape_hit(scene, h.prim, h.shape, o, d, 0.0f, FAR);
-        h.n = s.n;
-        h.u = s.uv.x;
-        h.v = s.uv.y;
-#if USES_INSTANCES
-        h.instance = 0;
-#endif
+        int prim = as_int(shape), row = shape_row_of(scene, prim);
+        ShapeHit s = shape_hit(scene, prim, row, o, d, 0.0f, FAR);
+        TraceHit met = {h.t, s.uv.x, s.uv.y, s.n, h.plane, h.side, prim, row}; /* of no instance */
+        h = met;
     }
 #endif
     return h;

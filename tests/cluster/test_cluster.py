@@ -202,8 +202,9 @@ def test_a_worker_with_two_devices(more, two, expected, tmp_path):
 def test_no_worker_that_can(two):
     plan = scene()
     with ClusterRenderer(plan, two.client) as renderer:
-        text = renderer._job.text.replace('"format":"clpt job"', '"format":"other"')
-        renderer._job = dataclasses.replace(renderer._job, text=text)
+        maker = renderer._maker
+        text = maker.job.text.replace('"format":"clpt job"', '"format":"other"')
+        maker.job = dataclasses.replace(maker.job, text=text)
         with pytest.raises(ClusterError, match=r"no worker can render this: .* is no job of clpt"):
             renderer.run(1)
 

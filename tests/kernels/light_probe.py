@@ -117,7 +117,7 @@ def _program(
     )
     virtual = {
         **PLAIN,
-        **shape_text.virtual_files(),
+        **shape_text.virtual_files(Features()),
         **light_dispatch.virtual_files(),
         "probe.cl": probe,
         "generated/scene.cl": scene_text(),

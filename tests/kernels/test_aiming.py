@@ -114,7 +114,7 @@ def probe(lowered: Lowered, aimed: bool) -> SceneProbe:
     transport = dataclasses.replace(features.transport, aimed=aimed)
     sent = dataclasses.replace(features, transport=transport)
     virtual = {
-        **shapes.virtual_files(),
+        **shapes.virtual_files(features),
         **lights.virtual_files(),
         "generated/lights.cl": stages.lights_text(features),
         "generated/emission.cl": emission.dispatch_text(sent),

@@ -62,7 +62,7 @@ def test_points_and_densities_of_lamps_that_deform() -> None:
     features = made.features
     assert {"vertices", "emitters"} == {*features.motion.parts} and not features.lights.tree
     virtual = {
-        **shapes.virtual_files(),
+        **shapes.virtual_files(features),
         **lights.virtual_files(),
         **parameters.virtual_files(features),
         **choices.virtual_files(features, "wide8"),

@@ -136,7 +136,7 @@ def _at_the_camera(index: SceneIndex, cache: LoweringCache) -> tuple[tuple[Any, 
 
 def _passed_through(index: SceneIndex, cache: LoweringCache) -> list[str]:
     """A warning where the camera is not in the same media all the time, else none."""
-    bounding = boundaries(index.scene.shapes, matter_of if index.nested else None)
+    bounding = boundaries(index.listed, matter_of if index.nested else None)
     if index.motions.camera is None and stands_still(bounding):
         return []
     found: list[tuple[Any, ...]] = []

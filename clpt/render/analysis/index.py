@@ -76,6 +76,11 @@ class SceneIndex:
         )
 
     @property
+    def listed(self) -> Sequence[Shape]:
+        """The shapes as the scene lists them, instances among them."""
+        return self.scene.shapes
+
+    @property
     def shining(self) -> tuple[str, ...]:
         """The kinds of leaves on shapes that are lights."""
         lights = (shape for shape in self.shapes if shape.emission is not None)

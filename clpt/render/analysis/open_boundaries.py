@@ -78,7 +78,7 @@ def _own_hole(shape: Shape, cached: Callable[..., Any] | None) -> float:
 def _hole(index: SceneIndex, inside: object, cached: Callable[..., Any] | None) -> float:
     """The largest hole of all shapes around something, over their area."""
     around: list[tuple[float, Shape]] = []
-    for shape in every(index.scene.shapes, lambda one: True):
+    for shape in every(index.listed, lambda one: True):
         around += [(1.0, shape)] * any(inside == own for own in _insides(shape))
         around += [(-1.0, shape)] * (shape.exterior is inside)
     if len(around) == 1:

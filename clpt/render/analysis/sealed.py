@@ -27,7 +27,7 @@ def sealed_media(index: SceneIndex, cached: Callable[..., Any] | None = None) ->
     There are none where a ray cannot meet all lights. cached: `LoweringCache`, which keeps the
     triangles of boundaries.
     """
-    placed = index.scene.shapes
+    placed = index.listed
     if index.nested or any(light.reach != "infinite" for light in index.lights):
         return frozenset()
     inside: dict[Medium, list[Shape]] = {}

@@ -89,12 +89,11 @@ class Moving:
                 ranges.own = transforms.inverse(outer) @ shapes.placement(ranges.shape)
             self.ranges.setdefault(number, []).append(ranges)
 
-    def move(self, scene: Scene, replaced: Replacements, begin: Callable[[], None]) -> str | None:
-        """Enqueue that shapes have other transforms or vertices, and that trees follow.
+    def plan(self, scene: Scene, replaced: Replacements) -> Callable[[], None] | str:
+        """Return what enqueues that shapes have other transforms or vertices, and trees follow.
 
-        scene: as it is; replaced: the shapes that move, and what they become; begin: is called
-        before the first change. Returns None, or,
-        with nothing done, why the scene must be lowered again.
+        scene: as it is; replaced: the shapes that move, and what they become. Returns a text where
+        the scene must be lowered again: why.
 
         Triangles, instances, spheres, disks, cylinders and curves can move. A shape must keep its
         number of vertices, its orientation and its kind, and must not emit light. A mesh of which a
@@ -107,11 +106,13 @@ class Moving:
             actions = self._plan(scene, replaced)
         except CannotMove as reason:
             return str(reason)
-        begin()
-        for action in actions:
-            action()
-        self._fit_trees()
-        return None
+
+        def move() -> None:
+            for action in actions:
+                action()
+            self._fit_trees()
+
+        return move
 
     def _plan(self, scene: Scene, replaced: Replacements) -> list[Action]:
         """Return the actions that enqueue a move. Raises CannotMove."""

@@ -13,6 +13,7 @@ the other, whose numbers it decides.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -33,14 +34,14 @@ AROUND = np.array([1.0, 2.0, 1.0])  # how much squares in a row count beside eac
 
 
 class DenoisedNoise:
-    """Tells how far the picture of a renderer is from the truth once it is denoised.
+    """Tells how far a picture is from the truth once it is denoised.
 
-    renderer: with halves; on: the device that denoises; method: a name of
+    picture: returns it as it is now, with halves; on: the device that denoises; method: a name of
     clpt.choices.DENOISERS.
     """
 
-    def __init__(self, renderer: Pictures, on: device.Device, method: str):
-        self._renderer, self._device, self._method = renderer, on, method
+    def __init__(self, picture: Callable[[], Pictures], on: device.Device, method: str):
+        self._picture, self._device, self._method = picture, on, method
         self._oidn: dict[int, tuple[list[Image | None], Oidn]] = {}  # of each colour
 
     def measure(self, cells: NDArray[np.bool_]) -> Floats:
@@ -52,7 +53,7 @@ class DenoisedNoise:
         noise before, which pixels of one colour alone may hide, as their edges are rough. Raises
         DeviceError where the denoiser fails.
         """
-        picture = self._renderer._developed()
+        picture = self._picture()
         halves, layers = picture.halves(), picture.layers()
         height, width = halves[0].shape[:2]
         down, across = -(-height // SIDE), -(-width // SIDE)

@@ -31,7 +31,7 @@ def lower_names(
     The numbers of materials and groups go to `distributions`, for each row of `shapes` and of
     `lights`. Raises SceneError for more shapes than a matte can tell apart.
     """
-    layers, things = index.layers, index.scene.shapes
+    layers, things = index.layers, index.listed
     names: dict[str, tuple[str, ...]] = {}
     features = LayerFeatures(layers, present=bool(layers))
     if "crypto_object" in layers:

@@ -272,7 +272,7 @@ def _lower_motion(found: Analysis, lights: LightRows, encoder: Encoder) -> int:
     if not index.motions:
         return 0
     rows += [-1] * ((*lights.first, len(lights.rows))[0] - len(rows))  # bricks of media
-    return lower_motion(index.motions, len(index.scene.shapes), rows, encoder.store)
+    return lower_motion(index.motions, len(index.listed), rows, encoder.store)
 
 
 def _lower_tangents(geometry: Geometry, encoder: Encoder) -> int:
@@ -434,7 +434,7 @@ def _of_motion(index: SceneIndex) -> list[str]:
     """Return warnings of grids of media that stay where a shape moves."""
     warnings: list[str] = []
     for i in index.motions.shapes:
-        shape = index.scene.shapes[i]
+        shape = index.listed[i]
         if any(isinstance(one, Lattice) for s in shape.members for one in (s.interior, s.exterior)):
             warnings.append(
                 f"{shapes.where(shape)}.motion: its boundary moves, the grid of its medium stays"

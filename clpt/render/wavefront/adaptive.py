@@ -99,7 +99,6 @@ class Adaptive:
         self._level = 0  # samples at the last look
         self._measured_at = np.zeros(count, np.int64)  # samples when a cell was last measured
         self._variance = np.full(count, np.inf)  # of a sample, relative; of n over n^rate
-        self._film_copies: dict[str, Any] = {}
         self._has_guides = False  # whether the film has samples beside those of the picture
 
     @property
@@ -157,6 +156,10 @@ class Adaptive:
             own = {n.removeprefix("lights_"): a for n, a in arrays.items() if n[:7] == "lights_"}
             self._lights.restore(own)
 
+    def become(self, other: Adaptive) -> None:
+        """Take the place of another one, as on another device."""
+        vars(self).update(vars(other))
+
     def run(self, end: int, noise: float, on_batch: OnBatch) -> bool:
         """Add samples until the noise is below a limit, or all pixels have `end`.
 
@@ -182,7 +185,7 @@ class Adaptive:
     def finish(self) -> None:
         """Take paths of learning out of the film, wherever an interrupt has left `run`."""
         if self._has_guides:
-            self._restore_film()
+            self._give_film_back()
         self.next = np.maximum(self.next, self._begun)
         self._tracer.use_all_pixels()
         self.noise = 0.0  # all is decided again
@@ -212,7 +215,8 @@ class Adaptive:
         lights = self._lights if self._lights is not None and self._lights.open else None
         self._tracer.gather()
         if lights is not None or overrun.any():
-            self._copy_film()
+            self._tracer.keep()
+            self._has_guides = True
         try:
             if lights is not None and not lights.measure(look, on_batch):
                 return False
@@ -222,7 +226,7 @@ class Adaptive:
             self._measure(guide_cells)
         finally:
             if self._has_guides:
-                self._restore_film()
+                self._give_film_back()
         self._decide(self.noise)
         return True
 
@@ -269,23 +273,10 @@ class Adaptive:
         wanted = np.ceil(np.where(sure, needed, 0.0) / step) * step
         self.stop[sure] = np.maximum(wanted, measured_at)[sure]
 
-    def _copy_film(self) -> None:
-        """Keep what the film holds, for `_restore_film`."""
-        stream, film = self.wavefront.stream, self.wavefront.film
-        for name, sums in film.sums.items():
-            if name not in self._film_copies:
-                what = f"a copy of the {name}"
-                self._film_copies[name] = self.wavefront.buffers.allocate(what, sums.size)
-            stream.copy(self._film_copies[name], sums)
-        self._has_guides = True
-
-    def _restore_film(self) -> None:
+    def _give_film_back(self) -> None:
         """Give the film back the samples that it had before."""
-        self._tracer.discard()
-        for name, sums in self.wavefront.film.sums.items():
-            self.wavefront.stream.copy(sums, self._film_copies[name])
+        self._tracer.give_back()
         self._has_guides = False
-        self.wavefront.refresh()
 
 
 def _rate(features: Features) -> float:

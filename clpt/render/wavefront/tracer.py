@@ -9,6 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
+import pyopencl as cl
+
 from clpt.arrays import Integers
 from clpt.render.wavefront.wavefront import Wavefront
 
@@ -65,6 +67,7 @@ class Tracer:
     def __init__(self, wavefront: Wavefront):
         self.wavefront = wavefront
         self._prepared: Selection | None = None
+        self._copies: dict[str, cl.Buffer] = {}
 
     def add(self, selection: Selection, first: int, end: int, on_batch: OnBatch) -> bool:
         """Add samples first to end - 1 of a selection; return whether it was not stopped."""
@@ -76,8 +79,20 @@ class Tracer:
     def gather(self) -> None:
         """Let the film hold all that was added so far."""
 
-    def discard(self) -> None:
-        """Forget what was added since `gather`."""
+    def keep(self) -> None:
+        """Keep what the film holds, for `give_back`."""
+        wavefront = self.wavefront
+        for name, sums in wavefront.film.sums.items():
+            if name not in self._copies:
+                what = f"a copy of the {name}"
+                self._copies[name] = wavefront.buffers.allocate(what, sums.size)
+            wavefront.stream.copy(self._copies[name], sums)
+
+    def give_back(self) -> None:
+        """Let the film hold what it did at `keep`."""
+        for name, sums in self.wavefront.film.sums.items():
+            self.wavefront.stream.copy(sums, self._copies[name])
+        self.wavefront.refresh()
 
     def use_all_pixels(self) -> None:
         """Let later renders sample every pixel."""

@@ -56,6 +56,10 @@ class Counts:
     def rays(self) -> int:
         return self.closest + self.shadow
 
+    def plus(self, other: Counts) -> Counts:
+        """Return the sums of what happened."""
+        return Counts(**{name: value + vars(other)[name] for name, value in vars(self).items()})
+
 
 class Wavefront:
     """A film of a scene on a device, and `render_samples`, which runs the bounce loop.

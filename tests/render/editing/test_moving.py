@@ -154,10 +154,10 @@ def test_what_cannot_be_is_told(renderer: Renderer) -> None:
 def test_where_light_is_traced_from_lights_nothing_moves_in_place(renderer: Renderer) -> None:
     target = renderer._wavefront.scene
     moving, lowered = Moving(target, renderer.scene), target.lowered
-    assert moving.move(renderer.scene, {}, lambda: None) is None
+    assert callable(moving.plan(renderer.scene, {}))
     features = dataclasses.replace(lowered.features, transport=TransportFeatures(light_paths=True))
     target.lowered = dataclasses.replace(lowered, features=features)
-    assert "traced from lights" in (moving.move(renderer.scene, {}, lambda: None) or "")
+    assert "traced from lights" in str(moving.plan(renderer.scene, {}))
     target.lowered = lowered
 
 
@@ -181,7 +181,5 @@ def test_the_reason_why_a_shape_does_not_move(
     scene_ = scene()
     moving = Moving(renderer._wavefront.scene, scene_)
     old = next(shape for shape in scene_.shapes if shape.name == name)
-    refusal = moving.move(
-        scene_, {id(old): (old, dataclasses.replace(old, **changes))}, lambda: None
-    )
-    assert refusal is not None and reason in refusal
+    refusal = moving.plan(scene_, {id(old): (old, dataclasses.replace(old, **changes))})
+    assert reason in str(refusal)

@@ -49,7 +49,7 @@ def test_the_error_is_told(method):
     made = SimpleNamespace(halves=lambda: tuple(halves), layers=dict)
     made._developed = lambda: made
     cells = np.ones(2 * (size // 16) ** 2, bool)
-    told = float(np.sqrt(DenoisedNoise(made, choose(), method).measure(cells).mean()))
+    told = float(np.sqrt(DenoisedNoise(lambda: made, choose(), method).measure(cells).mean()))
     picture = SimpleNamespace(
         denoise=method, halves=made.halves, layers=dict,
         colours=lambda: sum(halves) / 2, image=lambda: sum(halves) / 2,
@@ -64,7 +64,7 @@ def test_the_error_is_told(method):
     print(method, told, left)
     assert 0.6 * left < told < 3.0 * left and told < 0.15
     part = cells & (np.arange(len(cells)) < 2)  # of the first square alone
-    assert DenoisedNoise(made, choose(), method).measure(part)[:2].max() < 0.15**2
+    assert DenoisedNoise(lambda: made, choose(), method).measure(part)[:2].max() < 0.15**2
 
 
 def test_a_limit_is_for_what_is_left():

@@ -149,14 +149,14 @@ def test_a_film_is_that_of_the_way(monkeypatch: pytest.MonkeyPatch, guiding: boo
     parts = [clpt.Renderer(scene, narrow(), first_sample=first) for first in (0, 4)]
     for part, samples in zip(parts, (4, 3), strict=True):
         part.run(samples)
-        assert part._features.transport.guided == guiding
+        assert part._wavefront.features.transport.guided == guiding
         assert "lowest" in part.stats.reason
     parts[0].merge(parts[1].film_state())
     assert np.array_equal(parts[0].image(), whole.image())
     origin = parts[0]._origin().settings
     assert origin["chosen.guiding"] is guiding
     crop = clpt.Renderer(with_film(scene, crop=(3, 2, 7, 5)), narrow())
-    assert crop._features.transport.guided == guiding
+    assert crop._wavefront.features.transport.guided == guiding
 
 
 @pytest.mark.usefixtures("little")
@@ -190,7 +190,7 @@ def test_pictures_that_people_steer_have_no_trial(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(trial, "GUIDED_RAY", 0.0)
     scene = dataclasses.replace(slit(), integrator=Auto())
     steered = clpt.Renderer(scene, narrow(), cancel_seconds=0.1)
-    assert not steered._features.transport.guided
+    assert not steered._wavefront.features.transport.guided
 
 
 def broad() -> Scene:

@@ -171,7 +171,7 @@ class _Known:
     def __init__(self, index: SceneIndex, cache: LoweringCache):
         self.nested, self.cache, self.motions = index.nested, cache, index.motions
         matter = matter_of if self.nested else None
-        self.bounding = surroundings.boundaries(index.scene.shapes, matter)
+        self.bounding = surroundings.boundaries(index.listed, matter)
         self.looks = self.motions.looks()
         self.still = surroundings.stands_still(self.bounding)
         # A camera's medium that no boundary holds is wherever there is no other.
