@@ -19,8 +19,9 @@ LARGEST = ("stack", "spilled", "size", "memory", "arithmetic", "special", "secon
 HEAD = """# Programs through the compilers of GPUs that are not here
 
 WHICH of the scenes in `scenes/`, both modes, one lane, along queues; a stage whose text hangs on
-the layout of trees stands once for each. `python -m bench.gpu_compilers` measures; how, and what
-follows, stands in [docs/gpus.md](../../docs/gpus.md). Rows: [JSON lines](gpu_compilers.jsonl).
+the layout of trees stands once for each. Where the texts of a stage have changed since, a row has
+those alone that took most. `python -m bench.gpu_compilers` measures; how, and what follows, stands
+in [docs/gpus.md](../../docs/gpus.md). Rows: [JSON lines](gpu_compilers.jsonl).
 
 ![Registers, stage by stage](gpu_compilers.png)
 

@@ -110,22 +110,9 @@ class Crew:
             if not self.repeat(lambda: True):
                 self.lost.clear()
 
-    def empty(self, workers: Iterable[DeviceWorker]) -> None:
-        """Forget what films of devices hold."""
-        for worker in list(workers):
-            worker.unsaved = []
-            try:
-                worker.clear()
-            except Exception as error:
-                self.drop(worker, error)
-
     def use_all_pixels(self) -> None:
         """Let later renders sample every pixel, after selections of some."""
-        for worker in list(self.workers):
-            try:
-                worker.use_all_pixels()
-            except Exception as error:
-                self.drop(worker, error)
+        self._on_each(DeviceWorker.use_all_pixels)
 
     def count_from(self, counts: Counts) -> None:
         """Count from these, when films on devices are empty."""
@@ -135,7 +122,7 @@ class Crew:
 
     def put(self, film: FilmState | None) -> None:
         """Let a film be that of all devices."""
-        self.empty(self.workers)
+        self._on_each(DeviceWorker.clear)
         self.lost.clear()
         self.saved = film
 
@@ -145,7 +132,7 @@ class Crew:
             raise ClusterError("a device has failed: others do its part first")
         workers, saved = [worker for worker in self.workers if worker.unsaved], self.saved
         for worker in workers:
-            worker.film.hold()
+            worker.film.wavefront.film.hold()
 
         def read() -> FilmState:
             total = saved
@@ -169,6 +156,14 @@ class Crew:
             self._tell()
         others = "others do its part" if self.workers else "no other is left"
         log.warning("%s failed and is left out, %s: %s", worker.name, others, error)
+
+    def _on_each(self, action: Callable[[DeviceWorker], None]) -> None:
+        """Do something on every device; drop those that fail."""
+        for worker in list(self.workers):
+            try:
+                action(worker)
+            except Exception as error:
+                self.drop(worker, error)
 
     def _give_up(self) -> NoReturn:
         worker, error = self.failed[-1]

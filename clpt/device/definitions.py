@@ -16,6 +16,7 @@ from .conditions import BRANCHING, OPENING
 from .text_rows import Row, joined, rows_of
 
 _WORD = re.compile(r"[A-Za-z_]\w*")
+_PASTED_MEMBER = re.compile(r"(?:\.|->)(\w*)\s*##\s*(\w*)")
 _PASTED = re.compile(r"(?<![.\w])(?<!->)(\w*)\s*##\s*(\w*)")  # but for members
 _FUNCTION = re.compile(  # types, a name, arguments without brackets, and a body or nothing
     r"\s*(?:[A-Za-z_]\w*[\s*]+)+?(?P<name>[A-Za-z_]\w*)\s*\([^()]*\)\s*(?:\{.*\}|;)\s*\Z", re.DOTALL
@@ -202,8 +203,22 @@ def with_gaps(
         for one in made
         if one in definitions and _IN_MEMORY.fullmatch("\n".join(row.code for row in one.rows))
     }
-    words = {word for one in definitions - structs for word in one.words}
+    others = definitions - structs
+    words = {word for one in others for word in one.words}
+    pasting = [row for one in others for row in one.rows if "##" in row.code]
+    for struct in structs:
+        words |= {name for row in pasting for name in _pasted_members(row, struct.words)}
     return {one: _gaps(one, words) if one in structs else one.printed for one in definitions}
+
+
+def _pasted_members(row: Row, names: Iterable[str]) -> set[str]:
+    """Return the names, of `names`, that a macro pastes together behind a point or an arrow."""
+    arguments = {"", *_WORD.findall(row.macro[0])}
+    found: set[str] = set()
+    for begin, end in _PASTED_MEMBER.findall(row.code):
+        begin, end = ("" if part in arguments else part for part in (begin, end))
+        found |= {name for name in names if name.startswith(begin) and name.endswith(end)}
+    return found
 
 
 def _gaps(struct: Definition, words: Set[str]) -> tuple[Row, ...]:

@@ -243,8 +243,8 @@ class _Assembly:
         own = [one for _, ps in self.pieces for p in ps for one in p.definitions]
         stay = named([*defines, *own]) | {*(defines if self.library else ())}
         made = [ps for file, ps in self.pieces if file.generated]
-        rows = with_gaps(stay, (one for ps in made for p in ps for one in p.definitions))
-        left = [(file, [p.left(rows) for p in ps]) for file, ps in self.pieces]
+        printed = with_gaps(stay, (one for ps in made for p in ps for one in p.definitions))
+        left = [(file, [p.left(printed) for p in ps]) for file, ps in self.pieces]
         text = _Text([row.text for one in defines if one in stay for row in one.rows])
         root = self.pieces[0][0]
         if any(kept for file, found in left if file is root for kept, _ in found):

@@ -20,6 +20,7 @@ from ..device import (
     Events,
     Program,
     Stream,
+    Virtual,
     assemble,
     build,
     forking,
@@ -256,7 +257,7 @@ class Queries:
     def _program(self, kernel: str) -> Program:
         """The program of a kernel, for the layout."""
         root, all_hits = self._root_of(kernel), _PROGRAMS[kernel][1]
-        texts = {
+        texts: Virtual = {
             "generated/layout.cl": traversal_text(self.layout, all_hits),
             "generated/instance_traversal.cl": self._instances_text(),
             "generated/motion.cl": "",  # instances stand still

@@ -191,10 +191,6 @@ class DeviceFilm:
         """Enqueue that the film holds the words of another one of its form."""
         self.wavefront.set_words(state.arrays)
 
-    def hold(self) -> None:
-        """Enqueue a copy of the film on the device, one at a time. Raises MemoryBudgetError."""
-        self.wavefront.film.hold()
-
     def empty(self, *, seed: int | None = None, recover: bool = False) -> None:
         """Enqueue that the film is empty; seed: of later samples; recover: from any error."""
         wavefront = self.wavefront

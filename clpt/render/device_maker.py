@@ -99,5 +99,5 @@ class DeviceMaker(Maker):
 
     def hold(self, taken: Ranges) -> Held:
         """Keep a copy of the film on the device, one at a time. Raises MemoryBudgetError."""
-        self._home.hold()
+        self._home.wavefront.film.hold()
         return Held(partial(self._home.words, held=True, taken=taken), self.counts, taken)

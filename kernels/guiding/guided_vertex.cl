@@ -14,7 +14,10 @@ inline BsdfSample onward_sample(Scattering scatter, global const uint *guide, Gu
     vec2 toward = BSDF_CHROMATIC ? sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_GUIDE) : uv;
     real chance = sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_GUIDE + 1).x;
     vec3 u = v3(uv.x, uv.y, scatter.choice.y);
-    return guide_sample(guide, guided, scatter.bsdf, scatter.shading.frame, scatter.wo, u, toward, chance, ratio);
+    BsdfSample s =
+        guide_sample(guide, guided, scatter.bsdf, scatter.shading.frame, scatter.wo, u, toward, chance, ratio);
+    pair_of_sample(scatter.bsdf, scatter.wo, &s);
+    return s;
 }
 
 /* Russian roulette by what a guide knows, see guide_roulette; beta: of the ray that arrives. */

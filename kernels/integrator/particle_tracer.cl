@@ -22,9 +22,11 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
     Sampler sampler = light_path_sampler(scene.settings, pixel_index, load_path_sample(path, at));
     Scattering scatter = vertex_scattering(scene, path, at, active, v, sampler);
     real arrives = 1.0f / max_r(VERTEX_COSINE(v.s.n, v.d), (real)(1e-6f));
-    Rival rival = rival_of_emission(scene, path, at, v, vertex_hemisphere(scatter.shading.frame, scatter.wo));
+    Rival rival = rival_of_emission(scene, path, at, v, vertex_hemisphere(scene, scatter.shading.frame, scatter.wo));
 
-    v.state += join_camera(scene, shadow, at, active, v, scatter, rival, arrives);
+    CameraJoint joint = join_camera_seek(scene, v, scatter);
+    bsdf_ask(scene, scatter, join_camera_to(joint, scatter), 1);
+    v.state += join_camera(scene, shadow, at, active, v, scatter, rival, joint, arrives);
 
     vec2 uv = sampler_pair(sampler, scatter.dimension + DIMENSION_BSDF);
     BsdfSample bs = hero_sample(scatter.bsdf, scatter.wo, v3(uv.x, uv.y, scatter.choice.y), &ratio);
@@ -35,7 +37,7 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
     beta = spectrum_scale(beta, shading_frame_share(scatter.shading, neg3(v.d)));
     next = light_path_roulette(scene, path, at, next, null, v, scatter, &beta);
 
-    next = rival_goes_to_camera(scene, path, at, next, null, rival, scatter, &v, onward, bs);
+    next = rival_goes_to_camera(scene, path, at, next, null, rival, &v, onward, bs);
     if (BSDF_IS_PANE) path_scattered(path, at, next & !null);
     vertex_leave(path, at, next, null, v, onward, beta);
     store_path_ratio(path, at, next, ratio);

@@ -20,13 +20,16 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     Scattering scatter = vertex_scattering(scene, path, at, met, v, sampler);
     if (VERTEX_COUNTS)
         v.state = layers_record(scene, path, at, LAYER_PASSED, met, v, scatter, v.state);
-    if (BSDF_ABSORBS) /* as the surfaces of lights mostly do */
-        next = next & (spectrum_max(bsdf_albedo(scatter.bsdf)) > 0.0f);
+#if BSDF_ABSORBS /* as the surfaces of lights mostly do */
+    next = next & (spectrum_max(bsdf_albedo(scatter.bsdf)) > 0.0f);
+#endif
     Rival rival = rival_of_camera(scene, path, at, v, sampler);
     merge_at_vertex(scene, path, at, met, v, scatter, rival, ratio SHADE_PASSED);
     Guided guided = guide_at(scene, guide, v.s, v.d);
 
-    NextEvent event = next_event(scene, next, v, scatter, rival, guided, ratio SHADE_PASSED);
+    NextEvent event = next_event_seek(scene, next, v, scatter);
+    bsdf_ask(scene, scatter, next_event_wi(event, scatter), 0);
+    event = next_event_weigh(scene, event, v, scatter, rival, guided, ratio SHADE_PASSED);
     BsdfSample bs = onward_sample(scatter, guide, guided, &ratio);
     v.state += next_event_keep(scene, path, shadow, at, active, v, event);
 
@@ -43,7 +46,7 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
 
     vertex_leave(path, at, next, null, v, onward, beta);
     store_path_cone(path, at, next, cone_scattered(v.cone, bs.pdf, (bs.lobe & LOBE_DELTA) != 0));
-    path_scatters(path, at, next, null, &v, scatter, rival, bs, onward);
+    path_scatters(scene, path, at, next, null, &v, scatter, rival, bs, onward);
     store_path_eta(path, at, next, eta);
     store_path_ratio(path, at, next, ratio);
     vertex_end(path, at, met, next, null, v.state);

@@ -26,7 +26,21 @@ typedef struct {
     real pdf;        /* 0: nothing was sampled, the path ends */
     real eta;        /* index of the side of wi over that of wo; 1 on reflection */
     integer lobe;    /* LOBE_ bits */
+    real p, p_back;  /* those of BsdfPair, of wo and wi: path/hero.cl sets them */
 } BsdfSample;
+
+/* What a material has for a pair of directions, see path/pair.cl. */
+typedef struct {
+    Spectrum f;      /* f |cos| */
+    real pdf;        /* of wi, as hero_pdf has it */
+    real p, p_back;  /* of wi and of wo, as rival_pdf has them */
+} BsdfPair;
+
+/* What a vertex asks of its material. */
+typedef struct {
+    BsdfPair pair;
+    BsdfSample sample;
+} BsdfAnswer;
 
 inline BsdfSample bsdf_nothing(void)
 {

@@ -161,42 +161,38 @@ inline real rival_of_joint(Scene scene, Rival r, Surface s, CameraPoint c, real 
 }
 
 /* What a point of a light counts that next-event estimation has chosen; p: guide's and material's density of it. */
-#define event_weight(scene, rival, s, ls, m, wo, wi, p) rival_event_weight(scene, rival, s, ls, m, wo, wi)
-inline real rival_event_weight(Scene scene, Rival r, Surface s, LightSample ls, Bsdf m, vec3 wo, vec3 wi)
+#define event_weight(scene, rival, s, ls, pair, p) rival_event_weight(scene, rival, s, ls, pair)
+inline real rival_event_weight(Scene scene, Rival r, Surface s, LightSample ls, BsdfPair pair)
 {
-    real p = rival_pdf(m, wo, wi);
-    real third = rival_of_light_sample(scene, r, s, ls, p, rival_pdf(m, wi, wo));
-    return mis_weight_of_three(ls.pdf, p, third);
+    real third = rival_of_light_sample(scene, r, s, ls, pair.p, pair.p_back);
+    return mis_weight_of_three(ls.pdf, pair.p, third);
 }
 
 /* What a camera's path keeps that `scatters` along `onward`. Returns the density of that direction. */
-inline real rival_goes_to_light(Slab path, uint at, mask scatters, Rival r, Scattering scatter, Vertex *v, vec3 onward,
-                                mask delta, BsdfSample bs)
+inline real rival_goes_to_light(Slab path, uint at, mask scatters, Rival r, Vertex *v, vec3 onward, mask delta,
+                                BsdfSample bs)
 {
-    real p = rival_pdf(scatter.bsdf, scatter.wo, bs.wi), p_back = rival_pdf(scatter.bsdf, bs.wi, scatter.wo);
-    store_path_rival(path, at, scatters, rival_to_light(r, v->s, onward, delta, p, p_back));
-    rival_pends_to_light(path, at, scatters, r, v, onward, delta, p, p_back);
-    return p;
+    store_path_rival(path, at, scatters, rival_to_light(r, v->s, onward, delta, bs.p, bs.p_back));
+    rival_pends_to_light(path, at, scatters, r, v, onward, delta, bs.p, bs.p_back);
+    return bs.p;
 }
 
 /* What a light path keeps that goes on along `onward`. Returns which do. */
-inline mask rival_goes_to_camera(Scene scene, Slab path, uint at, mask next, mask null, Rival r, Scattering scatter,
-                                 Vertex *v, vec3 onward, BsdfSample bs)
+inline mask rival_goes_to_camera(Scene scene, Slab path, uint at, mask next, mask null, Rival r, Vertex *v, vec3 onward,
+                                 BsdfSample bs)
 {
     next = next & !rival_ends(scene, *v);
     mask delta = (bs.lobe & LOBE_DELTA) != 0;
-    real p = rival_pdf(scatter.bsdf, scatter.wo, bs.wi), p_back = rival_pdf(scatter.bsdf, bs.wi, scatter.wo);
-    store_path_rival(path, at, next & !null, rival_to_camera(r, v->s, onward, delta, p, p_back));
-    rival_pends_to_camera(path, at, next & !null, null, r, v, onward, delta, p, p_back);
+    store_path_rival(path, at, next & !null, rival_to_camera(r, v->s, onward, delta, bs.p, bs.p_back));
+    rival_pends_to_camera(path, at, next & !null, null, r, v, onward, delta, bs.p, bs.p_back);
     return next;
 }
 
 /* What the joint of a light path to the camera counts; leaves in `shine` those that are not left to the camera. */
-inline real rival_joint(Scene scene, Rival r, Vertex v, Scattering scatter, vec3 to, CameraPoint c, mask *shine)
+inline real rival_joint(Scene scene, Rival r, Vertex v, BsdfPair pair, CameraPoint c, mask *shine)
 {
-    real p = rival_pdf(scatter.bsdf, to, scatter.wo), p_back = rival_pdf(scatter.bsdf, scatter.wo, to);
     mask hidden = mask_of(scene.settings->hide_lights != 0) & (v.s.light >= 0);
     mask joined = BSDF_IS_PHASE ? !r.first | !r.met : !r.first;
     *shine = *shine & joined & !hidden & !rival_ends(scene, v);
-    return 1.0f / (1.0f + rival_of_joint(scene, r, v.s, c, p, p_back));
+    return 1.0f / (1.0f + rival_of_joint(scene, r, v.s, c, pair.p, pair.p_back));
 }

@@ -2,8 +2,8 @@
 typedef integer Rival;
 #define rival_of_camera(scene, path, at, v, sampler) ((integer)(0))
 #define rival_of_emission(scene, path, at, v, hemisphere) ((integer)(0))
-#define event_weight(scene, rival, s, ls, m, wo, wi, p) \
+#define event_weight(scene, rival, s, ls, pair, p) \
     sel((ls).pdf < 0.0f, (real)(1.0f), mis_weight((ls).pdf, p))
-#define rival_goes_to_light(path, at, scatters, rival, scatter, v, onward, delta, bs) ((bs).pdf)
-#define rival_goes_to_camera(scene, path, at, next, null, rival, scatter, v, onward, bs) (next)
-#define rival_joint(scene, rival, v, scatter, to, c, shine) ((real)(1.0f))
+#define rival_goes_to_light(path, at, scatters, rival, v, onward, delta, bs) ((bs).pdf)
+#define rival_goes_to_camera(scene, path, at, next, null, rival, v, onward, bs) (next)
+#define rival_joint(scene, rival, v, pair, c, shine) ((real)(1.0f))

@@ -16,17 +16,16 @@ inline Spectrum merge_photon(Photon photon, mask near, Vertex v, Scattering scat
                              real area, real unit, real number)
 {
     vec3 to = octahedral_unpack(photon.to_light), wi = to_frame(scatter.shading.frame, to);
-    Spectrum f = bsdf_eval(scatter.bsdf, scatter.wo, wi);
-    real p = rival_pdf(scatter.bsdf, scatter.wo, wi), p_back = rival_pdf(scatter.bsdf, wi, scatter.wo);
-    real w = photon_weight(photon.rival, rival.arrives, number, area / unit, p, p_back);
+    BsdfPair pair = bsdf_pair(scatter.bsdf, scatter.wo, wi, ratio);
+    real w = photon_weight(photon.rival, rival.arrives, number, area / unit, pair.p, pair.p_back);
     real share = shading_frame_share(scatter.shading, to);
     real scale = w * share / (area * max_r(fabs(dot3(v.s.n, to)), (real)(1e-3f)));
 #if USES_DISPERSION /* the pdfs of both parts for each wavelength as the hero, over their mean */
     scale /= max_r(spectrum_mean(spectrum_mul(ratio, photon.ratio)), (real)(1e-20f));
 #endif
-    Spectrum light = spectrum_scale(spectrum_mul(f, photon.power), scale);
-    near = near & !rival_sharp(mask_of(0), p, p_back);
-    return spectrum_sel(near & (spectrum_max(f) > 0.0f), light, spectrum_of(0.0f));
+    Spectrum light = spectrum_scale(spectrum_mul(pair.f, photon.power), scale);
+    near = near & !rival_sharp(mask_of(0), pair.p, pair.p_back);
+    return spectrum_sel(near & (spectrum_max(pair.f) > 0.0f), light, spectrum_of(0.0f));
 }
 
 /* The light of all photons around a vertex, by the share of it that merging takes, without what the path carries.

@@ -10,6 +10,7 @@
 /* bsdf_sample, its pdf and weight those of the four together. A direction that is not finite has a pdf of 0, so that
  * the path ends: it would leave the scene, and no sky knows where. */
 #include "generated/hero_steps.cl"
+#include "generated/pair.cl"
 
 inline BsdfSample hero_sample(Bsdf m, vec3 wo, vec3 u, Spectrum *ratio)
 {
@@ -17,5 +18,6 @@ inline BsdfSample hero_sample(Bsdf m, vec3 wo, vec3 u, Spectrum *ratio)
     s.pdf = sel(dot3(s.wi, s.wi) < 4.0f, s.pdf, (real)(0.0f)); /* NaN fails the comparison */
     hero_weighs(m, wo, &s, ratio);
     hero_goes_alone(&s, ratio);
+    pair_of_sample(m, wo, &s);
     return s;
 }

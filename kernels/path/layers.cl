@@ -8,7 +8,7 @@
 /* What a surface reflects, as the film's sensor tells it; `before`: of what is before it. */
 inline vec3 layer_albedo(Scene scene, Scattering scatter, Wavelengths lambdas, Spectrum before, real weight)
 {
-    Spectrum albedo = spectrum_mul(bsdf_albedo(scatter.bsdf), before);
+    Spectrum albedo = spectrum_mul(bsdf_albedo_in(scene, scatter.bsdf), before);
     return scale3(film_value(scene, albedo, lambdas), weight);
 }
 

@@ -102,7 +102,7 @@ inline Scattering vertex_scattering(Scene scene, Slab path, uint at, mask active
 #endif
 
 /* The normal of the hemisphere to which the material sends light, 0 if to the whole sphere: for interface/light.cl. */
-inline vec3 vertex_hemisphere(Frame frame, vec3 wo)
+inline vec3 vertex_hemisphere(Scene scene, Frame frame, vec3 wo)
 {
     real sign = BSDF_TRANSMITS ? (real)(0.0f) : sel(wo.z < 0.0f, (real)(-1.0f), (real)(1.0f));
     return scale3(frame.n, sign);

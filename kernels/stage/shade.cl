@@ -39,10 +39,19 @@
 #define WHICH_PASSED
 #endif
 
-STAGE(shade)(SLAB_ARGS, SCENE_ARGS SHADE_ARGS WHICH_ARG QUEUE_ARGS)
+#if SHADES_SEVERAL /* kinds, LANES paths of one at a time */
+#define KIND_ARG , uint kind
+#else
+#define KIND_ARG
+#endif
+
+STAGE(shade)(SLAB_ARGS, SCENE_ARGS SHADE_ARGS WHICH_ARG KIND_ARG QUEUE_ARGS)
 {
     SLABS
     SCENE
+#if SHADES_SEVERAL
+    scene.kind = kind;
+#endif
 #if QUEUED
     uint entry = get_global_id(0);
     if (entry < queue_counts[BSDF_KIND]) {
@@ -53,7 +62,7 @@ STAGE(shade)(SLAB_ARGS, SCENE_ARGS SHADE_ARGS WHICH_ARG QUEUE_ARGS)
     STAGE_AT
     mask active = ((load_path_state(path, at) & PATH_ALIVE) != 0) & (load_hit_prim(hit, at) >= 0);
 #if BSDF_COUNT > 1
-    active = active & (MATERIAL_KIND(load_hit_material(hit, at)) == BSDF_KIND);
+    active = active & (MATERIAL_KIND(load_hit_material(hit, at)) == (integer)(BSDF_KIND));
 #endif
     scene.time = load_path_time(path, at);
     if (any(active)) integrator_vertex(scene, path, hit, shadow, at, active SHADE_PASSED WHICH_PASSED);

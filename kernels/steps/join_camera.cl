@@ -1,17 +1,31 @@
-/* Joins a vertex of a light path to the camera: a ray to it waits in the shadow slab. Returns what Path.state gains.
- * arrives: 1 over the cosine of the ray that arrives. */
-inline integer join_camera(Scene scene, Slab shadow, uint at, mask active, Vertex v, Scattering scatter, Rival rival,
-                           real arrives)
+/* Joins a vertex of a light path to the camera: a ray to it waits in the shadow slab. */
+typedef struct {
+    CameraPoint c;
+    vec3 to; /* toward it, in shading.frame */
+} CameraJoint;
+#define join_camera_to(joint, scatter) ((joint).to)
+
+/* Chooses a point of the lens. */
+inline CameraJoint join_camera_seek(Scene scene, Vertex v, Scattering scatter)
 {
+    CameraJoint joint;
     vec2 lens = sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_LIGHT);
-    CameraPoint c = camera_connect(scene, v.s.p, mask_of(0), lens);
-    vec3 to = to_frame(scatter.shading.frame, neg3(c.d));
-    Spectrum f = bsdf_eval(scatter.bsdf, to, scatter.wo);
-    mask shine = active & c.seen & (spectrum_max(f) > 0.0f);
+    joint.c = camera_connect(scene, v.s.p, mask_of(0), lens);
+    joint.to = to_frame(scatter.shading.frame, neg3(joint.c.d));
+    return joint;
+}
+
+/* Returns what Path.state gains. arrives: 1 over the cosine of the ray that arrives. */
+inline integer join_camera(Scene scene, Slab shadow, uint at, mask active, Vertex v, Scattering scatter, Rival rival,
+                           CameraJoint joint, real arrives)
+{
+    CameraPoint c = joint.c;
+    BsdfPair pair = bsdf_pair(scatter.bsdf, joint.to, scatter.wo, spectrum_of(1.0f));
+    mask shine = active & c.seen & (spectrum_max(pair.f) > 0.0f);
     real share = shading_frame_share(scatter.shading, neg3(v.d));
     real carries = VERTEX_COSINE(v.s.n, c.d) * arrives * c.importance * share;
-    carries *= rival_joint(scene, rival, v, scatter, to, c, &shine);
-    Spectrum value = spectrum_scale(spectrum_mul(v.beta, f), carries);
+    carries *= rival_joint(scene, rival, v, pair, c, &shine);
+    Spectrum value = spectrum_scale(spectrum_mul(v.beta, pair.f), carries);
     value = vertex_beyond(scene, v, neg3(c.d), c.t, v.lambdas, value);
     connect_camera(shadow, at, active, shine, v.s, c, value);
     store_shadow_through(shadow, at, shine, vertex_through(v, neg3(c.d)));

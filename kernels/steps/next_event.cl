@@ -1,27 +1,35 @@
 /* Next-event estimation: a point of a light is chosen, and a ray toward it waits in the shadow slab. */
 typedef struct {
-    mask shine; /* the material sends light from there on */
+    mask shine; /* the material sends light from there on; before it is asked, what may */
     LightSample ls;
+    vec3 wi; /* toward it, in shading.frame */
     Spectrum value;
 } NextEvent;
+#define next_event_wi(e, scatter) ((e).wi)
 
-inline NextEvent next_event(Scene scene, mask next, Vertex v, Scattering scatter, Rival rival, Guided guided,
-                            Spectrum ratio SHADE_ARGS)
+/* Chooses the point. */
+inline NextEvent next_event_seek(Scene scene, mask next, Vertex v, Scattering scatter)
 {
     NextEvent e;
     Frame frame = scatter.shading.frame;
-    vec3 hemisphere = vertex_hemisphere(frame, scatter.wo);
+    vec3 hemisphere = vertex_hemisphere(scene, frame, scatter.wo);
     vec2 point = sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_LIGHT);
-    mask seeks = next & !vertex_sealed(v);
+    e.shine = next & !vertex_sealed(v);
     e.ls = light_sample_nothing();
-    if (!(BSDF_ABSORBS || BSDF_IS_SEALED) || any(seeks))
+    if (!(BSDF_ABSORBS || BSDF_IS_SEALED) || any(e.shine))
         e.ls = common_light_sample(scene, v.s.p, hemisphere, scatter.choice.x, point, scatter.lambdas);
-    vec3 wi = to_frame(frame, e.ls.wi);
-    Spectrum f = bsdf_eval(scatter.bsdf, scatter.wo, wi);
-    f = spectrum_scale(f, shading_frame_share(scatter.shading, e.ls.wi));
-    real w = event_weight(scene, rival, v.s, e.ls, scatter.bsdf, scatter.wo, wi,
-                          guided_pdf(guide, guided, e.ls.wi, hero_pdf(scatter.bsdf, scatter.wo, wi, ratio)));
-    e.shine = seeks & (e.ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
+    e.wi = to_frame(frame, e.ls.wi);
+    return e;
+}
+
+/* Weighs its light. */
+inline NextEvent next_event_weigh(Scene scene, NextEvent e, Vertex v, Scattering scatter, Rival rival, Guided guided,
+                                  Spectrum ratio SHADE_ARGS)
+{
+    BsdfPair pair = bsdf_pair(scatter.bsdf, scatter.wo, e.wi, ratio);
+    Spectrum f = spectrum_scale(pair.f, shading_frame_share(scatter.shading, e.ls.wi));
+    real w = event_weight(scene, rival, v.s, e.ls, pair, guided_pdf(guide, guided, e.ls.wi, pair.pdf));
+    e.shine = e.shine & (e.ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
     w = w / sel(e.shine, fabs(e.ls.pdf), (real)(1.0f));
     e.value = spectrum_scale(spectrum_mul(spectrum_mul(v.beta, f), e.ls.radiance), w);
     e.value = vertex_beyond(scene, v, e.ls.wi, e.ls.t, scatter.lambdas, e.value);

@@ -1,11 +1,11 @@
 /* What a path keeps of how its next direction was chosen, to weigh the light that it meets there. */
-inline void path_scatters(Slab path, uint at, mask next, mask null, Vertex *v, Scattering scatter, Rival rival,
-                          BsdfSample bs, vec3 onward)
+inline void path_scatters(Scene scene, Slab path, uint at, mask next, mask null, Vertex *v, Scattering scatter,
+                          Rival rival, BsdfSample bs, vec3 onward)
 {
     mask scatters = next & !null, delta = (bs.lobe & LOBE_DELTA) != 0;
     path_scattered(path, at, scatters);
     delta = delta | vertex_sealed(*v); /* where light that is met has its whole weight */
-    bs.pdf = rival_goes_to_light(path, at, scatters, rival, scatter, v, onward, delta, bs);
+    bs.pdf = rival_goes_to_light(path, at, scatters, rival, v, onward, delta, bs);
     store_path_pdf(path, at, scatters, sel(delta, (real)(-1.0f), bs.pdf));
-    if (!BSDF_DELTA) path_hemisphere_keep(path, at, next, vertex_hemisphere(scatter.shading.frame, scatter.wo));
+    if (!BSDF_DELTA) path_hemisphere_keep(path, at, next, vertex_hemisphere(scene, scatter.shading.frame, scatter.wo));
 }

@@ -63,6 +63,9 @@ def test_members_in_memory_that_nothing_names_are_gaps():
     rows = ["    int unused_0[4];", "    int c;", "    int unused_1[1];", "} S;"]
     assert text.splitlines()[2:6] == rows
     assert lanes in assemble("a", {"a": kernel, made: lanes}).text
+    pasted = kernel.replace("s->c = 1", "OF(s, x) = 1") + "#define OF(s, name) s->name##_c\n"
+    text = assemble("a", {"a": pasted, made: words.replace(" c;", " x_c;")}).text
+    assert text.splitlines()[2:4] == [rows[0], "    int x_c;"]
     assert words in assemble("a", {"a": words + kernel, made: ""}).text
 
 

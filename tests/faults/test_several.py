@@ -14,6 +14,7 @@ import pytest
 import clpt
 from clpt import device as dev
 from clpt.cluster.threads import Threads, on_all
+from clpt.render.wavefront.noise_meter import NoiseMeter
 from tests.faults.interrupts import (
     Injected,
     Trial,
@@ -66,6 +67,28 @@ def test_films_that_were_being_gathered_are_broken_until_a_reset(trial: Trial) -
     found = renderer.film_state()
     assert found.taken == ((0, 2),)
     assert np.array_equal(sums(found), trial.known.whole(found.taken))
+
+
+def test_an_interrupted_run_with_noise_leaves_the_film_as_it_was(
+    trial: Trial, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Samples may have been in two films, or in none: such a renderer used to be broken."""
+    renderer = trial.renderer
+    renderer.reset()
+    renderer.run(2)
+    before = renderer.film_state()
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(NoiseMeter, "measure", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            renderer.run(30, noise=1e-3)
+    found = renderer.film_state()
+    assert found.taken == before.taken == ((0, 2),)
+    assert np.array_equal(sums(found), sums(before))
+    assert renderer.run(1) and renderer.film_state().taken == ((0, 3),)
 
 
 def test_a_thread_that_begins_too_late_adds_nothing(

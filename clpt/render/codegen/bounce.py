@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from clpt.render.codegen import signatures
+from clpt.render.codegen import signatures, vertices
 from clpt.render.codegen.dispatch import function
 from clpt.render.contract.features import Features
 
@@ -164,12 +164,6 @@ def stages_text(features: Features, layout: str, lanes: int, interleaved: bool) 
     return "\n".join([*rows, ""])
 
 
-def walks(features: Features) -> bool:
-    """Whether the camera's paths go from collision to collision in media."""
-    of_camera = not features.transport.light_paths
-    return of_camera and any(cls.is_phase for cls in features.materials.leaves)
-
-
 def _call(features: Features, own: Features, layout: str, stage: Stage) -> _Call:
     """The call of a stage for one kind of paths, whose features are `own`."""
     begin, join = begin_and_join(own)
@@ -183,8 +177,20 @@ def _call(features: Features, own: Features, layout: str, stage: Stage) -> _Call
         "shade": signatures.shade_args(features),
     }
     args = [(type_, name) for name, type_ in groups.get(stage.kernel, {}).items()]
-    if stage.kernel == "shade" and has_both(features):
-        args.append(("uint ", "which"))
+    if stage.kernel == "shade":
+        args += [("uint ", "which")] if has_both(features) else []
+        return _shade_call(features, stage, args)
+    return _Call(stage, tuple(args))
+
+
+def _shade_call(features: Features, stage: Stage, args: list[tuple[str, str]]) -> _Call:
+    """The call of the part that shades a kind, with others where they share a vertex."""
+    leaves = features.materials.leaves
+    for vertex in vertices.vertices(features, stage.lanes):
+        if stage.program in (f"shade_{leaves[kind].kind}" for kind in vertex.kinds):
+            args += [("uint ", "kind")] if vertex.shared else []
+            stage = replace(stage, program=vertex.program)
+            break
     return _Call(stage, tuple(args))
 
 
@@ -204,10 +210,12 @@ def _verb(verb: str, passes: list[list[_Call]]) -> str:
 
 def _cases(shading: list[_Call]) -> list[str]:
     """Statements that shade by the kind of material."""
-    if len(shading) == 1:
-        return [shading[0].text]
-    cases = (f"case {kind}: {call.text} break;" for kind, call in enumerate(shading))
-    return ["switch (kind) {", *cases, "}"]
+    kinds: dict[str, list[str]] = {}
+    for kind, call in enumerate(shading):
+        kinds.setdefault(call.text, []).append(f"case {kind}:")
+    if len(kinds) == 1:
+        return [*kinds]
+    return ["switch (kind) {", *(f"{' '.join(own)} {t} break;" for t, own in kinds.items()), "}"]
 
 
 def _asked(passes: Sequence[Sequence[object]]) -> str:

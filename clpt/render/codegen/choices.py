@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from clpt import bvh
-from clpt.render.codegen import bounce, flags
+from clpt.render.codegen import flags
 from clpt.render.contract.features import Features
 from clpt.scene.scatterer import Scatterer
 
@@ -33,7 +33,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     ),
     "generated/bands.cl": lambda f, _: ("film/bands.cl",) * f.film.bands,
     "generated/integrator.cl": lambda f, _: (f"integrator/{f.transport.integrator}.cl",),
-    "generated/walk.cl": lambda f, _: either(bounce.walks(f), "path/walk.cl"),
+    "generated/walk.cl": lambda f, _: either(flags.walks(f), "path/walk.cl"),
     "generated/merging.cl": lambda f, _: either(f.transport.merged, "merging/area.cl"),
     "generated/cone.cl": lambda f, _: either(f.textures.mips, "path/cone.cl"),
     "generated/vertex_media.cl": lambda f, _: (
@@ -214,17 +214,22 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
     "generated/rival_steps.cl": lambda f, cls: (
         *either(f.transport.merged, "lighting/rivals_merging.cl"),
         *either(f.transport.joined and not cls.delta, "lighting/rivals_camera.cl"),
-        *either(
-            flags.is_chromatic(f, cls) and (f.told_dispersion or cls.is_phase),
-            "lighting/rival_pdf.cl",
-        ),
     ),
     "generated/hero_steps.cl": lambda f, cls: (
         *either(
             f.ratios and flags.is_chromatic(f, cls) and f.spectra.spectral, "path/hero_weighs.cl"
         ),
         *either(f.told_dispersion, "path/hero_alone.cl"),
+        *(
+            either(
+                flags.is_chromatic(f, cls) and (f.told_dispersion or cls.is_phase),
+                "lighting/rival_pdf.cl",
+            )
+            if f.transport.balanced and not flags.is_null(f, cls)
+            else ("lighting/rival_pdf_unasked.cl",)
+        ),
     ),
+    "generated/pair.cl": lambda f, cls: ("path/pair.cl",),
     "generated/guide.cl": lambda f, cls: (
         ("guiding/guided_vertex.cl",)
         if flags.is_guided(f, cls) and not f.transport.light_paths

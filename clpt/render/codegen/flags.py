@@ -18,6 +18,12 @@ from clpt.scene.scatterer import Scatterer
 Defines = dict[str, str | int]
 
 
+def walks(features: Features) -> bool:
+    """Whether the camera's paths go from collision to collision in media."""
+    of_camera = not features.transport.light_paths
+    return of_camera and any(cls.is_phase for cls in features.materials.leaves)
+
+
 def fluoresces(features: Features, cls: type[Scatterer]) -> bool:
     """Whether light may leave a material at another wavelength than it came."""
     return cls.fluoresces and features.spectra.spectral

@@ -24,9 +24,11 @@ from clpt.render.codegen import (
     signatures,
     stages,
     textures,
+    vertices,
 )
 from clpt.render.contract import custom_materials
 from clpt.render.contract.features import Features
+from clpt.scene.scatterer import Scatterer
 
 BOTH = tuple(f"integrator/{name}.cl" for name in ("path", "particle_tracer", "both"))
 
@@ -103,25 +105,45 @@ def _shading(
 ) -> dict[str, device.Source]:
     """The texts that shade, see `sources`; part: of a loop, for all kinds of paths of the scene."""
     files, defines = _shared(features, layout), _defines(features, lanes)
-    texts = {}
-    for cls in features.materials.leaves:
-        own = {
-            **files,
-            **choices.material_files(features, cls),
-            "generated/bsdf.cl": stages.bsdf_text(features, cls),
-        }
+    texts: dict[str, device.Source] = {}
+    for vertex in vertices.vertices(features, lanes if part else 1):
+        cls = vertices.leader(features, vertex)
+        own = {**files, **choices.material_files(features, cls), **_material(features, cls)}
+        if vertex.shared:
+            own |= vertices.virtual_files(features, vertex)
+            texts |= _materials(features, vertex, files, defines, lanes)
         if part:
             own["generated/common.cl"] = common.calls_text(common.shared(features, lanes))
         if cls.is_phase:
             own["generated/shading_frame.cl"] = ("path/phase_frame.cl",)
-        if cls.source is not None:
-            own[f"{cls.folder}/{cls.kind}.cl"] = custom_materials.text(cls)
-        kind = {**flags.of_material(features, cls), "QUEUED": int(queued)}
+        kind = {**vertices.defines(features, vertex), "QUEUED": int(queued)}
         if part and bounce.has_both(features):
             own["generated/integrator.cl"] = BOTH
             kind["SHADES_BOTH"] = 1
-        name = f"shade_{cls.kind}"
-        texts[name] = _source(name, own, {**defines, **kind}, lanes, "shade", part=part)
+        given = {**defines, **kind}
+        texts[vertex.program] = _source(vertex.program, own, given, lanes, "shade", part=part)
+    return texts
+
+
+def _material(features: Features, cls: type[Scatterer]) -> Files:
+    """The files of a kind's own functions."""
+    own: Files = {"generated/bsdf.cl": stages.bsdf_text(features, cls)}
+    if cls.source is not None:
+        own[f"{cls.folder}/{cls.kind}.cl"] = custom_materials.text(cls)
+    return own
+
+
+def _materials(
+    features: Features, vertex: vertices.Vertex, files: Files, defines: flags.Defines, lanes: int
+) -> dict[str, device.Source]:
+    """The parts of the kinds of a shared vertex, by program name."""
+    texts = {}
+    for cls in (features.materials.leaves[kind] for kind in vertex.kinds):
+        own = {**files, **choices.material_files(features, cls), **_material(features, cls)}
+        own["generated/material_part.cl"] = vertices.part_text(features, cls)
+        kind = vertices.part_defines(features, vertex, cls)
+        name = f"material_{cls.kind}"
+        texts[name] = _source(name, own, {**defines, **kind}, lanes, "material")
     return texts
 
 
@@ -160,7 +182,8 @@ def loop_sources(
     for own in features.passes:
         made |= _stages(own, layout, lanes, interleaved, part=True)
         stages_ = bounce.order(own, layout, lanes, interleaved)
-        used |= dict.fromkeys(stage.program for stage in stages_)
+        used |= dict.fromkeys(stage.program for stage in stages_ if stage.verb != "shade")
+    used |= dict.fromkeys(name for name in made if name.startswith(("shade_", "material_")))
     if shared := common.shared(features, lanes):
         own_files = _shared(features, layout)
         own_files["generated/common_part.cl"] = common.part_text(shared)

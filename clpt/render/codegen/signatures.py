@@ -81,6 +81,7 @@ def scene_text(unused: Container[str] = (), features: Features | None = None) ->
             *members,
             "    global const Settings *settings;",
             "    real time; /* of the path that is traced or shaded [s]; 0 where nothing moves */",
+            "    uint kind; /* of material, in a vertex of several: path/material_apart.cl */",
             "} Scene;",
             *rows,
             f"#define SHAPE_ROW_WORDS {SHAPE.words}",

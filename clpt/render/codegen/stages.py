@@ -243,23 +243,24 @@ def bsdf_text(features: Features, cls: type[Scatterer]) -> str:
             f"typedef {cls.__name__} Bsdf;",
             f"#define BSDF_REFLECTIVITY(m) {reflectivity}",
             *(f"#define bsdf_{verb} {kind}_{verb}" for verb in verbs),
-            *(_interior_text(cls) if features.media.absorbing else ()),
+            "#define bsdf_albedo_in(scene, m) bsdf_albedo(m)",
+            f"#define BSDF_INTERIOR(row) {interior(cls)}" if features.media.absorbing else "",
             *(_shift_text(cls) if flags.fluoresces(features, cls) else ()),
             "",
         ]
     )
 
 
-def _interior_text(cls: type[Scatterer]) -> list[str]:
-    """`BSDF_INTERIOR`: the name of the medium inside, see kernels/media/medium.cl."""
-    interior = interior_params(cls)
-    first = row_words(cls) - sum(map(words, interior.values()))
-    inside = f"((row) + {1 + first})" if interior else "((integer)(0))"
-    if interior and "thin" in device_params(cls):  # a sheet has no inside
+def interior(cls: type[Scatterer]) -> str:
+    """The name of the medium inside of a material at `row`, see kernels/media/medium.cl."""
+    own = interior_params(cls)
+    first = row_words(cls) - sum(map(words, own.values()))
+    inside = f"((row) + {1 + first})" if own else "((integer)(0))"
+    if own and "thin" in device_params(cls):  # a sheet has no inside
         at = parameters.word_before(cls, "thin")
         thin = f"gather_i(scene.materials, (row) + {at}) != 0"
         inside = f"sel_i({thin}, (integer)(0), {inside})"
-    return [f"#define BSDF_INTERIOR(row) {inside}"]
+    return inside
 
 
 def _shift_text(cls: type[Scatterer]) -> list[str]:

@@ -12,7 +12,16 @@ from clpt.scene.cameras import Perspective
 from clpt.spectra import Tabulated
 
 # Of a program, not of a scene: how it is built, and what generated files define.
-OTHERS = {"LANES", "QUEUED", "SHADES_BOTH", "PART", "NOT_INLINED", "USES_MAPPINGS", "SLAB_BLOCK"}
+OTHERS = {
+    "LANES",
+    "QUEUED",
+    "SHADES_BOTH",
+    "SHADES_SEVERAL",
+    "PART",
+    "NOT_INLINED",
+    "USES_MAPPINGS",
+    "SLAB_BLOCK",
+}
 OPENCL = {"FP_FAST_FMAF"}  # what compilers define
 TABLES = flags.SCENE | flags.MATERIAL.keys()
 CONDITION = re.compile(r"^\s*#\s*(?:if|ifdef|ifndef|elif)\b(.*)", re.MULTILINE)

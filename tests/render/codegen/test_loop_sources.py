@@ -15,7 +15,7 @@ import pytest
 
 import clpt
 from clpt.device import Source
-from clpt.render.codegen import common, flags, programs
+from clpt.render.codegen import common, flags, programs, vertices
 from clpt.render.contract.features import Features
 from clpt.render.lowering.scene import lower
 from clpt.scene.cameras import Perspective
@@ -86,6 +86,8 @@ def test_only_stages_are_seen_outside(name: str) -> None:
                     outside.append(private["PART"])
                 elif shared := re.match(r"COMMON\(\w+, (\w+)\)", head):
                     outside.append(f"loop_{shared[1]}")
+                elif apart := re.match(r"APART\(\w+, loop_(\w+)_answer\)", head):
+                    outside.append(f"loop_material_{apart[1]}")
                 else:
                     assert head.startswith("kernel "), f"{program}: {head} is not private"
                     outside.append(own)
@@ -117,14 +119,38 @@ def test_kinds_of_paths_share_what_is_the_same() -> None:
     """Light paths and photons add what only they have."""
     name = "scenes/bulb/scene.json"
     alone = features_of(name, PathTracer(light_paths=0))
-    shading = {f"shade_{kind}" for kind in alone.materials.kinds}
-    camera = {"generate", "intersect", "shadow", "loop", "common", *shading}
+    camera = {"generate", "intersect", "shadow", "loop", "common"}
     beside = {"emit", "splat"}
-    assert programs.loop_sources(alone, "wide8", 8).keys() == camera
-    with_light_paths = features_of(name, PathTracer(light_paths=1))
-    assert programs.loop_sources(with_light_paths, "wide8", 8).keys() == camera | beside
-    with_photons = features_of(name, Vcm())
-    assert programs.loop_sources(with_photons, "wide8", 8).keys() == camera | beside | {"deposit"}
+    assert programs.loop_sources(alone, "wide8", 8).keys() == camera | shading(alone)
+    both = features_of(name, PathTracer(light_paths=1))
+    assert programs.loop_sources(both, "wide8", 8).keys() == camera | beside | shading(both)
+    photons = features_of(name, Vcm())
+    there = camera | beside | {"deposit"} | shading(photons)
+    assert programs.loop_sources(photons, "wide8", 8).keys() == there
+
+
+def shading(features: Features) -> set[str]:
+    """The parts of a loop that shade."""
+    found = vertices.vertices(features, 8)
+    kinds = [kind for vertex in found if vertex.shared for kind in vertex.kinds]
+    own = {f"material_{features.materials.leaves[kind].kind}" for kind in kinds}
+    return own | {vertex.program for vertex in found}
+
+
+def test_kinds_share_a_vertex_but_for_what_differs() -> None:
+    """All kinds are shaded, each by one vertex; photons are merged by each kind's own."""
+    diffuse_and_plastic, dielectric = (0, 2), (1,)
+    features = features_of("scenes/three_spheres/scene.json")
+    found = vertices.vertices(features, 8)
+    assert [vertex.kinds for vertex in found] == [diffuse_and_plastic, dielectric]
+    assert [vertex.kinds for vertex in vertices.vertices(features, 1)] == [(0,), (1,), (2,)]
+    made = programs.loop_sources(features, "wide8", 8)
+    vertex = made["shade_diffuse_and_others"]
+    assert "bsdf/plastic.cl" not in vertex.files and "path/vertex.cl" in vertex.files
+    part = made["material_plastic"]
+    assert "bsdf/plastic.cl" in part.files and "path/vertex.cl" not in part.files
+    merged = features_of("scenes/three_spheres/scene.json", Vcm())
+    assert not any(vertex.shared for vertex in vertices.vertices(merged, 8))
 
 
 def test_kinds_of_materials_share_what_is_long() -> None:

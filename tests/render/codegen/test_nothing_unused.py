@@ -38,7 +38,15 @@ def made(features: Features, lanes: int) -> dict[str, device.Source]:
 def test_only_compilers_are_asked(name: str, lanes: int) -> None:
     """No condition is left that a text decides by itself: all name what compilers define, or what
     follows from that, such as NATIVE_GATHER."""
-    own = {*flags.SCENE, *flags.MATERIAL, "QUEUED", "PART", "SHADES_BOTH", "SPECTRUM_SIZE"}
+    own = {
+        *flags.SCENE,
+        *flags.MATERIAL,
+        "QUEUED",
+        "PART",
+        "SHADES_BOTH",
+        "SHADES_SEVERAL",
+        "SPECTRUM_SIZE",
+    }
     for program, text in made(features_of(name, "spectral"), lanes).items():
         for condition in re.findall(r"^#(?:el)?if\w* (.*)", text.text, re.MULTILINE):
             assert own.isdisjoint(re.findall(r"\w+", condition)), (program, condition)

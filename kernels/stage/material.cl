@@ -1,0 +1,27 @@
+/* What a kind of material has of its own, as a part of the loop (stage/loop.cl) for a vertex that several kinds share:
+ * path/material_apart.cl. */
+#include "core/base.cl"
+#include "interface/shape.cl"
+#include "interface/light.cl"
+#include "generated/textures.cl"
+#include "optics/fresnel.cl"
+#include "optics/microfacet.cl"
+#include "interface/bsdf.cl"
+#include "generated/bsdf.cl"
+#include "generated/hero_steps.cl"
+#include "path/pair.cl"
+
+/* What a vertex asks for, of LANES paths. */
+inline BsdfAnswer material_answer(Bsdf m, vec3 wo, vec3 wi, vec3 u, int adjoint)
+{
+    BsdfAnswer a;
+    Spectrum every = spectrum_of(1.0f);
+    a.sample = bsdf_sample(m, wo, u);
+    pair_of_sample(m, wo, &a.sample);
+    if (adjoint) a.pair = bsdf_pair(m, wi, wo, every);
+    else a.pair = bsdf_pair(m, wo, wi, every);
+    return a;
+}
+
+#define APART(type, name) __attribute__((noinline)) type name
+#include "generated/material_part.cl"
