@@ -30,7 +30,7 @@ def warm(scenes: tuple[Path, ...], options: SceneOptions, verbose: int, quiet: b
     """
     for scene in scenes:
         locate(scene)
-    from .opening.makers import DeviceMaker
+    from .opening.factories import DeviceMaker
     from .opening.scenes import open_scene
     from .printing.display import display
 

@@ -14,7 +14,7 @@ from ...render.film import film_file
 from ...render.film.saved_film import SavedFilm, differences_text, ranges_text
 from ...scene import Scene
 from ...scene.fingerprint import fingerprint
-from ..opening.makers import AnyRenderer
+from ..opening.factories import AnyRenderer
 from ..printing.display import clock
 from . import outputs
 from .standard_output import is_standard

@@ -13,7 +13,7 @@ from ...render.analysis.lights import light_power
 from ...render.analysis.lights.sources import emissions_of
 from ...scene import Scene
 from ...scene.lights import Light
-from ..opening.makers import AnyRenderer
+from ..opening.factories import AnyRenderer
 from ..options.grading import Grading, for_screens
 
 MOSTLY_WHITE = 0.5  # of the lit pixels

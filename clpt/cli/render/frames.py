@@ -26,7 +26,7 @@ from ...scene.fingerprint import fingerprint
 from ...version import VERSION
 from ..files import outputs, targets
 from ..opening.devices import choose_devices
-from ..opening.makers import AnyRenderer, Maker, cluster_makers, device_makers
+from ..opening.factories import AnyRenderer, Maker, cluster_makers, device_makers
 from ..options.applied import changed
 from ..printing.display import Display, clock
 from ..process.stopping import STATUS, stops

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from ...choices import MOST_SAMPLES
 from ...render.progress import Progress
 from ...render.wavefront.wavefront import Counts
-from ..opening.makers import DEVICE_SECONDS, AnyRenderer
+from ..opening.factories import DEVICE_SECONDS, AnyRenderer
 
 GROWTH = 3  # times what has been rendered so far
 

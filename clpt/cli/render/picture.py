@@ -14,7 +14,7 @@ from ...render.film.saved_film import SavedFilm
 from ...render.progress import Progress
 from ...scene import Scene
 from ..files import checkpoints, outputs
-from ..opening.makers import AnyRenderer, DeviceMaker, Maker, cluster_makers, device_makers
+from ..opening.factories import AnyRenderer, DeviceMaker, Maker, cluster_makers, device_makers
 from ..opening.scenes import open_scene, read_scene
 from ..options.grading import for_screens
 from ..printing.display import Display

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..opening.makers import AnyRenderer
+from ..opening.factories import AnyRenderer
 
 
 def refusals(renderer: AnyRenderer) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from ..opening.makers import AnyRenderer
+from ..opening.factories import AnyRenderer
 from .passes import End
 
 TIMES = {  # of RenderStats.seconds
