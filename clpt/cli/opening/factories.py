@@ -1,4 +1,4 @@
-"""Makers of pictures: devices of this machine, or the workers of a cluster."""
+"""Factories of renderers: on devices of this machine, or on the workers of a cluster."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ CLUSTER_SECONDS = 30.0  # of a pass with noise, at the end of which workers wait
 AnyRenderer: TypeAlias = DevicePictures
 
 
-class Maker:
-    """Renders one picture after the other.
+class RendererFactory:
+    """Makes the renderer of one picture after the other.
 
     name: for people; frame: the number of the frame that is rendered, infinite without.
     """
@@ -63,8 +63,8 @@ class Maker:
         """End what would delay the end of the process, after a signal."""
 
 
-class DeviceMaker(Maker):
-    """Devices of this machine; renderer: the last one that was made."""
+class DeviceFactory(RendererFactory):
+    """Makes renderers on devices of this machine; renderer: the last one that was made."""
 
     renderer: AnyRenderer
 
@@ -91,16 +91,16 @@ class DeviceMaker(Maker):
         dev.kill_compilers()
 
 
-class ClusterMaker(Maker):
-    """The workers of a cluster, of which pictures with lower numbers come first.
+class ClusterFactory(RendererFactory):
+    """Makes renderers on the workers of a cluster, where lower numbers of pictures come first.
 
-    others: all makers of this cluster, itself among them; made: options of its renderer.
+    others: all factories of this cluster, itself among them; made: options of its renderer.
     """
 
     watch: Watch
 
     def __init__(
-        self, name: str, client: Client, others: list[ClusterMaker], made: Mapping[str, Any]
+        self, name: str, client: Client, others: list[ClusterFactory], made: Mapping[str, Any]
     ):
         self.name, self._client, self._others, self._made = name, client, others, made
         self.renderer: ClusterRenderer | None = None
@@ -144,20 +144,20 @@ def new_renderer(scene: Scene, devices: list[dev.Device], **made: Any) -> AnyRen
     return Renderer(scene, devices[0], **made)
 
 
-def device_makers(
+def device_factories(
     devices: list[dev.Device], options: SceneOptions, pictures: int
-) -> list[DeviceMaker]:
-    """Return a maker for each device, or one of all where there are fewer pictures."""
+) -> list[DeviceFactory]:
+    """Return a factory for each device, or one of all where there are fewer pictures."""
     if pictures < len(devices):
-        return [DeviceMaker(devices, options)]
-    return [DeviceMaker([one], options) for one in devices]  # with nothing to add up
+        return [DeviceFactory(devices, options)]
+    return [DeviceFactory([one], options) for one in devices]  # with nothing to add up
 
 
 @contextmanager
-def cluster_makers(
+def cluster_factories(
     workers: Workers, options: SceneOptions, pictures: int, shown: Display
-) -> Iterator[list[ClusterMaker]]:
-    """Yield makers of the workers at an address; pictures: that may be rendered at a time."""
+) -> Iterator[list[ClusterFactory]]:
+    """Yield factories of the workers at an address; pictures: that may be rendered at a time."""
     from .workers import Watch, connected
 
     device = options.machine.device
@@ -165,10 +165,10 @@ def cluster_makers(
     made = options.made | {"device": None if several else device}  # one alone makes the pictures
     made = {name: value for name, value in made.items() if value is not None}
     with connected(workers, options.machine, shown) as client:
-        makers: list[ClusterMaker] = []
+        factories: list[ClusterFactory] = []
         for _ in range(min(pictures, OVERLAP)):
-            makers.append(ClusterMaker(workers.cluster or "", client, makers, made))
-        watch = Watch(lambda: [maker.renderer for maker in makers if maker.renderer], shown)
-        for maker in makers:
-            maker.watch = watch
-        yield makers
+            factories.append(ClusterFactory(workers.cluster or "", client, factories, made))
+        watch = Watch(lambda: [one.renderer for one in factories if one.renderer], shown)
+        for factory in factories:
+            factory.watch = watch
+        yield factories
