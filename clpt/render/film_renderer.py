@@ -66,12 +66,13 @@ OnProgress = Callable[[Progress], bool | None]
 class FilmRenderer(FilmOwner, Pictures):
     """Base of renderers: a film, whose samples come from a maker.
 
-    maker: takes the samples; first_sample: the number of the first one.
+    maker: takes the samples; denoise: the denoiser that the film is for; first_sample: the number
+    of the first sample.
     """
 
-    def __init__(self, maker: Maker, first_sample: int = 0):
+    def __init__(self, maker: Maker, denoise: str | None = None, first_sample: int = 0):
         super().__init__()
-        self._maker, self.denoise = maker, maker.denoise
+        self._maker, self.denoise = maker, denoise
         self._stop = Stop()
         self._first_sample = checked_number(first_sample)
         self._seconds: dict[str, float] = {}  # to the first sample
@@ -473,10 +474,12 @@ class FilmRenderer(FilmOwner, Pictures):
     def _put(
         self, what: str, film: FilmState, after: Contents, counts: Counts | None = None
     ) -> None:
-        """Let the film be another one, which may have counts; after: what it then holds."""
+        """Let the film be another one; after: what it then holds; counts: where it goes on."""
 
         def put(_: BaseException | None = None) -> Contents:
             self._maker.put(film, counts)
+            if counts is not None:
+                self._held, self._seconds_rendered = None, 0.0
             return after
 
         with self._change(what, put):
@@ -535,7 +538,7 @@ class FilmRenderer(FilmOwner, Pictures):
             Session(now.began, took, VERSION, device)
             for device, took in zip(self._maker.classes, seconds, strict=False)
         ]
-        arrays = {} if now.adaptive is None else self._maker.arrays_of(now.adaptive)
+        arrays = {} if now.adaptive is None else now.adaptive.arrays()
         return {"sessions": (*now.sessions, *sessions), "adaptive": arrays}
 
     def _saved(self, film: FilmState, counts: Counts, so_far: dict[str, Any]) -> SavedFilm:
@@ -560,7 +563,6 @@ class FilmRenderer(FilmOwner, Pictures):
         chosen = self._maker.adaptively(saved.adaptive, 0) if saved.adaptive else None
         restored = Contents(saved.film.taken, chosen, saved.sessions)
         self._put("load_state", saved.film, restored, Counts(**saved.counts))
-        self._held, self._seconds_rendered = None, 0.0
         self._warn_of_others()
 
     def denoised(self, method: str | None = None) -> Image:

@@ -398,6 +398,32 @@ def test_a_film_that_does_not_fit_changes_nothing(maker, make, plan):
     assert renderer.run(2) and renderer.samples == 5
 
 
+@pytest.mark.parametrize("plan", [pytest.param(QUICK["noise"], id="noise")])
+@pytest.mark.parametrize("maker", MAKERS)
+def test_a_stop_before_a_film_is_put_leaves_all_as_it_was(maker, make, plan, monkeypatch):
+    """Also the state of adaptive sampling, and where it is saved."""
+    renderer = make("device")
+    assert renderer.run(MOST, noise=plan.noise)
+    other = renderer._saved_film()
+    renderer = make(maker)
+    assert renderer.run(SPLIT[0], noise=plan.noise)
+    before = renderer._saved_film()
+
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(type(renderer), "_put", stop)
+        with pytest.raises(KeyboardInterrupt):
+            renderer._restore(other)
+    after = renderer._saved_film()
+    check_film(after.film, before.film)
+    check_arrays(dict(after.adaptive), dict(before.adaptive))
+    assert not np.array_equal(after.adaptive["next"], other.adaptive["next"])
+    assert renderer.run(MOST - SPLIT[0], noise=plan.noise)
+    check_film(renderer.film_state(), other.film)
+
+
 def test_a_worker_s_renderer_keeps_no_choice_of_another_scene():
     """Light paths suit the ball of glass, not the box without it: "auto" is asked for each."""
     with_ball = PLANS["rgb"].scene
