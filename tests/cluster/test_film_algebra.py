@@ -30,8 +30,8 @@ from clpt.errors import SceneError
 from clpt.render.film import film_file
 from clpt.render.film.pictures import Pictures
 from clpt.render.film.saved_film import SavedFilm
-from clpt.render.film_renderer import FilmRenderer
 from clpt.render.pictures import DevicePictures
+from clpt.render.resumable import ResumableRenderer
 from clpt.render.wavefront.wavefront import Counts
 from clpt.scene import Scene, shapes
 from clpt.scene.integrators import (
@@ -226,7 +226,7 @@ def pictures(source: Pictures) -> dict[str, np.ndarray]:
     return found
 
 
-def files(source: FilmRenderer | SavedFilm, folder: Path) -> dict[str, dict[str, np.ndarray]]:
+def files(source: ResumableRenderer | SavedFilm, folder: Path) -> dict[str, dict[str, np.ndarray]]:
     """What files of a film hold, by suffix and the names of channels."""
     found = {}
     for suffix in FORMATS:
@@ -323,7 +323,7 @@ def test_films_add_in_any_order_and_grouping(maker, make, plan, whole, tmp_path)
     check(renderer, whole)
 
 
-def check_files(source: FilmRenderer | SavedFilm, whole: Whole, folder: Path) -> None:
+def check_files(source: ResumableRenderer | SavedFilm, whole: Whole, folder: Path) -> None:
     found = files(source, folder)
     for suffix, wanted in whole.files.items():
         check_arrays(found[suffix], wanted)
