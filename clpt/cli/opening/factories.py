@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 from ... import device as dev
 from ...render.pictures import DevicePictures
@@ -30,8 +30,6 @@ OVERLAP = 2  # pictures of a cluster at a time: workers begin the next one while
 DEVICE_SECONDS = 3.0  # of a pass: at its end few paths are left; only there is there a checkpoint
 CLUSTER_SECONDS = 30.0  # of a pass with noise, at the end of which workers wait for each other
 
-AnyRenderer: TypeAlias = DevicePictures
-
 
 class RendererFactory:
     """Makes the renderer of one picture after the other.
@@ -42,7 +40,7 @@ class RendererFactory:
     name = ""
     frame = math.inf
 
-    def make(self, scene: Scene, shown: Display, first_sample: int = 0) -> AnyRenderer:
+    def make(self, scene: Scene, shown: Display, first_sample: int = 0) -> DevicePictures:
         """Return a new renderer of a scene, which takes samples from this number on."""
         raise NotImplementedError
 
@@ -66,14 +64,14 @@ class RendererFactory:
 class DeviceFactory(RendererFactory):
     """Makes renderers on devices of this machine; renderer: the last one that was made."""
 
-    renderer: AnyRenderer
+    renderer: DevicePictures
 
     def __init__(self, devices: list[dev.Device], options: SceneOptions):
         self.devices = devices
         self.name = " and ".join(on.info.label for on in devices)
         self._made = options.made
 
-    def make(self, scene: Scene, shown: Display, first_sample: int = 0) -> AnyRenderer:
+    def make(self, scene: Scene, shown: Display, first_sample: int = 0) -> DevicePictures:
         """Return a new renderer of a scene; note its warnings."""
         text = f"building kernels for {device_names([on.info for on in self.devices])}"
         compiling = shown.compiling(text)
@@ -135,7 +133,7 @@ class ClusterFactory(RendererFactory):
         return -self.frame
 
 
-def new_renderer(scene: Scene, devices: list[dev.Device], **made: Any) -> AnyRenderer:
+def new_renderer(scene: Scene, devices: list[dev.Device], **made: Any) -> DevicePictures:
     """Return a renderer on one device, or on several."""
     if len(devices) > 1:
         from ...cluster.multi_renderer import MultiRenderer

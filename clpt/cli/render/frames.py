@@ -21,12 +21,13 @@ from ... import images
 from ...device import share_compilers
 from ...errors import ClusterError, SceneError
 from ...render.analysis.checks import check
+from ...render.pictures import DevicePictures
 from ...scene import Scene
 from ...scene.fingerprint import fingerprint
 from ...version import VERSION
 from ..files import outputs, targets
 from ..opening.devices import choose_devices
-from ..opening.factories import AnyRenderer, RendererFactory, cluster_factories, device_factories
+from ..opening.factories import RendererFactory, cluster_factories, device_factories
 from ..options.applied import changed
 from ..printing.display import Display, clock
 from ..process.stopping import STATUS, stops
@@ -187,7 +188,7 @@ class _FrameLoop:
 
     def _work(self, factory: RendererFactory, reader: ThreadPoolExecutor) -> None:
         """Render frames with renderers of a factory, till none is left."""
-        renderer: AnyRenderer | None = None
+        renderer: DevicePictures | None = None
         try:
             while (taken := self._take(reader)) is not None:
                 frame, scene = taken
@@ -227,8 +228,8 @@ class _FrameLoop:
         scene: Scene,
         digest: str,
         factory: RendererFactory,
-        renderer: AnyRenderer | None,
-    ) -> AnyRenderer | None:
+        renderer: DevicePictures | None,
+    ) -> DevicePictures | None:
         """Render a frame unless it is complete; return the renderer for the next one."""
         plan = self.plan
         if plan.is_complete(frame, digest):
@@ -271,8 +272,8 @@ class _FrameLoop:
 
 
 def _showing(
-    scene: Scene, factory: RendererFactory, renderer: AnyRenderer | None, shown: Display
-) -> AnyRenderer:
+    scene: Scene, factory: RendererFactory, renderer: DevicePictures | None, shown: Display
+) -> DevicePictures:
     """Return a renderer of a scene: the one that there is, if it can take the scene."""
     if renderer is not None:
         try:
