@@ -18,7 +18,8 @@ from clpt import device
 # the processes that tests start take a second each to parse all sources, where none keeps bytecode
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
-os.environ.setdefault("POCL_WORK_GROUP_SPECIALIZATION", "0")  # as of the command
+os.environ.setdefault("POCL_WORK_GROUP_SPECIALIZATION", "0")  # both as of the command
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 gc.disable()  # what collection makes stays: to seek garbage in it takes a third of the time
 HERE = Path(__file__).resolve().parent
 # Tests that start processes, and wait for what the machine's other work may hold up.

@@ -16,7 +16,7 @@ BOUNDS = {
     "lines of the longest function": 60,
     "functions with 8 or more parameters": 4,
     "parameters of a function, most": 10,
-    "#if, #ifdef, #ifndef and #elif in kernels": 166,
+    "#if, #ifdef, #ifndef and #elif in kernels": 170,
     "lines of the longest kernel function": 50,
     "#if of a kernel function, most": 3,
     "kernel functions over 60 lines": 0,
@@ -28,12 +28,12 @@ BOUNDS = {
     "rooms in circles of imports": 0,
     "stays of a scene from render() to the tables": 37,
     "rooms of these stays": 20,
-    "lines of Python": 82_400,
-    "lines of OpenCL": 19_540,
+    "lines of Python": 82_700,
+    "lines of OpenCL": 19_700,
     "words of README.md": 1_200,
     "docstrings that begin with What, Of, How, Those, The same": 0,
     "lines of accumulate of Cornell's box": 205,
-    "lines of shade_diffuse of Cornell's box": 1_705,
+    "lines of shade_diffuse of Cornell's box": 1_760,
 }
 SHOWN = 12  # places of a figure that has risen
 
