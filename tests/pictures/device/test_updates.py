@@ -16,9 +16,9 @@ import clpt
 from clpt import device
 from clpt import transforms as tf
 from clpt.errors import MemoryBudgetError, SceneError
+from clpt.render.device_film import DeviceFilm
 from clpt.render.editing.rebuild import has_other_paths
 from clpt.render.lowering.scene import lower
-from clpt.render.device_film import DeviceFilm
 from clpt.scene import Scene
 from clpt.scene import materials as m
 from clpt.scene.cameras import Perspective
