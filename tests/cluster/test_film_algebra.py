@@ -384,6 +384,7 @@ def test_a_film_that_does_not_fit_changes_nothing(maker, make, plan):
     torn = {name: array for name, array in saved.adaptive.items() if name != "next"}
     narrow = dataclasses.replace(saved.film, words=saved.film.words[..., :-1])
     other = dataclasses.replace(saved.origin, kernels="0")
+    way = {**saved.origin.settings, "chosen.guiding": True}
     renderer = make(maker)
     assert renderer.run(3)
     before = renderer.film_state()
@@ -391,6 +392,7 @@ def test_a_film_that_does_not_fit_changes_nothing(maker, make, plan):
         ({"adaptive": torn}, "adaptive sampling does not fit"),
         ({"film": narrow}, "another form"),
         ({"origin": other}, "kernels: of clpt"),
+        ({"origin": dataclasses.replace(other, settings=way)}, "kernels: of clpt"),
     ):
         with pytest.raises(SceneError, match=told):
             renderer._restore(dataclasses.replace(saved, **changes))
