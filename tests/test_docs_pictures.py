@@ -18,6 +18,7 @@ from clpt.scene.params import Kind
 from docs.pictures import gallery
 
 ROOT = Path(__file__).resolve().parents[1]
+SMALL = 19  # pictures of the gallery; may only fall
 
 
 @pytest.fixture(scope="module")
@@ -76,8 +77,15 @@ def test_pictures_of_the_gallery_are_clean():
     assert [p for p in pictures if p.grain > 3.0 or p.sparks > 0.0025] == []
 
 
+def test_pictures_of_the_gallery_are_large():
+    """1280 pixels along the longer side; the animation is small."""
+    sizes = {p.name: max(p.size) for p in gallery.pictures()}
+    small = sorted(name for name, size in sizes.items() if size < 1280 and name != "turn.webp")
+    assert len(small) <= SMALL, f"smaller than 1280: {', '.join(small)}"
+
+
 def test_grain_and_sparks_are_found(tmp_path):
-    """Half of the pixels are 4 off their even surround, then 1 of 100 is a spark."""
+    """A quarter of the pixels are 4 above an even grey and a quarter below; 1 of 100 is a spark."""
     grey = np.full((40, 40), 100, np.uint8)
     grainy, sparks = grey.copy(), grey.copy()
     grainy[::2, ::2] += 4
