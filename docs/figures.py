@@ -1,7 +1,7 @@
 """Writes the tables of figures in README.md and docs/*.md: `python -m docs.figures`.
 
 A table stands between <!-- figures: NAME --> and <!-- end of figures -->. NAME is a function of
-`TABLES`; its numbers are the newest records of bench/results.
+`TABLES`; its numbers are the newest records of bench/results, or measured in the gallery's files.
 """
 
 from __future__ import annotations
@@ -16,6 +16,8 @@ from typing import Any
 import numpy as np
 
 from bench.report import RESULTS, table
+
+from .pictures import gallery as pictures
 
 ROOT = Path(__file__).resolve().parents[1]
 PLACE = re.compile(r"(<!-- figures: (\w+) -->\n).*?(<!-- end of figures -->)", re.S)
@@ -202,6 +204,21 @@ def media() -> str:
     return table(["scene", "RGB", "spectral"], body)
 
 
+def gallery() -> str:
+    """Return sizes and noise of the gallery's pictures."""
+    body = (
+        [
+            f"`{p.name}`",
+            "x".join(map(str, p.size)),
+            f"{p.grain:.0f}",
+            f"{p.mean:.2f}",
+            f"{p.sparks:.3%}".replace("%", " %"),
+        ]
+        for p in pictures.pictures()
+    )
+    return table(["picture", "pixels", "median", "mean", "bright pixels"], body)
+
+
 TABLES: dict[str, Callable[[], str]] = {
     one.__name__: one
     for one in (
@@ -215,6 +232,7 @@ TABLES: dict[str, Callable[[], str]] = {
         bands,
         queries,
         media,
+        gallery,
     )
 }
 

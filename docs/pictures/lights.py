@@ -136,7 +136,7 @@ LIGHTS = {
     "projector": lit(
         "Throws an image at the wall.",
         lights.Projector(
-            image=Bitmap(image=SCENES / "poppy_field" / "picture.png"),
+            image=Bitmap(image=SCENES / "poppy_field" / "picture.jpg"),
             irradiance=(105.0, 105.0, 105.0), fov=34.0,
             to_world=look_at([0.4, 2.2, 4.6], [0.0, 1.25, -1.6], UP),
         ),

@@ -26,7 +26,7 @@ from clpt.transforms import rotate, scale, translate
 
 from .studio import PLACES, SMALL, WIDE, Picture, arc, lathe, near_camera, studio
 
-FIELD = Path(__file__).parents[2] / "scenes" / "poppy_field" / "picture.png"
+FIELD = Path(__file__).parents[2] / "scenes" / "poppy_field" / "picture.jpg"
 RED, CREAM, DARK = (0.6, 0.07, 0.04), (0.8, 0.72, 0.58), (0.03, 0.06, 0.16)
 BALL = rotate([1, 0, 0], 90)  # an image stands upright on it
 

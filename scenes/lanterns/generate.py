@@ -137,7 +137,6 @@ def scene() -> Scene:
     ]
     screen = tf.translate([0, 2.6, -LENGTH + 3.0])
     sea = tf.translate([0, 0, 2.0 - LENGTH / 2]) @ tf.rotate([1, 0, 0], -90)
-    shows = Path("..") / "three_spheres" / "picture.png"
     return Scene(
         camera=Perspective(to_world=tf.look_at([0.7, 1.75, 3.4], [0, 2.2, -9], [0, 1, 0]), fov=58),
         shapes=[
