@@ -15,12 +15,7 @@ from ...render.pictures import DevicePictures
 from ...render.progress import Progress
 from ...scene import Scene
 from ..files import checkpoints, outputs
-from ..opening.factories import (
-    DeviceFactory,
-    RendererFactory,
-    cluster_factories,
-    device_factories,
-)
+from ..opening.factories import DeviceFactory, RendererFactory, cluster_factories, device_factories
 from ..opening.scenes import open_scene, read_scene
 from ..options.grading import for_screens
 from ..printing.display import Display
