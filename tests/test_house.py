@@ -12,15 +12,15 @@ from bench import house, imports, kernel_files, python_files, walks
 # the table. A size in lines may be raised for a feature that is worth it.
 BOUNDS = {
     "functions over 60 lines": 0,
-    "functions over 40 lines": 14,
-    "lines of the longest function": 60,
+    "functions over 40 lines": 12,
+    "lines of the longest function": 56,
     "functions with 8 or more parameters": 4,
     "parameters of a function, most": 10,
     "#if, #ifdef, #ifndef and #elif in kernels": 170,
     "lines of the longest kernel function": 50,
     "#if of a kernel function, most": 3,
     "kernel functions over 60 lines": 0,
-    "compile-time flags of a scene": 45,
+    "compile-time flags of a scene": 44,
     "fields of a record of features, most": 10,
     "getattr(": 54,
     ": Any": 250,

@@ -178,6 +178,19 @@ def build_parts(
         trees.append(_build(building, vertices, faces[i:j], tags[i:j], layout, quality))
     if len(trees) == 1:
         return trees[0], np.zeros((1, 2), np.uint32)
+    buffers, offsets = _joined(building, trees)
+    stats = {"trees": len(trees), "seconds": time.perf_counter() - start}
+    parts = tuple(
+        replace(tree_.parts[0], nodes=nodes, leaves=leaves, first=first)
+        for tree_, (nodes, leaves), first in zip(trees, offsets.tolist(), runs.firsts, strict=False)
+    )
+    return Bvh(layout, runs.firsts[-1], buffers, parts, stats), offsets
+
+
+def _joined(
+    building: Building, trees: list[Bvh]
+) -> tuple[dict[str, cl.Buffer], NDArray[np.uint32]]:
+    """Copy trees into shared buffers; return these, and the offsets as `build_parts` does."""
     sizes = np.array([[b.size for b in (t.buffers["nodes"], t.buffers["leaves"])] for t in trees])
     offsets = np.cumsum(sizes, axis=0) - sizes
     buffers = {}
@@ -186,13 +199,7 @@ def build_parts(
         for tree_, offset in zip(trees, own, strict=True):
             building.stream.copy(buffers[name], tree_.buffers[name], dst_offset=int(offset))
     building.stream.wait()
-    stats = {"trees": len(trees), "seconds": time.perf_counter() - start}
-    offsets //= 32
-    parts = tuple(
-        replace(tree_.parts[0], nodes=nodes, leaves=leaves, first=first)
-        for tree_, (nodes, leaves), first in zip(trees, offsets.tolist(), runs.firsts, strict=False)
-    )
-    return Bvh(layout, runs.firsts[-1], buffers, parts, stats), offsets.astype(np.uint32)
+    return buffers, (offsets // 32).astype(np.uint32)
 
 
 def build_boxes(device: Device, boxes: NDArray, layout: str = "shapes_binary") -> Bvh:

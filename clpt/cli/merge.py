@@ -60,18 +60,22 @@ def merge(
     total = added(films)
     for change in other_devices(total.sessions, total.sessions[0].device):
         note(f"clpt: warning: the films are of several classes of devices: {change}")
+    stats = _figures(total) | {"films": len(films)}
+    outputs.write_all(targets, total, stats, how, note, denoise)
+    note(checkpoints.summary(total))
+
+
+def _figures(total: SavedFilm) -> dict[str, str | int | float]:
+    """Return what a picture's file says of how it was made."""
     origin = total.origin.scene.values
-    stats: dict[str, str | int | float] = {
+    return {
         "software": f"clpt {VERSION}",
         "integrator": str(origin["integrator.type"]),
         "sampler": str(origin["sampler.type"]),
         "seed": int(origin["seed"] or 0),
         "spp": float(total.samples_per_pixel().mean(dtype=float)),
-        "films": len(films),
         "seconds": round(total.seconds, 3),
     }
-    outputs.write_all(targets, total, stats, how, note, denoise)
-    note(checkpoints.summary(total))
 
 
 def added(films: tuple[Path, ...]) -> SavedFilm:

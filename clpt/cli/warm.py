@@ -30,7 +30,7 @@ def warm(scenes: tuple[Path, ...], options: SceneOptions, verbose: int, quiet: b
     """
     for scene in scenes:
         locate(scene)
-    from .opening.makers import DeviceMaker
+    from .opening.factories import DeviceFactory
     from .opening.scenes import open_scene
     from .printing.display import display
 
@@ -38,7 +38,7 @@ def warm(scenes: tuple[Path, ...], options: SceneOptions, verbose: int, quiet: b
         shown, began = display(quiet, None), time.perf_counter()
         with ExitStack() as resources:
             opened = open_scene(scene, options, shown, resources)
-            renderer = DeviceMaker(opened.devices, options).make(opened.scene, shown)
+            renderer = DeviceFactory(opened.devices, options).make(opened.scene, shown)
             with shown.phase("compiling for the first samples"):
                 renderer.prepare()
         builds, seconds = [on.builds for on in renderer.devices], time.perf_counter() - began

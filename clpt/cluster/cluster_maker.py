@@ -65,7 +65,6 @@ class ClusterMaker(HostMaker):
         options: Mapping[str, Any],
     ):
         self.start = time.perf_counter()
-        self.denoise = options.get("denoise")
         self.farm, self._device, self._options = farm, device, options
         self._home: DeviceFilm | None = None
         self._sum = self._whole = FilmSum()  # of all films, and of those of whole blocks
@@ -79,12 +78,13 @@ class ClusterMaker(HostMaker):
 
     def _pack(self, scene: Scene) -> None:
         """Write the scene as workers get it."""
-        self._scene = scene = needs.prepared(scene, self.denoise)
+        denoise = self._options.get("denoise")
+        self._scene = scene = needs.prepared(scene, denoise)
         self._folder = tempfile.TemporaryDirectory(prefix="clpt-bundle-")
         folder = Path(self._folder.name)
         bundle = pack(scene, folder)
         options = {name: self._options[name] for name in self._options if name != "denoise"}
-        if needs.halves(scene, self.denoise):
+        if needs.halves(scene, denoise):
             options["halves"] = True
         self.job = Job(tasks.describe_job(bundle, options), bundle, folder)
 

@@ -61,7 +61,8 @@ class ClusterRenderer(DevicePictures):
         self.farm = Farm(client, mixed=mixed, patience=patience)
         if beside is not None:
             self.farm.known.agreed = beside.farm.known.agreed
-        super().__init__(ClusterMaker(scene, self.farm, device, options), first_sample)
+        maker = ClusterMaker(scene, self.farm, device, options)
+        super().__init__(maker, options.get("denoise"), first_sample)
 
     @property
     def digest(self) -> str:

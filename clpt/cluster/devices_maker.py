@@ -21,7 +21,7 @@ from clpt.render.options import RenderOptions
 from clpt.render.wavefront.adaptive import Adaptive
 from clpt.render.wavefront.film_state import FilmState, Ranges
 from clpt.render.wavefront.tracer import Selection
-from clpt.render.wavefront.wavefront import Counts
+from clpt.render.wavefront.wavefront import Counts, Wavefront
 from clpt.scene import Scene
 from clpt.scene.fingerprint import Plain
 from clpt.scene.integrators import Integrator
@@ -31,13 +31,12 @@ class DevicesMaker(HostMaker):
     """Devices that share the samples, each with a film of its own.
 
     options: see `RenderOptions`. The first device that has not failed is the home. What it knows of
-    noise is kept on the host after each call: where it fails, the call begins again on the next
-    one, which takes the same samples and comes to the same decisions.
+    noise is kept on the host after each call, by `Adaptive.keep`: where it fails, the call begins
+    again on the next one, which takes the same samples and comes to the same decisions.
     """
 
     def __init__(self, scene: Scene, devices: Sequence[dev.Device], options: RenderOptions):
         self.start = time.perf_counter()
-        self.denoise = options.get("denoise")
         if options.get("texture_budget") is None:
             options["texture_budget"] = min(texture_budget_of(device) for device in devices)
         share = Once()
@@ -49,8 +48,6 @@ class DevicesMaker(HostMaker):
             else:
                 self._lost_at_first.append(f"{name} failed and is left out: {result}")
         self.crew = Crew(workers)
-        self._measures: DeviceFilm | None = None  # noise
-        self._state: Mapping[str, NDArray[Any]] = {}  # of adaptive sampling, after the last call
 
     # ---- what there is
 
@@ -99,7 +96,8 @@ class DevicesMaker(HostMaker):
 
         The film holds what devices took. With adaptive sampling an error leaves it as it was.
         """
-        film, state, adaptive = self.crew.saved, self._state, more.adaptive
+        film, adaptive = self.crew.saved, more.adaptive
+        state = {} if adaptive is None else adaptive.arrays()
 
         def settle(error: BaseException | None) -> Contents:
             self.crew.rest()
@@ -121,21 +119,19 @@ class DevicesMaker(HostMaker):
         """
         if adaptive is None:
             return self.add(self.crew.whole, call.first, call.end, tick)
-        film, state = self.film, self._state
+        film, state = self.film, adaptive.arrays()
         while True:
-            measures = self._measures
             try:
-                if measures is not self.home:
+                if adaptive.wavefront is not self.home.wavefront:
                     adaptive.become(self.adaptively(state, 0))
-                measures = self._measures
                 finished = self._run_adaptively(call, adaptive, tick)
                 self.gather()
-                self._state = adaptive.arrays()
+                adaptive.keep()
                 return finished
             except SceneError:
                 raise
             except Exception as error:
-                self._drop(measures, error)
+                self._drop(adaptive.wavefront, error)
                 self.put(film)
 
     def _run_adaptively(self, call: Call, adaptive: Adaptive, tick: Callable[[], bool]) -> bool:
@@ -159,17 +155,12 @@ class DevicesMaker(HostMaker):
             home = self.home
             try:
                 begun = super().adaptively(arrays, first)
-                self._state = begun.arrays()
-                self._measures = home
+                begun.keep()
                 return begun
             except SceneError:
                 raise
             except Exception as error:
-                self._drop(home, error)
-
-    def arrays_of(self, adaptive: Adaptive) -> Mapping[str, NDArray[Any]]:
-        """Return the state of adaptive sampling as the last call left it."""
-        return self._state
+                self._drop(home.wavefront, error)
 
     # ---- the film
 
@@ -196,7 +187,7 @@ class DevicesMaker(HostMaker):
             try:
                 return home.no_words
             except Exception as error:
-                self._drop(home, error)
+                self._drop(home.wavefront, error)
 
     def put(self, state: FilmState | None, counts: Counts | None = None) -> None:
         """Let the film be another one."""
@@ -251,10 +242,10 @@ class DevicesMaker(HostMaker):
 
     # ---- inside
 
-    def _drop(self, maker: DeviceFilm | None, error: BaseException) -> None:
+    def _drop(self, wavefront: Wavefront, error: BaseException) -> None:
         """Leave a device out from now on. Raises the error where no other is left."""
         for worker in list(self.crew.workers):
-            if worker.film is maker:
+            if worker.film.wavefront is wavefront:
                 self.crew.drop(worker, error)
         if not self.crew.workers:
             raise error

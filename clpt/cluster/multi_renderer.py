@@ -62,7 +62,8 @@ class MultiRenderer(DevicePictures):
             raise DeviceError("a queue is of one device; give a Renderer the queue")
         threads, profiling = options.pop("threads", None), options.get("profiling", False)
         chosen = dev.choose_all(devices, profiling=profiling, threads=threads)
-        super().__init__(DevicesMaker(scene, chosen, options), options.get("first_sample") or 0)
+        maker = DevicesMaker(scene, chosen, options)
+        super().__init__(maker, options.get("denoise"), options.get("first_sample") or 0)
 
     @property
     def shares(self) -> tuple[DeviceShare, ...]:

@@ -23,6 +23,7 @@ from clpt.cluster.bundle import Bundle, Store, canonical
 from clpt.cluster.multi_renderer import MultiRenderer
 from clpt.errors import ClptError, ClusterError, MemoryBudgetError, SceneError
 from clpt.render.device_film import kernels_digest
+from clpt.render.film_renderer import maker_of
 from clpt.render.renderer import Renderer
 from clpt.render.wavefront.film_state import DIMENSIONS, FilmState
 from clpt.render.wavefront.tracer import Paths, Selection
@@ -55,7 +56,7 @@ class _Job:
             if len(devices) > 1
             else Renderer(scene, devices[0], **options)
         )
-        self.options, self._tracer = options, self.renderer._maker.tracer()
+        self.options, self._tracer = options, maker_of(self.renderer).tracer()
         self._packed: Reply | None = None  # the selection that was taken last
         self._selection: Selection | None = None
 
@@ -67,7 +68,7 @@ class _Job:
         except (SceneError, MemoryBudgetError) as error:
             log.debug("a renderer cannot take the next scene: %s", error)
             return False
-        self._tracer = self.renderer._maker.tracer()
+        self._tracer = maker_of(self.renderer).tracer()
         return True
 
     def block(

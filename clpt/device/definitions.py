@@ -16,7 +16,7 @@ from .conditions import BRANCHING, OPENING
 from .text_rows import Row, joined, rows_of
 
 _WORD = re.compile(r"[A-Za-z_]\w*")
-_PASTED_MEMBER = re.compile(r"(?:\.|->)(\w*)\s*##\s*(\w*)")
+_PASTED_MEMBER = re.compile(r"->(\w*)\s*##\s*(\w*)")
 _PASTED = re.compile(r"(?<![.\w])(?<!->)(\w*)\s*##\s*(\w*)")  # but for members
 _FUNCTION = re.compile(  # types, a name, arguments without brackets, and a body or nothing
     r"\s*(?:[A-Za-z_]\w*[\s*]+)+?(?P<name>[A-Za-z_]\w*)\s*\([^()]*\)\s*(?:\{.*\}|;)\s*\Z", re.DOTALL
@@ -212,7 +212,7 @@ def with_gaps(
 
 
 def _pasted_members(row: Row, names: Iterable[str]) -> set[str]:
-    """Return the names, of `names`, that a macro pastes together behind a point or an arrow."""
+    """Return the names, of `names`, that a macro pastes together behind an arrow."""
     arguments = {"", *_WORD.findall(row.macro[0])}
     found: set[str] = set()
     for begin, end in _PASTED_MEMBER.findall(row.code):

@@ -58,6 +58,7 @@ from clpt.version import VERSION
 log = logging.getLogger("clpt.render.renderer")  # which the documentation names
 
 TEXTURE_SHARE = 0.5  # of a device's free memory, for bitmaps
+WAY = tuple(f"chosen.{name}" for name in ("integrator", "light_paths", "guiding", "splatting"))
 TO_OUTPUT = ("to_first", "to_second", "to_third")
 
 Apply = Callable[..., None]  # takes what writes a change, see `FilmRenderer._apply`
@@ -348,11 +349,13 @@ class DeviceFilm:
         return write, [*lowered.warnings, *remarks]
 
     def other_way(self, origin: Origin) -> Integrator | None:
-        """Return the integrator that made a film of the scene, if another one was chosen here."""
+        """Return the integrator that made a film of the scene, if no more was chosen otherwise."""
         own = self.origin()
         if not self.scene.integrator.leaves_choice or own.settings == origin.settings:
             return None
-        return None if own.scene.differences(origin.scene) else origin.way
+        chosen = {name: origin.settings.get(name) for name in WAY}
+        alike = replace(own, settings={**own.settings, **chosen})
+        return None if alike.differences(origin) else origin.way
 
     def follow(self, way: Integrator, apply: Apply, share: Share | None = None) -> None:
         """Render in another way, if its film has another form; see `update`."""

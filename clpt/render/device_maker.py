@@ -20,7 +20,7 @@ class DeviceMaker(Maker):
     shows_meanwhile = True
 
     def __init__(self, home: DeviceFilm):
-        self._home, self.denoise, self.start = home, home.denoise, home.start
+        self._home, self.start = home, home.start
         self._discards = False
 
     @property

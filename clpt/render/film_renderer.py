@@ -1,7 +1,6 @@
 """The base of renderers on a device, on several, and on a cluster.
 
-It asks a maker for samples, and the film that they make is developed, denoised, saved and gone
-on with.
+It asks a maker for samples, and the film that they make is developed and denoised.
 """
 
 from __future__ import annotations
@@ -10,7 +9,6 @@ import dataclasses
 import logging
 import time
 from collections.abc import Callable, Mapping
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,36 +20,30 @@ from clpt.arrays import Image
 from clpt.choices import MOST_SAMPLES, Exposure
 from clpt.colour.view import View
 from clpt.denoise import needs
-from clpt.errors import ClptError, DeviceError, MemoryBudgetError, SceneError
+from clpt.errors import ClptError, DeviceError, SceneError
 from clpt.render.contents import Change, Contents, FilmOwner
 from clpt.render.device_film import Changes
 from clpt.render.editing.scene_edit import MaterialKey, ShapeKey
-from clpt.render.film import film_file
 from clpt.render.film.denoised_picture import DenoisedPicture
 from clpt.render.film.developed import Developed
 from clpt.render.film.layer_channels import write_layers
 from clpt.render.film.picture_form import PictureForm
 from clpt.render.film.pictures import Pictures
 from clpt.render.film.saved_film import (
-    Origin,
-    SavedFilm,
-    Session,
     classes_text,
     other_devices,
 )
 from clpt.render.locking import Stop, healing, synchronized
-from clpt.render.maker import Call, Discarded, Held, Maker, Settle
+from clpt.render.maker import Call, Discarded, Maker, Settle
 from clpt.render.options import check_changes, check_scene
 from clpt.render.progress import Progress
 from clpt.render.stats import RenderStats, collect
 from clpt.render.wavefront import adaptive
-from clpt.render.wavefront.film_state import FilmState, join_ranges
+from clpt.render.wavefront.film_state import join_ranges
 from clpt.render.wavefront.wavefront import Counts, Wavefront
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
-from clpt.scene.fingerprint import Plain
 from clpt.scene.materials import Material
-from clpt.version import VERSION
 
 if TYPE_CHECKING:
     import pyopencl as cl
@@ -66,19 +58,19 @@ OnProgress = Callable[[Progress], bool | None]
 class FilmRenderer(FilmOwner, Pictures):
     """Base of renderers: a film, whose samples come from a maker.
 
-    maker: takes the samples; first_sample: the number of the first one.
+    maker: takes the samples; denoise: the denoiser that the film is for; first_sample: the number
+    of the first sample.
     """
 
-    def __init__(self, maker: Maker, first_sample: int = 0):
+    def __init__(self, maker: Maker, denoise: str | None = None, first_sample: int = 0):
         super().__init__()
-        self._maker, self.denoise = maker, maker.denoise
+        self._maker, self.denoise = maker, denoise
         self._stop = Stop()
         self._first_sample = checked_number(first_sample)
         self._seconds: dict[str, float] = {}  # to the first sample
         self._seconds_rendered = 0.0  # since the film was empty, or gone on with
         self._telling = False  # of progress, while samples are taken
         self._told: list[str] = []  # warnings of what took samples before
-        self._held: tuple[Held, dict[str, Any]] | SavedFilm | None = None
 
     # ---- what there is
 
@@ -331,7 +323,7 @@ class FilmRenderer(FilmOwner, Pictures):
     def _emptied(self, *, seed: int | None = None, recover: bool = False) -> Contents:
         """Let the film be empty; return what it then holds; see `Maker.empty`."""
         self._maker.empty(seed=seed, recover=recover)
-        self._held, self._seconds_rendered = None, 0.0
+        self._seconds_rendered = 0.0
         return Contents()
 
     @synchronized
@@ -410,7 +402,7 @@ class FilmRenderer(FilmOwner, Pictures):
         with change, change.beginning_unless(*refusals):
             self._contents = put()
 
-    # ---- the film, its pictures, and its files
+    # ---- the film and its pictures
 
     def _brought(self) -> Maker:
         """Return the maker, whose film is together."""
@@ -430,12 +422,6 @@ class FilmRenderer(FilmOwner, Pictures):
         return maker
 
     @synchronized
-    def film_state(self) -> FilmState:
-        """Return what the film holds, as whole numbers on the host; wait for it."""
-        taken = self._settled.taken
-        return dataclasses.replace(self._brought().words(), taken=taken)
-
-    @synchronized
     def _developed(self, *words: str) -> Developed:
         """Return the pictures of the film as it is now, which then stay; see `Pictures`."""
         return Developed(self._brought().words(*words), self._form)
@@ -447,121 +433,6 @@ class FilmRenderer(FilmOwner, Pictures):
         form = self._maker.home.form
         with_noise = form.adaptive or self._known.adaptive is not None
         return dataclasses.replace(form, adaptive=with_noise)
-
-    @synchronized
-    def _origin(self) -> Origin:
-        """Return what the samples are of. Raises SceneError for a scene that cannot be read."""
-        return self._maker.home.origin()
-
-    def _device_class(self) -> Mapping[str, Plain]:
-        """Return what decides the last bits of samples: equal classes give equal films."""
-        return self._maker.classes[0]
-
-    @synchronized
-    def merge(self, state: FilmState) -> None:
-        """Add the samples of another film of the same scene to this one, and wait.
-
-        The picture is then that of one renderer that took them all, to the bit. To go on where a
-        state was taken, merge it into a new renderer. `self.samples` is then after the last one.
-
-        Raises SceneError if the film has another form, or a sample is in both: nothing has changed.
-        """
-        merged = self.film_state().merged(state)
-        after = dataclasses.replace(self._settled, taken=merged.taken, adaptive=None)
-        self._put("merge", merged, after)
-
-    def _put(
-        self, what: str, film: FilmState, after: Contents, counts: Counts | None = None
-    ) -> None:
-        """Let the film be another one, which may have counts; after: what it then holds."""
-
-        def put(_: BaseException | None = None) -> Contents:
-            self._maker.put(film, counts)
-            return after
-
-        with self._change(what, put):
-            self._contents = put()
-
-    @synchronized
-    def _hold(self) -> None:
-        """Keep a copy of the film where it is, as it is now, for `_saved_film`.
-
-        So a render that is stopped in the middle of a `run` can be saved as it was before: without
-        samples that some pixels have and others have not. Raises MemoryBudgetError.
-        """
-        so_far, self._held = self._progress(), None
-        try:
-            held = self._maker.hold(self._settled.taken)
-        except MemoryBudgetError:
-            raise
-        except Exception as error:
-            log.debug("a film cannot be held where it is: %s", error)
-            self._held = self._saved_film()
-        else:
-            self._held = held, so_far
-
-    @synchronized
-    def _saved_film(self, *, held: bool = False) -> SavedFilm:
-        """Return the film with all that it takes to go on with it; wait for the device.
-
-        held: as it was at the last `_hold`. Raises SceneError for a scene that cannot be read,
-        without a `_hold`, and where a device has failed since that had a part of the film.
-        """
-        if not held:
-            return self._saved(self.film_state(), self.counts, self._progress())
-        if self._held is None:
-            raise SceneError("no film is held")
-        if not isinstance(self._held, SavedFilm):
-            self._held = self._read(*self._held)
-        return self._held
-
-    def _read(self, held: Held, so_far: dict[str, Any]) -> SavedFilm:
-        """Bring what is held to the host."""
-        try:
-            return self._saved(held.read(), held.counts, so_far)
-        except MemoryError:
-            raise
-        except Exception as error:
-            if held.taken != self._known.taken:
-                message = f"a device has failed that had a part of the film: {error}"
-                raise SceneError(message) from error
-        return self._saved_film()  # nothing was added since
-
-    def _progress(self) -> dict[str, Any]:
-        """Return what a saved film has beside its words, counts and origin."""
-        now = self._settled
-        seconds = [self._seconds_rendered, *[0.0] * len(self._maker.classes)]  # each second once
-        sessions = [
-            Session(now.began, took, VERSION, device)
-            for device, took in zip(self._maker.classes, seconds, strict=False)
-        ]
-        arrays = {} if now.adaptive is None else self._maker.arrays_of(now.adaptive)
-        return {"sessions": (*now.sessions, *sessions), "adaptive": arrays}
-
-    def _saved(self, film: FilmState, counts: Counts, so_far: dict[str, Any]) -> SavedFilm:
-        return SavedFilm(film, self._origin(), self._form, dict(vars(counts)), **so_far)
-
-    @synchronized
-    def _follow(self, origin: Origin) -> None:
-        """Render in the way that made a film, if that can be; the film may be empty then.
-
-        What is "auto" may depend on how many samples are wanted, which the film did not know.
-        """
-        way = self._maker.home.other_way(origin)
-        if way is not None:
-            self._maker.follow(way, partial(self._apply, what="load_state"))
-
-    @synchronized
-    def _restore(self, saved: SavedFilm) -> None:
-        """Go on from a saved film, as `load_state` does. Raises SceneError."""
-        self._settled  # noqa: B018
-        self._follow(saved.origin)
-        saved.check_fits(self._origin(), self._maker.home.words())
-        chosen = self._maker.adaptively(saved.adaptive, 0) if saved.adaptive else None
-        restored = Contents(saved.film.taken, chosen, saved.sessions)
-        self._put("load_state", saved.film, restored, Counts(**saved.counts))
-        self._held, self._seconds_rendered = None, 0.0
-        self._warn_of_others()
 
     def denoised(self, method: str | None = None) -> Image:
         """The picture so far without most of its noise, as `image` returns it.
@@ -596,36 +467,6 @@ class FilmRenderer(FilmOwner, Pictures):
         space = film.output_space
         images.write(path, picture, exposure=exposure, space=space, tone=tone, view=view)
 
-    def save_state(self, path: str | Path) -> None:
-        """Write the film to a file, from which `load_state` goes on, in another process too.
-
-        path: of the file; the former one is replaced.
-
-        Raises SceneError for a file that cannot be written: the former one is then as it was.
-        """
-        saved = self._saved_film()
-        try:
-            film_file.write(path, saved)
-        except OSError as error:
-            raise SceneError(f"cannot be written: {error}", file=path) from error
-
-    def load_state(self, path: str | Path) -> None:
-        """Go on from a file of `save_state`, of any renderer: what the film held before is gone.
-
-        path: of the file.
-
-        All that follows is to the bit as if nothing had been interrupted, where the device is of
-        the class that took the samples; `warnings` tells where it is not.
-
-        Raises SceneError for a file that cannot be read, is damaged, or is of another scene, other
-        settings or other kernels: it says what differs, and nothing has changed.
-        """
-        saved = film_file.read(path)
-        try:
-            self._restore(saved)
-        except SceneError as error:
-            raise SceneError(error.message, file=path) from None
-
     # ---- the end
 
     def close(self) -> None:
@@ -636,7 +477,7 @@ class FilmRenderer(FilmOwner, Pictures):
         """
         with self._lock:
             self._closed = True
-            self._contents, self._held = Contents(), None
+            self._contents = Contents()
             self._maker.close()
 
     def __enter__(self) -> Self:
@@ -679,6 +520,11 @@ class Watch:
         finally:
             renderer._telling = False
         return not renderer._stop.is_set()
+
+
+def maker_of(renderer: FilmRenderer) -> Maker:
+    """Return what takes the samples of a renderer, for other parts of clpt."""
+    return renderer._maker
 
 
 def next_range(first: int, samples: int) -> tuple[int, int]:

@@ -53,13 +53,11 @@ class Call:
 class Maker(ABC):
     """Takes samples of a scene, and has their film; what is not said otherwise is asked of `home`.
 
-    denoise: the denoiser that the film is for; start: when it was begun to be made [s of
-    time.perf_counter]. shows_meanwhile: whether the film can be shown while samples are taken;
-    adds_films: whether it is a sum of films, which can be saved meanwhile, and lacks samples before
-    others, which the next call takes first.
+    start: when it was begun to be made [s of time.perf_counter]. shows_meanwhile: whether the film
+    can be shown while samples are taken; adds_films: whether it is a sum of films, which can be
+    saved meanwhile, and lacks samples before others, which the next call takes first.
     """
 
-    denoise: str | None = None
     start: float
     shows_meanwhile = adds_films = False
 
@@ -136,7 +134,8 @@ class Maker(ABC):
         """Return adaptive sampling of the film, which begins, or goes on from a state.
 
         arrays: the state, empty at the beginning; first: the first sample that is missing then.
-        Raises SceneError where halves are wanted and not kept, and for a state of another film.
+        The film stays as it is, and so does its own state. Raises SceneError where halves are
+        wanted and not kept, and for a state of another film.
         """
         home = self.home
         begun = Adaptive(home.wavefront, self.tracer(), home.denoised_noise(self.words))
@@ -149,10 +148,6 @@ class Maker(ABC):
             message = f"the state of adaptive sampling does not fit: {error}"
             raise SceneError(message) from error
         return begun
-
-    def arrays_of(self, adaptive: Adaptive) -> Mapping[str, NDArray[Any]]:
-        """Return the state of adaptive sampling, for `adaptively`."""
-        return adaptive.arrays()
 
     # ---- the film
 

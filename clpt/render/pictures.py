@@ -13,11 +13,11 @@ from clpt import device as dev
 from clpt import images
 from clpt.colour.view import View
 from clpt.render.film.resolve import Resolve, Screen
-from clpt.render.film_renderer import FilmRenderer
 from clpt.render.locking import synchronized
+from clpt.render.resumable import ResumableRenderer
 
 
-class DevicePictures(FilmRenderer):
+class DevicePictures(ResumableRenderer):
     """Base of renderers: their picture as an array on the device, beside those of the host.
 
     _make_widget: given by who shows pictures in notebooks, see `clpt/__init__`.

@@ -52,7 +52,7 @@ class Renderer(DevicePictures):
         check_scene(scene)
         check_options(scene, options)
         home = DeviceFilm(scene, open_device(device, options), options)
-        super().__init__(DeviceMaker(home), options.get("first_sample", 0))
+        super().__init__(DeviceMaker(home), home.denoise, options.get("first_sample", 0))
         self._progress_of_steps = progress
 
     @synchronized

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Image
 from clpt.device import Device
+from clpt.render.film_renderer import maker_of
 from clpt.render.progress import Progress
 from clpt.render.renderer import Renderer
 from clpt.scene import Scene
@@ -248,7 +249,7 @@ class RenderLoop:
                 self._rates = progress.paths / self.seconds, progress.rays / self.seconds
             if time.perf_counter() - self._told > STATUS_SECONDS:
                 self.tell(renderer)
-            if self.has_shown and renderer._maker.shows_meanwhile:
+            if self.has_shown and maker_of(renderer).shows_meanwhile:
                 self.meanwhile()
                 if self._stale:
                     self._offer(renderer, 1)

@@ -158,7 +158,7 @@ def scene() -> Scene:
         lights=[
             Constant(radiance=(0.002, 0.004, 0.011)),
             Projector(
-                image=Bitmap(image=HERE / shows),
+                image=Bitmap(image=HERE / "slide.png"),
                 irradiance=(500.0, 500.0, 500.0),
                 fov=30.0,
                 to_world=tf.look_at([0, 2.6, -LENGTH + 14.0], [0, 2.6, -LENGTH], [0, 1, 0]),

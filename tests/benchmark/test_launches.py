@@ -90,7 +90,7 @@ def bad_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def wrong(context: Any, on: Any, code: Any, options: Sequence[str] = ()) -> Any:
         if isinstance(code, str) and launches.PLAIN[0] not in options:
-            code = code.replace("(transmittance > 0.0f)", "(transmittance > 2.0f)")
+            code = code.replace("(shadow_most(passes) > 0.0f)", "(shadow_most(passes) > 2.0f)")
         return build(context, on, code, options)
 
     monkeypatch.setattr(native_programs, "build", wrong)

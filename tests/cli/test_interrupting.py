@@ -14,7 +14,7 @@ import pytest
 from clpt import images
 from clpt.__main__ import run
 from clpt.cli.files import checkpoints, outputs, targets
-from clpt.cli.opening import makers, scenes
+from clpt.cli.opening import factories, scenes
 from clpt.cli.options import scene_options
 from clpt.cli.process import stopping
 from clpt.cli.render import picture
@@ -29,7 +29,7 @@ POINTS = {
     "the device is opened": (scenes, "share_compilers", False),
     "the scene is read": (scene_options, "load", False),
     "the scene is checked": (scenes, "check", False),
-    "kernels are built": (makers, "new_renderer", False),
+    "kernels are built": (factories, "new_renderer", False),
     "checkpoints begin": (checkpoints.Checkpoints, "__init__", False),
     "samples are taken": (picture, "render_samples", False),
     "a film is saved": (checkpoints.Checkpoints, "save", True),
@@ -75,12 +75,12 @@ def test_a_signal_at_each_point(tmp_path, monkeypatch, capsys, heeded, point, nu
 
 BUILDING = """
 import hashlib, sys
-import clpt.cli.opening.makers as makers
+import clpt.cli.opening.factories as factories
 from clpt.__main__ import main
 def build(*_, **__):  # C, that no signal ends
     print("builds", file=sys.stderr, flush=True)
     hashlib.pbkdf2_hmac("sha256", b"", b"", 2_000_000_000)
-makers.new_renderer = build
+factories.new_renderer = build
 main()
 """
 

@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import pytest
 from rich.console import Console
 
-from clpt.cli.opening.makers import DEVICE_SECONDS
+from clpt.cli.opening.factories import DEVICE_SECONDS
 from clpt.cli.printing import display
 from clpt.cli.printing.display import Bar, Lines, clock, figures
 from clpt.cli.printing.names import device_name, device_names

@@ -206,7 +206,7 @@ def test_a_lost_scheduler(hub, folder, capsys):
         )  # fmt: skip
         ended.append(client)
         lines = [client.stderr.readline()]
-        while "samples/s" not in lines[-1] or lines[-1].startswith("0/"):
+        while "rays/s" not in lines[-1] or lines[-1].startswith("0/"):
             lines.append(client.stderr.readline())
             assert lines[-1], lines
         scheduler.kill()

@@ -18,7 +18,7 @@ from machines import LONGEST, client_of, machines, wait_until  # noqa: E402
 
 from clpt import images  # noqa: E402
 from clpt.__main__ import run  # noqa: E402
-from clpt.cli.opening.makers import ClusterMaker  # noqa: E402
+from clpt.cli.opening.factories import ClusterFactory  # noqa: E402
 
 SIZE = ["--size", "16x12", "--mode", "rgb"]
 TURN = ["-D", "angle={10*(frame-2)}"]
@@ -71,8 +71,8 @@ def test_frames_with_noise(hub, folder, capsys):
 
 
 def test_an_earlier_frame_comes_first():
-    crews: list[ClusterMaker] = []
-    crews += [ClusterMaker("", None, crews, {}) for _ in range(2)]
+    crews: list[ClusterFactory] = []
+    crews += [ClusterFactory("", None, crews, {}) for _ in range(2)]
     crews[0].frame, crews[1].frame = 7, 8
     assert crews[0]._priority() > crews[1]._priority()
     crews[0].frame = 9

@@ -364,7 +364,7 @@ def test_ctrl_c_writes_the_picture_so_far(tmp_path):
     )
     try:
         lines = [process.stderr.readline()]
-        while "samples/s" not in lines[-1] or lines[-1].startswith("0/"):
+        while "rays/s" not in lines[-1] or lines[-1].startswith("0/"):
             lines.append(process.stderr.readline())
             assert lines[-1], lines
         process.send_signal(signal.SIGINT)

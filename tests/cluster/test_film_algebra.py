@@ -30,8 +30,8 @@ from clpt.errors import SceneError
 from clpt.render.film import film_file
 from clpt.render.film.pictures import Pictures
 from clpt.render.film.saved_film import SavedFilm
-from clpt.render.film_renderer import FilmRenderer
 from clpt.render.pictures import DevicePictures
+from clpt.render.resumable import ResumableRenderer
 from clpt.render.wavefront.wavefront import Counts
 from clpt.scene import Scene, shapes
 from clpt.scene.integrators import (
@@ -226,7 +226,7 @@ def pictures(source: Pictures) -> dict[str, np.ndarray]:
     return found
 
 
-def files(source: FilmRenderer | SavedFilm, folder: Path) -> dict[str, dict[str, np.ndarray]]:
+def files(source: ResumableRenderer | SavedFilm, folder: Path) -> dict[str, dict[str, np.ndarray]]:
     """What files of a film hold, by suffix and the names of channels."""
     found = {}
     for suffix in FORMATS:
@@ -323,7 +323,7 @@ def test_films_add_in_any_order_and_grouping(maker, make, plan, whole, tmp_path)
     check(renderer, whole)
 
 
-def check_files(source: FilmRenderer | SavedFilm, whole: Whole, folder: Path) -> None:
+def check_files(source: ResumableRenderer | SavedFilm, whole: Whole, folder: Path) -> None:
     found = files(source, folder)
     for suffix, wanted in whole.files.items():
         check_arrays(found[suffix], wanted)
@@ -384,6 +384,7 @@ def test_a_film_that_does_not_fit_changes_nothing(maker, make, plan):
     torn = {name: array for name, array in saved.adaptive.items() if name != "next"}
     narrow = dataclasses.replace(saved.film, words=saved.film.words[..., :-1])
     other = dataclasses.replace(saved.origin, kernels="0")
+    way = {**saved.origin.settings, "chosen.guiding": True}
     renderer = make(maker)
     assert renderer.run(3)
     before = renderer.film_state()
@@ -391,11 +392,38 @@ def test_a_film_that_does_not_fit_changes_nothing(maker, make, plan):
         ({"adaptive": torn}, "adaptive sampling does not fit"),
         ({"film": narrow}, "another form"),
         ({"origin": other}, "kernels: of clpt"),
+        ({"origin": dataclasses.replace(other, settings=way)}, "kernels: of clpt"),
     ):
         with pytest.raises(SceneError, match=told):
             renderer._restore(dataclasses.replace(saved, **changes))
         check_film(renderer.film_state(), before)
     assert renderer.run(2) and renderer.samples == 5
+
+
+@pytest.mark.parametrize("plan", [pytest.param(QUICK["noise"], id="noise")])
+@pytest.mark.parametrize("maker", MAKERS)
+def test_a_stop_before_a_film_is_put_leaves_all_as_it_was(maker, make, plan, monkeypatch):
+    """Also the state of adaptive sampling, and where it is saved."""
+    renderer = make("device")
+    assert renderer.run(MOST, noise=plan.noise)
+    other = renderer._saved_film()
+    renderer = make(maker)
+    assert renderer.run(SPLIT[0], noise=plan.noise)
+    before = renderer._saved_film()
+
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(type(renderer), "_put", stop)
+        with pytest.raises(KeyboardInterrupt):
+            renderer._restore(other)
+    after = renderer._saved_film()
+    check_film(after.film, before.film)
+    check_arrays(dict(after.adaptive), dict(before.adaptive))
+    assert not np.array_equal(after.adaptive["next"], other.adaptive["next"])
+    assert renderer.run(MOST - SPLIT[0], noise=plan.noise)
+    check_film(renderer.film_state(), other.film)
 
 
 def test_a_worker_s_renderer_keeps_no_choice_of_another_scene():

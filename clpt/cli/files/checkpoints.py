@@ -12,9 +12,9 @@ from ... import output_files
 from ...errors import MemoryBudgetError, SceneError
 from ...render.film import film_file
 from ...render.film.saved_film import SavedFilm, differences_text, ranges_text
+from ...render.pictures import DevicePictures
 from ...scene import Scene
 from ...scene.fingerprint import fingerprint
-from ..opening.makers import AnyRenderer
 from ..printing.display import clock
 from . import outputs
 from .standard_output import is_standard
@@ -106,7 +106,9 @@ def check(
         raise SceneError(message, file=path)
 
 
-def go_on(renderer: AnyRenderer, saved: SavedFilm, path: Path, note: Callable[[str], None]) -> None:
+def go_on(
+    renderer: DevicePictures, saved: SavedFilm, path: Path, note: Callable[[str], None]
+) -> None:
     """Let a renderer go on from a film, and say so. Raises SceneError, which says what differs."""
     known = len(renderer.warnings)
     renderer._follow(saved.origin)
@@ -129,7 +131,7 @@ class Checkpoints:
 
     def __init__(
         self,
-        renderer: AnyRenderer,
+        renderer: DevicePictures,
         path: Path,
         period: float | None,
         resumed: bool,

@@ -15,14 +15,14 @@ from ...errors import ClptError, SceneError
 from ...render.film import film_file, layer_channels
 from ...render.film.denoised_picture import DenoisedPicture
 from ...render.film.saved_film import SavedFilm
-from ...render.film_renderer import FilmRenderer
 from ...render.pictures import DevicePictures
+from ...render.resumable import ResumableRenderer
 from ...version import VERSION
 from ..options.grading import Grading
 from .standard_output import is_standard
 from .targets import FILM
 
-Film = FilmRenderer | SavedFilm  # what can be saved
+Film = ResumableRenderer | SavedFilm  # what can be saved
 Source = Film | DenoisedPicture  # what pictures are taken of
 
 

@@ -11,9 +11,9 @@ from ... import images
 from ...arrays import Floats32
 from ...render.analysis.lights import light_power
 from ...render.analysis.lights.sources import emissions_of
+from ...render.pictures import DevicePictures
 from ...scene import Scene
 from ...scene.lights import Light
-from ..opening.makers import AnyRenderer
 from ..options.grading import Grading, for_screens
 
 MOSTLY_WHITE = 0.5  # of the lit pixels
@@ -23,12 +23,12 @@ OUTSHINING = 1000.0  # times as strong as any other lamp
 ADVICE = "docs/lighting.md has a list: Why is it black?"
 
 
-def exposure_found(renderer: AnyRenderer) -> float:
+def exposure_found(renderer: DevicePictures) -> float:
     """Return the stops of `--exposure auto`."""
     return images.auto_exposure(_pixels(renderer))
 
 
-def remarks(renderer: AnyRenderer, grading: Grading, targets: tuple[Path, ...]) -> Iterator[str]:
+def remarks(renderer: DevicePictures, grading: Grading, targets: tuple[Path, ...]) -> Iterator[str]:
     """Yield sentences of a picture in which little is seen, with what mends it."""
     scene, pixels = renderer.scene, _pixels(renderer)
     exposure = images.stops(grading.exposure, pixels)
@@ -46,7 +46,7 @@ def remarks(renderer: AnyRenderer, grading: Grading, targets: tuple[Path, ...]) 
     yield from _outshone(scene)
 
 
-def _pixels(renderer: AnyRenderer) -> Floats32:
+def _pixels(renderer: DevicePictures) -> Floats32:
     """The picture so far in linear Rec. 709, (h, w, c)."""
     colours = renderer.colours() if renderer._form.bands else renderer.image()
     return images.to_rec709(images.straight(colours), renderer.scene.film.output_space)

@@ -21,12 +21,13 @@ from ... import images
 from ...device import share_compilers
 from ...errors import ClusterError, SceneError
 from ...render.analysis.checks import check
+from ...render.pictures import DevicePictures
 from ...scene import Scene
 from ...scene.fingerprint import fingerprint
 from ...version import VERSION
 from ..files import outputs, targets
 from ..opening.devices import choose_devices
-from ..opening.makers import AnyRenderer, Maker, cluster_makers, device_makers
+from ..opening.factories import RendererFactory, cluster_factories, device_factories
 from ..options.applied import changed
 from ..printing.display import Display, clock
 from ..process.stopping import STATUS, stops
@@ -109,12 +110,12 @@ def render_frames(job: Job, shown: Display) -> int:
     """Render frames that are not complete; return the exit status."""
     frames = _Frames.of(job)
     with ExitStack() as resources, stops() as stopped:
-        makers = _makers(job, len(frames.numbers), shown, resources)
-        _FrameLoop(frames, makers, shown, stopped).run()
-        makers[0].report()
+        factories = _factories(job, len(frames.numbers), shown, resources)
+        _FrameLoop(frames, factories, shown, stopped).run()
+        factories[0].report()
         if stopped:
-            for maker in makers:
-                maker.stop()
+            for factory in factories:
+                factory.stop()
             return STATUS + stopped[0]
     film, fps = job.animation.video, job.animation.fps
     if film is not None:
@@ -125,28 +126,30 @@ def render_frames(job: Job, shown: Display) -> int:
     return 0
 
 
-def _makers(job: Job, frames: int, shown: Display, resources: ExitStack) -> Sequence[Maker]:
+def _factories(
+    job: Job, frames: int, shown: Display, resources: ExitStack
+) -> Sequence[RendererFactory]:
     """Return who renders frames: devices, or the workers of a cluster."""
     if job.workers.cluster is not None:
         together = 1 if job.until.limit is not None else frames  # its time is a frame's own
-        several = cluster_makers(job.workers, job.options, together, shown)
+        several = cluster_factories(job.workers, job.options, together, shown)
         return resources.enter_context(several)
     devices = choose_devices(job.options.machine)
     share_compilers(devices, job.options.machine.threads, resources)
-    return device_makers(devices, job.options, frames)
+    return device_factories(devices, job.options, frames)
 
 
 class _FrameLoop:
-    """Threads that take frames, one for each maker, and one that reads scenes ahead."""
+    """Threads that take frames, one for each factory, and one that reads scenes ahead."""
 
     def __init__(
         self,
         frames: _Frames,
-        makers: Sequence[Maker],
+        factories: Sequence[RendererFactory],
         shown: Display,
         stopped: Sequence[int],
     ):
-        self.plan, self.makers, self.shown, self.stopped = frames, [*makers], shown, stopped
+        self.plan, self.factories, self.shown, self.stopped = frames, [*factories], shown, stopped
         self.errors: list[BaseException] = []
         self._left = deque(frames.numbers)
         self._ahead: deque[tuple[int, Future[tuple[Scene, str]]]] = deque()
@@ -160,8 +163,8 @@ class _FrameLoop:
         with ThreadPoolExecutor(1) as reader:
             while (self._left or self._ahead) and not (self.errors or self.stopped):
                 threads = [
-                    threading.Thread(target=self._work, args=(maker, reader), daemon=True)
-                    for maker in self.makers
+                    threading.Thread(target=self._work, args=(factory, reader), daemon=True)
+                    for factory in self.factories
                 ]
                 for thread in threads:
                     thread.start()
@@ -178,55 +181,55 @@ class _FrameLoop:
         with self._lock:
             if self.errors or self.stopped:
                 return None
-            while self._left and len(self._ahead) <= len(self.makers):
+            while self._left and len(self._ahead) <= len(self.factories):
                 frame = self._left.popleft()
                 self._ahead.append((frame, reader.submit(self.plan.load, frame)))
             return self._ahead.popleft() if self._ahead else None
 
-    def _work(self, maker: Maker, reader: ThreadPoolExecutor) -> None:
-        """Let a maker render frames, till none is left."""
-        renderer: AnyRenderer | None = None
+    def _work(self, factory: RendererFactory, reader: ThreadPoolExecutor) -> None:
+        """Render frames with renderers of a factory, till none is left."""
+        renderer: DevicePictures | None = None
         try:
             while (taken := self._take(reader)) is not None:
                 frame, scene = taken
                 try:
-                    renderer = self._frame(frame, *scene.result(), maker, renderer)
+                    renderer = self._frame(frame, *scene.result(), factory, renderer)
                 except (SceneError, ClusterError, OSError, click.ClickException):
                     raise
                 except Exception as error:
-                    if not self._lose(maker, error, taken):
+                    if not self._lose(factory, error, taken):
                         raise
                     return
         except BaseException as error:
             self.errors.append(error)
         finally:
-            maker.frame = math.inf
+            factory.frame = math.inf
             if renderer is not None:
                 renderer.close()
 
     def _lose(
         self,
-        lost: Maker,
+        lost: RendererFactory,
         error: BaseException,
         taken: tuple[int, Future[tuple[Scene, str]]],
     ) -> bool:
-        """Leave a maker out, of which others get the frame; return whether there are others."""
+        """Leave a factory out, of which others get the frame; return whether there are others."""
         with self._lock:
-            self.makers = [maker for maker in self.makers if maker is not lost]
+            self.factories = [factory for factory in self.factories if factory is not lost]
             self._ahead.appendleft(taken)
         what = f"{lost.name} failed and is left out, others do its part: {error}"
-        if self.makers:
+        if self.factories:
             self.shown.note(f"clpt: warning: {what}")
-        return bool(self.makers)
+        return bool(self.factories)
 
     def _frame(
         self,
         frame: int,
         scene: Scene,
         digest: str,
-        maker: Maker,
-        renderer: AnyRenderer | None,
-    ) -> AnyRenderer | None:
+        factory: RendererFactory,
+        renderer: DevicePictures | None,
+    ) -> DevicePictures | None:
         """Render a frame unless it is complete; return the renderer for the next one."""
         plan = self.plan
         if plan.is_complete(frame, digest):
@@ -235,12 +238,12 @@ class _FrameLoop:
         stale = [path for path in plan.targets(frame) if path.is_file()]
         if any(_fingerprint_of(path) not in (None, digest) for path in stale):
             self.shown.note(f"frame {frame}: the scene or an option has changed since {stale[0]}")
-        maker.frame = frame
-        renderer = _showing(scene, maker, renderer, self.shown)
+        factory.frame = frame
+        renderer = _showing(scene, factory, renderer, self.shown)
         began, until = time.perf_counter(), plan.job.until
         end = End(until.end(scene), until.limit, scene.noise, self.stopped)
-        seconds = maker.pass_seconds(scene.noise is not None)
-        render_samples(renderer, end, maker.look, pass_seconds=seconds)
+        seconds = factory.pass_seconds(scene.noise is not None)
+        render_samples(renderer, end, factory.look, pass_seconds=seconds)
         if self.stopped:
             return renderer  # what it has so far is no frame
         if not renderer.counts.samples:
@@ -269,8 +272,8 @@ class _FrameLoop:
 
 
 def _showing(
-    scene: Scene, maker: Maker, renderer: AnyRenderer | None, shown: Display
-) -> AnyRenderer:
+    scene: Scene, factory: RendererFactory, renderer: DevicePictures | None, shown: Display
+) -> DevicePictures:
     """Return a renderer of a scene: the one that there is, if it can take the scene."""
     if renderer is not None:
         try:
@@ -280,7 +283,7 @@ def _showing(
             renderer.close()
     for warning in scene.warnings:
         shown.note(f"clpt: warning: {warning}")
-    return maker.make(scene, shown)
+    return factory.make(scene, shown)
 
 
 def _fingerprint_of(path: Path) -> str | None:

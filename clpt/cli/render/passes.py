@@ -9,9 +9,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from ...choices import MOST_SAMPLES
+from ...render.pictures import DevicePictures
 from ...render.progress import Progress
 from ...render.wavefront.wavefront import Counts
-from ..opening.makers import DEVICE_SECONDS, AnyRenderer
+from ..opening.factories import DEVICE_SECONDS
 
 GROWTH = 3  # times what has been rendered so far
 
@@ -31,7 +32,7 @@ class End:
 
 
 def render_samples(
-    renderer: AnyRenderer,
+    renderer: DevicePictures,
     end: End,
     show: Callable[[Progress], None],
     after_pass: Callable[[], None] = lambda: None,
@@ -65,7 +66,7 @@ def render_samples(
 
 
 def _teller(
-    renderer: AnyRenderer, end: End, show: Callable[[Progress], None], began: float
+    renderer: DevicePictures, end: End, show: Callable[[Progress], None], began: float
 ) -> Callable[[Progress], bool]:
     """Return what shows the progress since `began`, and tells whether the render goes on."""
     first = renderer.first_sample

@@ -11,10 +11,16 @@ from pathlib import Path
 
 from ...errors import ClusterError
 from ...render.film.saved_film import SavedFilm
+from ...render.pictures import DevicePictures
 from ...render.progress import Progress
 from ...scene import Scene
 from ..files import checkpoints, outputs
-from ..opening.makers import AnyRenderer, DeviceMaker, Maker, cluster_makers, device_makers
+from ..opening.factories import (
+    DeviceFactory,
+    RendererFactory,
+    cluster_factories,
+    device_factories,
+)
 from ..opening.scenes import open_scene, read_scene
 from ..options.grading import for_screens
 from ..printing.display import Display
@@ -40,7 +46,7 @@ def render_picture(job: Job, shown: Display, began: float) -> int:
     former = _Former.find(job, shown.note)
     with ExitStack() as resources:
         opened = _open(job, former, shown, resources)
-        renderer = opened.maker.make(opened.scene, shown, job.until.first)
+        renderer = opened.factory.make(opened.scene, shown, job.until.first)
         resources.callback(renderer.close)
         shown.note(report.header(shown.name, renderer, opened.where))
         end = former.go_on(renderer, job.until.end(opened.scene), shown.note)
@@ -49,12 +55,12 @@ def render_picture(job: Job, shown: Display, began: float) -> int:
         viewer = showing(job.tev, job.scene.name, renderer, shown.note)
         with stops() as stopped, viewer as show_picture:
             ends = End(end, job.until.limit, renderer.scene.noise, stopped)
-            picture.render(opened.maker, ends, show_picture)
+            picture.render(opened.factory, ends, show_picture)
             picture.finish(bool(stopped))
             shown.note(report.ending(renderer, ends, time.perf_counter() - began))
         opened.tell_after(job.verbose)
         if stopped:
-            opened.maker.stop()
+            opened.factory.stop()
             return STATUS + stopped[0]
     return 0
 
@@ -81,7 +87,7 @@ class _Former:
             checkpoints.check(self.film, self.path, scene, first, end, gaps=gaps)
 
     def go_on(
-        self, renderer: AnyRenderer, end: int | None, note: Callable[[str], None]
+        self, renderer: DevicePictures, end: int | None, note: Callable[[str], None]
     ) -> int | None:
         """Give the film to a renderer; return the end of its samples, see `Until.end`."""
         if self.film is None:
@@ -93,18 +99,18 @@ class _Former:
 
 @dataclass(frozen=True)
 class _Opened:
-    """A scene and its maker; devices: the maker, if it is of this machine; loading [s]."""
+    """A scene, and what makes its renderer; devices: the same, on this machine; loading [s]."""
 
     scene: Scene
-    maker: Maker
-    devices: DeviceMaker | None = None
+    factory: RendererFactory
+    devices: DeviceFactory | None = None
     loading: float = 0.0
 
     @property
     def where(self) -> str:
         """Who renders, in short."""
         if self.devices is None:
-            return f"workers of {self.maker.name}"
+            return f"workers of {self.factory.name}"
         return device_names([on.info for on in self.devices.devices])
 
     def tell_before(self, verbose: int) -> None:
@@ -126,10 +132,10 @@ def _open(job: Job, former: _Former, shown: Display, resources: ExitStack) -> _O
 
     if job.workers.cluster is not None:
         scene = read_scene(job.scene, job.options, shown, accept)
-        (workers,) = resources.enter_context(cluster_makers(job.workers, job.options, 1, shown))
+        (workers,) = resources.enter_context(cluster_factories(job.workers, job.options, 1, shown))
         return _Opened(scene, workers)
     found = open_scene(job.scene, job.options, shown, resources, accept)
-    (devices,) = device_makers(found.devices, job.options, 1)
+    (devices,) = device_factories(found.devices, job.options, 1)
     return _Opened(found.scene, devices, devices, found.loading)
 
 
@@ -139,7 +145,7 @@ class _Picture:
     ready: when it began [s of time.perf_counter].
     """
 
-    def __init__(self, job: Job, renderer: AnyRenderer, former: _Former, shown: Display):
+    def __init__(self, job: Job, renderer: DevicePictures, former: _Former, shown: Display):
         self._job, self._renderer, self._shown = job, renderer, shown
         self.ready = time.perf_counter()
         period, every, note = job.resuming.period, job.output.every, shown.note
@@ -152,9 +158,9 @@ class _Picture:
             former.film is not None and bool(former.film.adaptive)
         )
 
-    def render(self, maker: Maker, end: End, show_picture: Callable[[], None]) -> None:
+    def render(self, factory: RendererFactory, end: End, show_picture: Callable[[], None]) -> None:
         """Render until the end, and write now and then; show_picture: called after each pass."""
-        seconds = maker.pass_seconds(
+        seconds = factory.pass_seconds(
             self._adaptive, self._job.resuming.period, self._job.output.every
         )
         single = math.isinf(seconds)  # a pass, whose film is whole at any time
@@ -164,13 +170,13 @@ class _Picture:
             show_picture()
 
         def show(progress: Progress) -> None:
-            maker.look(progress)
+            factory.look(progress)
             if single:
                 after_pass()
             self._shown.show(progress)
 
         def ended() -> None:
-            maker.report()
+            factory.report()
             if single:
                 self._writer.hold()
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from ..opening.makers import AnyRenderer
+from ...render.pictures import DevicePictures
 
 
-def refusals(renderer: AnyRenderer) -> list[str]:
+def refusals(renderer: DevicePictures) -> list[str]:
     """Return a sentence for each way in which samples of a render, or pixels, are wrong."""
     told = []
     if rejected := renderer.counts.rejected:

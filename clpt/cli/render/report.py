@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from ..opening.makers import AnyRenderer
+from ...render.pictures import DevicePictures
 from .passes import End
 
 TIMES = {  # of RenderStats.seconds
@@ -14,7 +14,7 @@ TIMES = {  # of RenderStats.seconds
 }
 
 
-def header(name: str, renderer: AnyRenderer, where: str) -> str:
+def header(name: str, renderer: DevicePictures, where: str) -> str:
     """Return the line that says what is rendered, how and where."""
     film, asked, chosen = renderer.scene.film, renderer.scene.integrator.kind, renderer.stats
     how = asked if asked == chosen.integrator else f"{asked} -> {chosen.integrator}"
@@ -22,7 +22,7 @@ def header(name: str, renderer: AnyRenderer, where: str) -> str:
     return "  ".join((name, size, film.mode, how, where))
 
 
-def ending(renderer: AnyRenderer, end: End, seconds: float) -> str:
+def ending(renderer: DevicePictures, end: End, seconds: float) -> str:
     """Return the line that says how far the render came, in so many seconds of all."""
     mean = renderer.counts.samples / renderer._wavefront.paths.pixels
     samples = f"{mean:.0f}" if mean >= 10 or mean == int(mean) else f"{mean:.2g}"
@@ -32,7 +32,7 @@ def ending(renderer: AnyRenderer, end: End, seconds: float) -> str:
     return f"stopped at {samples}{of} spp, with the picture so far; {seconds:.1f} s in all"
 
 
-def before(renderer: AnyRenderer, loading: float) -> None:
+def before(renderer: DevicePictures, loading: float) -> None:
     """Print what was made of the scene, and the time; loading: seconds for its file."""
     first, stats = renderer._wavefront, renderer.stats
     for on in renderer.devices:
@@ -70,7 +70,7 @@ def before(renderer: AnyRenderer, loading: float) -> None:
         _line(what, f"{stats.seconds[name]:.2f} s")
 
 
-def after(renderer: AnyRenderer) -> None:
+def after(renderer: DevicePictures) -> None:
     """Print the time of the first sample, what each device did, and each stage of the first."""
     from ...cluster.multi_renderer import MultiRenderer  # here: one device has no use for it
 

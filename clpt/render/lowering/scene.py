@@ -25,7 +25,12 @@ from clpt.render.analysis.index import SceneIndex
 from clpt.render.analysis.lights.sources import Sources
 from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.render.analysis.wavelengths import Density, density, emissions
-from clpt.render.contract.features import Features, GeometryFeatures, SpectraFeatures
+from clpt.render.contract.features import (
+    Features,
+    GeometryFeatures,
+    LayerFeatures,
+    SpectraFeatures,
+)
 from clpt.render.contract.layer_names import LayerNames
 from clpt.render.contract.parameter_words import row_words
 from clpt.render.lowering import features as needs
@@ -151,20 +156,7 @@ def encode(found: Analysis, cache: LoweringCache, texture_budget: int | None = N
     )  # fmt: skip
     motion_row = _lower_motion(found, lights, encoder)
     names, layers = lower_names(index, geometry, lights, encoder.store)
-    features = Features(
-        camera=needs.of_camera(index),
-        film=needs.of_film(index, layers),
-        transport=needs.of_transport(index, rows.profile, aimed=len(found.aims) > 0),
-        lights=needs.of_lights(lights),
-        media=needs.of_media(index, surfaces.materials, surfaces.near, sealed=bool(found.sealed)),
-        motion=needs.of_motion(index, geometry, motion_row),
-        geometry=_geometry_features(index, encoder, surfaces),
-        textures=needs.of_textures(encoder),
-        spectra=SpectraFeatures(
-            index.mode, encoder.spectra.samples, encoder.spectra.step, rows.tabulated
-        ),
-        materials=needs.of_materials(index, encoder, surfaces.materials),
-    )
+    features = _features(found, encoder, surfaces, rows, motion_row, layers)
     aims, around, disperses = (rows.aims, len(found.aims)), surfaces.around, features.dispersion
     own = Found(rows.density, rows.ambient, aims, around, disperses, layers)
     settings = settings_of(index, geometry, lights, wavelengths, found.sphere, own)
@@ -253,6 +245,27 @@ def _encode_views(
     glasses = _lower_camera(index, encoder)
     ambient = _lower_ambient(index, encoder)
     return _Views(profile, density_row, tabulated, aims, glasses, ambient)
+
+
+def _features(
+    found: Analysis, encoder: Encoder, surfaces: _Surfaces, rows: _Views, motion: int,
+    layers: LayerFeatures,
+) -> Features:  # fmt: skip
+    """Return what the scene uses; motion: as of `_lower_motion`; layers: of the film."""
+    index = found.index
+    own = index.mode, encoder.spectra.samples, encoder.spectra.step, rows.tabulated
+    return Features(
+        camera=needs.of_camera(index),
+        film=needs.of_film(index, layers),
+        transport=needs.of_transport(index, rows.profile, aimed=len(found.aims) > 0),
+        lights=needs.of_lights(surfaces.lights),
+        media=needs.of_media(index, surfaces.materials, surfaces.near, sealed=bool(found.sealed)),
+        motion=needs.of_motion(index, surfaces.geometry, motion),
+        geometry=_geometry_features(index, encoder, surfaces),
+        textures=needs.of_textures(encoder),
+        spectra=SpectraFeatures(*own),
+        materials=needs.of_materials(index, encoder, surfaces.materials),
+    )
 
 
 def _geometry_features(

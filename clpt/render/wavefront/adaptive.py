@@ -100,6 +100,7 @@ class Adaptive:
         self._measured_at = np.zeros(count, np.int64)  # samples when a cell was last measured
         self._variance = np.full(count, np.inf)  # of a sample, relative; of n over n^rate
         self._has_guides = False  # whether the film has samples beside those of the picture
+        self._kept: dict[str, NDArray[Any]] | None = None
 
     @property
     def active(self) -> float:
@@ -136,7 +137,14 @@ class Adaptive:
             self._lights.skip(samples)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """Return the state, for `restore`: arrays by name; wait for the device."""
+        """Return the state, for `restore`: arrays by name, as `keep` kept it, or as it is now."""
+        return self._read() if self._kept is None else self._kept
+
+    def keep(self) -> None:
+        """Keep the state as it is now, which outlives the device; wait for that."""
+        self._kept = self._read()
+
+    def _read(self) -> dict[str, NDArray[Any]]:
         own = {
             "next": self.next, "stop": self.stop, "measured_at": self._measured_at,
             "variance": self._variance, "noise": np.float64(self.noise),

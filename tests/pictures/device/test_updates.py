@@ -16,6 +16,7 @@ import clpt
 from clpt import device
 from clpt import transforms as tf
 from clpt.errors import MemoryBudgetError, SceneError
+from clpt.render.device_film import DeviceFilm
 from clpt.render.editing.rebuild import has_other_paths
 from clpt.render.lowering.scene import lower
 from clpt.scene import Scene
@@ -139,7 +140,7 @@ def test_values_are_a_few_words(
     monkeypatch.setattr(
         stream, "write", lambda b, a, *more: (written.append(a.nbytes), write(b, a, *more))[1]
     )
-    monkeypatch.setattr(renderer, "_rebuild", None)
+    monkeypatch.setattr(DeviceFilm, "_rebuild", None)
     buffers, used = renderer._wavefront.arguments, renderer._wavefront.buffers.used
     with caplog.at_level(logging.INFO, "clpt"):
         renderer.update(materials={RED: m.Diffuse(reflectance=(0.1, 0.2, 0.3))})

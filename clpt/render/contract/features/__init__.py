@@ -119,7 +119,6 @@ class Features:
         return own.joined and own.light_paths and self.lights.visible and not own.weighed
 
     @property
-    @macro("SHADOW_MEDIA")
     def shadow_media(self) -> bool:
         """Whether rays to lights may go through several media."""
         several = self.materials.null_surfaces or self.media.grids.present

@@ -1,11 +1,11 @@
-"""Makers of pictures: devices of this machine, or the workers of a cluster."""
+"""Factories of renderers: on devices of this machine, or on the workers of a cluster."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 from ... import device as dev
 from ...render.pictures import DevicePictures
@@ -30,11 +30,9 @@ OVERLAP = 2  # pictures of a cluster at a time: workers begin the next one while
 DEVICE_SECONDS = 3.0  # of a pass: at its end few paths are left; only there is there a checkpoint
 CLUSTER_SECONDS = 30.0  # of a pass with noise, at the end of which workers wait for each other
 
-AnyRenderer: TypeAlias = DevicePictures
 
-
-class Maker:
-    """Renders one picture after the other.
+class RendererFactory:
+    """Makes the renderer of one picture after the other.
 
     name: for people; frame: the number of the frame that is rendered, infinite without.
     """
@@ -42,7 +40,7 @@ class Maker:
     name = ""
     frame = math.inf
 
-    def make(self, scene: Scene, shown: Display, first_sample: int = 0) -> AnyRenderer:
+    def make(self, scene: Scene, shown: Display, first_sample: int = 0) -> DevicePictures:
         """Return a new renderer of a scene, which takes samples from this number on."""
         raise NotImplementedError
 
@@ -63,17 +61,17 @@ class Maker:
         """End what would delay the end of the process, after a signal."""
 
 
-class DeviceMaker(Maker):
-    """Devices of this machine; renderer: the last one that was made."""
+class DeviceFactory(RendererFactory):
+    """Makes renderers on devices of this machine; renderer: the last one that was made."""
 
-    renderer: AnyRenderer
+    renderer: DevicePictures
 
     def __init__(self, devices: list[dev.Device], options: SceneOptions):
         self.devices = devices
         self.name = " and ".join(on.info.label for on in devices)
         self._made = options.made
 
-    def make(self, scene: Scene, shown: Display, first_sample: int = 0) -> AnyRenderer:
+    def make(self, scene: Scene, shown: Display, first_sample: int = 0) -> DevicePictures:
         """Return a new renderer of a scene; note its warnings."""
         text = f"building kernels for {device_names([on.info for on in self.devices])}"
         compiling = shown.compiling(text)
@@ -91,16 +89,16 @@ class DeviceMaker(Maker):
         dev.kill_compilers()
 
 
-class ClusterMaker(Maker):
-    """The workers of a cluster, of which pictures with lower numbers come first.
+class ClusterFactory(RendererFactory):
+    """Makes renderers on the workers of a cluster, where lower numbers of pictures come first.
 
-    others: all makers of this cluster, itself among them; made: options of its renderer.
+    others: all factories of this cluster, itself among them; made: options of its renderer.
     """
 
     watch: Watch
 
     def __init__(
-        self, name: str, client: Client, others: list[ClusterMaker], made: Mapping[str, Any]
+        self, name: str, client: Client, others: list[ClusterFactory], made: Mapping[str, Any]
     ):
         self.name, self._client, self._others, self._made = name, client, others, made
         self.renderer: ClusterRenderer | None = None
@@ -135,7 +133,7 @@ class ClusterMaker(Maker):
         return -self.frame
 
 
-def new_renderer(scene: Scene, devices: list[dev.Device], **made: Any) -> AnyRenderer:
+def new_renderer(scene: Scene, devices: list[dev.Device], **made: Any) -> DevicePictures:
     """Return a renderer on one device, or on several."""
     if len(devices) > 1:
         from ...cluster.multi_renderer import MultiRenderer
@@ -144,20 +142,20 @@ def new_renderer(scene: Scene, devices: list[dev.Device], **made: Any) -> AnyRen
     return Renderer(scene, devices[0], **made)
 
 
-def device_makers(
+def device_factories(
     devices: list[dev.Device], options: SceneOptions, pictures: int
-) -> list[DeviceMaker]:
-    """Return a maker for each device, or one of all where there are fewer pictures."""
+) -> list[DeviceFactory]:
+    """Return a factory for each device, or one of all where there are fewer pictures."""
     if pictures < len(devices):
-        return [DeviceMaker(devices, options)]
-    return [DeviceMaker([one], options) for one in devices]  # with nothing to add up
+        return [DeviceFactory(devices, options)]
+    return [DeviceFactory([one], options) for one in devices]  # with nothing to add up
 
 
 @contextmanager
-def cluster_makers(
+def cluster_factories(
     workers: Workers, options: SceneOptions, pictures: int, shown: Display
-) -> Iterator[list[ClusterMaker]]:
-    """Yield makers of the workers at an address; pictures: that may be rendered at a time."""
+) -> Iterator[list[ClusterFactory]]:
+    """Yield factories of the workers at an address; pictures: that may be rendered at a time."""
     from .workers import Watch, connected
 
     device = options.machine.device
@@ -165,10 +163,10 @@ def cluster_makers(
     made = options.made | {"device": None if several else device}  # one alone makes the pictures
     made = {name: value for name, value in made.items() if value is not None}
     with connected(workers, options.machine, shown) as client:
-        makers: list[ClusterMaker] = []
+        factories: list[ClusterFactory] = []
         for _ in range(min(pictures, OVERLAP)):
-            makers.append(ClusterMaker(workers.cluster or "", client, makers, made))
-        watch = Watch(lambda: [maker.renderer for maker in makers if maker.renderer], shown)
-        for maker in makers:
-            maker.watch = watch
-        yield makers
+            factories.append(ClusterFactory(workers.cluster or "", client, factories, made))
+        watch = Watch(lambda: [one.renderer for one in factories if one.renderer], shown)
+        for factory in factories:
+            factory.watch = watch
+        yield factories
