@@ -93,6 +93,11 @@ def check_writable(path: str | Path) -> None:
             raise PermissionError(message) from error
 
 
+def check_folder(path: str | Path) -> None:
+    """Try whether files can be made in a folder, and leave nothing behind. Raises OSError."""
+    check_writable(_new_name(Path(path) / "file"))
+
+
 def link(path: str | Path, other: str | Path) -> None:
     """Give the file at `path` a second name, so that it stays there when it is replaced.
 

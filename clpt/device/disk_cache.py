@@ -101,7 +101,7 @@ def _unfit(path: Path) -> str | None:
     """Return why a folder cannot hold a cache; None if it can. It is made where it is missing."""
     try:
         path.mkdir(mode=0o700, parents=True, exist_ok=True)
-        output_files.check_writable(path / "trial")
+        output_files.check_folder(path)
         if os.name != "posix":
             return None
         for part in (path, *(one for one in path.iterdir() if one.is_dir())):

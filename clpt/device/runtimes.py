@@ -98,7 +98,7 @@ def _make_caches_writable() -> None:
     ):
         nearest = next(path for path in (wanted, *wanted.parents) if path.exists())
         try:
-            output_files.check_writable(nearest / "trial")
+            output_files.check_folder(nearest)
         except OSError as error:
             other = disk_cache.temporary_folder() / variable.partition("_")[0].lower()
             os.environ[variable] = str(other)

@@ -67,6 +67,12 @@ def test_the_users_folder_is_used_and_private(user, caplog):
         assert user.stat().st_mode & 0o777 == 0o700
 
 
+@pytest.mark.parametrize("inside", ["trial", "file"])
+def test_folders_in_it_do_not_matter(user, caplog, inside):
+    (user / inside).mkdir(parents=True)
+    assert disk_cache.folder() == user and not caplog.text
+
+
 @posix
 @pytest.mark.parametrize("part", ["", "programs"])
 def test_a_folder_that_others_can_write_is_not_used(user, caplog, part):
