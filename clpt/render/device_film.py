@@ -438,7 +438,7 @@ class DeviceFilm:
             paper=tuple(map(tuple, white_paper(film, features.spectra.mode).tolist())),
             names=first.scene.lowered.layer_names,
             adaptive=self.scene.noise is not None,
-            octaves=self.scene.sampler.octaves * ("variance" in features.film.layers.names),
+            octaves=self.scene.sampler.octaves if settings["octaves"] == 2 else 0.0,
         )
 
 
