@@ -96,20 +96,16 @@ class Contender:
     caches: Path
     options: tuple[str, ...] | None = None
 
-    @property
-    def name(self) -> str:
-        return "mitsuba" if self.options is None else "clpt"
-
     def render(self, spp: int, seed: int) -> Taken:
         """Return a picture. Raises RuntimeError with the process's last words if it fails twice."""
         with tempfile.TemporaryDirectory() as folder:
             out = Path(folder) / ("a.npy" if self.options is None else "a.exr")
-            command = self._command(spp, seed, out)
+            command = [sys.executable, *self._command(spp, seed, out)]
             try:
-                cpu, seconds, peak = self._run(command)
+                cpu, seconds, peak = watched(command, self.cores, self.caches)
             except RuntimeError as error:
                 print(f"once more: {error}", file=sys.stderr)
-                cpu, seconds, peak = self._run(command)
+                cpu, seconds, peak = watched(command, self.cores, self.caches)
             image = np.load(out) if self.options is None else clpt.read_image(out)
         return Taken(cpu, seconds, peak, np.asarray(image, np.float32)[..., :3])
 
@@ -120,26 +116,25 @@ class Contender:
         given = ["--mode", self.mode, "--spp", str(spp), "--seed", str(seed), "-o", str(out)]
         return ["-m", "clpt", "render", str(self.file), *self.options, *given, "--quiet"]
 
-    def _run(self, arguments: list[str]) -> tuple[float, float, int]:
-        caches = {name: str(self.caches / name) for name in ("XDG_CACHE_HOME", "POCL_CACHE_DIR")}
-        for folder in caches.values():
-            os.makedirs(folder, exist_ok=True)
-        threads = {"POCL_MAX_PTHREAD_COUNT": str(len(self.cores))}
-        cores = ",".join(map(str, self.cores))
-        report = self.caches / "report.json"
-        watch = [sys.executable, "-I", "-S", "-c", WATCH, str(report)]
-        command = ["taskset", "-c", cores, *watch, sys.executable, *arguments]
-        with tempfile.TemporaryFile("w+") as words:
-            done = subprocess.run(
-                command, cwd=machine.ROOT, env={**os.environ, **caches, **threads},
-                stdout=words, stderr=words,
-            )  # fmt: skip
-            if done.returncode:
-                words.seek(0)
-                last = (words.read().strip().splitlines() or [f"status {done.returncode}"])[-1]
-                raise RuntimeError(f"{self.name}: {last[:300]}")
-        clock, processor, memory = json.loads(report.read_text())
-        return processor, clock, memory
+
+def watched(command: Sequence[str], cores: Sequence[int], caches: Path) -> tuple[float, float, int]:
+    """Run a process on some cores; return its seconds of processor time and by the clock, and its
+    largest resident set [bytes]. Raises RuntimeError with its last words if it fails."""
+    folders = {name: str(caches / name) for name in ("XDG_CACHE_HOME", "POCL_CACHE_DIR")}
+    for folder in folders.values():
+        os.makedirs(folder, exist_ok=True)
+    given = {**os.environ, **folders, "POCL_MAX_PTHREAD_COUNT": str(len(cores))}
+    report = caches / "report.json"
+    watch = [sys.executable, "-I", "-S", "-c", WATCH, str(report)]
+    held = ["taskset", "-c", ",".join(map(str, cores)), *watch, *command]
+    with tempfile.TemporaryFile("w+") as words:
+        done = subprocess.run(held, cwd=machine.ROOT, env=given, stdout=words, stderr=words)
+        if done.returncode:
+            words.seek(0)
+            last = (words.read().strip().splitlines() or [f"status {done.returncode}"])[-1]
+            raise RuntimeError(f"{Path(command[0]).name}: {last[:300]}")
+    clock, processor, memory = json.loads(report.read_text())
+    return processor, clock, memory
 
 
 def relative_mse(image: NDArray[np.floating], reference: NDArray[np.floating]) -> float:
@@ -150,13 +145,28 @@ def relative_mse(image: NDArray[np.floating], reference: NDArray[np.floating]) -
     return float(error[: int(error.size * (1 - TRIM))].mean())
 
 
-def with_film(
-    scene: Path, width: int, mode: str, as_file: bool, sampler: str | None
-) -> tuple[Path, tuple[int, int]]:
-    """Write a copy of a scene beside it with a film of that width; return it and the film's size.
+@dataclass(frozen=True)
+class Settings:
+    """What is compared: modes, numbers of cores, ways of clpt, samples a pixel of pictures and of
+    references, the film's width, and whether it keeps the file's filter."""
 
-    as_file: leave its pixel filter as it is; sampler: a kind to put in the place of its own.
+    modes: Sequence[str]
+    threads: Sequence[int]
+    ways: Sequence[str]
+    spp: int
+    long: int
+    width: int
+    as_file: bool
+
+
+def with_film(
+    scene: Path, folder: Path, settings: Settings, mode: str, sampler: str | None
+) -> tuple[Path, tuple[int, int]]:
+    """Write a copy of a scene with the film of the settings to a folder; return it and its size.
+
+    sampler: a kind to put in the place of its own. What lies beside the scene is linked.
     """
+    width, as_file = settings.width, settings.as_file
     tree = ET.parse(scene)
     root = tree.getroot()
     given = {e.get("name", ""): e.get("value", "") for e in root.iter("default")}
@@ -191,23 +201,12 @@ def with_film(
         name = integrator.get("type", "")
         if name.startswith("$") and name[1:] not in given:
             integrator.set("type", "path")
-    copy = scene.with_name(f".efficiency-{os.getpid()}-{sampler}-{scene.name}")
+    folder.mkdir()
+    for beside in scene.resolve().parent.iterdir():
+        (folder / beside.name).symlink_to(beside)
+    copy = folder / f"film-{scene.name}"
     tree.write(copy)
     return copy, (width, height)
-
-
-@dataclass(frozen=True)
-class Settings:
-    """What is compared: modes, numbers of cores, ways of clpt, samples a pixel of pictures and of
-    references, the film's width, and whether it keeps the file's filter."""
-
-    modes: Sequence[str]
-    threads: Sequence[int]
-    ways: Sequence[str]
-    spp: int
-    long: int
-    width: int
-    as_file: bool
 
 
 def compare(scene: Path, settings: Settings) -> list[Row]:
@@ -220,33 +219,29 @@ def in_mode(scene: Path, mode: str, settings: Settings) -> list[Row]:
     every = sorted(os.sched_getaffinity(0))
     rows: list[Row] = []
     copies: dict[str, Path] = {}
-    try:
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
         for name, kind in SAMPLERS.items():
-            copies[name], size = with_film(scene, settings.width, mode, settings.as_file, kind)
-        with tempfile.TemporaryDirectory() as folder:
+            copies[name], size = with_film(scene, folder / name, settings, mode, kind)
 
-            def contenders(number: int) -> dict[str, Contender]:
-                """Mitsuba by its samplers, and then clpt by its ways."""
-                each = (mode, every[:number], Path(folder) / f"{number}")
-                theirs = {f"mitsuba {name}": Contender(copies[name], *each) for name in SAMPLERS}
-                ours = {way: Contender(copies["file"], *each, WAYS[way]) for way in settings.ways}
-                return theirs | ours
+        def contenders(number: int) -> dict[str, Contender]:
+            """Mitsuba by its samplers, and then clpt by its ways."""
+            each = (mode, every[:number], folder / f"{number}")
+            theirs = {f"mitsuba {name}": Contender(copies[name], *each) for name in SAMPLERS}
+            return theirs | {w: Contender(copies["file"], *each, WAYS[w]) for w in settings.ways}
 
-            reference, means = reference_of(contenders(len(every)), settings)
-            about = {
-                "scene": name_of(scene),
-                "mode": mode,
-                "as_file": settings.as_file,
-                "size": [*size],
-                "spp": settings.spp,
-                "means": [round(mean, 6) for mean in means],
-            }
-            for number in settings.threads:
-                found = figures(contenders(number), settings.spp, reference)
-                rows += [{**about, "threads": number, **pair} for pair in pairs(found)]
-    finally:
-        for copy in copies.values():
-            copy.unlink()
+        reference, means = reference_of(contenders(len(every)), settings)
+        about = {
+            "scene": name_of(scene),
+            "mode": mode,
+            "as_file": settings.as_file,
+            "size": [*size],
+            "spp": settings.spp,
+            "means": [round(mean, 6) for mean in means],
+        }
+        for number in settings.threads:
+            found = figures(contenders(number), settings.spp, reference)
+            rows += [{**about, "threads": number, **pair} for pair in pairs(found)]
     return rows
 
 
