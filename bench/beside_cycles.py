@@ -148,8 +148,8 @@ class Contender:
                 command += [*WAYS[self.way], "--mode", "rgb", "--size", size, *film, "-o", out]
             else:
                 guiding = str(int(self.way == "guiding"))
-                command = [self.python, "-I", str(CYCLES), f"{self.folder / 'scene.json'}", *numbers]
-                command += [guiding, out]
+                described = str(self.folder / "scene.json")
+                command = [self.python, "-I", str(CYCLES), described, *numbers, guiding, out]
             cpu, _, _ = watched(command, CORE, self.folder / "caches")
             return cpu, np.asarray(clpt.read_image(out), np.float32)[..., :3]
 

@@ -139,7 +139,7 @@ def efficiency(rows: Sequence[Row]) -> str:
         return [
             *(str(row[name]) for name in ("scene", "mode", "threads")),
             "the file's" if row["as_file"] else "box",
-            "the file's" if row.get("sampler", row["as_file"]) in ("file", True) else "multijitter",
+            "the file's" if sampler_of(row) == "file" else "multijitter",
             row.get("way", "file"),
             *(f"**{row[name]:.2f}**" for name in ("efficiency_ratio", "rate_ratio")),
             ", ".join(f"{one['way']} {one['efficiency_ratio']:.2f}" for one in others),
@@ -152,18 +152,25 @@ def efficiency(rows: Sequence[Row]) -> str:
     return table(headings, map(cells, best)) + "\n" + geometric_means([row for row, *_ in best])
 
 
+def sampler_of(row: Row) -> str:
+    """Whether Mitsuba had the file's sampler or its best one; in rows that do not say so, too."""
+    return str(row.get("sampler", "file" if row["as_file"] else "best"))
+
+
 def best_ways(rows: Sequence[Row]) -> list[list[Row]]:
-    """Rows of the newest film of each comparison, the way with the highest efficiency first."""
-    groups: dict[tuple[object, ...], list[Row]] = {}
+    """The newest rows of the newest film of each comparison, the most efficient way first."""
+    groups: dict[tuple[object, ...], dict[str, Row]] = {}
     for row in sorted(rows, key=lambda row: str(row["date"])):
-        sampler = row.get("sampler", "file" if row["as_file"] else "best")
-        which = (*(row[name] for name in ("mode", "as_file", "threads", "scene")), sampler)
-        group = groups.setdefault(which, [])
-        if group and (group[0]["size"], "way" in group[0]) != (row["size"], "way" in row):
+        about = (row[name] for name in ("mode", "as_file", "threads", "scene"))
+        film = str(row["size"]), "way" in row
+        group = groups.setdefault((*about, sampler_of(row)), {})
+        if any((str(old["size"]), "way" in old) != film for old in group.values()):
             group.clear()
-        group.append(row)
+        group[str(row.get("way"))] = row
     ordered = sorted(groups.items(), key=lambda item: tuple(map(str, item[0])))
-    return [sorted(group, key=lambda row: -row["efficiency_ratio"]) for _, group in ordered]
+    return [
+        sorted(group.values(), key=lambda row: -row["efficiency_ratio"]) for _, group in ordered
+    ]
 
 
 def hard_light(rows: Sequence[Row]) -> str:
@@ -207,8 +214,7 @@ def geometric_means(rows: Sequence[Row]) -> str:
     """Efficiency over all scenes, by mode, threads, filter and Mitsuba's sampler."""
     groups: dict[tuple[object, ...], list[float]] = {}
     for row in rows:
-        sampler = row.get("sampler", "file" if row["as_file"] else "best")
-        which = (row["mode"], row["threads"], row["as_file"], sampler)
+        which = (row["mode"], row["threads"], row["as_file"], sampler_of(row))
         groups.setdefault(which, []).append(float(row["efficiency_ratio"]))
     lines = [
         f"- {mode}, {threads} thread(s), {'the file' if as_file else 'box'}'s filter, Mitsuba's "
@@ -314,18 +320,20 @@ def page(machines: dict[str, list[Row]]) -> str:
     return text
 
 
-def write() -> Path:
-    """Write the page; where it is."""
-    machines: dict[str, list[Row]] = {}
+def machines() -> dict[str, list[Row]]:
+    """All records, by their processor and its cores."""
+    found: dict[str, list[Row]] = {}
     for file in sorted(RESULTS.glob("2*.jsonl")):
         for line in file.read_text(encoding="utf-8").splitlines():
             record = json.loads(line)
-            machines.setdefault(f"{record['processor']}, {record['cores']} cores", []).append(
-                record
-            )
-    RESULTS.mkdir(exist_ok=True)
+            found.setdefault(f"{record['processor']}, {record['cores']} cores", []).append(record)
+    return found
+
+
+def write() -> Path:
+    """Write the page; where it is."""
     path = RESULTS / "README.md"
-    path.write_text(page(machines), encoding="utf-8")
+    path.write_text(page(machines()), encoding="utf-8")
     return path
 
 
