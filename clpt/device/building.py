@@ -123,7 +123,8 @@ def compile_ahead(device: Device, sources: Mapping[str, Source], main: str) -> N
             seconds = compile_limits.seconds_for(source)
             told = source.name, seconds, device.info.platform, device.info.name
             device.builds.on_compile()
-            device.compilers.submit(part, Job(*told, " ".join(options), text))
+            job = Job(*told, " ".join(options), text)
+            device.compilers.submit(part, job, first=device.hurries)
     device.builds.on_new()
 
 

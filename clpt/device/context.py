@@ -161,6 +161,7 @@ class Device:
         self.context, self.queue, self.info = context, queue, info
         self.builds = Builds()
         self.compilers: Compilers | None = None  # in other processes, where the caller gives some
+        self.hurries = False  # whether they compile for it before they do for others
         self.programs = program_cache.of(queue)
 
     @classmethod

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import time
 from collections.abc import Callable
 from functools import partial
 
@@ -16,21 +17,24 @@ from clpt.view.target import Change, Make, Target, Variant
 
 log = logging.getLogger(__name__)
 
+PATIENCE = 0.4  # [s]
+
 
 class Beginning:
     """Makes the first renderer of a session, and pictures of a solid scene until it is there.
 
-    make: makes the renderer of `variant` of the scene, on the device. If all of its programs are in
-    caches there are no other pictures.
+    make: makes the renderer of `variant` of the scene, on the device. There are pictures of the solid
+    scene where programs are in no cache, or where preparing the scene takes longer than PATIENCE.
     """
 
     def __init__(self, device: Device, make: Make, variant: Variant, scene: Scene):
         self.variant = variant
         self._making = Making(device, lambda: make(variant(scene)))
         own = Device.open(device.info, context=device.context)  # nobody waits for these programs
+        own.compilers, own.hurries = device.compilers, True
         small = partial(Renderer, device=own, tree_quality="fast")
         self._solid = Target(small, lambda scene: solid(variant(scene)))
-        self._fails = False
+        self._fails, self._began = False, time.monotonic()
 
     def note(self, change: Change) -> None:
         """Note that the scene has changed."""
@@ -46,8 +50,12 @@ class Beginning:
         self._making.wait(seconds)
 
     def show(self, scene: Scene, offer: Callable[[Bytes], None]) -> None:
-        """Offer a picture of the scene if kernels are compiled; that begins after the first one."""
-        if not self._making.is_new or self._fails:
+        """Offer a picture of the solid scene if it takes long until there is another one.
+
+        Kernels are compiled only after the first one.
+        """
+        soon = not self._making.is_new and time.monotonic() - self._began < PATIENCE
+        if soon or self._fails:
             return
         try:
             renderer = self._solid.follow(scene)

@@ -81,10 +81,9 @@ class RenderLoop:
         self.seconds = 0.0  # of rendering the whole picture
         self._film: Image | None = None
         self._errors = maps.ErrorMap()
-        options = {"cancel_seconds": CANCEL_SECONDS, **options}
-        self._make = partial(Renderer, device=device, **options)
+        self._options = {"cancel_seconds": CANCEL_SECONDS, **options}
         self._divider = first_divider(scene)
-        self._whole = self._make if make is None else partial(make, **options)
+        self._whole = self._make if make is None else partial(make, **self._options)
         self._limits: str | None = None  # the denoiser after which the limit of noise holds
         self._full = Target(self._make_whole, lambda scene: scene)
         self._preview = Target(self._make, smaller(self._divider))
@@ -241,8 +240,8 @@ class RenderLoop:
         self._slow_previews = self._slow_previews + 1 if took > SLOW else 0
         if self._slow_previews == 2 and self._divider < DIVIDERS[-1]:
             fitting = self._divider * math.sqrt(took / SLOW)
-            self._resize_preview(next((n for n in DIVIDERS if n >= fitting), DIVIDERS[-1]))
-            self._preview.follow(self.scene)  # now, not in a drag; by the kernels that it had
+            coarser = next((n for n in DIVIDERS if n >= fitting), DIVIDERS[-1])
+            self._resize_preview(coarser, now=True)
             self._previews_left = 0
             return
         finer = finer_divider(self._divider, first_divider(self.scene))
@@ -250,8 +249,13 @@ class RenderLoop:
         fast = finer < self._divider and would_take < MUCH_FASTER * SLOW
         self._fast_previews = self._fast_previews + 1 if fast else 0
         if self._fast_previews >= FAST_PREVIEWS and not self._previews_left:  # not in a drag
-            self._resize_preview(finer)
-            self._preview.follow(self.scene)
+            self._resize_preview(finer, now=True)
+
+    def _make(self, scene: Scene, beside: Renderer | None = None, **more: Any) -> Renderer:
+        """Return a renderer on the device, beside one that there is."""
+        others = beside, self._full.renderer, self._preview.renderer
+        beside = next((one for one in others if isinstance(one, Renderer)), None)
+        return Renderer(scene, self.device, beside=beside, **self._options, **more)
 
     def _make_whole(self, scene: Scene) -> Renderer:
         return self._whole(scene, denoise=self._limits)
@@ -262,10 +266,17 @@ class RenderLoop:
             self._tell(PREPARING)
         return target.follow(self.scene)
 
-    def _resize_preview(self, divider: int) -> None:
-        self._preview.close()
+    def _resize_preview(self, divider: int, *, now: bool = False) -> None:
+        """Let previews be of another size; now: not in a drag, and by the kernels that there are."""
+        former = self._preview
         self._divider, self._slow_previews, self._fast_previews = divider, 0, 0
-        self._preview = Target(self._make, smaller(divider))
+        self._preview = preview = Target(self._make, smaller(divider))
+        try:
+            if now:
+                small = preview.variant(self.scene)
+                preview.renderer = self._make(small, beside=former.renderer)
+        finally:
+            former.close()
 
     def _render_pass(self) -> None:
         renderer = self._follow(self._full)
