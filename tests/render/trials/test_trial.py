@@ -10,24 +10,25 @@ import numpy as np
 import pytest
 
 import clpt
-from clpt.render.analysis import guides
+from clpt.errors import SceneError
+from clpt.render.analysis import guides, worth
 from clpt.render.lowering.scene import Lowered, lower
 from clpt.render.trials import cost, trial
 from clpt.scene import Scene
-from clpt.scene.integrators import Auto, Integrator, Path
+from clpt.scene.integrators import FEWEST_LIGHT_PATHS, Auto, Integrator, Path
 from clpt.scene.media import Homogeneous
 from tests.pictures.support import assert_agree, blocks, with_film
 from tests.pictures.transport.test_guiding import slit
 from tests.pictures.transport.test_hybrid import caustic, lamp, narrow
 
 AUTO = Path(light_paths="auto", max_depth=5)
-WAYS = [(0.5, False), (0, False), (0, True)]
+WAYS = [(0.5, False), (FEWEST_LIGHT_PATHS, False), (0, True)]
 
 
 def long(scene: Scene, integrator: Integrator = AUTO, **changes: Any) -> Scene:
     """A scene of which so many samples are wanted that a trial is worth it."""
     pixels = scene.film.width * scene.film.height
-    changes = {"spp": -(-guides.WORTH // pixels), "integrator": integrator, **changes}
+    changes = {"spp": -(-worth.GUIDE_RAYS // pixels), "integrator": integrator, **changes}
     return dataclasses.replace(scene, **changes)
 
 
@@ -38,10 +39,11 @@ def ways(scene: Scene) -> list[tuple[Any, bool]]:
 def test_ways_that_are_tried() -> None:
     """The chosen one first; with the depths that the scene says."""
     assert ways(long(caustic())) == WAYS
-    assert ways(long(slit())) == WAYS[1:]
+    assert ways(long(slit())) == [(0, False), (0, True)]
     assert {one.max_depth for one in lower(long(caustic())).candidates} == {5}
     shallow = Path(light_paths="auto", max_depth=2)
     assert ways(long(slit(), shallow)) == []
+    assert ways(long(caustic(), spp=worth.SAMPLES // (16 * 12))) == []
 
 
 @pytest.mark.parametrize(
@@ -72,24 +74,48 @@ def test_an_edit_has_no_trial() -> None:
     assert lower(scene, former=lower(scene)).candidates == ()
 
 
-def test_a_guide_that_nobody_asked_for_learns_for_long() -> None:
+def test_a_guide_learns_the_longer_the_more_samples_there_are() -> None:
+    """Unless somebody says from how many light paths."""
+    learned = {1 << 20: 20, worth.SAMPLES: 20, worth.GUIDE_RAYS: 22, 1 << 40: 22}
+    for samples, power in learned.items():
+        assert guides.paths_for(samples) == 1 << power
+    assert guides.paths_for(3 << 23) == 1 << 21
     scene = long(caustic())
     *_, guided = lower(scene).candidates
     former = dataclasses.replace(lower(scene), integrator=guided)
     assert lower(scene, former=former).settings["guide_paths"] == guides.LONG_PATHS
-    asked = dataclasses.replace(scene, integrator=guided)
-    assert lower(asked).settings["guide_paths"] == guides.PATHS
+    for said, taken in ((0, guides.PATHS), (1000, 1000)):
+        asked = Path(light_paths=0, guiding=True, guide_paths=said)
+        assert lower(long(caustic(), asked)).settings["guide_paths"] == taken
 
 
-def made_up(monkeypatch: pytest.MonkeyPatch, noise: dict[tuple[Any, bool], float]) -> list[Any]:
+@pytest.mark.parametrize("wrong", [-1, 1.5, True, 1 << 25])
+def test_a_guide_learns_from_a_whole_number_of_light_paths(wrong: Any) -> None:
+    with pytest.raises(SceneError, match="guide_paths: must be a whole number"):
+        Path(guiding=True, guide_paths=wrong)
+
+
+def test_a_trial_takes_a_share_of_the_film() -> None:
+    """Where it is long enough for more pixels than the fewest that tell something."""
+    trial_samples = cost.ROUNDS * cost.SAMPLES
+    for samples in (worth.SAMPLES, 1 << 24, 1 << 27):
+        share = cost.pixels_for(samples) * trial_samples / samples
+        assert share <= 1.0 / worth.SHARE
+    assert cost.pixels_for(1) == cost.FEWEST
+    assert cost.pixels_for(1 << 40) == cost.PIXELS
+
+
+def made_up(
+    monkeypatch: pytest.MonkeyPatch, noise: dict[tuple[Any, bool], float], rays: int = 1 << 20
+) -> list[Any]:
     """Let trials find these variances at equal rays; return what is tried, as it is."""
     asked: list[Any] = []
 
-    def tried(_: trial.Ground, lowered: Lowered) -> cost.Trial:
+    def tried(_: trial.Ground, lowered: Lowered, *__: Any) -> tuple[cost.Trial, None]:
         way = lowered.integrator.light_paths, lowered.integrator.guiding
         asked.append(way)
         drawn = np.random.default_rng(len(asked)).normal(1.0, noise[way] ** 0.5, (8, 32, 64, 3))
-        return cost.Trial(drawn, 1000)
+        return cost.Trial(drawn, rays), None
 
     monkeypatch.setattr(trial, "tried", tried)
     return asked
@@ -120,9 +146,46 @@ def test_no_guide_is_compiled_where_there_is_little_noise(monkeypatch: pytest.Mo
     trial.decided(ground, lowered, lambda way: lower(dataclasses.replace(scene, integrator=way)))
     assert asked == WAYS[:2]
     asked.clear()
+    noise = {way: 0.9 * trial.QUIET for way in ((0, False), (0, True))}
+    asked = made_up(monkeypatch, noise)
     alone = lower(long(slit()))
     found = trial.decided(ground, alone, lambda way: alone)
-    assert asked == WAYS[1:2] and found.reason == alone.reason
+    assert asked == [(0, False)] and found.reason == alone.reason
+
+
+def test_no_guide_is_compiled_for_few_rays(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = long(caustic(), spp=-(-worth.SAMPLES // (16 * 12)))
+    lowered = lower(scene)
+
+    def lower_as(way: Integrator) -> Lowered:
+        return lower(scene, former=dataclasses.replace(lowered, integrator=way))
+
+    ground: Any = None
+    pictures = cost.ROUNDS * cost.SAMPLES * 32 * 64
+    for each, guides_too in ((15, False), (17, True)):  # rays of a sample
+        asked = made_up(monkeypatch, dict.fromkeys(WAYS, 1.0), each * pictures)
+        trial.decided(ground, lowered, lower_as)
+        assert asked == (WAYS if guides_too else WAYS[:2])
+
+
+def test_few_light_paths_are_left_out_where_that_is_worth_a_compilation(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """They stand for `path` without any; else the kernels of the trial go on."""
+    pictures = cost.ROUNDS * cost.SAMPLES * 32 * 64
+    ground: Any = None
+    for power, left in ((26, FEWEST_LIGHT_PATHS), (31, 0)):
+        scene = long(caustic(), spp=-(-(1 << power) // (16 * 12)))
+        lowered = lower(scene)
+
+        def lower_as(way: Integrator) -> Lowered:
+            return lower(scene, former=dataclasses.replace(lowered, integrator=way))  # noqa: B023
+
+        noise = {way: 0.1 if way == WAYS[1] else 0.3 for way in WAYS}
+        made_up(monkeypatch, noise, pictures)
+        found = trial.decided(ground, lowered, lower_as)
+        assert found.integrator.light_paths == left and not found.integrator.guiding
+        assert "light paths 1.00, path 0.3" in found.reason
 
 
 @pytest.fixture
@@ -130,11 +193,12 @@ def little(monkeypatch: pytest.MonkeyPatch) -> None:
     """Trials of few samples, in which guides learn from few light paths."""
     monkeypatch.setattr(guides, "PATHS", 1 << 12)
     monkeypatch.setattr(guides, "LONG_PATHS", 1 << 12)
-    monkeypatch.setattr(guides, "WORTH", 1)
+    for name in ("SAMPLES", "GUIDE_RAYS"):
+        monkeypatch.setattr(worth, name, 1)
     monkeypatch.setattr(trial, "ROUNDS", 2)
     monkeypatch.setattr(trial, "SAMPLES", 4)
     monkeypatch.setattr(trial, "QUIET", 0.0)
-    monkeypatch.setattr(cost, "PIXELS", 256)
+    monkeypatch.setattr(cost, "FEWEST", 256)
 
 
 @pytest.mark.usefixtures("little")
@@ -154,7 +218,7 @@ def test_a_film_is_that_of_the_way(monkeypatch: pytest.MonkeyPatch, guiding: boo
     parts[0].merge(parts[1].film_state())
     assert np.array_equal(parts[0].image(), whole.image())
     origin = parts[0]._origin().settings
-    assert origin["chosen.guiding"] is guiding
+    assert origin["chosen.guide_paths"] == (guides.PATHS if guiding else 0)
     crop = clpt.Renderer(with_film(scene, crop=(3, 2, 7, 5)), narrow())
     assert crop._wavefront.features.transport.guided == guiding
 
@@ -168,8 +232,8 @@ def test_a_film_is_gone_on_with_in_its_way(
     monkeypatch.setattr(trial, "GUIDED_RAY", 0.0)
     scene, file = dataclasses.replace(slit(), integrator=Auto()), tmp_path / "a.film"
 
-    def made(worth: int) -> clpt.Renderer | clpt.MultiRenderer:
-        monkeypatch.setattr(guides, "WORTH", worth)
+    def made(samples: int) -> clpt.Renderer | clpt.MultiRenderer:
+        monkeypatch.setattr(worth, "SAMPLES", samples)
         return clpt.MultiRenderer(scene, [narrow()]) if several else clpt.Renderer(scene, narrow())
 
     for first, guiding in ((1 << 40, False), (1, True)):
