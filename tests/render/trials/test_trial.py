@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib as files
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,8 @@ from tests.pictures.transport.test_guiding import slit
 from tests.pictures.transport.test_hybrid import caustic, lamp, narrow
 
 AUTO = Path(light_paths="auto", max_depth=5)
-WAYS = [(0.5, False), (FEWEST_LIGHT_PATHS, False), (0, True)]
+EVERY = [(0.5, False), (FEWEST_LIGHT_PATHS, False), (0, False), (0, True)]
+WAYS = [EVERY[0], EVERY[1], EVERY[3]]  # of which a film of 2^27 samples is worth a trial
 
 
 def long(scene: Scene, integrator: Integrator = AUTO, **changes: Any) -> Scene:
@@ -32,13 +34,17 @@ def long(scene: Scene, integrator: Integrator = AUTO, **changes: Any) -> Scene:
     return dataclasses.replace(scene, **changes)
 
 
+def lower_way(scene: Scene, way: Integrator) -> Lowered:
+    return lower(dataclasses.replace(scene, integrator=way))
+
+
 def ways(scene: Scene) -> list[tuple[Any, bool]]:
     return [(one.light_paths, one.guiding) for one in lower(scene).candidates]
 
 
 def test_ways_that_are_tried() -> None:
     """The chosen one first; with the depths that the scene says."""
-    assert ways(long(caustic())) == WAYS
+    assert ways(long(caustic())) == EVERY
     assert ways(long(slit())) == [(0, False), (0, True)]
     assert {one.max_depth for one in lower(long(caustic())).candidates} == {5}
     shallow = Path(light_paths="auto", max_depth=2)
@@ -121,16 +127,12 @@ def made_up(
     return asked
 
 
-@pytest.mark.parametrize("best", WAYS, ids=["light paths", "path", "guiding"])
+@pytest.mark.parametrize("best", WAYS, ids=["light paths", "few", "guiding"])
 def test_the_cheapest_way_is_taken(monkeypatch: pytest.MonkeyPatch, best: tuple[Any, bool]) -> None:
     scene = long(caustic())
     asked = made_up(monkeypatch, {way: 0.5 if way == best else 1.0 for way in WAYS})
     ground: Any = None
-
-    def lower_as(way: Integrator) -> Lowered:
-        return lower(dataclasses.replace(scene, integrator=way))
-
-    found = trial.decided(ground, lower(scene), lower_as)
+    found = trial.decided(ground, lower(scene), partial(lower_way, scene))
     assert asked == WAYS
     assert (found.integrator.light_paths, found.integrator.guiding) == best
     assert found.features.transport.guided == best[1]
@@ -142,12 +144,10 @@ def test_no_guide_is_compiled_where_there_is_little_noise(monkeypatch: pytest.Mo
     asked = made_up(monkeypatch, dict.fromkeys(WAYS, 0.9 * trial.QUIET))
     ground: Any = None
     scene = long(caustic())
-    lowered = lower(scene)
-    trial.decided(ground, lowered, lambda way: lower(dataclasses.replace(scene, integrator=way)))
+    trial.decided(ground, lower(scene), partial(lower_way, scene))
     assert asked == WAYS[:2]
     asked.clear()
-    noise = {way: 0.9 * trial.QUIET for way in ((0, False), (0, True))}
-    asked = made_up(monkeypatch, noise)
+    asked = made_up(monkeypatch, dict.fromkeys([(0, False), (0, True)], 0.9 * trial.QUIET))
     alone = lower(long(slit()))
     found = trial.decided(ground, alone, lambda way: alone)
     assert asked == [(0, False)] and found.reason == alone.reason
@@ -155,37 +155,24 @@ def test_no_guide_is_compiled_where_there_is_little_noise(monkeypatch: pytest.Mo
 
 def test_no_guide_is_compiled_for_few_rays(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = long(caustic(), spp=-(-worth.SAMPLES // (16 * 12)))
-    lowered = lower(scene)
-
-    def lower_as(way: Integrator) -> Lowered:
-        return lower(scene, former=dataclasses.replace(lowered, integrator=way))
-
     ground: Any = None
     pictures = cost.ROUNDS * cost.SAMPLES * 32 * 64
     for each, guides_too in ((15, False), (17, True)):  # rays of a sample
         asked = made_up(monkeypatch, dict.fromkeys(WAYS, 1.0), each * pictures)
-        trial.decided(ground, lowered, lower_as)
+        trial.decided(ground, lower(scene), partial(lower_way, scene))
         assert asked == (WAYS if guides_too else WAYS[:2])
 
 
-def test_few_light_paths_are_left_out_where_that_is_worth_a_compilation(
+def test_path_without_light_paths_is_compiled_for_very_many_rays(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """They stand for `path` without any; else the kernels of the trial go on."""
-    pictures = cost.ROUNDS * cost.SAMPLES * 32 * 64
     ground: Any = None
-    for power, left in ((26, FEWEST_LIGHT_PATHS), (31, 0)):
+    for power, without in ((27, False), (29, True)):  # of four rays each
         scene = long(caustic(), spp=-(-(1 << power) // (16 * 12)))
-        lowered = lower(scene)
-
-        def lower_as(way: Integrator) -> Lowered:
-            return lower(scene, former=dataclasses.replace(lowered, integrator=way))  # noqa: B023
-
-        noise = {way: 0.1 if way == WAYS[1] else 0.3 for way in WAYS}
-        made_up(monkeypatch, noise, pictures)
-        found = trial.decided(ground, lowered, lower_as)
-        assert found.integrator.light_paths == left and not found.integrator.guiding
-        assert "light paths 1.00, path 0.3" in found.reason
+        asked = made_up(monkeypatch, {way: 0.1 if way == (0, False) else 0.3 for way in EVERY})
+        found = trial.decided(ground, lower(scene), partial(lower_way, scene))
+        assert asked == (EVERY[:3] if without else EVERY[:2])
+        assert (found.integrator.light_paths == 0) == without
 
 
 @pytest.fixture
