@@ -93,13 +93,19 @@ class DeviceFilm:
     it was lowered; start: when it was begun to be made [s of time.perf_counter];
     built: how many programs were built, and how many of them came from clpt's cache; seconds: of
     each part of that. options: see `RenderOptions`. share: makes things once for several devices,
-    by a key and a function; without it the scene may have arrays in the memory of the device.
+    by a key and a function; without it the scene may have arrays in the memory of the device. former:
+    a lowered scene that has much in common with this one.
 
     Raises as `Renderer` does.
     """
 
     def __init__(
-        self, scene: Scene, device: dev.Device, options: RenderOptions, share: Share | None = None
+        self,
+        scene: Scene,
+        device: dev.Device,
+        options: RenderOptions,
+        share: Share | None = None,
+        former: Lowered | None = None,
     ):
         self.start = start = time.perf_counter()
         self.seconds: dict[str, float] = {}
@@ -123,9 +129,9 @@ class DeviceFilm:
             trees=options.get("tree_quality", "high"),
             halves=options.get("halves", False) or needs.halves(scene, denoise),
         )
-        lowered = self._lower(scene, share)
-        self.seconds["lower"] = time.perf_counter() - start
         self._opened: Wavefront | None = None
+        lowered = self._lower(scene, share, former, anew=True)
+        self.seconds["lower"] = time.perf_counter() - start
         self._opened = first = self._create(lowered)
         first.prepare()
         self.built = device.builds.programs - before[0], device.builds.cached - before[1]
@@ -247,10 +253,11 @@ class DeviceFilm:
         want to see something soon, and what is chosen stays.
         """
         steered = self._ground.tuning.cancel_seconds is not None
+        chooses = anew and not (steered and self.is_open)
 
         def make() -> Lowered:
             readable, budget = resolve_device_arrays(scene, self.device.queue), self._texture_budget
-            lowered = lower(readable, budget, former, anew=anew and not steered)
+            lowered = lower(readable, budget, former, anew=chooses)
             if not lowered.candidates or steered:
                 return lowered
 
