@@ -100,8 +100,8 @@ def decided(lit: Lit, former: Integrator | None = None) -> tuple[SceneIndex, str
 def _candidates(index: SceneIndex, chosen: Integrator) -> tuple[Integrator, ...]:
     """The integrators between which a trial may decide, the chosen one first; else none.
 
-    It pays if many samples are to come. Where a limit of noise ends the picture nobody knows how many; photons blur the
-    picture, which no variance tells; and some scenes cannot have a guide.
+    It pays if many samples are to come. Where a limit of noise ends the picture nobody knows how
+    many; photons blur the picture, which no variance tells; and some scenes cannot have a guide.
     """
     samples = index.samples
     if samples < worth.SAMPLES or index.adaptive or index.lit_ghosts or chosen.guiding:
