@@ -46,6 +46,8 @@ def test_ways_that_are_tried() -> None:
     assert ways(long(caustic())) == WAYS
     assert ways(long(slit())) == [(0, False), (0, True)]
     assert {one.max_depth for one in lower(long(caustic())).candidates} == {5}
+    photons = long(caustic(), Auto())
+    assert ways(photons) == [(1, False), (0, True)] and lower(photons).integrator.kind == "vcm"
     shallow = Path(light_paths="auto", max_depth=2)
     assert ways(long(slit(), shallow)) == []
     assert ways(long(caustic(), spp=worth.SAMPLES // (16 * 12))) == []
@@ -56,7 +58,6 @@ def test_ways_that_are_tried() -> None:
     [
         {"spp": 64},
         {"noise": 0.1},
-        {"integrator": Auto()},  # photons suit it
         {"integrator": Path(light_paths=0)},
         {"integrator": Path(guiding=True)},
     ],
