@@ -27,6 +27,13 @@ PROCESSES = [HERE / name for name in ("benchmark", "cli", "cluster", "device", "
 PROCESSES += [HERE / name for name in ("faults", "test_output_files.py", "view")]
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """One more than there are cores: tests that wait for processes and disks use no core."""
+    own = hasattr(os, "sched_getaffinity")  # a process may have fewer than the machine
+    return (len(os.sched_getaffinity(0)) if own else os.cpu_count() or 1) + 1
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Let quick tests of processes try twice more; the summary tells of each that did so.
 
