@@ -69,7 +69,7 @@ FURNACES = [
     pytest.param(phase, mode, id=f"{phase.kind}-{mode}", marks=marks)
     for phase in (*LOSSLESS, VARIED)
     for mode in MODES
-    for marks in (() if mode == "rgb" or phase is VARIED else pytest.mark.slow,)
+    for marks in (() if mode == "spectral" and phase is VARIED else pytest.mark.slow,)
 ]
 
 
@@ -78,6 +78,25 @@ def test_furnace(phase: phases.Phase, mode: str) -> None:
     """What scatters all light cannot be seen under the same light from everywhere."""
     scene = ball(media.Homogeneous(sigma_s=CHROMATIC, phase=phase))
     assert_mean(exposures(with_mode(scene, mode), 8, 64), 1.0, WITHIN)
+
+
+@pytest.mark.parametrize("number", range(len(LOSSLESS) + 1))
+def test_furnace_beside_others(number: int) -> None:
+    """A ball of each phase function, one of which is seen: all of them by one program."""
+    scenes = [
+        ball(
+            media.Homogeneous(sigma_s=CHROMATIC, phase=phase), to_world=tf.translate([9.0 * i, 0, 0])
+        )
+        for i, phase in enumerate((*LOSSLESS, VARIED))
+    ]
+    at = np.array([9.0 * number, 0.0, 0.0])
+    view = tf.look_at(at + [0, 0, 5], at, [0, 1, 0])
+    scene = dataclasses.replace(
+        scenes[0],
+        shapes=[shape for one in scenes for shape in one.shapes],
+        camera=Perspective(fov=12.0, to_world=view),
+    )
+    assert_mean(exposures(with_mode(scene, "rgb"), 8, 64), 1.0, WITHIN)
 
 
 GLASS = [
