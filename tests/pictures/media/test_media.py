@@ -83,18 +83,16 @@ def test_furnace(phase: phases.Phase, mode: str) -> None:
 @pytest.mark.parametrize("number", range(len(LOSSLESS) + 1))
 def test_furnace_beside_others(number: int) -> None:
     """A ball of each phase function, one of which is seen: all of them by one program."""
-    scenes = [
-        ball(
-            media.Homogeneous(sigma_s=CHROMATIC, phase=phase), to_world=tf.translate([9.0 * i, 0, 0])
-        )
-        for i, phase in enumerate((*LOSSLESS, VARIED))
+    places = [9.0 * i for i in range(len(LOSSLESS) + 1)]
+    balls = [
+        ball(media.Homogeneous(sigma_s=CHROMATIC, phase=phase), to_world=tf.translate([x, 0, 0]))
+        for phase, x in zip((*LOSSLESS, VARIED), places, strict=True)
     ]
-    at = np.array([9.0 * number, 0.0, 0.0])
-    view = tf.look_at(at + [0, 0, 5], at, [0, 1, 0])
+    x = places[number]
     scene = dataclasses.replace(
-        scenes[0],
-        shapes=[shape for one in scenes for shape in one.shapes],
-        camera=Perspective(fov=12.0, to_world=view),
+        balls[0],
+        shapes=[shape for one in balls for shape in one.shapes],
+        camera=Perspective(fov=12.0, to_world=tf.look_at([x, 0, 5], [x, 0, 0], [0, 1, 0])),
     )
     assert_mean(exposures(with_mode(scene, "rgb"), 8, 64), 1.0, WITHIN)
 
