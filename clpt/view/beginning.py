@@ -23,8 +23,8 @@ PATIENCE = 0.4  # [s]
 class Beginning:
     """Makes the first renderer of a session, and pictures of a solid scene until it is there.
 
-    make: makes the renderer of `variant` of the scene, on the device. There are pictures of the solid
-    scene where programs are in no cache, or where preparing the scene takes longer than PATIENCE.
+    make: makes the renderer of `variant` of the scene, on the device. There are pictures of the
+    solid scene where programs are in no cache, or where the scene takes longer than PATIENCE.
     """
 
     def __init__(self, device: Device, make: Make, variant: Variant, scene: Scene):

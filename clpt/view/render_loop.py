@@ -267,7 +267,7 @@ class RenderLoop:
         return target.follow(self.scene)
 
     def _resize_preview(self, divider: int, *, now: bool = False) -> None:
-        """Let previews be of another size; now: not in a drag, and by the kernels that there are."""
+        """Let previews be of another size; now: not in a drag, by the kernels that there are."""
         former = self._preview
         self._divider, self._slow_previews, self._fast_previews = divider, 0, 0
         self._preview = preview = Target(self._make, smaller(divider))
