@@ -58,7 +58,7 @@ from clpt.version import VERSION
 log = logging.getLogger("clpt.render.renderer")  # which the documentation names
 
 TEXTURE_SHARE = 0.5  # of a device's free memory, for bitmaps
-WAY = tuple(f"chosen.{name}" for name in ("integrator", "light_paths", "guiding", "splatting"))
+WAY = tuple(f"chosen.{name}" for name in ("integrator", "light_paths", "guide_paths", "splatting"))
 TO_OUTPUT = ("to_first", "to_second", "to_third")
 
 Apply = Callable[..., None]  # takes what writes a change, see `FilmRenderer._apply`
@@ -126,7 +126,7 @@ class DeviceFilm:
             tuning=tuning,
             slots=options.get("slots"),
             looped=looped,
-            tree_quality=options.get("tree_quality", "high"),
+            trees=options.get("tree_quality", "high"),
             halves=options.get("halves", False) or needs.halves(scene, denoise),
         )
         self._opened: Wavefront | None = None
@@ -402,7 +402,7 @@ class DeviceFilm:
         settings: dict[str, Plain] = {
             "chosen.integrator": lowered.integrator.kind,
             "chosen.light_paths": float(lowered.settings["light_paths"]),
-            "chosen.guiding": bool(features.transport.guided),
+            "chosen.guide_paths": int(lowered.settings["guide_paths"]),
             "chosen.splatting": features.film.filter.reach > 0,
             "chosen.texels": int(lowered.tables["texels"].size),
             "halves": first.film.halves == 2,
