@@ -329,7 +329,7 @@ class RenderLoop:
         self._budget.spend(time.perf_counter() - began)
         self.tell(renderer)
 
-    def _send(self, pixels: Bytes, divider: int, *, rest: bool = False, **told: Any) -> None:
+    def _send(self, pixels: Bytes, divider: int, *, rest: bool = False, **told: object) -> None:
         """Send a picture, with a header of its size and of what else is `told` of it."""
         data = pictures.png(pixels) if rest else pictures.jpeg(pixels)
         self._frame += 1
