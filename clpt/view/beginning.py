@@ -61,7 +61,8 @@ class Beginning:
             renderer = self._solid.follow(scene)
             renderer.reset()
             renderer.run(SAMPLES)
-            offer(shaded(renderer))
+            if not self.is_over:
+                offer(shaded(renderer))
         except Exception:  # the scene's own renderer tells what is wrong
             log.debug("the scene is not shown in plain colours", exc_info=True)
             self._fails = True
