@@ -26,18 +26,20 @@ LAYOUTS = ("compact", "wide8")
 class Program:
     """A text, and where it stands first.
 
-    stage: with its layout, if the text hangs on that.
+    stage: with its layout, if the text hangs on that; registers: as of `device.Source`.
     """
 
     text: str
     stage: str
     scene: str
     mode: str
+    registers: int | None = None
 
     @property
     def digest(self) -> str:
-        """What is equal for equal texts."""
-        return hashlib.sha256(self.text.encode()).hexdigest()[:16]
+        """What is equal for equal texts and limits."""
+        limit = "" if self.registers is None else str(self.registers)
+        return hashlib.sha256((self.text + limit).encode()).hexdigest()[:16]
 
 
 def scenes() -> list[Path]:
@@ -60,7 +62,7 @@ def of_scenes(paths: Iterable[Path], modes: Iterable[str] = MODES) -> list[Progr
             features = lower(dataclasses.replace(scene, film=film)).features
             for layout in LAYOUTS:
                 for stage, source in _sources(features, layout):
-                    program = Program(source.text, stage, path.name, mode)
+                    program = Program(source.text, stage, path.name, mode, source.registers)
                     found.setdefault(source.text, program)
                     layouts.setdefault(source.text, set()).add(layout)
     return [_named(program, layouts[text]) for text, program in found.items()]

@@ -38,7 +38,7 @@ def build(device: Device, source: Source, options: Sequence[str] = ()) -> Progra
 
     Raises KernelBuildError with our file and line, the log, and the path of the text.
     """
-    flags = _flags(device, options)
+    flags = _flags(device, options, source.registers)
     on_disk = not has_src_build_cache(device.info.cl_device)
     program = _known(device, source, flags, on_disk)
     if program is not None:
@@ -230,11 +230,12 @@ def build_all(
     return programs
 
 
-def _flags(device: Device, options: Sequence[str]) -> list[str]:
-    """The compiler's options."""
+def _flags(device: Device, options: Sequence[str], registers: int | None = None) -> list[str]:
+    """The compiler's options; registers: of a work-item, see `Source`."""
+    few = [f"-cl-nv-maxrregcount={registers}"] if registers and device.info.limits_registers else []
     # Oclgrind cannot interpret all that its compiler's optimiser makes.
     plain = ["-cl-opt-disable", "-DNOT_INLINED"] if _is_oclgrind(device) else []
-    return [*OPTIONS, *options, *plain]
+    return [*OPTIONS, *options, *few, *plain]
 
 
 def _is_oclgrind(device: Device) -> bool:

@@ -67,7 +67,7 @@ inline mask spectrum_varies(Spectrum a)
     return m;
 }
 
-/* For what is long: SPECTRUM_IN_TURN(F) expands F(c) for all components at once or, on a GPU, for one after the other, as
+/* For what is long: SPECTRUM_IN_TURN(F) expands F(c) for all components at once or, on a GPU, for one after the other:
  * all at once need too many of its registers. SPECTRUM_AT(s, c) is a component there, SPECTRUM_PUT(s, c, v) sets it. */
 #if LANES == 1
 inline real spectrum_part(Spectrum s, int number)

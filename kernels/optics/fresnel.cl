@@ -71,9 +71,9 @@ inline real fresnel_metal(real cos_i, real eta, real k)
 }
 inline Spectrum fresnel_conductor(real cos_i, Spectrum eta, Spectrum k)
 {
-    Spectrum f;
-#define C(c) f.c = fresnel_metal(cos_i, eta.c, k.c);
-    SPECTRUM_EACH(C)
+    Spectrum f = spectrum_of(0.0f);
+#define C(c) SPECTRUM_PUT(f, c, fresnel_metal(cos_i, SPECTRUM_AT(eta, c), SPECTRUM_AT(k, c)));
+    SPECTRUM_IN_TURN(C)
 #undef C
     return f;
 }

@@ -238,3 +238,13 @@ def test_remarks_of_a_driver_are_no_warnings(device, cache_folder, monkeypatch, 
         link(opened, {"main": source()}, "main", build(opened, source()).signatures)
         assert warnings.filters == before
     assert "kernel was vectorised" in caplog.text
+
+
+def test_drivers_are_told_how_many_registers_where_they_take_it(device, monkeypatch):
+    """PoCL does not; NVIDIA's does, by an option of its own."""
+    option = "-cl-nv-maxrregcount=96"
+    assert not device.info.limits_registers
+    assert option not in building._flags(device, (), 96)
+    monkeypatch.setattr(context.DeviceInfo, "limits_registers", True)
+    assert option in building._flags(device, (), 96)
+    assert option not in building._flags(device, (), None)

@@ -6,6 +6,7 @@ material in a scene rebuilds nothing else.
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 
 from clpt import bvh, device
@@ -19,6 +20,7 @@ from clpt.render.codegen import (
     flags,
     lights,
     parameters,
+    registers,
     rough_coat_table,
     shapes,
     signatures,
@@ -229,8 +231,12 @@ def _source(
     """The text of a program; stage: its file, if it is not called so; part: of a loop."""
     own: flags.Defines = {"PART": f"loop_{name}"} if part else {}
     given = {"LANES": lanes, "QUEUED": 0, **own, **defines}
-    alone = _ALONE if given["SLAB_BLOCK"] else {}  # a CPU's rays go alone, too
-    return device.assemble(f"stage/{stage or name}.cl", {**virtual, **alone}, given)
+    file = f"stage/{stage or name}.cl"
+    if not given["SLAB_BLOCK"]:
+        return device.assemble(file, virtual, given)
+    given["FEW_REGISTERS"] = int(registers.are_few(name))  # a CPU's rays go alone, too
+    source = device.assemble(file, {**virtual, **_ALONE}, given)
+    return dataclasses.replace(source, registers=registers.limit(name))
 
 
 def _shared(features: Features, layout: str) -> Files:
