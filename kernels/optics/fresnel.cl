@@ -48,10 +48,7 @@ inline Spectrum fresnel_spectrum(real cos_i, Spectrum eta)
 inline Spectrum relative_index(Spectrum inside, Spectrum outside)
 {
     Spectrum eta = spectrum_div(inside, outside);
-#if SPECTRUM_SIZE == 3
-    eta = spectrum_of(spectrum_mean(eta));
-#endif
-    return eta;
+    return SPECTRUM_SIZE == 3 ? spectrum_of(spectrum_mean(eta)) : eta;
 }
 
 /* Vacuum and a metal of index eta + i k (Born and Wolf 1999, 14.4; as in Lazanyi and

@@ -39,9 +39,11 @@ Files = dict[str, str | device.Part | tuple[str, ...]]
 # Files of kernels that take the place of others where a work-item shades one path.
 _ALONE: device.Virtual = {
     **bvh.ALONE,
+    "core/spectrum_at_once.cl": ("core/spectrum_in_turn.cl",),
     "core/texels_between.cl": ("core/texels_in_turn.cl",),
     "optics/thin_film.cl": ("optics/thin_film_in_turn.cl",),
 }
+_FEW: device.Virtual = {"bvh/no_vectorize.cl": ("interface/few_registers.cl",)}
 
 
 def sources(
@@ -232,10 +234,10 @@ def _source(
     own: flags.Defines = {"PART": f"loop_{name}"} if part else {}
     given = {"LANES": lanes, "QUEUED": 0, **own, **defines}
     file = f"stage/{stage or name}.cl"
-    if not given["SLAB_BLOCK"]:
+    if not given["SLAB_BLOCK"]:  # a CPU's rays go alone, too
         return device.assemble(file, virtual, given)
-    given["FEW_REGISTERS"] = int(registers.are_few(name))  # a CPU's rays go alone, too
-    source = device.assemble(file, {**virtual, **_ALONE}, given)
+    few = _FEW if registers.are_few(name) else {}
+    source = device.assemble(file, {**virtual, **_ALONE, **few}, given)
     return dataclasses.replace(source, registers=registers.limit(name))
 
 

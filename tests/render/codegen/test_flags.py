@@ -21,7 +21,6 @@ OTHERS = {
     "NOT_INLINED",
     "USES_MAPPINGS",
     "SLAB_BLOCK",
-    "FEW_REGISTERS",
 }
 OPENCL = {"FP_FAST_FMAF"}  # what compilers define
 TABLES = flags.SCENE | flags.MATERIAL.keys()
