@@ -18,7 +18,6 @@ _LIMITS = {
     "shade_plastic": 128,
     "shade_rough_conductor": 128,
     "shade_rough_plastic": 136,
-    "shade_rough_dielectric": 136,
 }
 _FEW = 112  # up to which AMD's compilers do with 128
 
