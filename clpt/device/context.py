@@ -91,7 +91,7 @@ class DeviceInfo:
 
     @property
     def limits_registers(self) -> bool:
-        """Whether the driver's compiler takes a number of registers as an option: NVIDIA's."""
+        """Whether the driver's compiler takes and tells numbers of registers: NVIDIA's."""
         return "cl_nv_compiler_options" in self.cl_device.extensions.split()
 
     @cached_property

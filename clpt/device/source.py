@@ -32,14 +32,14 @@ class Source:
     """A whole program as text.
 
     name: the root it was assembled from; text: what the compiler gets; files: every file and
-    virtual file that went in, in order, as errors name them; registers: that a work-item of a GPU
-    has at most, None for as many as its compiler likes.
+    virtual file that went in, in order, as errors name them; registers: limits of a work-item of a
+    GPU to try, see clpt/device/registers.py.
     """
 
     name: str
     text: str
     files: tuple[str, ...]
-    registers: int | None = None
+    registers: tuple[int, ...] = ()
 
     def place(self, row: int) -> tuple[str | None, int | None]:
         """Return the file and line that a row of the text comes from, counted from 1.

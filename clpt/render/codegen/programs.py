@@ -238,7 +238,7 @@ def _source(
         return device.assemble(file, virtual, given)
     few = _FEW if registers.are_few(name) else {}
     source = device.assemble(file, {**virtual, **_ALONE, **few}, given)
-    return dataclasses.replace(source, registers=registers.limit(name))
+    return dataclasses.replace(source, registers=registers.limits(name))
 
 
 def _shared(features: Features, layout: str) -> Files:
