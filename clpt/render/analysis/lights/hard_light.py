@@ -39,6 +39,7 @@ SOME = 0.25  # where they have more; `vcm` has one, as its photons are these
 FOGGY = 0.25, 0.5  # the same two where lights are in media that scatter
 MANY = 4  # where they are in bulbs: the camera's paths find next to nothing there
 DIRECTIONS = 128  # in which a light looks for what is sharp
+SLACK = 1e-6  # of the cosine of a cone around what may be met, for roundings
 BULB = 0.75  # of them: where what is sharp fills more, the light is in a bulb
 SEEN = 0.02  # of the picture: where what is sharp fills more, caustics may be seen through it
 
@@ -199,14 +200,26 @@ def _is_enclosed(geometry: Geometry, place: NDArray[np.float64] | None) -> bool:
     directions = np.stack([level * np.cos(turn), level * np.sin(turn), z])
     covered = np.zeros(DIRECTIONS, bool)
     for pieces in sharp_pieces(geometry, (), lambda one: is_sharp(one) and not _is_dull(one)):
-        a, b, c = (pieces[:, i : i + 3] - place for i in (0, 3, 6))
-        ahead = np.sign(np.einsum("ij,ij->i", a, np.cross(b, c)))[:, None]
-        edges = [np.cross(p, q) @ directions * ahead for p, q in ((a, b), (b, c), (c, a))]
-        middle, reach = (a + b + c) / 3.0, pieces[:, 9:]
-        along = np.maximum(middle @ directions, 0.0)
-        apart = (middle * middle).sum(axis=1, keepdims=True) - along * along
-        covered |= ((apart <= reach * reach) | (np.minimum.reduce(edges) > 0.0)).any(axis=0)
+        covered[_covered(pieces, place, directions)] = True
     return bool(covered.mean() > BULB)
+
+
+def _covered(
+    pieces: NDArray[np.float64], place: NDArray[np.float64], directions: NDArray[np.float64]
+) -> NDArray[np.intp]:
+    """Return which directions (3, n) from a place meet pieces, some more than once."""
+    a, b, c = (pieces[:, i : i + 3] - place for i in (0, 3, 6))
+    middle, reach = (a + b + c) / 3.0, pieces[:, 9]
+    size = reach + np.max([np.linalg.norm(p - middle, axis=1) for p in (a, b, c)], axis=0)
+    away, along = np.linalg.norm(middle, axis=1), middle @ directions
+    edge = np.where(size < away, np.sqrt(np.maximum(away * away - size * size, 0.0)), -away)
+    piece, way = np.nonzero(along >= (edge - SLACK * away)[:, None])  # a cone around each piece
+    a, b, c, middle, reach = (one[piece] for one in (a, b, c, middle, reach))
+    ahead = np.sign(np.einsum("ij,ij->i", a, np.cross(b, c)))
+    towards = directions.T[way]
+    sides = [np.einsum("ij,ij->i", np.cross(p, q), towards) for p, q in ((a, b), (b, c), (c, a))]
+    apart = (middle * middle).sum(axis=1) - np.maximum(along[piece, way], 0.0) ** 2
+    return way[(apart <= reach * reach) | (np.min(sides * ahead, axis=0) > 0.0)]
 
 
 def _share_seen(index: SceneIndex, geometry: Geometry) -> float:
