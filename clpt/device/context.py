@@ -89,6 +89,11 @@ class DeviceInfo:
         """
         return self.platform.casefold() != "rusticl"
 
+    @property
+    def limits_registers(self) -> bool:
+        """Whether the driver's compiler takes and tells numbers of registers: NVIDIA's."""
+        return "cl_nv_compiler_options" in self.cl_device.extensions.split()
+
     @cached_property
     def shares_words(self) -> bool:
         """Whether kernels that run see what the host writes: fine-grained shared memory."""
