@@ -22,7 +22,7 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
     Sampler sampler = light_path_sampler(scene.settings, pixel_index, load_path_sample(path, at));
     Scattering scatter = vertex_scattering(scene, path, at, active, v, sampler);
     real arrives = 1.0f / max_r(VERTEX_COSINE(v.s.n, v.d), (real)(1e-6f));
-    Rival rival = rival_of_emission(scene, path, at, v, vertex_hemisphere(scene, scatter.shading.frame, scatter.wo));
+    Rival rival = rival_of_emission(scene, path, at, v, vertex_receiver(scene, v, scatter));
 
     CameraJoint joint = join_camera_seek(scene, v, scatter);
     bsdf_ask(scene, scatter, join_camera_to(joint, scatter), 1);

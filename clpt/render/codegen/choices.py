@@ -79,7 +79,10 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         ("generated/lights.cl", "path/met_light.cl") * f.media.grids.emissive
         + ("media/grid_flight.cl",) * f.media.grids.present
     ),
-    "generated/kept_hemisphere.cl": lambda f, _: either(f.hemispheres, "path/kept_hemisphere.cl"),
+    "generated/kept_hemisphere.cl": lambda f, _: (
+        when(f.lights.gloss, "path/kept_receiver.cl")
+        or either(f.hemispheres, "path/kept_hemisphere.cl")
+    ),
     "generated/seen_wavelengths.cl": lambda f, _: either(
         f.fluorescence, "path/seen_wavelengths.cl"
     ),

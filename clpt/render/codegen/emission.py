@@ -69,7 +69,7 @@ def densities_text(features: Features) -> str:
     across it at distance t; over the cosine at a light on a shape. Of that, what is left where
     squared distances cancel: [1/(m^2 sr)], and of a light at a point per t^2 [1/m^2], in units of
     Settings.rival_area.
-    light_found_pdf(scene, row, p, hemisphere, wi, t, n): the density with which next-event
+    light_found_pdf(scene, row, p, receiver, wi, t, n): the density with which next-event
     estimation at p finds that point of the light [1/sr]; n: the normal there. Of a delta light it
     is the chance of its row.
     light_path_pdf(scene, row, p, wi, t, n): light_emit_pdf of light that is aimed, too.
@@ -89,7 +89,7 @@ def densities_text(features: Features) -> str:
         "value * l.pmf * scene.settings->rival_area",
     )
     found = Function(
-        "real light_found_pdf(Scene scene, integer row, vec3 p, vec3 hemisphere, vec3 wi, real t, "
+        "real light_found_pdf(Scene scene, integer row, vec3 p, Receiver receiver, vec3 wi, real t, "
         "vec3 n)",
         "1.0f",
         [
@@ -184,7 +184,7 @@ def _aimed_text(features: Features) -> list[str]:
 # of a point that a light shines on, where the light was lowered
 _BACK = (
     "vec3 rest = motion_point_back(motion, p), along = motion_back_unit(motion, wi);",
-    "vec3 front = motion_front_back(motion, n), side = motion_back_unit(motion, hemisphere);",
+    "vec3 front = motion_front_back(motion, n), side = motion_back_unit(motion, receiver_hemisphere(receiver));",
     "real far = t * motion_length_back(motion, wi);",
 )
 
@@ -194,7 +194,7 @@ def _pdf_arguments(kind: str, moving: bool) -> str:
     if kind in shape_records.RECORDS:
         return "rest, along, far, front" if moving else "p, wi, t, n"
     if kind in INFINITE:
-        return "scene, side, along" if moving else "scene, hemisphere, wi"
+        return "scene, side, along" if moving else "scene, receiver_hemisphere(receiver), wi"
     return ""
 
 

@@ -32,7 +32,7 @@ from clpt.render.contract.features import (
     SpectraFeatures,
 )
 from clpt.render.contract.layer_names import LayerNames
-from clpt.render.contract.parameter_words import row_words
+from clpt.render.contract.parameter_words import NORMAL_MAP_WORDS, row_words
 from clpt.render.lowering import features as needs
 from clpt.render.lowering.camera import filters
 from clpt.render.lowering.camera.cameras import lower_camera
@@ -41,7 +41,8 @@ from clpt.render.lowering.device_grids import DeviceGrid
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.geometry import lower_geometry, shape_words
 from clpt.render.lowering.layer_names import lower_names
-from clpt.render.lowering.lights.lights import LightRows, light_rows
+from clpt.render.lowering.lights.lights import LightRows, has_tree, light_rows
+from clpt.render.lowering.materials import gloss
 from clpt.render.lowering.materials.material_words import MaterialWords
 from clpt.render.lowering.media.body_words import BodyWords
 from clpt.render.lowering.media.light_media import light_media_words
@@ -58,6 +59,7 @@ from clpt.scene.params import Kind, params
 from clpt.scene.roles import INDEX
 from clpt.scene.shapes import Mesh, Shape
 
+GLOSS = True
 TREE_FROM = 16  # lights from which a tree chooses among them, see bench/lights.py
 
 
@@ -205,7 +207,7 @@ def _encode_surfaces(found: Analysis, encoder: Encoder) -> _Surfaces:
     """Append shapes, materials, media and lights."""
     index = found.index
     filters.lower_filter(index.film.filter, encoder.store, index.splatting)
-    materials = _begin_materials(index, encoder)
+    materials = _begin_materials(found, encoder)
     moves = spheres_move(index)
     geometry = lower_geometry(found.geometry, encoder, materials, spheres_move=moves)
     media = MediumWords(index, encoder, materials, found.sealed, found.sources.glows)
@@ -258,7 +260,7 @@ def _features(
         camera=needs.of_camera(index),
         film=needs.of_film(index, layers),
         transport=needs.of_transport(index, rows.profile, aimed=len(found.aims) > 0),
-        lights=needs.of_lights(surfaces.lights),
+        lights=needs.of_lights(surfaces.lights, _gloss_before(index, surfaces.materials)),
         media=needs.of_media(index, surfaces.materials, surfaces.near, sealed=bool(found.sealed)),
         motion=needs.of_motion(index, surfaces.geometry, motion),
         geometry=_geometry_features(index, encoder, surfaces),
@@ -266,6 +268,10 @@ def _features(
         spectra=SpectraFeatures(*own),
         materials=needs.of_materials(index, encoder, surfaces.materials),
     )
+
+
+def _gloss_before(index: SceneIndex, materials: MaterialWords) -> int:
+    return (1 + NORMAL_MAP_WORDS * index.normal_mapped) * materials.tells_gloss
 
 
 def _geometry_features(
@@ -319,14 +325,23 @@ def _lower_density(index: SceneIndex, encoder: Encoder, wavelengths: Density) ->
     return density_row, tabulated
 
 
-def _begin_materials(index: SceneIndex, encoder: Encoder) -> MaterialWords:
+def _begin_materials(found: Analysis, encoder: Encoder) -> MaterialWords:
     """Append what idle lanes read as a material, and make the maker of material words."""
+    index = found.index
     if index.shifts:
         encoder.spectra.expect_light(emissions(index))
     leaves: tuple[type[Kind], ...] = (*mt.LEAVES, *index.leaves)
     longest = max(map(row_words, leaves))
     encoder.store.append("materials", np.zeros(longest, np.uint32))
-    return MaterialWords(encoder, index.leaves, index.normal_mapped)
+    return MaterialWords(encoder, index.leaves, index.normal_mapped, _tells_gloss(found))
+
+
+def _tells_gloss(found: Analysis) -> bool:
+    """Whether the tree over lights asks for the gloss of materials."""
+    index = found.index
+    tree = not index.light_paths and has_tree(found.sources.every, TREE_FROM)
+    leaves = (leaf for shape in index.shapes for leaf in mt.parts(shape.material))
+    return GLOSS and tree and not index.balanced and any(gloss.word(leaf) for leaf in leaves)
 
 
 def _lower_medium_aims(index: SceneIndex, encoder: Encoder, lights: LightRows) -> int:

@@ -10,10 +10,13 @@ import dataclasses
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from clpt.errors import SceneError
 from clpt.render.analysis.index import any_of
 from clpt.render.contract.parameter_words import MIXTURE
 from clpt.render.lowering.encoder import Encoder
+from clpt.render.lowering.materials import gloss
 from clpt.render.lowering.materials.normal_maps import NormalPerturbation
 from clpt.scene import materials as mt
 from clpt.scene import roles
@@ -51,8 +54,9 @@ class MaterialWords:
     some let light through; mixture_depth: how deep masks and blends nest.
     """
 
-    def __init__(self, encoder: Encoder, leaves: tuple[type[Scatterer], ...], normal_mapped: bool):
+    def __init__(self, encoder: Encoder, leaves: tuple[type[Scatterer], ...], normal_mapped: bool, tells_gloss: bool = False):
         self._encoder, self._leaves, self._normal_mapped = encoder, leaves, normal_mapped
+        self.tells_gloss = tells_gloss
         self._words: dict[tuple[int, tuple[Any, ...]], int] = {}
         self._depths: dict[int, int] = {}  # of mixtures, by their words
         self.uvs = self.tangents = self.absorption = False
@@ -108,6 +112,9 @@ class MaterialWords:
 
     def _leaf(self, material: Scatterer, side: _Side) -> int:
         before = side.perturbation.words(self._encoder) if self._normal_mapped else None
+        if self.tells_gloss:
+            own = np.array([gloss.word(material)], np.uint32)
+            before = own if before is None else np.concatenate([own, before])
         row = self._encoder.row(material, "materials", before)
         if row >= 1 << 24:
             raise SceneError("the scene has more than 16 million words of material parameters")

@@ -1,0 +1,75 @@
+"""Gloss of materials: what the tree over lights knows of them, kernels/lighting/receiver.cl.
+
+It only decides how often a light is chosen, so a guess costs noise and no truth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from clpt.scene.params import fields_of
+from clpt.scene.scatterer import Scatterer
+
+STRAIGHT = 0.04  # of light that a dielectric reflects which falls on it straight on
+UNKNOWN = 0.5  # an albedo or a share that is a texture
+
+Values = Mapping[str, Any]
+
+
+def word(material: Scatterer) -> int:
+    """Return the gloss of a leaf material, 0 for none.
+
+    The upper 16 bits are the roughness of its microfacets, alpha; the lower ones the share of its
+    reflection in what it reflects of light that comes straight on.
+    """
+    found = _KINDS.get(material.kind)
+    if found is None or material.transmits:
+        return 0
+    alpha, share = found(fields_of(material))
+    alpha, share = np.clip((alpha, share), 1e-3, 1.0)
+    return int(alpha * 65535) << 16 | int(share * 65535)
+
+
+def _number(value: Any) -> float:
+    """A parameter's mean over its colours, where it is known."""
+    if isinstance(value, (int, float)):
+        return float(value)
+    if isinstance(value, (tuple, list, np.ndarray)):
+        return float(np.mean(np.asarray(value, float)))
+    return UNKNOWN
+
+
+def _metal(values: Values) -> tuple[float, float]:
+    return float(np.sqrt(_number(values["alpha_u"]) * _number(values["alpha_v"]))), 1.0
+
+
+def _plastic(values: Values) -> tuple[float, float]:
+    return _number(values["alpha"]), _share(STRAIGHT, _number(values["diffuse_reflectance"]))
+
+
+def _principled(values: Values) -> tuple[float, float]:
+    metal, albedo = _number(values["metallic"]), _number(values["base_color"])
+    straight = metal * albedo + (1.0 - metal) * STRAIGHT
+    return _number(values["roughness"]) ** 2, _share(straight, (1.0 - metal) * albedo)
+
+
+def _phong(values: Values) -> tuple[float, float]:
+    share = _share(_number(values["specular"]), _number(values["diffuse"]))
+    return float(np.sqrt(2.0 / (4.0 * _number(values["exponent"]) + 2.0))), share
+
+
+def _share(glossy: float, diffuse: float) -> float:
+    return glossy / max(glossy + diffuse, 1e-6)
+
+
+_KINDS: dict[str, Callable[[Values], tuple[float, float]]] = {
+    "rough_conductor": _metal,
+    "coated_conductor": _metal,
+    "rough_plastic": _plastic,
+    "principled": _principled,
+    "gltf_surface": _principled,
+    "phong": _phong,
+}
