@@ -4,7 +4,7 @@
 #ifndef RECEIVER_SPREAD
 #define RECEIVER_SPREAD 0.1f
 #endif
-#define RECEIVER_MOST 0.9f /* so that light that is not where the gloss looks is found, too */
+#define RECEIVER_MOST 0.95f /* so that light that is not where the gloss looks is found, too */
 
 typedef struct {
     vec3 hemisphere; /* unit normal of the hemisphere to which it sends light, 0 if to the sphere */

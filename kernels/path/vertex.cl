@@ -108,13 +108,13 @@ inline vec3 vertex_hemisphere(Scene scene, Frame frame, vec3 wo)
     return scale3(frame.n, sign);
 }
 
-/* The same, and its gloss, for the choice of a light. */
-inline Receiver vertex_receiver(Scene scene, Vertex v, Scattering scatter)
+/* The same, and the gloss of light that leaves along `away`, for the choice of a light. */
+inline Receiver vertex_receiver(Scene scene, Vertex v, Scattering scatter, vec3 away)
 {
     vec3 hemisphere = vertex_hemisphere(scene, scatter.shading.frame, scatter.wo);
 #if USES_GLOSS
     natural gloss = BSDF_IS_PHASE ? (natural)(0u) : as_natural(gather_i(scene.materials, max_i(v.row - USES_GLOSS, (integer)(0))));
-    return receiver_of(hemisphere, octahedral_pack(neg3(v.d)), gloss);
+    return receiver_of(hemisphere, octahedral_pack(away), gloss);
 #else
     return hemisphere;
 #endif

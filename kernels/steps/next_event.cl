@@ -12,7 +12,7 @@ inline NextEvent next_event_seek(Scene scene, mask next, Vertex v, Scattering sc
 {
     NextEvent e;
     Frame frame = scatter.shading.frame;
-    Receiver receiver = vertex_receiver(scene, v, scatter);
+    Receiver receiver = vertex_receiver(scene, v, scatter, neg3(v.d));
     vec2 point = sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_LIGHT);
     e.shine = next & !vertex_sealed(v);
     e.ls = light_sample_nothing();

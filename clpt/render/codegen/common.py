@@ -59,6 +59,12 @@ FUNCTIONS = (
         ),
         lambda f, cls: f.transport.balanced and not flags.is_null(f, cls),
     ),
+    Common(
+        "real",
+        "light_tree_pmf",
+        _parameters("Scene scene, integer row, vec3 p, Receiver receiver"),
+        flags.asks_chance,
+    ),
 )
 
 

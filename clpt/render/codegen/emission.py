@@ -71,7 +71,8 @@ def densities_text(features: Features) -> str:
     Settings.rival_area.
     light_found_pdf(scene, row, p, receiver, wi, t, n): the density with which next-event
     estimation at p finds that point of the light [1/sr]; n: the normal there. Of a delta light it
-    is the chance of its row.
+    is the chance of its row. Where the tree asks for gloss it is without that chance, which is
+    known later, see kernels/lighting/rival_chosen.cl.
     light_path_pdf(scene, row, p, wi, t, n): light_emit_pdf of light that is aimed, too.
     """
     present, moving = kinds_of(features), features.motion.lights
@@ -98,7 +99,7 @@ def densities_text(features: Features) -> str:
             if (given := _pdf_arguments(kind, moving))
         ],
         ("LightRow l = light_at(scene, row);", *motion, *_BACK * moving),
-        f"value * {pmf_text(features)}",
+        "value" if features.lights.gloss else f"value * {pmf_text(features)}",
     )
     either = "#define light_path_pdf(scene, row, p, wi, t, n) light_emit_pdf(scene, row, wi, t)"
     if features.transport.aimed:

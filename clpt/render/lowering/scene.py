@@ -341,7 +341,7 @@ def _tells_gloss(found: Analysis) -> bool:
     index = found.index
     tree = not index.light_paths and has_tree(found.sources.every, TREE_FROM)
     leaves = (leaf for shape in index.shapes for leaf in mt.parts(shape.material))
-    return GLOSS and tree and not index.balanced and any(gloss.word(leaf) for leaf in leaves)
+    return GLOSS and tree and any(gloss.word(leaf) for leaf in leaves)
 
 
 def _lower_medium_aims(index: SceneIndex, encoder: Encoder, lights: LightRows) -> int:
