@@ -1,56 +1,58 @@
-/* What a surface does with light that comes to a point, as far as the tree over lights asks for it. */
+/* What a surface does with light that comes to it, as far as the tree over lights asks for that.
+ *
+ * Its gloss is that of GGX microfacets of one roughness and one share in what is reflected, a guess of the host:
+ * clpt/render/lowering/materials/gloss.py. Lights below a node of the tree count by that lobe, as wide as the node takes
+ * it: Liu et al. 2019, "Adaptive BRDF-Oriented Multiple Importance Sampling of Many Lights", and Tokuyoshi et al. 2024,
+ * "Hierarchical Light Sampling with Accurate Spherical Gaussian Lighting", do so with other lobes. By the half vector
+ * it is as long as it should be where light grazes, and costs one division. */
 #include "core/octahedral.cl"
 
-#ifndef RECEIVER_SPREAD
-#define RECEIVER_SPREAD 0.1f
-#endif
-#define RECEIVER_MOST 0.95f /* so that light that is not where the gloss looks is found, too */
+#define RECEIVER_SPREAD 0.1f /* by which the square of a node's sine adds to that of the roughness */
+#define RECEIVER_MOST 0.95f  /* of the share, as it is a guess: other light is to be found, too */
 
 typedef struct {
-    vec3 hemisphere; /* unit normal of the hemisphere to which it sends light, 0 if to the sphere */
-    vec3 wo;         /* to where that light goes, unit length */
-    real width;      /* square of the roughness of its gloss */
-    real share;      /* of gloss in what it reflects; 0: none */
-    real height;     /* of the gloss, see receiver_gloss */
-    natural toward, gloss; /* words that a path keeps of wo and the rest */
+    vec3 hemisphere;       /* unit normal of the hemisphere to which it sends light, 0 if to the sphere */
+    natural toward, gloss; /* words that a path keeps: to where that light goes, and alpha and share */
+    vec3 wo;               /* to where it goes, unit length */
+    real width, share;     /* alpha^2; 0: no gloss */
+    real height;           /* share G1(wo) / (4 |cos|) */
 } Receiver;
 
 #define receiver_hemisphere(r) ((r).hemisphere)
 
-/* wo, gloss: words that a path keeps, see clpt/render/lowering/materials/gloss.py. */
-inline Receiver receiver_of(vec3 hemisphere, natural wo, natural gloss)
+inline Receiver receiver_of(vec3 hemisphere, natural toward, natural gloss)
 {
-    Receiver r;
-    r.hemisphere = hemisphere;
-    r.toward = wo;
-    r.gloss = gloss;
-    r.wo = octahedral_unpack(wo);
+    Receiver r = {hemisphere, toward, gloss, octahedral_unpack(toward)};
+    real cos_o = dot3(r.wo, hemisphere), away = 1.0f - clamp_r(cos_o, (real)(0.0f), (real)(1.0f));
+    real straight = to_real(gloss & 0xffffu) * (1.0f / 65535.0f); /* and Schlick's rise to 1 */
+    real share = straight + (1.0f - straight) * sqr(sqr(away)) * away;
     r.width = sqr(to_real(gloss >> 16u) * (1.0f / 65535.0f));
-    real straight = to_real(gloss & 0xffffu) * (1.0f / 65535.0f), cos_o = dot3(r.wo, hemisphere);
-    real away = clamp_r(1.0f - cos_o, (real)(0.0f), (real)(1.0f));
-    mask glossy = (gloss != 0u) & (cos_o > 0.0f);
-    r.share = sel(glossy, RECEIVER_MOST * (straight + (1.0f - straight) * sqr(sqr(away)) * away), (real)(0.0f));
-    cos_o = max_r(cos_o, (real)(0.0f));
-    r.height = 0.5f * r.share / (cos_o + sqrt_r(r.width + (1.0f - r.width) * sqr(cos_o)));
+    r.share = sel((gloss != 0u) & (cos_o > 0.0f), RECEIVER_MOST * share, (real)(0.0f));
+    real c = max_r(cos_o, (real)(0.0f));
+    r.height = 0.5f * r.share / (c + sqrt_r(r.width + (1.0f - r.width) * sqr(c)));
     return r;
 }
 
-/* What the gloss sends of light from around wi, over that of a white diffuse surface that faces it: pi f cos, f of GGX
- * microfacets without the masking of wi, by the half vector. Lights within an angle of sine `spread` around wi see
- * these facets as rough as it takes. */
-inline real receiver_gloss(Receiver r, vec3 wi, real spread)
+/* Of a surface whose material is at `row`, for light that it sends along `away`. */
+inline Receiver receiver_at(Scene scene, integer row, vec3 hemisphere, vec3 away)
 {
-    vec3 h = add3(r.wo, wi);
-    real width = min_r(r.width + RECEIVER_SPREAD * sqr(spread), (real)(1.0f));
-    real h2 = dot3(h, h), along = max_r(dot3(h, r.hemisphere), (real)(0.0f));
-    real d = h2 - (1.0f - width) * sqr(along);
-    return r.height * width * sqr(h2 / max_r(d, (real)(1e-20f)));
+    natural gloss = as_natural(gather_i(scene.materials, max_i(row - GLOSS_BEFORE, (integer)(0))));
+    return receiver_of(hemisphere, octahedral_pack(away), gloss);
 }
 
-/* The same of all that is reflected; cosine: of the light to the normal. */
-inline real receiver_reflects(Receiver r, vec3 wi, real spread, real cosine)
+/* pi f cos of the gloss for light that comes from around wi, within an angle of that sine; without its masking. */
+inline real receiver_gloss(Receiver r, vec3 wi, real sine)
+{
+    vec3 h = add3(r.wo, wi);
+    real width = min_r(r.width + RECEIVER_SPREAD * sqr(sine), (real)(1.0f));
+    real h2 = dot3(h, h), up = max_r(dot3(h, r.hemisphere), (real)(0.0f));
+    return r.height * width * sqr(h2 / max_r(h2 - (1.0f - width) * sqr(up), (real)(1e-20f)));
+}
+
+/* The same of all that is reflected, over the albedo; cosine: of the light to the normal. */
+inline real receiver_reflects(Receiver r, vec3 wi, real sine, real cosine)
 {
     mask glossy = r.share > 0.0f;
-    if (any(glossy)) cosine = sel(glossy, cosine * (1.0f - r.share) + receiver_gloss(r, wi, spread), cosine);
+    if (any(glossy)) cosine = sel(glossy, cosine * (1.0f - r.share) + receiver_gloss(r, wi, sine), cosine);
     return cosine;
 }

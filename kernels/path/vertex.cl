@@ -108,16 +108,10 @@ inline vec3 vertex_hemisphere(Scene scene, Frame frame, vec3 wo)
     return scale3(frame.n, sign);
 }
 
-/* The same, and the gloss of light that leaves along `away`, for the choice of a light. */
+/* The same, and its gloss for light that leaves along `away`: for the choice of a light. */
 inline Receiver vertex_receiver(Scene scene, Vertex v, Scattering scatter, vec3 away)
 {
-    vec3 hemisphere = vertex_hemisphere(scene, scatter.shading.frame, scatter.wo);
-#if USES_GLOSS
-    natural gloss = BSDF_IS_PHASE ? (natural)(0u) : as_natural(gather_i(scene.materials, max_i(v.row - USES_GLOSS, (integer)(0))));
-    return receiver_of(hemisphere, octahedral_pack(away), gloss);
-#else
-    return hemisphere;
-#endif
+    return receiver_at(scene, v.row, vertex_hemisphere(scene, scatter.shading.frame, scatter.wo), away);
 }
 
 /* Whether what leaves by such a lobe has met a null surface. */

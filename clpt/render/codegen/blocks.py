@@ -9,8 +9,8 @@ from clpt.render.contract.features import Features
 
 CHANGED = (
     "o", "d", "beta", "radiance", "lambdas", "pdf", "sampled_hemisphere", "sampled_wo",
-    "sampled_gloss", "null_distance", "nulls", "ratio", "eta", "medium", "bodies", "lead", "rival", "pending", "expected", "state",
-    "cone",
+    "sampled_gloss", "null_distance", "nulls", "ratio", "eta", "medium", "bodies", "lead", "rival",
+    "pending", "expected", "state", "cone",
 )  # fmt: skip
 READ = ("weight", "light", "time", "pixel_index", "pixel_key", "sample")  # and not changed
 # members that not every scene has, each with the features that ask for it

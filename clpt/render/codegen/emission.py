@@ -90,8 +90,8 @@ def densities_text(features: Features) -> str:
         "value * l.pmf * scene.settings->rival_area",
     )
     found = Function(
-        "real light_found_pdf(Scene scene, integer row, vec3 p, Receiver receiver, vec3 wi, real t, "
-        "vec3 n)",
+        "real light_found_pdf(Scene scene, integer row, vec3 p, Receiver receiver, vec3 wi, "
+        "real t, vec3 n)",
         "1.0f",
         [
             Case(kind_test(kind, present), f"{kind}_pdf({row_text(features, kind)}, {given})")
@@ -185,7 +185,8 @@ def _aimed_text(features: Features) -> list[str]:
 # of a point that a light shines on, where the light was lowered
 _BACK = (
     "vec3 rest = motion_point_back(motion, p), along = motion_back_unit(motion, wi);",
-    "vec3 front = motion_front_back(motion, n), side = motion_back_unit(motion, receiver_hemisphere(receiver));",
+    "vec3 front = motion_front_back(motion, n);",
+    "vec3 side = motion_back_unit(motion, receiver_hemisphere(receiver));",
     "real far = t * motion_length_back(motion, wi);",
 )
 

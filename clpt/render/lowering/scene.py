@@ -32,7 +32,7 @@ from clpt.render.contract.features import (
     SpectraFeatures,
 )
 from clpt.render.contract.layer_names import LayerNames
-from clpt.render.contract.parameter_words import NORMAL_MAP_WORDS, row_words
+from clpt.render.contract.parameter_words import row_words
 from clpt.render.lowering import features as needs
 from clpt.render.lowering.camera import filters
 from clpt.render.lowering.camera.cameras import lower_camera
@@ -59,7 +59,6 @@ from clpt.scene.params import Kind, params
 from clpt.scene.roles import INDEX
 from clpt.scene.shapes import Mesh, Shape
 
-GLOSS = True
 TREE_FROM = 16  # lights from which a tree chooses among them, see bench/lights.py
 
 
@@ -260,7 +259,7 @@ def _features(
         camera=needs.of_camera(index),
         film=needs.of_film(index, layers),
         transport=needs.of_transport(index, rows.profile, aimed=len(found.aims) > 0),
-        lights=needs.of_lights(surfaces.lights, _gloss_before(index, surfaces.materials)),
+        lights=needs.of_lights(surfaces.lights, surfaces.materials.gloss_before),
         media=needs.of_media(index, surfaces.materials, surfaces.near, sealed=bool(found.sealed)),
         motion=needs.of_motion(index, surfaces.geometry, motion),
         geometry=_geometry_features(index, encoder, surfaces),
@@ -268,10 +267,6 @@ def _features(
         spectra=SpectraFeatures(*own),
         materials=needs.of_materials(index, encoder, surfaces.materials),
     )
-
-
-def _gloss_before(index: SceneIndex, materials: MaterialWords) -> int:
-    return (1 + NORMAL_MAP_WORDS * index.normal_mapped) * materials.tells_gloss
 
 
 def _geometry_features(
@@ -333,15 +328,16 @@ def _begin_materials(found: Analysis, encoder: Encoder) -> MaterialWords:
     leaves: tuple[type[Kind], ...] = (*mt.LEAVES, *index.leaves)
     longest = max(map(row_words, leaves))
     encoder.store.append("materials", np.zeros(longest, np.uint32))
-    return MaterialWords(encoder, index.leaves, index.normal_mapped, _tells_gloss(found))
+    tells = index.normal_mapped, _asks_gloss(found)
+    return MaterialWords(encoder, index.leaves, *tells)
 
 
-def _tells_gloss(found: Analysis) -> bool:
+def _asks_gloss(found: Analysis) -> bool:
     """Whether the tree over lights asks for the gloss of materials."""
     index = found.index
     tree = not index.light_paths and has_tree(found.sources.every, TREE_FROM)
     leaves = (leaf for shape in index.shapes for leaf in mt.parts(shape.material))
-    return GLOSS and tree and any(gloss.word(leaf) for leaf in leaves)
+    return tree and any(gloss.word(leaf) for leaf in leaves)
 
 
 def _lower_medium_aims(index: SceneIndex, encoder: Encoder, lights: LightRows) -> int:

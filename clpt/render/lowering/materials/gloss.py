@@ -14,7 +14,9 @@ from clpt.scene.params import fields_of
 from clpt.scene.scatterer import Scatterer
 
 STRAIGHT = 0.04  # of light that a dielectric reflects which falls on it straight on
-UNKNOWN = 0.5  # an albedo or a share that is a texture
+TEXTURED = 0.2  # an albedo or a share that is a texture: a mean of what scenes have
+ROUGHLY = 0.5  # a roughness that is one
+EXPONENT = 30.0  # and an exponent
 
 Values = Mapping[str, Any]
 
@@ -33,32 +35,36 @@ def word(material: Scatterer) -> int:
     return int(alpha * 65535) << 16 | int(share * 65535)
 
 
-def _number(value: Any) -> float:
-    """A parameter's mean over its colours, where it is known."""
+def _number(value: Any, other: float = TEXTURED) -> float:
+    """The mean of a parameter over its colours; `other` if it is not known."""
     if isinstance(value, (int, float)):
         return float(value)
     if isinstance(value, (tuple, list, np.ndarray)):
         return float(np.mean(np.asarray(value, float)))
-    return UNKNOWN
+    return other
 
 
 def _metal(values: Values) -> tuple[float, float]:
-    return float(np.sqrt(_number(values["alpha_u"]) * _number(values["alpha_v"]))), 1.0
+    return float(
+        np.sqrt(_number(values["alpha_u"], ROUGHLY**2) * _number(values["alpha_v"], ROUGHLY**2))
+    ), 1.0
 
 
 def _plastic(values: Values) -> tuple[float, float]:
-    return _number(values["alpha"]), _share(STRAIGHT, _number(values["diffuse_reflectance"]))
+    return _number(values["alpha"], ROUGHLY**2), _share(
+        STRAIGHT, _number(values["diffuse_reflectance"])
+    )
 
 
 def _principled(values: Values) -> tuple[float, float]:
     metal, albedo = _number(values["metallic"]), _number(values["base_color"])
     straight = metal * albedo + (1.0 - metal) * STRAIGHT
-    return _number(values["roughness"]) ** 2, _share(straight, (1.0 - metal) * albedo)
+    return _number(values["roughness"], ROUGHLY) ** 2, _share(straight, (1.0 - metal) * albedo)
 
 
 def _phong(values: Values) -> tuple[float, float]:
     share = _share(_number(values["specular"]), _number(values["diffuse"]))
-    return float(np.sqrt(2.0 / (4.0 * _number(values["exponent"]) + 2.0))), share
+    return float(np.sqrt(2.0 / (4.0 * _number(values["exponent"], EXPONENT) + 2.0))), share
 
 
 def _share(glossy: float, diffuse: float) -> float:
