@@ -17,8 +17,8 @@ inline void light_tree_minus(real cos_a, real sin_a, real cos_b, real sin_b, rea
 
 /* What the lights below a node may send to p, all surfaces there shading them: their power, times the cosine at the
  * light, over the squared distance; and times what p reflects, which of a dull surface is the cosine there if light
- * from one hemisphere only matters. The cosine at the light is the largest that any of these may have, the other that of
- * the sphere's highest point, over the distance of its centre; lift: 1 where light from both sides matters, else 0.
+ * from one hemisphere only matters. The cosine at the light is the largest that any of these may have, the other that
+ * of the sphere's highest point, over the distance of its centre; lift: 1 where light from both sides matters, else 0.
  * Lights that shine on the whole scene count as much everywhere. */
 inline real light_tree_importance(LightNode n, vec3 p, Receiver receiver, real lift)
 {

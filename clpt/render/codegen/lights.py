@@ -83,6 +83,7 @@ def dispatch_text(features: Features, densities: str = "") -> str:
     words = shape_records.RECORDS["triangle"].words
     parts = [f"#define TRIANGLE_ROW_WORDS {words}"] * features.motion.emitters
     parts += [f"#define LIGHT_{kind.upper()} {KINDS.index(kind)}" for kind in present]
+    parts += [f"#define GLOSS_BEFORE {features.lights.gloss}"] * (features.lights.gloss > 0)
     parts += [f'#include "{name}"' for name in includes]
     parts += _tree_text() if features.lights.tree else []
     parts += [_sides_text(features), _sample_text(features), _pdf_text(features), densities]
@@ -146,11 +147,15 @@ def _pick_text(features: Features) -> list[str]:
     return ["real pmf;", f"integer row = {picked};"]
 
 
+def _hemisphere(moving: bool) -> str:
+    """The hemisphere by which an infinite light is sampled, which turns with one that moves."""
+    return "hemisphere" if moving else "receiver_hemisphere(receiver)"
+
+
 def _sample_text(features: Features) -> str:
     """`light_sample`: a light that is chosen by `pick`, and a direction to it."""
     others, surfaces = others_of(features), surfaces_of(features)
     kinds, moving = [*others, *surfaces], features.motion.lights
-    side = "hemisphere" if moving else "receiver_hemisphere(receiver)"
     weighed = features.transport.balanced
     head = (
         "LightSample light_sample(Scene scene, vec3 p, Receiver receiver, real pick, vec2 u, "
@@ -171,7 +176,7 @@ def _sample_text(features: Features) -> str:
             "vec3 hemisphere = motion_back_unit(motion, receiver_hemisphere(receiver));",
         ]
     for kind in others:
-        seen = side if kind in INFINITE else "p"
+        seen = _hemisphere(moving) if kind in INFINITE else "p"
         sampled = f"{kind}_sample({row_text(features, kind)}, scene, {seen}, u, lambdas)"
         rows += choose("s", "LightSample", Case(kind_test(kind, kinds), sampled))
     if surfaces:
@@ -253,7 +258,6 @@ def _infinite_text(features: Features) -> list[str]:
     """`infinite_light`, whose `row` is the same in all lanes, and `infinite_gather`."""
     kinds = [kind for kind in others_of(features) if kind in INFINITE]
     moving = features.motion.lights
-    side = "hemisphere" if moving else "receiver_hemisphere(receiver)"
     if not kinds:
         return []
     rows = [
@@ -272,7 +276,7 @@ def _infinite_text(features: Features) -> list[str]:
             kind_test(kind, kinds),
             f"{RECORDS[kind].name} light = {row_text(features, kind)};",
             f"*radiance = spectrum_sel(m, {kind}_radiance(light, scene, d, lambdas), *radiance);",
-            f"*pdf = sel(m, {kind}_pdf(light, scene, {side}, d), *pdf);",
+            f"*pdf = sel(m, {kind}_pdf(light, scene, {_hemisphere(moving)}, d), *pdf);",
         )
     rows.append(f"*pdf *= {pmf_text(features)};")
     head = (
