@@ -83,7 +83,8 @@ class Lit:
         if factors:
             text += parameters.factor_text(factors)
         features = Features(
-            lights=of_lights(self.rows, int(self.gloss)), materials=MaterialFeatures(sources=encoder.sources)
+            lights=of_lights(self.rows, int(self.gloss)),
+            materials=MaterialFeatures(sources=encoder.sources),
         )
         return text + light_dispatch.dispatch_text(features)
 

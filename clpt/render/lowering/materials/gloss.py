@@ -12,11 +12,13 @@ import numpy as np
 
 from clpt.scene.params import fields_of
 from clpt.scene.scatterer import Scatterer
+from clpt.spectra import RGB, RGBUnbounded, Spectrum
 
 STRAIGHT = 0.04  # of light that a dielectric reflects which falls on it straight on
 TEXTURED = 0.2  # an albedo or a share that is a texture: a mean of what scenes have
 ROUGHLY = 0.5  # a roughness that is one
 EXPONENT = 30.0  # and an exponent
+SEEN = np.linspace(420.0, 680.0, 14)  # wavelengths over which an albedo is meant [nm]
 
 Values = Mapping[str, Any]
 
@@ -39,9 +41,9 @@ def _number(value: Any, other: float = TEXTURED) -> float:
     """The mean of a parameter over its colours; `other` if it is not known."""
     if isinstance(value, (int, float)):
         return float(value)
-    if isinstance(value, (tuple, list, np.ndarray)):
-        return float(np.mean(np.asarray(value, float)))
-    return other
+    if isinstance(value, (RGB, RGBUnbounded)):
+        return (value.r + value.g + value.b) / 3.0
+    return float(value.sample(SEEN).mean()) if isinstance(value, Spectrum) else other
 
 
 def _metal(values: Values) -> tuple[float, float]:
