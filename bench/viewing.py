@@ -2,7 +2,8 @@
 
 The command in a process of its own, with programs cached, and a client of its socket without a
 browser. `first`: from the start of the process to the first picture; `render`: to the first samples
-of `clpt render` of the same scene. `drag`: from a message to the first picture of it, while the
+of `clpt render` of the same scene. `solid` and `cold`: with empty caches, to the first picture, which
+may be in plain colours, and to the first one of the scene's own kernels. `drag`: from a message to the first picture of it, while the
 whole picture is being rendered; `own`: the part of that in which the device does not render (the
 same drag, less the seconds that the header of the picture tells). `per_second`: pictures in a drag
 of 2 s. `cost`: processor time of a sample with a viewer, above that of a sample without. Medians.

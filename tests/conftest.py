@@ -34,9 +34,14 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """
     if config.getoption("markexpr") != "not slow":
         return
+    retried = {path for path in {item.path for item in items} if _starts_processes(path)}
     for item in items:
-        if any(item.path.is_relative_to(folder) for folder in PROCESSES):
+        if item.path in retried:
             item.add_marker(pytest.mark.flaky(reruns=2))
+
+
+def _starts_processes(path: Path) -> bool:
+    return any(path.is_relative_to(folder) for folder in PROCESSES)
 
 
 def pytest_collection_finish() -> None:

@@ -43,6 +43,8 @@ def build(device: Device, source: Source, options: Sequence[str] = ()) -> Progra
     program = _known(device, source, flags, on_disk)
     if program is not None:
         return program
+    if on_disk:
+        device.builds.on_new()
     device.builds.on_compile()
     start = time.perf_counter()
     with compile_limits.watched(source):
@@ -70,6 +72,7 @@ def link(
     program = _known(device, whole, flags, _has_binaries(device))
     if program is not None:
         return program
+    device.builds.on_new()
     entry = _entry(device, whole, flags)
     with disk_cache.alone(entry):  # another process may have been at it
         program = _known(device, whole, flags, _has_binaries(device))
@@ -104,7 +107,7 @@ def _linked_of_any(
 
 
 def compile_ahead(device: Device, sources: Mapping[str, Source], main: str) -> None:
-    """Let the device's `compilers` begin with what `link` will need; it returns at once."""
+    """Let the device's `compilers` begin with what `link` will need, and do not wait for them."""
     flags = _flags(device, ())
     if device.compilers is None or not _has_binaries(device):
         return
@@ -120,7 +123,9 @@ def compile_ahead(device: Device, sources: Mapping[str, Source], main: str) -> N
             seconds = compile_limits.seconds_for(source)
             told = source.name, seconds, device.info.platform, device.info.name
             device.builds.on_compile()
-            device.compilers.submit(part, Job(*told, " ".join(options), text))
+            job = Job(*told, " ".join(options), text)
+            device.compilers.submit(part, job, first=device.hurries)
+    device.builds.on_new()
 
 
 def _drop_parts(device: Device, sources: Mapping[str, Source], flags: list[str]) -> None:

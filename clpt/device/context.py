@@ -130,14 +130,16 @@ class Builds:
     """The programs that have been built so far, and the seconds that took (summed over threads).
 
     cached: how many of them came from clpt's own cache; drivers do not tell about theirs.
-    on_compile: called when a program, or a part of one, is about to be given to a compiler; threads
-    call it.
+    on_compile: called when a program, or a part of one, is about to be given to a compiler; on_new:
+    when one is that is in none of clpt's caches, after other processes have got their share. Threads
+    call both, and wait for them.
     """
 
     programs: int = 0
     cached: int = 0
     seconds: float = 0.0
     on_compile: Callable[[], None] = lambda: None
+    on_new: Callable[[], None] = lambda: None
     _lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
 
     def add(self, seconds: float, cached: bool) -> None:
@@ -159,6 +161,7 @@ class Device:
         self.context, self.queue, self.info = context, queue, info
         self.builds = Builds()
         self.compilers: Compilers | None = None  # in other processes, where the caller gives some
+        self.hurries = False  # whether they compile for it before they do for others
         self.programs = program_cache.of(queue)
 
     @classmethod

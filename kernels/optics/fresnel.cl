@@ -37,8 +37,8 @@ inline Spectrum fresnel_spectrum(real cos_i, Spectrum eta)
 {
     Spectrum f = spectrum_of(fresnel_dielectric(cos_i, eta.x).f);
     if (any(spectrum_varies(eta))) {
-#define C(c) f.c = fresnel_dielectric(cos_i, eta.c).f;
-        SPECTRUM_EACH(C)
+#define C(c) SPECTRUM_PUT(f, c, fresnel_dielectric(cos_i, SPECTRUM_AT(eta, c)).f);
+        SPECTRUM_IN_TURN(C)
 #undef C
     }
     return f;

@@ -17,8 +17,8 @@ READ = ("weight", "light", "time", "pixel_index", "pixel_key", "sample")  # and 
 NEEDED: dict[str, Callable[[Features], bool]] = {
     "lambdas": lambda f: f.spectra.spectral,
     "sampled_hemisphere": lambda f: f.hemispheres,
-    "sampled_wo": lambda f: f.lights.gloss,
-    "sampled_gloss": lambda f: f.lights.gloss,
+    "sampled_wo": lambda f: f.lights.gloss > 0,
+    "sampled_gloss": lambda f: f.lights.gloss > 0,
     "null_distance": lambda f: f.materials.null_surfaces,
     "nulls": lambda f: f.materials.null_surfaces,
     "ratio": lambda f: f.ratios,

@@ -38,6 +38,7 @@ Files = dict[str, str | device.Part | tuple[str, ...]]
 _ALONE: device.Virtual = {
     **bvh.ALONE,
     "core/texels_between.cl": ("core/texels_in_turn.cl",),
+    "optics/thin_film.cl": ("optics/thin_film_in_turn.cl",),
 }
 
 

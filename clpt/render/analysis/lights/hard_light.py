@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.geometry import analytic, shape_records, shapes, triangles
-from clpt.render.analysis import cameras, guides, surroundings
+from clpt.render.analysis import cameras, guides, surroundings, worth
 from clpt.render.analysis.geometry import Emitter, Geometry
 from clpt.render.analysis.index import SceneIndex
 from clpt.render.analysis.lights import image_lights, light_bounds, sky_light
@@ -25,7 +25,7 @@ from clpt.render.analysis.lights.look import Look
 from clpt.render.analysis.lights.sources import Sources
 from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.scene import materials as mt
-from clpt.scene.integrators import Auto, Integrator, Path, Vcm, shared
+from clpt.scene.integrators import FEWEST_LIGHT_PATHS, Auto, Integrator, Path, Vcm, shared
 from clpt.scene.lights import CubeMap, Envmap, Sky
 from clpt.scene.shapes import Shape
 
@@ -79,35 +79,40 @@ def decided(lit: Lit, former: Integrator | None = None) -> tuple[SceneIndex, str
     else:
         keeps = isinstance(former, Vcm) and isinstance(given, Auto)
         guiding = former.guiding and not given.guiding
-        chosen = former if keeps else Path(light_paths=former.light_paths, guiding=guiding)
+        guide_paths = former.guide_paths if guiding else 0
+        plain = Path(light_paths=former.light_paths, guiding=guiding, guide_paths=guide_paths)
+        chosen = former if keeps else plain
         reason = "as before the scene was edited"
     if index.light_layers and index.adaptive:
         chosen, reason = Path(light_paths=0), "layers of light have no guides of noise"
     elif "light_groups" in index.layers and isinstance(chosen, Vcm):
         chosen, reason = Path(light_paths=chosen.light_paths), "photons do not know their group"
     if given.guiding:
-        chosen, reason = Path(light_paths=0, guiding=True), "directions are guided"
+        chosen = Path(light_paths=0, guiding=True, guide_paths=given.guide_paths)
+        reason = "directions are guided"
     chosen = replace(chosen, **shared(given, chosen))
-    scene = replace(index.scene, integrator=chosen)
-    index = replace(index, scene=scene, long_guide=not given.guiding)
+    index = replace(index, scene=replace(index.scene, integrator=chosen))
     return replace(index, candidates=_candidates(index, chosen) if former is None else ()), reason
 
 
 def _candidates(index: SceneIndex, chosen: Integrator) -> tuple[Integrator, ...]:
     """The integrators between which a trial may decide, the chosen one first; else none.
 
-    It pays if many samples are to come. Where a limit of noise ends the picture nobody knows how
-    many; photons blur the picture, which no variance tells; and some scenes cannot have a guide.
+    Beside light paths few of them are tried, by the same kernels. It pays if many samples are to
+    come. Where a limit of noise ends the picture nobody knows how many; photons blur the
+    picture, which no variance tells; and some scenes cannot have a guide.
     """
-    samples = index.spp * index.film.width * index.film.height
-    if samples < guides.WORTH or index.adaptive or index.lit_ghosts or chosen.guiding:
+    samples = index.samples
+    if samples < worth.SAMPLES or index.adaptive or index.lit_ghosts or chosen.guiding:
         return ()
     if not isinstance(chosen, Path):
         return ()
-    plain = [replace(chosen, light_paths=0)] if chosen.light_paths else []
+    fewer = (FEWEST_LIGHT_PATHS, 0) if chosen.light_paths else ()
+    plain = [replace(chosen, light_paths=number) for number in fewer]
     several = chosen.max_depth < 0 or chosen.max_depth > 2
     can_guide = several and not index.has_media
-    guided = [replace(chosen, light_paths=0, guiding=True)] if can_guide else []
+    guide = replace(chosen, light_paths=0, guiding=True, guide_paths=guides.paths_for(samples))
+    guided = [guide] if can_guide else []
     return (chosen, *plain, *guided) if plain or guided else ()
 
 
