@@ -76,8 +76,9 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         + either(f.media.bodies, "media/bodies.cl") * f.media.present
     ),
     "generated/grid_flight.cl": lambda f, _: (
-        ("generated/lights.cl", "path/met_light.cl") * f.media.grids.emissive
-        + ("media/grid_flight.cl",) * f.media.grids.present
+        *when(f.media.grids.emissive, "generated/lights.cl", "path/met_light.cl"),
+        *when(f.media.grids.present and not f.media.grids.emissive, "lighting/receiver_none.cl"),
+        *when(f.media.grids.present, "media/grid_flight.cl"),
     ),
     "generated/kept_hemisphere.cl": lambda f, _: (
         when(f.lights.gloss, "path/kept_receiver.cl")
