@@ -6,7 +6,9 @@ import gc
 import os
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +27,27 @@ HERE = Path(__file__).resolve().parent
 # Tests that start processes, and wait for what the machine's other work may hold up.
 PROCESSES = [HERE / name for name in ("benchmark", "cli", "cluster", "device", "embedding")]
 PROCESSES += [HERE / name for name in ("faults", "test_output_files.py", "view")]
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """One more than there are cores: tests that wait for processes and disks use no core."""
+    own = hasattr(os, "sched_getaffinity")  # a process may have fewer than the machine
+    return (len(os.sched_getaffinity(0)) if own else os.cpu_count() or 1) + 1
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection(session: pytest.Session) -> None:
+    """Let workers import test files in different orders: what one has compiled others load."""
+    config = session.config
+    if not hasattr(config, "workerinput") or config.args_source.name != "TESTPATHS":
+        return
+    number = int(config.workerinput["workerid"].removeprefix("gw"))
+    files = sorted(HERE.rglob("test_*.py"))
+    first = number * len(files) // config.workerinput["workercount"]
+    for path in [*files[first:], *files[:first]]:
+        with suppress(Exception, pytest.skip.Exception):  # collection tells of it
+            import_module(".".join(path.relative_to(HERE.parent).with_suffix("").parts))
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -41,9 +41,7 @@ def context(folder: Path | None) -> ssl.SSLContext:
     return found
 
 
-def answer(
-    port: int, tls: ssl.SSLContext | None, request: bytes, seconds: float = 0.5
-) -> bytes:
+def answer(port: int, tls: ssl.SSLContext | None, request: bytes, seconds: float = 0.5) -> bytes:
     """What a listener says to a request: nothing, where it hangs up, or waits for some seconds."""
     with ExitStack() as resources:
         try:

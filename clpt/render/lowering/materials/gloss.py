@@ -6,7 +6,6 @@ It only decides how often a light is chosen, so a guess costs noise and no truth
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
 
 import numpy as np
 
@@ -20,7 +19,7 @@ ROUGHLY = 0.5  # a roughness that is one
 EXPONENT = 30.0  # and an exponent
 SEEN = np.linspace(420.0, 680.0, 14)  # wavelengths over which an albedo is meant [nm]
 
-Values = Mapping[str, Any]
+Values = Mapping[str, object]
 
 
 def word(material: Scatterer) -> int:
@@ -37,7 +36,7 @@ def word(material: Scatterer) -> int:
     return int(alpha * 65535) << 16 | int(share * 65535)
 
 
-def _number(value: Any, other: float = TEXTURED) -> float:
+def _number(value: object, other: float = TEXTURED) -> float:
     """The mean of a parameter over its colours; `other` if it is not known."""
     if isinstance(value, (int, float)):
         return float(value)
