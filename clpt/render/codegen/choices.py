@@ -76,10 +76,14 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         + either(f.media.bodies, "media/bodies.cl") * f.media.present
     ),
     "generated/grid_flight.cl": lambda f, _: (
-        ("generated/lights.cl", "path/met_light.cl") * f.media.grids.emissive
-        + ("media/grid_flight.cl",) * f.media.grids.present
+        *when(f.media.grids.emissive, "generated/lights.cl", "path/met_light.cl"),
+        *when(f.media.grids.present and not f.media.grids.emissive, "lighting/receiver_none.cl"),
+        *when(f.media.grids.present, "media/grid_flight.cl"),
     ),
-    "generated/kept_hemisphere.cl": lambda f, _: either(f.hemispheres, "path/kept_hemisphere.cl"),
+    "generated/kept_hemisphere.cl": lambda f, _: (
+        when(f.lights.gloss, "path/kept_receiver.cl")
+        or either(f.hemispheres, "path/kept_hemisphere.cl")
+    ),
     "generated/seen_wavelengths.cl": lambda f, _: either(
         f.fluorescence, "path/seen_wavelengths.cl"
     ),
@@ -245,6 +249,7 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
     ),
     "generated/light_path_steps.cl": lambda f, cls: (
         *either(f.transport.joined and not cls.delta, "steps/join_camera.cl"),
+        *either(flags.asks_chance(f, cls), "lighting/rival_chosen.cl"),
         "steps/adjoint_weight.cl",
         *either(not flags.is_null(f, cls), "steps/light_path_roulette.cl"),
     ),

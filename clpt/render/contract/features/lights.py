@@ -17,6 +17,7 @@ class LightFeatures:
     visible: bool = False  # some light is no delta light: a camera may see it
     two_sided: bool = False  # some shape emits from its back too
     tree: bool = False  # a tree chooses among the lights
+    gloss: int = 0  # words before a material's row where its gloss stands; 0: nobody asks for it
     few: bool = flag("FEW_LIGHTS", True)  # the number that chooses one also places the point on it
 
     @property

@@ -85,7 +85,7 @@ def light_rows(
         weights = _shared(power, infinite)
         same = content(weights)
         rows["pmf"], rows["keep"], rows["alias"] = encoder.cache(alias_table, weights, by=(same,))
-        if tree_from is not None and _count(every, len(rows)) >= tree_from:
+        if tree_from is not None and has_tree(every, tree_from):
             tree = _tree(every, encoder)
     shine = (rows["shape"] >= 0) & (rows["emission_mode"] != ALONG)
     return LightRows(
@@ -103,10 +103,10 @@ def light_rows(
     )
 
 
-def _count(every: Sequence[Source], rows: int) -> int:
-    """Return how many lights there are; each at a place of its own counts for several."""
+def has_tree(every: Sequence[Source], tree_from: int) -> bool:
+    """Whether there are so many lights; each at a place of its own counts for several."""
     apart = sum(bool(one.bounds.placed.any()) for one in every)
-    return max(rows, PLACED_LIGHT_WEIGHT * apart)
+    return max(sum(len(one.power) for one in every), PLACED_LIGHT_WEIGHT * apart) >= tree_from
 
 
 def _tree(every: Sequence[Source], encoder: Encoder) -> NDArray[np.uint32]:
