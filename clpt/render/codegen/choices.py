@@ -76,7 +76,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         + either(f.media.bodies, "media/bodies.cl") * f.media.present
     ),
     "generated/grid_flight.cl": lambda f, _: (
-        ("generated/lights.cl", "path/met_light.cl") * f.media.grids.emissive
+        ("generated/lights.cl", "path/met_light.cl") * (f.media.grids.emissive or f.lights.bodies)
         + ("media/grid_flight.cl",) * f.media.grids.present
     ),
     "generated/kept_hemisphere.cl": lambda f, _: either(f.hemispheres, "path/kept_hemisphere.cl"),
@@ -110,6 +110,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         f"media/grid_meet{'_mixed' * bool(f.media.grids.mixed)}.cl",
     ),
     "generated/brick_weight.cl": lambda f, _: either(f.lights.bricks, "media/brick_weight.cl"),
+    "generated/body_weight.cl": lambda f, _: either(f.lights.bodies, "media/body_weight.cl"),
     "generated/grid_origin.cl": lambda f, _: either(f.media.grids.emissive, "media/grid_origin.cl"),
     "generated/flight_steps.cl": lambda f, _: (
         f"media/flight_medium{'_bodies' * f.media.bodies}.cl",

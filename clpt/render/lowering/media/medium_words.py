@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from clpt.arrays import Words
 from clpt.records import MEDIUM_BITS
 from clpt.render.analysis.bricks import Glow, black_bodies, brick_counts
+from clpt.render.analysis.glow import GlowingBody
 from clpt.render.analysis.index import SceneIndex
 from clpt.render.contract.parameter_words import SPECTRUM_WORDS
 from clpt.render.lowering import grids
 from clpt.render.lowering.encoder import Encoder
+from clpt.render.lowering.lights.body_lights import BodyLight
 from clpt.render.lowering.lights.brick_lights import BrickLights
 from clpt.render.lowering.lights.lights import LightRows
 from clpt.render.lowering.materials.material_words import MaterialWords
@@ -62,13 +64,13 @@ class MediumWords:
         encoder: Encoder,
         materials: MaterialWords,
         sealed: frozenset[Medium] = frozenset(),
-        glows: Mapping[Medium, Glow] = MappingProxyType({}),
+        glows: Mapping[Medium, Glow | GlowingBody] = MappingProxyType({}),
     ):
         self._index, self._encoder, self._materials = index, encoder, materials
         self._sealed, self._glows = sealed, glows
         self._words: dict[Medium, int] = {}
-        self.lights: list[BrickLights] = []  # of media whose words are made
-        self._row = len(index.lights)  # in `lights`, of the next brick
+        self.lights: list[BrickLights | BodyLight] = []  # of media whose words are made
+        self._row = len(index.lights)  # in `lights`, of the next part of a medium
         self._has_media = bool(index.media)  # not of an integrator that sees none
 
     def word(self, medium: Medium | None) -> int:
@@ -91,8 +93,11 @@ class MediumWords:
         absorbs, scatters = medium.coefficients(spectral)
         phases = medium.collisions(spectral) if medium.scatters else ()
         rows = []
+        body = self._glows.get(medium)
+        body = body if isinstance(body, GlowingBody) else None
         if self._index.emitting:
             light = medium.light or Constant(0.0)
+            rows.append(np.array([1 + self._row if body else 0], np.uint32))
             rows.append(self._encoder.named_words("medium", "light", light, roles.EMISSION)[0])
         rows += self._part_words(phases, (absorbs, scatters))
         mixture = self._mixture_words(medium)
@@ -103,8 +108,11 @@ class MediumWords:
             rows.append(grids.row(medium, self._encoder))
             word |= MEDIUM_BITS["grid"]
             word |= MEDIUM_BITS["bytes"] if isinstance(medium, Grid) and medium.bits == 8 else 0
-        before = 2 + (SPECTRUM_WORDS if self._index.emitting else 0)
+        before = 2 + (1 + SPECTRUM_WORDS) * bool(self._index.emitting)
         word |= before + self._encoder.store.size("materials")
+        if body is not None:
+            self._row += 1
+            self.lights.append(BodyLight(word, body))
         if isinstance(medium, Lattice) and self._index.grids.emissive:
             rows.append(self._glow(medium, word))
         if isinstance(medium, Lattice) and self._index.grids.tinted:
@@ -177,6 +185,7 @@ class MediumWords:
         if source is not None:
             words[2] = store.append("images", self._encoder.cache(grids.bricks, source))
         bright = self._glows[medium]
+        assert isinstance(bright, Glow)
         rows = np.zeros(np.prod(brick_counts(medium.size)), np.int32)
         rows[bright.emitting] = -1
         rows[bright.numbers] = 1 + self._row + np.arange(len(bright.numbers))
