@@ -120,6 +120,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     ),
     "generated/brick_weight.cl": lambda f, _: either(f.lights.bricks, "media/brick_weight.cl"),
     "generated/body_weight.cl": lambda f, _: either(f.lights.bodies, "media/body_weight.cl"),
+    "generated/aim_cone.cl": lambda f, _: either(f.media.aim_cones, "media/aim_cone.cl"),
     "generated/grid_origin.cl": lambda f, _: either(f.media.grids.emissive, "media/grid_origin.cl"),
     "generated/flight_steps.cl": lambda f, _: (
         f"media/flight_medium{'_bodies' * f.media.bodies}.cl",

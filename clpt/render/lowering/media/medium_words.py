@@ -14,6 +14,8 @@ from clpt.records import MEDIUM_BITS
 from clpt.render.analysis.bricks import Glow, black_bodies, brick_counts
 from clpt.render.analysis.glow import GlowingBody
 from clpt.render.analysis.index import SceneIndex
+from clpt.render.analysis.lights.light_bounds import Bounds
+from clpt.render.contract.features.media import MOST_AIMS
 from clpt.render.contract.parameter_words import SPECTRUM_WORDS
 from clpt.render.lowering import grids
 from clpt.render.lowering.encoder import Encoder
@@ -29,7 +31,7 @@ from clpt.scene.phases import Phase
 from clpt.scene.shapes import Shape
 from clpt.spectra import Constant, Spectrum
 
-MOST_AIMS = 8  # lamps near which flights end, see kernels/media/equiangular.cl
+BROAD = 1.4  # [rad] half angle from which a cone is none
 
 
 def medium_aims(lights: LightRows) -> NDArray[np.float32]:
@@ -37,22 +39,36 @@ def medium_aims(lights: LightRows) -> NDArray[np.float32]:
 
     (n, 4) float32: x, y, z [m], and the sum of the shares of those up to it; n is 0, 1 or
     MOST_AIMS, so that kernels do not change with the number of lamps. The lamps of most power are
-    taken, each in its middle; the share is that of its power.
+    taken, each in its middle; the share is that of its power. Where some of them shine into a cone
+    as many rows follow: its axis and the cosine of its half angle, -1 for no cone.
     """
-    places, powers, row = [], [], 0
+    places, powers, cones, row = [], [], [], 0
     for bounds in lights.bounds:
         power = lights.power[row : row + len(bounds)]
         row += len(bounds)
         if bounds.placed.all() and power.sum() > 0.0:
             places.append(np.average((bounds.low + bounds.high) / 2.0, axis=0, weights=power))
             powers.append(power.sum())
+            cones.append(_cone(bounds))
     if not places:
         return np.zeros((0, 4), np.float32)
     first = np.argsort(-np.array(powers), kind="stable")[:MOST_AIMS]
     sums = np.cumsum(np.array(powers)[first])
     rows = np.column_stack([np.array(places)[first], sums / sums[-1]]).astype(np.float32)
     count = 1 if len(rows) == 1 else MOST_AIMS
-    return np.concatenate([rows, np.repeat(rows[-1:], count - len(rows), axis=0)])
+    around = np.array(cones, np.float32)[first]
+    kinds = [rows, around] if (around[:, 3] >= 0.0).any() else [rows]
+    return np.concatenate(
+        [part for one in kinds for part in (one, np.repeat(one[-1:], count - len(one), axis=0))]
+    )
+
+
+def _cone(bounds: Bounds) -> tuple[float, float, float, float]:
+    """The cone into which a lamp shines: its axis and the cosine of its half angle, -1: none."""
+    angle = float(bounds.theta_o[0] + bounds.theta_e[0])
+    point = len(bounds) == 1 and bool((bounds.low == bounds.high).all())
+    x, y, z = bounds.axis[0].tolist()
+    return x, y, z, float(np.cos(angle)) if point and angle < BROAD else -1.0
 
 
 class MediumWords:
