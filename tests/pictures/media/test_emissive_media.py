@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import clpt
 from clpt import spectra
 from clpt import transforms as tf
 from clpt.geometry.triangles import triangulate
@@ -163,6 +164,37 @@ def test_albedo_on_a_grid() -> None:
     assert_agree(*pictures, "the albedo on a grid and the medium's own", 2e-4)
 
 
+def test_a_glowing_ball_that_moves() -> None:
+    """The light goes with it: the picture is that of a scene that has it there."""
+    scene, there = (under_a_ball(300.0, 0.3, at) for at in (0.8, 1.1))
+    moved = {0: there.shapes[0].to_world}
+    with clpt.Renderer(scene) as renderer:
+        renderer.update(transforms=moved)
+        renderer.run(2)
+        got = renderer.image()
+    with clpt.Renderer(there) as renderer:
+        renderer.run(2)
+        assert got.mean() > 0.0
+        np.testing.assert_array_equal(got, renderer.image())
+
+
+AWAY = 1.2  # of the floor that is seen from below the ball [m]
+
+
+def under_a_ball(scale: float, radius: float, height: float) -> Scene:
+    """A floor that a glowing ball lights, and nothing else, seen from above."""
+    strength = 1.0 / scale if scale < 1.0 else 1.0
+    glowing = media.Homogeneous(sigma_a=CHROMATIC, scale=scale, emission=strength * COLOUR)
+    scene = slab(glowing)
+    place = tf.translate([0.1, 0.2, height]) @ tf.scale(radius)
+    ball = Sphere(to_world=place, material=Null(), interior=glowing)
+    scene.shapes = [ball, Rectangle(to_world=tf.scale(9.0), material=Diffuse(reflectance=0.5))]
+    eye = tf.look_at([0.1 + AWAY, 0.2, 5], [0.1 + AWAY, 0.2, 0], [0, 1, 0])
+    scene.camera = Orthographic(to_world=eye @ tf.scale(1e-3))
+    scene.lights, scene.integrator = [], PathIntegrator(max_depth=2, light_paths=0)
+    return scene
+
+
 @pytest.mark.parametrize("scale", [1e-4, 300.0])
 def test_floor_under_a_glowing_ball(scale: float) -> None:
     """A thin ball shines as a point in its middle would (Newton's shells), a thick one as a lamp.
@@ -171,19 +203,10 @@ def test_floor_under_a_glowing_ball(scale: float) -> None:
     height, d its distance, j what a metre emits], or rho L (r / d)^2 z / d.
     """
     radius, height, reflects = 0.3, 0.8, 0.5
-    strength = 1.0 / scale if scale < 1.0 else 1.0
-    glowing = media.Homogeneous(sigma_a=CHROMATIC, scale=scale, emission=strength * COLOUR)
-    scene = slab(glowing)
-    ball = Sphere(center=(0.1, 0.2, height), radius=radius, material=Null(), interior=glowing)
-    scene.shapes = [ball, Rectangle(to_world=tf.scale(9.0), material=Diffuse(reflectance=reflects))]
-    away = 1.2
-    scene.camera = Orthographic(
-        to_world=tf.look_at([0.1 + away, 0.2, 5], [0.1 + away, 0.2, 0], [0, 1, 0]) @ tf.scale(1e-3)
-    )
-    scene.lights, scene.integrator = [], PathIntegrator(max_depth=2, light_paths=0)
-    distance = np.hypot(height, away)
+    scene = under_a_ball(scale, radius, height)
+    distance = np.hypot(height, AWAY)
     if scale < 1.0:
-        sent = scale * strength * CHROMATIC * COLOUR * 4.0 / 3.0 * np.pi * radius**3
+        sent = CHROMATIC * COLOUR * 4.0 / 3.0 * np.pi * radius**3
         wanted = reflects / np.pi * sent * height / distance**3
     else:
         wanted = reflects * COLOUR * (radius / distance) ** 2 * height / distance
