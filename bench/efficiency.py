@@ -1,15 +1,19 @@
 """Scenes of others, as their files are: samples a second, error and efficiency beside Mitsuba's.
 
 `python -m bench.efficiency [SCENE ...]`: names of `bench.renders`, or Mitsuba files; by default all
-of both, the files of the folder `--assets` among them. Both renderers are whole processes. A figure
-is processor time of all their threads, which neighbours on the machine disturb less than the clock;
-what a process takes until its first sample is taken out, and told by itself. Efficiency is 1 /
-(relative MSE x seconds); the reference is the mean of two long renders, one of each renderer, with
-other seeds; the worst .1 % of the pixels are left out.
+of both, the files of the folder `--assets` among them. Both renderers are whole processes, which
+take turns. A figure is processor time of all their threads, which neighbours on the machine disturb
+less than the clock; what a process takes until its first sample is taken out, and told by itself.
+Efficiency is 1 / (relative MSE x seconds); the reference is the mean of two long renders, one of
+each renderer, with other seeds, whose own error, a quarter of what they differ by, is taken off;
+the worst .1 % of the pixels are left out.
 
-Each renderer has its best sampler (Sobol, multijitter) and both a box filter; with `--as-file` the
-filter and the sampler are the file's own. In spectral mode a metal's `eta` and `k` by RGB are taken
-as values at 610, 550 and 460 nm: Mitsuba would cut them at 1, as if they were reflectances.
+clpt renders in each of the ways of `--way`: `path` without light paths, `file` as `clpt render`
+does where nothing is asked for, `auto` by that integrator, `guiding`, whose learning counts.
+Mitsuba has the file's sampler and its best one (multijitter); clpt reads either as Sobol. Both have
+a box filter; with `--as-file` the filter is the file's own. In spectral mode a metal's `eta` and
+`k` by RGB are taken as values at 610, 550 and 460 nm: Mitsuba would cut them at 1, as if they were
+reflectances.
 """
 
 from __future__ import annotations
@@ -57,7 +61,14 @@ METAL = (610, 550, 460)  # wavelengths for the red, green and blue of a metal's 
 TRIM = 0.001
 APART = 0.03  # of the means of what the two render: beyond, there is no common reference
 SEEDS = (3, 4, 5)
-BEST = "multijitter"  # which clpt reads as Sobol
+SAMPLERS = {"file": None, "best": "multijitter"}  # of Mitsuba
+PLAIN = ("--integrator", "path", "--light-paths", "0")
+WAYS: dict[str, tuple[str, ...]] = {  # of clpt, and their options
+    "path": PLAIN,
+    "file": (),
+    "auto": ("--integrator", "auto"),
+    "guiding": (*PLAIN, "--guiding"),
+}
 
 Row = dict[str, Any]
 
@@ -75,50 +86,56 @@ class Taken:
 
 @dataclass(frozen=True)
 class Contender:
-    """A renderer of one file in one mode, held to some cores; its processes keep their caches."""
+    """A renderer of one file in one mode, held to some cores; its processes keep their caches.
 
-    name: str
+    options: of `clpt render`; None for Mitsuba.
+    """
+
     file: Path
     mode: str
     cores: Sequence[int]
     caches: Path
+    options: tuple[str, ...] | None = None
 
     def render(self, spp: int, seed: int) -> Taken:
-        """Return a picture. Raises RuntimeError with the process's last words if it fails."""
+        """Return a picture. Raises RuntimeError with the process's last words if it fails twice."""
         with tempfile.TemporaryDirectory() as folder:
-            out = Path(folder) / ("a.exr" if self.name == "clpt" else "a.npy")
-            cpu, seconds, peak = self._run(self._command(spp, seed, out))
-            image = clpt.read_image(out) if self.name == "clpt" else np.load(out)
+            out = Path(folder) / ("a.npy" if self.options is None else "a.exr")
+            command = [sys.executable, *self._command(spp, seed, out)]
+            try:
+                cpu, seconds, peak = watched(command, self.cores, self.caches)
+            except RuntimeError as error:
+                print(f"once more: {error}", file=sys.stderr)
+                cpu, seconds, peak = watched(command, self.cores, self.caches)
+            image = np.load(out) if self.options is None else clpt.read_image(out)
         return Taken(cpu, seconds, peak, np.asarray(image, np.float32)[..., :3])
 
     def _command(self, spp: int, seed: int, out: Path) -> list[str]:
-        if self.name == "mitsuba":
+        if self.options is None:
             variant = f"llvm_ad_{self.mode}"
             return ["-c", MITSUBA, variant, str(self.file), str(spp), str(seed), str(out)]
-        options = {"--mode": self.mode, "--spp": spp, "--seed": seed, "-o": out}
-        flat = [str(part) for pair in options.items() for part in pair]
-        return ["-m", "clpt", "render", str(self.file), *flat, "--quiet"]
+        given = ["--mode", self.mode, "--spp", str(spp), "--seed", str(seed), "-o", str(out)]
+        return ["-m", "clpt", "render", str(self.file), *self.options, *given, "--quiet"]
 
-    def _run(self, arguments: list[str]) -> tuple[float, float, int]:
-        caches = {name: str(self.caches / name) for name in ("XDG_CACHE_HOME", "POCL_CACHE_DIR")}
-        for folder in caches.values():
-            os.makedirs(folder, exist_ok=True)
-        threads = {"POCL_MAX_PTHREAD_COUNT": str(len(self.cores))}
-        cores = ",".join(map(str, self.cores))
-        report = self.caches / "report.json"
-        watch = [sys.executable, "-I", "-S", "-c", WATCH, str(report)]
-        command = ["taskset", "-c", cores, *watch, sys.executable, *arguments]
-        with tempfile.TemporaryFile("w+") as words:
-            done = subprocess.run(
-                command, cwd=machine.ROOT, env={**os.environ, **caches, **threads},
-                stdout=words, stderr=words,
-            )  # fmt: skip
-            if done.returncode:
-                words.seek(0)
-                last = (words.read().strip().splitlines() or [f"status {done.returncode}"])[-1]
-                raise RuntimeError(f"{self.name}: {last[:300]}")
-        clock, processor, memory = json.loads(report.read_text())
-        return processor, clock, memory
+
+def watched(command: Sequence[str], cores: Sequence[int], caches: Path) -> tuple[float, float, int]:
+    """Run a process on some cores; return its seconds of processor time and by the clock, and its
+    largest resident set [bytes]. Raises RuntimeError with its last words if it fails."""
+    folders = {name: str(caches / name) for name in ("XDG_CACHE_HOME", "POCL_CACHE_DIR")}
+    for folder in folders.values():
+        os.makedirs(folder, exist_ok=True)
+    given = {**os.environ, **folders, "POCL_MAX_PTHREAD_COUNT": str(len(cores))}
+    report = caches / "report.json"
+    watch = [sys.executable, "-I", "-S", "-c", WATCH, str(report)]
+    held = ["taskset", "-c", ",".join(map(str, cores)), *watch, *command]
+    with tempfile.TemporaryFile("w+") as words:
+        done = subprocess.run(held, cwd=machine.ROOT, env=given, stdout=words, stderr=words)
+        if done.returncode:
+            words.seek(0)
+            last = (words.read().strip().splitlines() or [f"status {done.returncode}"])[-1]
+            raise RuntimeError(f"{Path(command[0]).name}: {last[:300]}")
+    clock, processor, memory = json.loads(report.read_text())
+    return processor, clock, memory
 
 
 def relative_mse(image: NDArray[np.floating], reference: NDArray[np.floating]) -> float:
@@ -129,11 +146,28 @@ def relative_mse(image: NDArray[np.floating], reference: NDArray[np.floating]) -
     return float(error[: int(error.size * (1 - TRIM))].mean())
 
 
-def with_film(scene: Path, width: int, mode: str, as_file: bool) -> tuple[Path, tuple[int, int]]:
-    """Write a copy of a scene beside it with a film of that width; return it and the film's size.
+@dataclass(frozen=True)
+class Settings:
+    """What is compared: modes, numbers of cores, ways of clpt, samples a pixel of pictures and of
+    references, the film's width, and whether it keeps the file's filter."""
 
-    as_file: leave its pixel filter and sampler as they are.
+    modes: Sequence[str]
+    threads: Sequence[int]
+    ways: Sequence[str]
+    spp: int
+    long: int
+    width: int
+    as_file: bool
+
+
+def with_film(
+    scene: Path, folder: Path, settings: Settings, mode: str, sampler: str | None
+) -> tuple[Path, tuple[int, int]]:
+    """Write a copy of a scene with the film of the settings to a folder; return it and its size.
+
+    sampler: a kind to put in the place of its own. What lies beside the scene is linked.
     """
+    width, as_file = settings.width, settings.as_file
     tree = ET.parse(scene)
     root = tree.getroot()
     given = {e.get("name", ""): e.get("value", "") for e in root.iter("default")}
@@ -154,9 +188,9 @@ def with_film(scene: Path, width: int, mode: str, as_file: bool) -> tuple[Path, 
         ET.SubElement(film, "integer", name="height", value=str(height))
         if not as_file:
             ET.SubElement(film, "rfilter", type="box")
-    if not as_file:
-        for sampler in root.iter("sampler"):
-            sampler.set("type", BEST)
+    if sampler is not None:
+        for element in root.iter("sampler"):
+            element.set("type", sampler)
     if mode == "spectral":
         for element in root.iter("rgb"):
             if element.get("name") in ("eta", "k"):
@@ -168,54 +202,65 @@ def with_film(scene: Path, width: int, mode: str, as_file: bool) -> tuple[Path, 
         name = integrator.get("type", "")
         if name.startswith("$") and name[1:] not in given:
             integrator.set("type", "path")
-    copy = scene.with_name(f".efficiency-{os.getpid()}-{scene.name}")
+    folder.mkdir()
+    for beside in scene.resolve().parent.iterdir():
+        (folder / beside.name).symlink_to(beside)
+    copy = folder / f"film-{scene.name}"
     tree.write(copy)
     return copy, (width, height)
 
 
-def compare(
-    scene: Path, modes: Sequence[str], threads: Sequence[int], spp: int, long: int, film: Row
-) -> list[Row]:
-    """Return a row for each mode and number of threads. film: as `with_film` takes it."""
-    return [row for mode in modes for row in in_mode(scene, mode, threads, spp, long, film)]
+def compare(scene: Path, settings: Settings) -> list[Row]:
+    """Return a row for each mode, number of cores, way of clpt and sampler of Mitsuba."""
+    return [row for mode in settings.modes for row in in_mode(scene, mode, settings)]
 
 
-def in_mode(
-    scene: Path, mode: str, threads: Sequence[int], spp: int, long: int, film: Row
-) -> list[Row]:
-    """Return a row for each number of threads."""
-    copy, (w, h) = with_film(scene, mode=mode, **film)
+def in_mode(scene: Path, mode: str, settings: Settings) -> list[Row]:
+    """Return the rows of one mode."""
     every = sorted(os.sched_getaffinity(0))
-    rows = []
-    try:
-        with tempfile.TemporaryDirectory() as folder:
+    rows: list[Row] = []
+    copies: dict[str, Path] = {}
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        for name, kind in SAMPLERS.items():
+            copies[name], size = with_film(scene, folder / name, settings, mode, kind)
 
-            def pair(number: int, what: str) -> list[Contender]:
-                cores, where = every[:number], Path(folder) / what
-                return [Contender(name, copy, mode, cores, where) for name in ("clpt", "mitsuba")]
+        def contenders(number: int) -> dict[str, Contender]:
+            """Mitsuba by its samplers, and then clpt by its ways."""
+            each = (mode, every[:number], folder / f"{number}")
+            theirs = {f"mitsuba {name}": Contender(copies[name], *each) for name in SAMPLERS}
+            return theirs | {w: Contender(copies["file"], *each, WAYS[w]) for w in settings.ways}
 
-            both = [
-                one.render(long, seed).image
-                for one, seed in zip(pair(len(every), "reference"), (77, 7777), strict=True)
-            ]
-            means = [float(image.mean()) for image in both]
-            if abs(means[0] - means[1]) > APART * means[1]:
-                raise RuntimeError(f"{mode}: the two have other pictures, of means {means}")
-            reference = (both[0] + both[1]) / 2
-            about = {
-                "scene": name_of(scene),
-                "mode": mode,
-                "as_file": film["as_file"],
-                "size": [w, h],
-                "spp": spp,
-                "means": [round(mean, 6) for mean in means],
-            }
-            for number in threads:
-                measured = figures(pair(number, f"{number}"), spp, w * h, reference)
-                rows.append({**about, "threads": number, **measured})
-    finally:
-        copy.unlink()
+        long, means = long_renders(contenders(len(every)), settings)
+        about = {
+            "scene": name_of(scene),
+            "mode": mode,
+            "as_file": settings.as_file,
+            "size": [*size],
+            "spp": settings.spp,
+            "means": [round(mean, 6) for mean in means],
+        }
+        for number in settings.threads:
+            found = figures(contenders(number), settings.spp, long)
+            rows += [{**about, "threads": number, **pair} for pair in pairs(found)]
     return rows
+
+
+def long_renders(
+    contenders: dict[str, Contender], settings: Settings
+) -> tuple[list[NDArray[np.float32]], list[float]]:
+    """Return long renders by clpt, in the first of its ways, and by Mitsuba, and their means.
+
+    Raises RuntimeError if the two are pictures of different means.
+    """
+    pair = contenders[settings.ways[0]], contenders["mitsuba best"]
+    both = [
+        one.render(settings.long, seed).image for one, seed in zip(pair, (77, 7777), strict=True)
+    ]
+    means = [float(image.mean()) for image in both]
+    if abs(means[0] - means[1]) > APART * means[1]:
+        raise RuntimeError(f"{pair[0].mode}: the two have other pictures, of means {means}")
+    return both, means
 
 
 def name_of(scene: Path) -> str:
@@ -224,37 +269,56 @@ def name_of(scene: Path) -> str:
 
 
 def figures(
-    pair: Sequence[Contender], spp: int, pixels: int, reference: NDArray[np.floating]
-) -> Row:
-    """Return what both took beside each other; clpt first in lists. The first sample of each pixel
-    is not counted: its time is the start's."""
-    cold = [one.render(1, 1) for one in pair]
-    machine.settle(pair[0].caches)
-    warm = [[one.render(1, seed) for one in pair] for seed in SEEDS]
-    full = [[one.render(spp, seed) for one in pair] for seed in SEEDS[:2]]
-    start = [min(run[i].cpu for run in warm) for i in range(2)]
-    clock = [min(run[i].seconds for run in warm) for i in range(2)]
-    cpu = [min(run[i].cpu for run in full) - start[i] for i in range(2)]
-    seconds = [min(run[i].seconds for run in full) - clock[i] for i in range(2)]
-    errors = [
-        float(np.mean([relative_mse(run[i].image, reference) for run in full])) for i in range(2)
-    ]
-    return {
-        "msamples": [round(pixels * (spp - 1) / t / 1e6, 4) for t in cpu],
-        "rate_ratio": round(cpu[1] / cpu[0], 3),
-        "relmse": [round(e, 6) for e in errors],
-        "efficiency_ratio": round(errors[1] * cpu[1] / (errors[0] * cpu[0]), 3),
-        "busy": [round(t / max(s, 1e-3), 2) for t, s in zip(cpu, seconds, strict=True)],
-        "first_cold": [round(run.cpu, 2) for run in cold],
-        "first_cold_clock": [round(run.seconds, 2) for run in cold],
-        "first_warm": [round(t, 2) for t in start],
-        "peak_mib": [round(max(run[i].peak for run in full) / 2**20) for i in range(2)],
-    }
+    contenders: dict[str, Contender], spp: int, long: Sequence[NDArray[np.float32]]
+) -> dict[str, Row]:
+    """Return what each took; the first sample of each pixel is not counted: its time is the
+    start's. The start of guiding is that of `path`, because it learns before its first sample."""
+    for one in contenders.values():  # compiles
+        one.render(1, 1)
+    machine.settle(next(iter(contenders.values())).caches)
+    warm, full = (
+        [{n: c.render(samples, seed) for n, c in contenders.items()} for seed in SEEDS]
+        for samples in (1, spp)
+    )
+    reference = (long[0] + long[1]) / 2
+    own = relative_mse(long[0], reference)  # which is that of the reference
+    pixels, found = reference.shape[0] * reference.shape[1], {}
+    for name in contenders:
+        begun = [run["path" if name == "guiding" and "path" in run else name] for run in warm]
+        start, clock = min(run.cpu for run in begun), min(run.seconds for run in begun)
+        cpu = min(run[name].cpu for run in full) - start
+        seconds = min(run[name].seconds for run in full) - clock
+        errors = [relative_mse(run[name].image, reference) for run in full]
+        found[name] = {
+            "msamples": round(pixels * (spp - 1) / cpu / 1e6, 4),
+            "relmse": round(float(np.mean(errors)) - own, 6),
+            "busy": round(cpu / max(seconds, 1e-3), 2),
+            "first_warm": round(min(run[name].cpu for run in warm), 2),
+            "peak_mib": round(max(run[name].peak for run in full) / 2**20),
+        }
+    return found
+
+
+def pairs(found: dict[str, Row]) -> list[Row]:
+    """Return a row for each way of clpt beside each sampler of Mitsuba; clpt first in lists."""
+    rows = []
+    for way in (name for name in found if name in WAYS):
+        for sampler in SAMPLERS:
+            ours, theirs = found[way], found[f"mitsuba {sampler}"]
+            rate = ours["msamples"] / theirs["msamples"]
+            rows.append({
+                "way": way,
+                "sampler": sampler,
+                "rate_ratio": round(rate, 3),
+                "efficiency_ratio": round(rate * theirs["relmse"] / ours["relmse"], 3),
+                **{name: [ours[name], theirs[name]] for name in ours},
+            })  # fmt: skip
+    return rows
 
 
 HEADINGS = (
-    "scene", "mode", "threads", "Msamples/s", "rate : Mitsuba", "relMSE", "efficiency : Mitsuba",
-    "busy", "first sample, cold", "by the clock", "with caches", "peak MiB", "means",
+    "scene", "mode", "threads", "way", "Mitsuba's sampler", "Msamples/s", "rate : Mitsuba",
+    "relMSE", "efficiency : Mitsuba", "busy", "first sample", "peak MiB", "means",
 )  # fmt: skip
 
 
@@ -268,13 +332,13 @@ def cells(row: Row) -> list[str]:
         row["scene"],
         row["mode"],
         str(row["threads"]),
+        row["way"],
+        row["sampler"],
         two("msamples"),
         f"{row['rate_ratio']:.2f}",
         two("relmse"),
         f"{row['efficiency_ratio']:.2f}",
-        *(two(name) for name in ("busy", "first_cold", "first_cold_clock", "first_warm")),
-        two("peak_mib"),
-        two("means"),
+        *(two(name) for name in ("busy", "first_warm", "peak_mib", "means")),
     ]
 
 
@@ -284,48 +348,32 @@ def cells(row: Row) -> list[str]:
 @click.option("--width", default=200, show_default=True, help="of the film [pixels]")
 @click.option("--mode", "modes", multiple=True, type=click.Choice(["rgb", "spectral"]))
 @click.option("--threads", multiple=True, type=int, help="cores that both are held to  [1, 2]")
+@click.option("--way", "ways", multiple=True, type=click.Choice(list(WAYS)), help="of clpt  [all]")
 @click.option("--spp", default=64, show_default=True)
 @click.option("--long", default=512, show_default=True, help="samples a pixel of the references")
-@click.option("--as-file", is_flag=True, help="with each file's own pixel filter and sampler")
+@click.option("--as-file", is_flag=True, help="with each file's own pixel filter")
 @click.option("--json", "json_file", type=click.Path(), help="append the figures as JSON lines")
-def main(
-    scenes: tuple[str, ...],
-    assets: Path | None,
-    width: int,
-    modes: tuple[str, ...],
-    threads: tuple[int, ...],
-    spp: int,
-    long: int,
-    as_file: bool,
-    json_file: str | None,
-) -> None:
+def main(scenes: tuple[str, ...], assets: Path | None, json_file: str | None, **given: Any) -> None:
     find_llvm()
     every = list(scenes) or list(SCENES)
     if assets is not None:
         every += [str(path) for path in sorted(assets.glob("mitsuba/*/*.xml"))]
-    film = {"width": width, "as_file": as_file}
+    usual = {"modes": ("rgb", "spectral"), "threads": (1, 2), "ways": tuple(WAYS)}
+    settings = Settings(**{name: value or usual.get(name, value) for name, value in given.items()})
     table = Table(*HEADINGS, title=f"{machine.processor()}; clpt / Mitsuba")
-    all_rows = []
     with tempfile.TemporaryDirectory() as folder:
         for name in every:
             path = SCENES[name](Path(folder)) if name in SCENES else Path(name)
             try:
-                rows = compare(
-                    path, modes or ("rgb", "spectral"), threads or (1, 2), spp, long, film
-                )
+                rows = compare(path, settings)
             except (RuntimeError, OSError, ET.ParseError) as error:
                 print(f"{name}: {error}", file=sys.stderr)
                 continue
             machine.append(json_file, "efficiency", rows)
-            all_rows += rows
             for row in rows:
                 table.add_row(*cells(row))
                 print(" | ".join(cells(row)), file=sys.stderr, flush=True)
     machine.console().print(table)
-    if all_rows:
-        ratios = [row["efficiency_ratio"] for row in all_rows]
-        mean = np.exp(np.mean(np.log(ratios)))
-        print(f"efficiency : Mitsuba, geometric mean {mean:.2f}, least {min(ratios):.2f}")
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ import numpy as np
 RESULTS = Path(__file__).parent / "results"
 WHICH = (
     "scene", "mode", "renderer", "sampler", "threads", "layout", "rays", "query", "effect",
-    "figure", "triangles", "builder", "bent", "as_file", "size", "benchmark_version",
+    "figure", "triangles", "builder", "bent", "as_file", "size", "benchmark_version", "way",
 )  # fmt: skip
 
 HEAD = """# What was measured
@@ -26,7 +26,10 @@ Row = dict[str, object]
 
 def newest(records: Iterable[Row]) -> list[Row]:
     """The last record of each figure, in the order in which they first came."""
-    kept = {(r["bench"], r.get("device"), *(r.get(name) for name in WHICH)): r for r in records}
+    kept = {
+        json.dumps([r["bench"], r.get("device"), *(r.get(name) for name in WHICH)]): r
+        for r in records
+    }
     return list(kept.values())
 
 
@@ -128,20 +131,46 @@ def figures(rows: Sequence[Row]) -> str:
 
 def efficiency(rows: Sequence[Row]) -> str:
     """Scenes as their files are, clpt's figure before Mitsuba's; seconds of processor time."""
+    best = best_ways(rows)
 
-    def cells(row: Row) -> list[str]:
-        pairs = ("msamples", "relmse", "busy", "first_cold", "first_cold_clock", "first_warm")
+    def cells(found: Sequence[Row]) -> list[str]:
+        row, *others = found
+        pairs = ("msamples", "relmse", "busy", "first_warm", "peak_mib")
         return [
             *(str(row[name]) for name in ("scene", "mode", "threads")),
-            "the file's" if row["as_file"] else "box, best",
+            "the file's" if row["as_file"] else "box",
+            "the file's" if sampler_of(row) == "file" else "multijitter",
+            row.get("way", "file"),
             *(f"**{row[name]:.2f}**" for name in ("efficiency_ratio", "rate_ratio")),
-            *(" / ".join(f"{v:g}" for v in row.get(name, ())) for name in (*pairs, "peak_mib")),
+            ", ".join(f"{one['way']} {one['efficiency_ratio']:.2f}" for one in others),
+            *(" / ".join(f"{v:g}" for v in row.get(name, ())) for name in pairs),
         ]
 
-    headings = ["scene", "mode", "threads", "filter, sampler", "efficiency : Mitsuba"]
-    headings += ["rate : Mitsuba", "Msamples/s", "relMSE", "cores busy", "first sample, cold"]
-    headings += ["the same by the clock", "with caches", "peak [MiB]"]
-    return table(headings, map(cells, rows)) + "\n" + geometric_means(rows)
+    headings = ["scene", "mode", "threads", "filter", "Mitsuba's sampler", "clpt's best way"]
+    headings += ["efficiency : Mitsuba", "rate : Mitsuba", "efficiency of other ways"]
+    headings += ["Msamples/s", "relMSE", "cores busy", "first sample with caches", "peak [MiB]"]
+    return table(headings, map(cells, best)) + "\n" + geometric_means([row for row, *_ in best])
+
+
+def sampler_of(row: Row) -> str:
+    """Whether Mitsuba had the file's sampler or its best one; in rows that do not say so, too."""
+    return str(row.get("sampler", "file" if row["as_file"] else "best"))
+
+
+def best_ways(rows: Sequence[Row]) -> list[list[Row]]:
+    """The newest rows of the newest film of each comparison, the most efficient way first."""
+    groups: dict[tuple[object, ...], dict[str, Row]] = {}
+    for row in sorted(rows, key=lambda row: str(row["date"])):
+        about = (row[name] for name in ("mode", "as_file", "threads", "scene"))
+        film = str(row["size"]), "way" in row
+        group = groups.setdefault((*about, sampler_of(row)), {})
+        if any((str(old["size"]), "way" in old) != film for old in group.values()):
+            group.clear()
+        group[str(row.get("way"))] = row
+    ordered = sorted(groups.items(), key=lambda item: tuple(map(str, item[0])))
+    return [
+        sorted(group.values(), key=lambda row: -row["efficiency_ratio"]) for _, group in ordered
+    ]
 
 
 def hard_light(rows: Sequence[Row]) -> str:
@@ -182,16 +211,17 @@ def media(rows: Sequence[Row]) -> str:
 
 
 def geometric_means(rows: Sequence[Row]) -> str:
-    """Efficiency over all scenes, by mode, threads and filter."""
+    """Efficiency over all scenes, by mode, threads, filter and Mitsuba's sampler."""
     groups: dict[tuple[object, ...], list[float]] = {}
     for row in rows:
-        which = tuple(row[name] for name in ("mode", "threads", "as_file"))
+        which = (row["mode"], row["threads"], row["as_file"], sampler_of(row))
         groups.setdefault(which, []).append(float(row["efficiency_ratio"]))
     lines = [
-        f"- {mode}, {threads} thread(s), {'as the file' if as_file else 'box, best sampler'}: "
+        f"- {mode}, {threads} thread(s), {'the file' if as_file else 'box'}'s filter, Mitsuba's "
+        f"{'best sampler' if sampler == 'best' else 'sampler by the file'}: "
         f"geometric mean {np.exp(np.mean(np.log(found))):.2f}, least {min(found):.2f}, "
         f"of {len(found)} scenes"
-        for (mode, threads, as_file), found in groups.items()
+        for (mode, threads, as_file, sampler), found in groups.items()
     ]
     return "\n".join(["Efficiency over Mitsuba's:", "", *lines, ""])
 
@@ -254,6 +284,7 @@ TABLES: dict[str, Callable[[Sequence[Row]], str]] = {
     "embedding": plain,
     "soak": plain,
     "beside": plain,
+    "beside_cycles": plain,
     "devices": plain,
     "denoising": plain,
     "layers": plain,
@@ -289,18 +320,20 @@ def page(machines: dict[str, list[Row]]) -> str:
     return text
 
 
-def write() -> Path:
-    """Write the page; where it is."""
-    machines: dict[str, list[Row]] = {}
-    for file in sorted(RESULTS.glob("*.jsonl")):
+def machines() -> dict[str, list[Row]]:
+    """All records, by their processor and its cores."""
+    found: dict[str, list[Row]] = {}
+    for file in sorted(RESULTS.glob("2*.jsonl")):
         for line in file.read_text(encoding="utf-8").splitlines():
             record = json.loads(line)
-            machines.setdefault(f"{record['processor']}, {record['cores']} cores", []).append(
-                record
-            )
-    RESULTS.mkdir(exist_ok=True)
+            found.setdefault(f"{record['processor']}, {record['cores']} cores", []).append(record)
+    return found
+
+
+def write() -> Path:
+    """Write the page; where it is."""
     path = RESULTS / "README.md"
-    path.write_text(page(machines), encoding="utf-8")
+    path.write_text(page(machines()), encoding="utf-8")
     return path
 
 

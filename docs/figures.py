@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bench.report import RESULTS, table
+from bench.report import RESULTS, best_ways, sampler_of, table
 
 from .pictures import gallery as pictures
 
@@ -67,20 +67,21 @@ def shown(value: float) -> str:
 def efficiency() -> str:
     """Return clpt's efficiency over Mitsuba's: three scenes, and the mean of all."""
 
-    def ratios(processor: str, mode: str, scenes: Iterable[str]) -> list[float]:
-        about = {"processor": processor, "mode": mode, "threads": 1, "as_file": False}
-        return [newest("efficiency", scene=s, **about)["efficiency_ratio"] for s in scenes]
+    def ratios(processor: str, mode: str) -> dict[str, float]:
+        """Of each scene, by the way of clpt that is the best one, beside Mitsuba's best sampler."""
+        about = {"bench": "efficiency", "processor": processor, "mode": mode, "threads": 1}
+        own = [r for r in records() if {**about, "as_file": False}.items() <= r.items()]
+        best = (found[0] for found in best_ways(own) if sampler_of(found[0]) == "best")
+        return {row["scene"]: row["efficiency_ratio"] for row in best}
 
-    columns = [(p, mode) for p in (AVX2, AVX512) for mode in ("rgb", "spectral")]
+    columns = [ratios(p, mode) for p in (AVX2, AVX512) for mode in ("rgb", "spectral")]
     body = [
-        [NAMES.get(s, s), *(f"{ratios(p, mode, [s])[0]:.1f}" for p, mode in columns)]
+        [NAMES.get(s, s), *(f"{found[s]:.1f}" for found in columns)]
         for s in ("cornell", "atrium", "glass")
     ]
     means = ["geometric mean of all scenes"]
-    for processor, mode in columns:
-        about = {"processor": processor, "mode": mode, "threads": 1, "as_file": False}
-        found = ratios(processor, mode, names("efficiency", "scene", **about))
-        means.append(f"{np.exp(np.mean(np.log(found))):.1f} (of {len(found)})")
+    for found in columns:
+        means.append(f"{np.exp(np.mean(np.log([*found.values()]))):.1f} (of {len(found)})")
     heads = ["clpt : Mitsuba 3", "AVX2, RGB", "AVX2, spectral", "AVX-512, RGB", "AVX-512, spectral"]
     return table(heads, [*body, means])
 

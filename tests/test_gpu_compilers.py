@@ -142,7 +142,7 @@ def test_registers_only_fall(kept: Row) -> None:
     ]
     assert own, "the scene has no such program any more: measure again"
     for program in own:
-        figures = vendor.figures(program.text, kept["device"])
+        figures = vendor.figures(program.text, kept["device"], program.registers)
         for name in ("registers", "stack", "spilled"):
             assert getattr(figures, name) <= kept[name], (name, figures)
 

@@ -14,7 +14,13 @@ from functools import partial
 import pyopencl as cl
 from pyopencl.characterize import has_src_build_cache
 
-from clpt.device import compile_limits, declarations, disk_cache, native_programs
+from clpt.device import (
+    compile_limits,
+    declarations,
+    disk_cache,
+    native_programs,
+    registers,
+)
 
 from ..errors import DeviceError, KernelBuildError
 from .compilers import Job
@@ -43,6 +49,8 @@ def build(device: Device, source: Source, options: Sequence[str] = ()) -> Progra
     program = _known(device, source, flags, on_disk)
     if program is not None:
         return program
+    if on_disk:
+        device.builds.on_new()
     device.builds.on_compile()
     start = time.perf_counter()
     with compile_limits.watched(source):
@@ -70,6 +78,7 @@ def link(
     program = _known(device, whole, flags, _has_binaries(device))
     if program is not None:
         return program
+    device.builds.on_new()
     entry = _entry(device, whole, flags)
     with disk_cache.alone(entry):  # another process may have been at it
         program = _known(device, whole, flags, _has_binaries(device))
@@ -104,7 +113,7 @@ def _linked_of_any(
 
 
 def compile_ahead(device: Device, sources: Mapping[str, Source], main: str) -> None:
-    """Let the device's `compilers` begin with what `link` will need; it returns at once."""
+    """Let the device's `compilers` begin with what `link` will need, and do not wait for them."""
     flags = _flags(device, ())
     if device.compilers is None or not _has_binaries(device):
         return
@@ -120,7 +129,9 @@ def compile_ahead(device: Device, sources: Mapping[str, Source], main: str) -> N
             seconds = compile_limits.seconds_for(source)
             told = source.name, seconds, device.info.platform, device.info.name
             device.builds.on_compile()
-            device.compilers.submit(part, Job(*told, " ".join(options), text))
+            job = Job(*told, " ".join(options), text)
+            device.compilers.submit(part, job, first=device.hurries)
+    device.builds.on_new()
 
 
 def _drop_parts(device: Device, sources: Mapping[str, Source], flags: list[str]) -> None:
@@ -243,8 +254,7 @@ def _is_oclgrind(device: Device) -> bool:
 
 def _from_source(device: Device, source: Source, flags: list[str]) -> Program:
     try:
-        make = partial(native_programs.build, device.context, device.info.cl_device)
-        built = declarations.built(device, source.text, flags, make)
+        built = _natively(device, source, flags)
     except cl.Error as error:
         raise _build_error(source, str(error)) from error
     try:
@@ -254,6 +264,20 @@ def _from_source(device: Device, source: Source, flags: list[str]) -> Program:
             f"{device.info.label} does not tell the arguments of its kernels ({error}); "
             "clpt cannot run on this driver"
         ) from error
+
+
+def _natively(device: Device, source: Source, flags: list[str]) -> cl.Program:
+    """Return a program that the driver builds of a text. Raises pyopencl.Error."""
+    cl_device = device.info.cl_device
+    make = partial(native_programs.build, device.context, cl_device)
+    if not (source.registers and device.info.limits_registers):
+        return declarations.built(device, source.text, flags, make)
+
+    def limited(limit: int | None) -> tuple[cl.Program, tuple[int, int]]:
+        program = make(source.text, [*flags, *registers.option(limit)])
+        return program, registers.told(native_programs.said(program, cl_device))
+
+    return registers.fewest(source.registers, limited)
 
 
 def _from_cache(device: Device, source: Source, flags: list[str], entry: str) -> Program | None:

@@ -78,13 +78,13 @@ class Compilers:
         self._closed = False
         _running.add(self)
 
-    def submit(self, key: Hashable, job: Job) -> None:
-        """Let a process do a job, if none has the key yet."""
+    def submit(self, key: Hashable, job: Job, first: bool = False) -> None:
+        """Let a process do a job, if none has the key yet; first: before all that wait."""
         with self._changed:
             if self._closed or key in self._tasks:
                 return
             task = self._tasks[key] = _Task(job)
-            self._waiting.append(task)
+            self._waiting.insert(0 if first else len(self._waiting), task)
             self._changed.notify()
             if len(self._threads) < min(self.count, len(self._waiting)):
                 thread = threading.Thread(target=self._serve, daemon=True)

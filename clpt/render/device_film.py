@@ -58,7 +58,7 @@ from clpt.version import VERSION
 log = logging.getLogger("clpt.render.renderer")  # which the documentation names
 
 TEXTURE_SHARE = 0.5  # of a device's free memory, for bitmaps
-WAY = tuple(f"chosen.{name}" for name in ("integrator", "light_paths", "guiding", "splatting"))
+WAY = tuple(f"chosen.{name}" for name in ("integrator", "light_paths", "guide_paths", "splatting"))
 TO_OUTPUT = ("to_first", "to_second", "to_third")
 
 Apply = Callable[..., None]  # takes what writes a change, see `FilmRenderer._apply`
@@ -94,12 +94,18 @@ class DeviceFilm:
     built: how many programs were built, and how many of them came from clpt's cache; seconds: of
     each part of that. options: see `RenderOptions`. share: makes things once for several devices,
     by a key and a function; without it the scene may have arrays in the memory of the device.
+    former: a lowered scene that has much in common with this one.
 
     Raises as `Renderer` does.
     """
 
     def __init__(
-        self, scene: Scene, device: dev.Device, options: RenderOptions, share: Share | None = None
+        self,
+        scene: Scene,
+        device: dev.Device,
+        options: RenderOptions,
+        share: Share | None = None,
+        former: Lowered | None = None,
     ):
         self.start = start = time.perf_counter()
         self.seconds: dict[str, float] = {}
@@ -120,12 +126,12 @@ class DeviceFilm:
             tuning=tuning,
             slots=options.get("slots"),
             looped=looped,
-            tree_quality=options.get("tree_quality", "high"),
+            trees=options.get("tree_quality", "high"),
             halves=options.get("halves", False) or needs.halves(scene, denoise),
         )
-        lowered = self._lower(scene, share)
-        self.seconds["lower"] = time.perf_counter() - start
         self._opened: Wavefront | None = None
+        lowered = self._lower(scene, share, former, anew=True)
+        self.seconds["lower"] = time.perf_counter() - start
         self._opened = first = self._create(lowered)
         first.prepare()
         self.built = device.builds.programs - before[0], device.builds.cached - before[1]
@@ -247,10 +253,11 @@ class DeviceFilm:
         want to see something soon, and what is chosen stays.
         """
         steered = self._ground.tuning.cancel_seconds is not None
+        chooses = anew and not (steered and self.is_open)
 
         def make() -> Lowered:
             readable, budget = resolve_device_arrays(scene, self.device.queue), self._texture_budget
-            lowered = lower(readable, budget, former, anew=anew and not steered)
+            lowered = lower(readable, budget, former, anew=chooses)
             if not lowered.candidates or steered:
                 return lowered
 
@@ -395,7 +402,7 @@ class DeviceFilm:
         settings: dict[str, Plain] = {
             "chosen.integrator": lowered.integrator.kind,
             "chosen.light_paths": float(lowered.settings["light_paths"]),
-            "chosen.guiding": bool(features.transport.guided),
+            "chosen.guide_paths": int(lowered.settings["guide_paths"]),
             "chosen.splatting": features.film.filter.reach > 0,
             "chosen.texels": int(lowered.tables["texels"].size),
             "halves": first.film.halves == 2,

@@ -30,7 +30,9 @@ class Renderer(DevicePictures):
     """Renders a scene; its picture so far is available at any time.
 
     device: where to render, a name or index (see clpt.device.choose), or a clpt.device.Device.
-    progress: called when a step has ended, in a thread of the driver. options: see `RenderOptions`.
+    progress: called when a step has ended, in a thread of the driver. beside: another renderer, of
+    a scene that has much in common with this one, such as the same in another size: what both need
+    is prepared once. options: see `RenderOptions`.
 
     It may be used from several threads: one method runs at a time. With `with`, `close`, or when it
     is dropped, it gives the device's memory back.
@@ -47,11 +49,13 @@ class Renderer(DevicePictures):
         device: dev.Device | str | int | None = None,
         *,
         progress: Callable[[Progress], Any] | None = None,
+        beside: Renderer | None = None,
         **options: Unpack[RenderOptions],
     ):
         check_scene(scene)
         check_options(scene, options)
-        home = DeviceFilm(scene, open_device(device, options), options)
+        former = None if beside is None else beside._maker.home.wavefront.scene.lowered
+        home = DeviceFilm(scene, open_device(device, options), options, former=former)
         super().__init__(DeviceMaker(home), home.denoise, options.get("first_sample", 0))
         self._progress_of_steps = progress
 

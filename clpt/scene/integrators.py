@@ -21,6 +21,7 @@ from clpt.spectra.spectrum import LONGEST, SHORTEST
 
 MOST_BANDS = 1024
 FEWEST_LIGHT_PATHS = 1.0 / 64
+MOST_GUIDE_PATHS = 1 << 24  # sums of what they carry have 32 bits
 DEEPEST = 4000  # path state has 12 bits for the depth
 MOST_GROUPS = 64  # of wavelengths
 MOST_PHOTON_MEMORY = 8192  # [MiB]; words of photons are numbered by 31 bits
@@ -36,6 +37,7 @@ class Integrator(Kind):
     hide_lights = False
     free_panes = False
     guiding = False
+    guide_paths = 0
     light_tracing = True
     merging = False
 
@@ -101,6 +103,7 @@ class Path(Integrator):
     guiding: bool = host(
         False, "directions are learned from light paths before the first sample; without others"
     )
+    guide_paths: int = host(0, "light paths from which `guiding` learns; 0: a million")
 
     def check(self) -> None:
         super().check()
@@ -108,6 +111,7 @@ class Path(Integrator):
         if self.guiding and given not in (0, AUTO):
             message = "guiding is for paths from the camera alone: ask for no light_paths"
             raise SceneError(message, where=f"{self.kind}.guiding")
+        self._check_guide_paths()
         if isinstance(given, str) and given == AUTO:
             return
         number = isinstance(given, (int, float)) and not isinstance(given, bool)
@@ -115,6 +119,13 @@ class Path(Integrator):
             fewest = f"{FEWEST_LIGHT_PATHS:g}"
             message = f"must be 0, {fewest} to {MOST_LIGHT_PATHS}, or {AUTO!r}, not {given!r}"
             raise SceneError(message, where=f"{self.kind}.light_paths")
+
+    def _check_guide_paths(self) -> None:
+        given: Any = self.guide_paths
+        whole = isinstance(given, int) and not isinstance(given, bool)
+        if not whole or not 0 <= given <= MOST_GUIDE_PATHS:
+            message = f"must be a whole number of 0 to {MOST_GUIDE_PATHS}, not {given!r}"
+            raise SceneError(message, where=f"{self.kind}.guide_paths")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -178,7 +189,7 @@ class Auto(Integrator):
 
 def shared(integrator: Integrator, other: Integrator) -> dict[str, Any]:
     """Return the parameters of an integrator that another one has too, but how it finds light."""
-    known = fields_of(other).keys() - {"light_paths", "guiding"}
+    known = fields_of(other).keys() - {"light_paths", "guiding", "guide_paths"}
     return {name: value for name, value in fields_of(integrator).items() if name in known}
 
 

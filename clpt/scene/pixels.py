@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -23,17 +24,20 @@ def spectral_image(texture: object, role: Role) -> SpectralImage | None:
     return spectral_exr.find(texture.image, emissive=role is EMISSION, where="bitmap.image")
 
 
-def pixels(texture: Bitmap, role: Role) -> Floats32:
+def pixels(texture: Bitmap, role: Role, side: int | None = None) -> Floats32:
     """Return a bitmap's image, (h, w, 1 or 3) float32, top row first; for REAL (h, w, 1).
 
-    role: of spectra it chooses the colour that stands for them. Raises SceneError if it cannot be
-    read or is no image.
+    role: of spectra it chooses the colour that stands for them; side: about how many texels along
+    each side are enough, of which the others are left out. Raises SceneError if it cannot be read
+    or is no image.
     """
     spectral = spectral_image(texture, role)
     image = texture.image if spectral is None else spectral.to_rgb()
     if isinstance(image, (str, Path)):
-        image = images.read_stored(image).decoded(not texture.raw)
-    image = np.asarray(on_host(image))
+        stored = images.read_stored(image)
+        some = dataclasses.replace(stored, values=_thinned(stored.values, side))
+        image = some.decoded(not texture.raw)
+    image = _thinned(np.asarray(on_host(image)), side)
     image = image[..., None] if image.ndim == 2 else image
     if image.dtype == np.uint8 and image.ndim == 3:
         image = images.Stored(image, encoded=True).decoded(not texture.raw)
@@ -45,6 +49,14 @@ def pixels(texture: Bitmap, role: Role) -> Floats32:
         raise SceneError(f"{wanted}, not {image.shape}", where="bitmap.image")
     chosen = channel(image, texture.channel) if role is REAL else image[..., :3]
     return np.nan_to_num(chosen.astype(np.float32))
+
+
+def _thinned(image: NDArray[Any], side: int | None) -> NDArray[Any]:
+    """Return every so many texels of an image (h, w, ...), about `side` along each side."""
+    if side is None or image.ndim < 2:
+        return image
+    down, across = (max(1, size // side) for size in image.shape[:2])
+    return image[::down, ::across]
 
 
 def channel(image: NDArray[Any], name: str) -> NDArray[Any]:

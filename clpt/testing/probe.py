@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -49,9 +50,7 @@ def run(
     given: (k, n) float32, streams of `in`; table: what follows them there; virtual: the program's
     files; options: more of the compiler's. Returns (rows, n) float32. n is padded to whole blocks.
     """
-    files = {**rough_coat_table.virtual_files(), **virtual}
-    source = device.assemble("probe.cl", files, {"LANES": lanes})
-    program = device.build(on, source, options)
+    program = device.build(on, _source(tuple(virtual.items()), lanes), options)
     n = given.shape[1]
     padded = -(-n // 16) * 16
     data = np.empty((given.shape[0], padded), np.float32)
@@ -62,6 +61,12 @@ def run(
     memory = {"in": give.upload("arguments", data), "out": give.allocate("results", out.nbytes)}
     stream.run(program.kernel("probe").bind(**memory, n=padded), (padded // lanes,), (1,))
     return stream.read(memory["out"], out)[:, :n]
+
+
+@lru_cache(maxsize=64)  # one text is called with many arguments
+def _source(virtual: tuple[tuple[str, Any], ...], lanes: int) -> device.Source:
+    files = {**rough_coat_table.virtual_files(), **dict(virtual)}
+    return device.assemble("probe.cl", files, {"LANES": lanes})
 
 
 class Probe:

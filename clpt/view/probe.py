@@ -20,8 +20,7 @@ from clpt.render.renderer import Renderer
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Camera, Matrix, Orthographic, Perspective
 from clpt.scene.integrators import Box, Direct, Integrator, Path, Whitted, shared
-from clpt.scene.params import fields_of
-from clpt.scene.shapes import Group, Instance, Shape
+from clpt.view.bare import bare, each
 from clpt.view.messages import Reply, answering
 
 BANDS = 47  # of 10 nm, of all light
@@ -243,31 +242,15 @@ def first_hit(follower: Follower, scene: Scene, x: int, y: int) -> dict[str, Any
 
 def surfaces_of(scene: Scene, x: int, y: int) -> Scene:
     """Return a scene that shows the surface at a pixel's centre, with neither light nor media."""
-    groups: dict[int, Group] = {}
-    shapes: list[Shape] = []
-    for shape in scene.shapes:
-        if isinstance(shape, Instance):
-            group = shape.group
-            if id(group) not in groups:
-                bare = Group(shapes=tuple(map(_bare, group.shapes)), name=group.name)
-                groups[id(group)] = bare
-            shapes.append(dataclasses.replace(shape, group=groups[id(group)]))
-        else:
-            shapes.append(_bare(shape))
     pixel = pixel_of(scene, x, y, 0, Path(max_depth=1, light_paths=0))
     middle = Box(radius=NARROW)
     film = dataclasses.replace(
         pixel.film, mode="rgb", sensor="cie1931", filter=middle, layers=LAYERS
     )
     camera = dataclasses.replace(pixel.camera, medium=None)
-    return dataclasses.replace(pixel, camera=camera, shapes=shapes, lights=[], film=film)
-
-
-def _bare(shape: Shape) -> Shape:
-    plain: dict[str, Any] = {"emission": None, "interior": None, "exterior": None, "priority": 0}
-    given = fields_of(shape)
-    own = {name: value for name, value in plain.items() if given[name] != value}
-    return dataclasses.replace(shape, **own) if own else shape
+    return dataclasses.replace(
+        pixel, camera=camera, shapes=each(scene.shapes, bare), lights=[], film=film
+    )
 
 
 def _estimate(name: str, batches: list[NDArray[np.float64]]) -> dict[str, list[float]]:

@@ -17,13 +17,14 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.arrays import Image
+from clpt.arrays import Bytes, Image
 from clpt.device import Device
 from clpt.render.film_renderer import maker_of
 from clpt.render.progress import Progress
 from clpt.render.renderer import Renderer
 from clpt.scene import Scene
 from clpt.view import maps, pictures
+from clpt.view.beginning import Beginning
 from clpt.view.messages import PREPARING
 from clpt.view.pictures import Display
 from clpt.view.target import Change, Make, Target, smaller
@@ -38,6 +39,7 @@ DIVIDERS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 128, 256)
 PASS_SECONDS = 2.0  # of a pass; and more when the render has lasted, since ends of passes are dear
 PASS_SHARE, LONGEST_PASS = 0.5, 10.0  # of the time so far, and [s]
 STATUS_SECONDS = 0.25  # between messages of progress
+BEGINNING_SECONDS = 0.02  # between looks at what viewers ask for while kernels are compiled
 
 
 class Outlet(Protocol):
@@ -79,17 +81,18 @@ class RenderLoop:
         self.seconds = 0.0  # of rendering the whole picture
         self._film: Image | None = None
         self._errors = maps.ErrorMap()
-        options = {"cancel_seconds": CANCEL_SECONDS, **options}
-        self._make = partial(Renderer, device=device, **options)
+        self._options = {"cancel_seconds": CANCEL_SECONDS, **options}
         self._divider = first_divider(scene)
-        self._whole = self._make if make is None else partial(make, **options)
+        self._whole = self._make if make is None else partial(make, **self._options)
         self._limits: str | None = None  # the denoiser after which the limit of noise holds
         self._full = Target(self._make_whole, lambda scene: scene)
         self._preview = Target(self._make, smaller(self._divider))
+        self._beginning: Beginning | None = None
         self._previews_left, self._begins = PREVIEW_SAMPLES, True
         self._stale = self._offered = False
         self._budget = pictures.Budget()
         self._frame = self._changes = 0
+        self._solid_changes = -1  # of the last picture in plain colours
         self._asked: float | None = None  # when something was that restarts
         self._waited = self._samples = 0.0
         self._slow_previews = self._fast_previews = 0
@@ -97,6 +100,11 @@ class RenderLoop:
         self.status: dict[str, Any] = PREPARING  # what viewers were told last
         self._rates = 0.0, 0.0
         self._closing = False
+
+    def begin_solid(self) -> None:
+        """Show the scene in plain colours while kernels of the first picture are compiled."""
+        self._beginning = Beginning(self.device, self._make, self._preview.variant, self.scene)
+        self._tell(PREPARING)
 
     def begin(self, scene: Scene, change: Change, denoise: str | None = None) -> None:
         """Render another scene from now on.
@@ -112,6 +120,8 @@ class RenderLoop:
         self.scene = scene
         self._full.note(change)
         self._preview.note(change)
+        if self._beginning is not None:
+            self._beginning.note(change)
         self._previews_left, self._begins = PREVIEW_SAMPLES, True
         self._film, self.has_shown = None, False
         self._errors = maps.ErrorMap()
@@ -139,7 +149,9 @@ class RenderLoop:
 
         Raises what `Renderer` raises for a scene that it cannot render.
         """
-        if self._previews_left:
+        if self._beginning is not None:
+            self._go_on_beginning(self._beginning)
+        elif self._previews_left:
             self._previews_left -= 1
             self._render_preview()
         elif self._wants_samples():
@@ -155,6 +167,8 @@ class RenderLoop:
 
     def renderer(self) -> Renderer:
         """Return the renderer of the whole picture, of the present scene."""
+        if self._beginning is not None:
+            self._end_beginning(self._beginning)
         return self._full.follow(self.scene)
 
     def wants_more(self) -> None:
@@ -175,6 +189,8 @@ class RenderLoop:
 
     def close(self) -> None:
         """Give the device's memory back."""
+        if self._beginning is not None:
+            self._beginning.close()
         self._full.close()
         self._preview.close()
 
@@ -191,6 +207,26 @@ class RenderLoop:
             return False
         return self._begins or not (self.paused or self.done)
 
+    def _go_on_beginning(self, beginning: Beginning) -> None:
+        beginning.wait(BEGINNING_SECONDS)
+        if beginning.is_over:
+            self._end_beginning(beginning)
+        elif self._solid_changes != self._changes:
+            beginning.show(self.scene, self._offer_solid)
+
+    def _end_beginning(self, beginning: Beginning) -> None:
+        """Take over the renderer that was made beside. Raises what making it has raised."""
+        self._beginning = None
+        renderer = beginning.renderer()
+        if beginning.variant is self._preview.variant:
+            self._preview.renderer = renderer
+        else:
+            renderer.close()
+
+    def _offer_solid(self, pixels: Bytes) -> None:
+        self._solid_changes = self._changes
+        self._send(pixels, self._divider, solid=True)
+
     def _render_preview(self) -> None:
         began = time.perf_counter()
         built = self._preview.is_slow
@@ -204,8 +240,8 @@ class RenderLoop:
         self._slow_previews = self._slow_previews + 1 if took > SLOW else 0
         if self._slow_previews == 2 and self._divider < DIVIDERS[-1]:
             fitting = self._divider * math.sqrt(took / SLOW)
-            self._resize_preview(next((n for n in DIVIDERS if n >= fitting), DIVIDERS[-1]))
-            self._preview.follow(self.scene)  # now, not in a drag; by the kernels that it had
+            coarser = next((n for n in DIVIDERS if n >= fitting), DIVIDERS[-1])
+            self._resize_preview(coarser, now=True)
             self._previews_left = 0
             return
         finer = finer_divider(self._divider, first_divider(self.scene))
@@ -213,8 +249,13 @@ class RenderLoop:
         fast = finer < self._divider and would_take < MUCH_FASTER * SLOW
         self._fast_previews = self._fast_previews + 1 if fast else 0
         if self._fast_previews >= FAST_PREVIEWS and not self._previews_left:  # not in a drag
-            self._resize_preview(finer)
-            self._preview.follow(self.scene)
+            self._resize_preview(finer, now=True)
+
+    def _make(self, scene: Scene, beside: Renderer | None = None, **more: Any) -> Renderer:
+        """Return a renderer on the device, beside one that there is."""
+        others = beside, self._full.renderer, self._preview.renderer
+        beside = next((one for one in others if isinstance(one, Renderer)), None)
+        return Renderer(scene, self.device, beside=beside, **self._options, **more)
 
     def _make_whole(self, scene: Scene) -> Renderer:
         return self._whole(scene, denoise=self._limits)
@@ -225,10 +266,17 @@ class RenderLoop:
             self._tell(PREPARING)
         return target.follow(self.scene)
 
-    def _resize_preview(self, divider: int) -> None:
-        self._preview.close()
+    def _resize_preview(self, divider: int, *, now: bool = False) -> None:
+        """Let previews be of another size; now: not in a drag, by the kernels that there are."""
+        former = self._preview
         self._divider, self._slow_previews, self._fast_previews = divider, 0, 0
-        self._preview = Target(self._make, smaller(divider))
+        self._preview = preview = Target(self._make, smaller(divider))
+        try:
+            if now:
+                small = preview.variant(self.scene)
+                preview.renderer = self._make(small, beside=former.renderer)
+        finally:
+            former.close()
 
     def _render_pass(self) -> None:
         renderer = self._follow(self._full)
@@ -272,9 +320,18 @@ class RenderLoop:
         """
         began = time.perf_counter()
         pixels, legend = self._shown(renderer, whole=divider == 1)
-        data = pictures.png(pixels) if rest else pictures.jpeg(pixels)
         if divider == 1 and renderer is self._full.renderer:
             self.has_shown, self._film = True, None
+        shown = None if legend is None else dataclasses.asdict(legend)
+        took = {"samples": renderer.samples, "rendered": rendered}
+        self._send(pixels, divider, rest=rest, legend=shown, **took)
+        self._stale, self._offered = False, rest
+        self._budget.spend(time.perf_counter() - began)
+        self.tell(renderer)
+
+    def _send(self, pixels: Bytes, divider: int, *, rest: bool = False, **told: object) -> None:
+        """Send a picture, with a header of its size and of what else is `told` of it."""
+        data = pictures.png(pixels) if rest else pictures.jpeg(pixels)
         self._frame += 1
         film = self.scene.film
         header = {
@@ -284,19 +341,17 @@ class RenderLoop:
             "film": [film.width, film.height],
             "crop": film.crop,
             "divider": divider,
-            "samples": renderer.samples,
+            "samples": 0,
             "rest": rest,
+            "solid": False,
             "difference": self._difference(),
             "changes": self._changes,
             "waited": self._waited,
-            "rendered": rendered,
+            "rendered": 0.0,
             "shows": self.shows,
-            "legend": None if legend is None else dataclasses.asdict(legend),
+            "legend": None,
         }
-        self.outlet.picture(header, data)
-        self._stale, self._offered = False, rest
-        self._budget.spend(time.perf_counter() - began)
-        self.tell(renderer)
+        self.outlet.picture(header | told, data)
 
     def _shown(self, renderer: Renderer, whole: bool) -> tuple[NDArray[np.uint8], Any]:
         """Return what a renderer has for the screen, and the legend of its colours or None."""

@@ -87,8 +87,13 @@ class Session(CameraWork):
         self._revision = 0
         self._thread = threading.Thread(target=self._main, name="clpt view", daemon=True)
 
-    def start(self) -> None:
-        """Begin to render."""
+    def start(self, *, solid: bool = False) -> None:
+        """Begin to render.
+
+        solid: show the scene in plain colours while its kernels are compiled, if they have to be.
+        """
+        if solid:
+            self._loop.begin_solid()
         self._thread.start()
 
     def close(self, timeout: float | None = None) -> bool:

@@ -56,8 +56,8 @@ Spectrum rough_dielectric_eval(RoughDielectric m, vec3 wo, vec3 wi)
     Spectrum eta = rough_dielectric_index(m);
     Spectrum v = rough_dielectric_value(m, d, wo, wi, eta.x);
     if (any(spectrum_varies(eta))) {
-#define C(c) v.c = rough_dielectric_value(m, d, wo, wi, eta.c).c;
-        SPECTRUM_EACH(C)
+#define C(c) SPECTRUM_PUT(v, c, SPECTRUM_AT(rough_dielectric_value(m, d, wo, wi, SPECTRUM_AT(eta, c)), c));
+        SPECTRUM_IN_TURN(C)
 #undef C
     }
     mask reflected = wo.z * wi.z > 0.0f;
@@ -78,8 +78,8 @@ Spectrum rough_dielectric_pdfs(RoughDielectric m, vec3 wo, vec3 wi)
     Spectrum eta = rough_dielectric_index(m);
     Spectrum v = spectrum_of(rough_dielectric_density(m, d, wo, wi, eta.x));
     if (any(spectrum_varies(eta))) {
-#define C(c) v.c = rough_dielectric_density(m, d, wo, wi, eta.c);
-        SPECTRUM_EACH(C)
+#define C(c) SPECTRUM_PUT(v, c, rough_dielectric_density(m, d, wo, wi, SPECTRUM_AT(eta, c)));
+        SPECTRUM_IN_TURN(C)
 #undef C
     }
     return v;

@@ -28,11 +28,11 @@ inline Spectrum rough_plastic_value(RoughPlastic m, vec3 wo, vec3 wi, Spectrum t
     Spectrum f = fresnel_spectrum(clamp_r(dot3(wo, h), (real)(0.0f), (real)(1.0f)), eta);
     Spectrum coat = spectrum_scale(spectrum_mul(m.specular_reflectance, f), v);
     Spectrum t_wi = coat_transmittance_spectrum(d, fabs(wi.z), eta), r;
+    Spectrum inside = coat_inside_reflectance_spectrum(d, eta);
     mask nonlinear = m.nonlinear != 0;
-#define C(c)                                                                  \
-    real CAT(inside_, c) = coat_inside_reflectance(d, eta.c);                 \
-    CAT(inside_, c) *= sel(nonlinear, m.diffuse_reflectance.c, (real)(1.0f)); \
-    r.c = m.diffuse_reflectance.c * t_wo.c * t_wi.c / (eta.c * eta.c * (1.0f - CAT(inside_, c)));
+#define C(c)                                                           \
+    inside.c *= sel(nonlinear, m.diffuse_reflectance.c, (real)(1.0f)); \
+    r.c = m.diffuse_reflectance.c * t_wo.c * t_wi.c / (eta.c * eta.c * (1.0f - inside.c));
     SPECTRUM_EACH(C)
 #undef C
     mask front = (wo.z > 0.0f) & (wi.z > 0.0f);

@@ -2,7 +2,7 @@
  * writes only where m; where lanes write to one place the last one counts.
  *
  * Processors with an instruction for it get it by a compiler's built-in function. Written out lane by lane, reads are
- * nine tenths of a compiled shading kernel, and of the time to compile it. */
+ * nine tenths of a compiled shading kernel, and of the time to compile it. LANE_BITS: a mask as a bit for each lane. */
 #ifdef __has_builtin
 #if LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_gathersiv16sf)
 #define NATIVE_GATHER(p, at) \
@@ -10,14 +10,16 @@
 #define NATIVE_PAIRS(p, at) \
     as_float16(__builtin_ia32_gathersiv8di((long8)(0), (const void *)(size_t)(p), at, (uchar)0xff, 4))
 #elif LANES == 8 && defined(__AVX2__) && __has_builtin(__builtin_ia32_gatherd_ps256)
+#define LANE_BITS(m) __builtin_ia32_movmskps256(as_real(m))
 #define NATIVE_GATHER(p, at) \
     __builtin_ia32_gatherd_ps256((real)(0.0f), (const float *)(size_t)(p), at, as_real((mask)(-1)), 4)
 #define NATIVE_PAIRS(p, at) \
     as_float8(__builtin_ia32_gatherd_q256((long4)(0), (const long *)(size_t)(p), at, (long4)(-1), 4))
 #endif
 #if LANES == 16 && defined(__AVX512DQ__) && __has_builtin(__builtin_ia32_scattersiv16sf)
+#define LANE_BITS(m) __builtin_ia32_cvtd2mask512(m)
 #define NATIVE_SCATTER(p, at, m, v) \
-    __builtin_ia32_scattersiv16sf((void *)(size_t)(p), __builtin_ia32_cvtd2mask512(m), at, v, 4)
+    __builtin_ia32_scattersiv16sf((void *)(size_t)(p), LANE_BITS(m), at, v, 4)
 #elif LANES == 8 && defined(__AVX512DQ__) && defined(__AVX512VL__) && __has_builtin(__builtin_ia32_scattersiv8sf)
 #define NATIVE_SCATTER(p, at, m, v) \
     __builtin_ia32_scattersiv8sf((void *)(size_t)(p), __builtin_ia32_cvtd2mask256(m), at, v, 4)

@@ -55,39 +55,13 @@ typedef CAT(uint, LANES) natural;
 #define to_real(x) CAT(convert_float, LANES)(x)
 #define to_integer(x) CAT(convert_int, LANES)(x)
 #define to_natural(x) CAT(convert_uint, LANES)(x)
-/* Of a mask that is known when the text is compiled a compiler sees through its own built-in function, and leaves the
- * branch out; convert_char8 may be a function of a library that is linked later. */
-#if defined(__has_builtin)
-#if __has_builtin(__builtin_convertvector)
-#define NARROW(m, type) __builtin_convertvector(m, type)
-#endif
-#endif
-#ifndef NARROW
-#define NARROW(m, type) CAT(convert_, type)(m)
-#endif
 #if LANES == 8
 #define LANE_INDEX ((integer)(0, 1, 2, 3, 4, 5, 6, 7))
-inline int any_lane(int8 m) { return as_ulong(NARROW(m, char8)) != 0; }
-inline uint lanes_of(int8 m) { return (uint)popcount(as_ulong(NARROW(m, char8))) / 8; }
 #else
 #define LANE_INDEX ((integer)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15))
-inline int any_lane(int16 m)
-{
-    ulong2 q = as_ulong2(NARROW(m, char16));
-    return (q.x | q.y) != 0;
-}
-inline uint lanes_of(int16 m)
-{
-    ulong2 q = as_ulong2(NARROW(m, char16));
-    return (uint)(popcount(q.x) + popcount(q.y)) / 8;
-}
 #endif
 #endif
 typedef integer mask;
-#if LANES > 1
-#undef any
-#define any(m) any_lane(m) /* OpenCL's own any() is slow on some runtimes */
-#endif
 
 typedef struct { real x, y; } vec2;
 typedef struct { real x, y, z; } vec3;
@@ -135,6 +109,21 @@ inline real sqrt_r(real x) { return sqrt(max_r(x, (real)(0.0f))); } /* of a roun
 #if LANES == 1
 inline int sum_lanes(integer v) { return v; }
 #else
+/* Compilers see through their own built-in functions where a mask is known, and leave a branch out; convert_char8 may
+ * be a function of a library that is linked later. */
+#ifdef LANE_BITS
+inline int any_lane(mask m) { return LANE_BITS(m) != 0; }
+#elif LANES == 8
+inline int any_lane(mask m) { return as_ulong(__builtin_convertvector(m, char8)) != 0; }
+#else
+inline int any_lane(mask m)
+{
+    ulong2 q = as_ulong2(__builtin_convertvector(m, char16));
+    return (q.x | q.y) != 0;
+}
+#endif
+#undef any
+#define any(m) any_lane(m) /* OpenCL's own any() is slow on some runtimes */
 inline int sum_lanes(integer v)
 {
     int r = 0;
@@ -143,6 +132,7 @@ inline int sum_lanes(integer v)
 #undef ADD
     return r;
 }
+inline uint lanes_of(mask m) { return (uint)-sum_lanes(m); }
 #endif
 /* A word read as a float, and an aligned block of LANES neighbours read or written at once. */
 inline real gather_w(global const uint *p, integer at) { return as_real(gather_i(p, at)); }

@@ -22,42 +22,54 @@ inline vec4 gather4(global const float *p, integer at)
     return r;
 }
 #else
-#define ROW_2(i) vload2(0, p + at.s##i)
+typedef float2 Row2 __attribute__((aligned(4)));
+typedef float4 Row4 __attribute__((aligned(4)));
+#define ROW_2(i) (*(global const Row2 *)(p + at.s##i))
 #define ROW_3(i) (float4)(vload3(0, p + at.s##i), 0.0f)
-#define ROW_4(i) vload4(0, p + at.s##i)
+#define ROW_4(i) (*(global const Row4 *)(p + at.s##i))
+/* Of two vectors: one after the other, and every second word of both. By clang's function, of which all compilers for
+ * CPUs are made, each is one instruction. `.even` and a vector of vectors are three, vload4 a call. */
+#define JOINED_4(a, b) __builtin_shufflevector(a, b, 0, 1, 2, 3)
+#define JOINED_8(a, b) __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7)
+#define JOINED_16(a, b) __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
 #if LANES == 8
-#define ROW_HALVES(R) real a = (real)(R(0), R(1), R(2), R(3)), b = (real)(R(4), R(5), R(6), R(7));
-#define ROW_QUARTERS(R) \
-    real a = (real)(R(0), R(1)), b = (real)(R(2), R(3)), c = (real)(R(4), R(5)), d = (real)(R(6), R(7));
+#define EVENS(a, b) __builtin_shufflevector(a, b, 0, 2, 4, 6, 8, 10, 12, 14)
+#define ODDS(a, b) __builtin_shufflevector(a, b, 1, 3, 5, 7, 9, 11, 13, 15)
 #else
-#define ROW_HALVES(R)                                                \
-    real a = (real)(R(0), R(1), R(2), R(3), R(4), R(5), R(6), R(7)); \
-    real b = (real)(R(8), R(9), R(a), R(b), R(c), R(d), R(e), R(f));
-#define ROW_QUARTERS(R)                                                                    \
-    real a = (real)(R(0), R(1), R(2), R(3)), b = (real)(R(4), R(5), R(6), R(7));           \
-    real c = (real)(R(8), R(9), R(a), R(b)), d = (real)(R(c), R(d), R(e), R(f));
+#define EVENS(a, b) __builtin_shufflevector(a, b, 0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30)
+#define ODDS(a, b) __builtin_shufflevector(a, b, 1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31)
+#endif
+#define JOINED_4x2(R, i, j, k, l) JOINED_8(JOINED_4(R(i), R(j)), JOINED_4(R(k), R(l)))
+#if LANES == 8
+#define ROW_HALVES(R) real a = JOINED_4x2(R, 0, 1, 2, 3), b = JOINED_4x2(R, 4, 5, 6, 7);
+#define ROW_QUARTERS(R) \
+    real a = JOINED_8(R(0), R(1)), b = JOINED_8(R(2), R(3)), c = JOINED_8(R(4), R(5)), d = JOINED_8(R(6), R(7));
+#else
+#define JOINED_4x4(R, i, j, k, l) JOINED_16(JOINED_8(R(i), R(j)), JOINED_8(R(k), R(l)))
+#define JOINED_8x2(R, i, j, k, l, m, n, o, q) JOINED_16(JOINED_4x2(R, i, j, k, l), JOINED_4x2(R, m, n, o, q))
+#define ROW_HALVES(R) real a = JOINED_8x2(R, 0, 1, 2, 3, 4, 5, 6, 7), b = JOINED_8x2(R, 8, 9, a, b, c, d, e, f);
+#define ROW_QUARTERS(R)                                                \
+    real a = JOINED_4x4(R, 0, 1, 2, 3), b = JOINED_4x4(R, 4, 5, 6, 7); \
+    real c = JOINED_4x4(R, 8, 9, a, b), d = JOINED_4x4(R, c, d, e, f);
 #endif
 inline vec2 gather2(global const float *p, integer at)
 {
     ROW_HALVES(ROW_2)
-    vec2 r = {(real)(a.even, b.even), (real)(a.odd, b.odd)};
+    vec2 r = {EVENS(a, b), ODDS(a, b)};
     return r;
 }
 inline vec3 gather3(global const float *p, integer at)
 {
     ROW_QUARTERS(ROW_3)
-    real xz = (real)(a.even, b.even), last_xz = (real)(c.even, d.even);
-    vec3 r = {(real)(xz.even, last_xz.even), (real)(a.odd.even, b.odd.even, c.odd.even, d.odd.even),
-              (real)(xz.odd, last_xz.odd)};
+    real xz = EVENS(a, b), last_xz = EVENS(c, d), y = ODDS(a, b), last_y = ODDS(c, d);
+    vec3 r = {EVENS(xz, last_xz), EVENS(y, last_y), ODDS(xz, last_xz)};
     return r;
 }
 inline vec4 gather4(global const float *p, integer at)
 {
     ROW_QUARTERS(ROW_4)
-    real xz = (real)(a.even, b.even), last_xz = (real)(c.even, d.even);
-    real yw = (real)(a.odd, b.odd), last_yw = (real)(c.odd, d.odd);
-    vec4 r = {(real)(xz.even, last_xz.even), (real)(yw.even, last_yw.even), (real)(xz.odd, last_xz.odd),
-              (real)(yw.odd, last_yw.odd)};
+    real xz = EVENS(a, b), last_xz = EVENS(c, d), yw = ODDS(a, b), last_yw = ODDS(c, d);
+    vec4 r = {EVENS(xz, last_xz), EVENS(yw, last_yw), ODDS(xz, last_xz), ODDS(yw, last_yw)};
     return r;
 }
 #undef ROW_2
@@ -75,11 +87,11 @@ inline vec4 row4_alike(global const uint *table, integer at)
     if (any(at != at.s0)) {
         real a = NATIVE_PAIRS(row, at.lo), b = NATIVE_PAIRS(row, at.hi);
         real c = NATIVE_PAIRS(row + 2, at.lo), d = NATIVE_PAIRS(row + 2, at.hi);
-        vec4 r = {(real)(a.even, b.even), (real)(a.odd, b.odd), (real)(c.even, d.even), (real)(c.odd, d.odd)};
+        vec4 r = {EVENS(a, b), ODDS(a, b), EVENS(c, d), ODDS(c, d)};
         return r;
     }
-    row += at.s0;
-    vec4 r = {(real)(row[0]), (real)(row[1]), (real)(row[2]), (real)(row[3])};
+    Row4 one = *(global const Row4 *)(row + at.s0);
+    vec4 r = {(real)(one.x), (real)(one.y), (real)(one.z), (real)(one.w)};
     return r;
 }
 #define row4 row4_alike

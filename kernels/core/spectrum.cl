@@ -66,3 +66,4 @@ inline mask spectrum_varies(Spectrum a)
 #undef C
     return m;
 }
+#include "core/spectrum_at_once.cl"

@@ -30,8 +30,12 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     NextEvent event = next_event_seek(scene, next, v, scatter);
     bsdf_ask(scene, scatter, next_event_wi(event, scatter), 0);
     event = next_event_weigh(scene, event, v, scatter, rival, guided, ratio SHADE_PASSED);
+    if (LANES == 1) { /* for what is kept meanwhile a GPU has too few registers */
+        v.state += next_event_keep(scene, path, shadow, at, active, v, event);
+        scatter.wo = to_frame(scatter.shading.frame, neg3(load_path_d(path, at)));
+    }
     BsdfSample bs = onward_sample(scatter, guide, guided, &ratio);
-    v.state += next_event_keep(scene, path, shadow, at, active, v, event);
+    if (LANES > 1) v.state += next_event_keep(scene, path, shadow, at, active, v, event);
 
     mask null = vertex_is_null(bs.lobe);
     next = next & (bs.pdf > 0.0f);

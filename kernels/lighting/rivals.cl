@@ -100,12 +100,19 @@ inline mask rival_light_met(Scene scene, integer row)
     return (row < scene.settings->infinite_count) | (light_at(scene, row).shape >= 0);
 }
 
-/* Over the density of next-event estimation, that of a light path along wi, where the material has densities p and
- * p_back. */
-inline real rival_of_light_sample(Scene scene, Rival r, Surface s, LightSample ls, real p, real p_back)
+/* The density of a light path that comes from a point of a light. It is asked for before the material is: what it needs
+ * on the way and what the material keeps would be too many of a GPU's registers. */
+inline real event_begins(Scene scene, Surface s, LightSample ls)
+{
+    return light_path_pdf(scene, ls.row, s.p, ls.wi, ls.t, ls.n);
+}
+
+/* Over the density of next-event estimation, that of a light path along wi, which `begins` with such a density, where
+ * the material has densities p and p_back. */
+inline real rival_of_light_sample(Scene scene, Rival r, Surface s, LightSample ls, real begins, real p, real p_back)
 {
     real chosen = sel(ls.pdf < 0.0f, ls.chance, ls.pdf);
-    real emission = light_path_pdf(scene, ls.row, s.p, ls.wi, ls.t, ls.n) / max_r(chosen, (real)(1e-30f));
+    real emission = begins / max_r(chosen, (real)(1e-30f));
     real arrives = rival_arrives(r, mask_of(0), p, p_back) * VERTEX_COSINE(s.n, ls.wi) * emission;
     real third = rival_limited(arrives * p_back);
     real joined = 0.0f;
@@ -161,10 +168,10 @@ inline real rival_of_joint(Scene scene, Rival r, Surface s, CameraPoint c, real 
 }
 
 /* What a point of a light counts that next-event estimation has chosen; p: guide's and material's density of it. */
-#define event_weight(scene, rival, s, ls, pair, p) rival_event_weight(scene, rival, s, ls, pair)
-inline real rival_event_weight(Scene scene, Rival r, Surface s, LightSample ls, BsdfPair pair)
+#define event_weight(scene, rival, s, ls, begins, pair, p) rival_event_weight(scene, rival, s, ls, begins, pair)
+inline real rival_event_weight(Scene scene, Rival r, Surface s, LightSample ls, real begins, BsdfPair pair)
 {
-    real third = rival_of_light_sample(scene, r, s, ls, pair.p, pair.p_back);
+    real third = rival_of_light_sample(scene, r, s, ls, begins, pair.p, pair.p_back);
     return mis_weight_of_three(ls.pdf, pair.p, third);
 }
 

@@ -110,8 +110,8 @@ inline Spectrum coat_transmittance_spectrum(Microfacets d, real cos_i, Spectrum 
 {
     Spectrum t = spectrum_of(coat_transmittance(d, cos_i, eta.x));
     if (any(spectrum_varies(eta))) {
-#define C(c) t.c = coat_transmittance_apart(d, cos_i, eta.c);
-        SPECTRUM_EACH(C)
+#define C(c) SPECTRUM_PUT(t, c, coat_transmittance_apart(d, cos_i, SPECTRUM_AT(eta, c)));
+        SPECTRUM_IN_TURN(C)
 #undef C
     }
     return t;
@@ -122,6 +122,17 @@ inline real coat_inside_reflectance(Microfacets d, real eta)
 {
     real inside = COAT_INSIDE_UNIT * coat_look_up(coat_inside, coat_cell(d, eta));
     return sel(eta > 1.0f, inside, fresnel_diffuse(1.0f / eta));
+}
+
+inline Spectrum coat_inside_reflectance_spectrum(Microfacets d, Spectrum eta)
+{
+    Spectrum r = spectrum_of(coat_inside_reflectance(d, eta.x));
+    if (any(spectrum_varies(eta))) {
+#define C(c) SPECTRUM_PUT(r, c, coat_inside_reflectance(d, SPECTRUM_AT(eta, c)));
+        SPECTRUM_IN_TURN(C)
+#undef C
+    }
+    return r;
 }
 
 /* What leaves facets d that reflect all, of light of the cosine that is usual within a coat. */

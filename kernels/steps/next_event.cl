@@ -2,7 +2,8 @@
 typedef struct {
     mask shine; /* the material sends light from there on; before it is asked, what may */
     LightSample ls;
-    vec3 wi; /* toward it, in shading.frame */
+    real begins; /* density of a light path from there, where paths are weighed against those */
+    vec3 wi;     /* toward it, in shading.frame */
     Spectrum value;
 } NextEvent;
 #define next_event_wi(e, scatter) ((e).wi)
@@ -18,6 +19,7 @@ inline NextEvent next_event_seek(Scene scene, mask next, Vertex v, Scattering sc
     e.ls = light_sample_nothing();
     if (!(BSDF_ABSORBS || BSDF_IS_SEALED) || any(e.shine))
         e.ls = common_light_sample(scene, v.s.p, hemisphere, scatter.choice.x, point, scatter.lambdas);
+    e.begins = event_begins(scene, v.s, e.ls);
     e.wi = to_frame(frame, e.ls.wi);
     return e;
 }
@@ -28,7 +30,7 @@ inline NextEvent next_event_weigh(Scene scene, NextEvent e, Vertex v, Scattering
 {
     BsdfPair pair = bsdf_pair(scatter.bsdf, scatter.wo, e.wi, ratio);
     Spectrum f = spectrum_scale(pair.f, shading_frame_share(scatter.shading, e.ls.wi));
-    real w = event_weight(scene, rival, v.s, e.ls, pair, guided_pdf(guide, guided, e.ls.wi, pair.pdf));
+    real w = event_weight(scene, rival, v.s, e.ls, e.begins, pair, guided_pdf(guide, guided, e.ls.wi, pair.pdf));
     e.shine = e.shine & (e.ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
     w = w / sel(e.shine, fabs(e.ls.pdf), (real)(1.0f));
     e.value = spectrum_scale(spectrum_mul(spectrum_mul(v.beta, f), e.ls.radiance), w);

@@ -384,7 +384,7 @@ def test_a_film_that_does_not_fit_changes_nothing(maker, make, plan):
     torn = {name: array for name, array in saved.adaptive.items() if name != "next"}
     narrow = dataclasses.replace(saved.film, words=saved.film.words[..., :-1])
     other = dataclasses.replace(saved.origin, kernels="0")
-    way = {**saved.origin.settings, "chosen.guiding": True}
+    way = {**saved.origin.settings, "chosen.guide_paths": 1 << 20}
     renderer = make(maker)
     assert renderer.run(3)
     before = renderer.film_state()

@@ -101,7 +101,7 @@ CAMERA = f"""{VERTEX}
     ls.wi = onward;
     ls.chance = found;
     ls.pdf = sel(hit, found, (real)(-1.0f));
-    real third = rival_of_light_sample(world, here, s, ls, p, p_back);
+    real third = rival_of_light_sample(world, here, s, ls, event_begins(world, s, ls), p, p_back);
     real chosen = mis_weight_of_three(ls.pdf, p, third);
 
     rival = rival_to_light(here, s, onward, is_delta, p, p_back);

@@ -1,6 +1,7 @@
 """Independent ways to the same mean, compared in blocks of pixels.
 
     python -m tests.together.agree --scenes 200 --seed 1
+    python -m tests.together.agree --fixed --scenes 8 --both --way "light paths" --way vcm
 
 A scene is rendered EXPOSURES times with seeds of their own, by `path` and in another way; a block
 of pixels has as many independent values of each. Welch's t-test gives a probability for each block.
@@ -19,6 +20,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import functools
 import json
 import random
 import sys
@@ -36,6 +38,7 @@ from clpt.scene import materials as m
 from clpt.scene.integrators import Independent, ParticleTracer, Path, Sobol, Vcm
 from tests.pictures.support import ROUNDING, blocks, exposures
 from tests.together.equivalents import every_shape
+from tests.together.fixed import SCENES
 from tests.together.strategies import scene_of
 
 Values = NDArray[np.float64]
@@ -247,14 +250,23 @@ def drawn(seed: int) -> Scene:
     return dataclasses.replace(scene, film=film, noise=None)
 
 
-def attempt(seed: int, samples: int, most: int) -> Iterator[dict[str, Any] | Comparison]:
-    """Compare a drawn scene in some ways; a row where that cannot be done."""
-    name = f"seed {seed}"
+def chosen(scene: Scene, seed: int, most: int) -> list[str]:
+    """Return some ways that a scene can be rendered in, drawn; at most so many."""
+    ways = [way for way in WAYS if WAYS[way](scene) is not None]
+    return [str(way) for way in np.random.default_rng(seed).permutation(ways)[:most]]
+
+
+def attempt(
+    name: str, made: Callable[[], Scene], mode: str | None, seed: int, given: argparse.Namespace
+) -> Iterator[dict[str, Any] | Comparison]:
+    """Compare a scene in some ways; a row where that cannot be done."""
     try:
-        scene = drawn(seed)
-        ways = [way for way in WAYS if WAYS[way](scene) is not None]
-        chosen = np.random.default_rng(seed).permutation(ways)[:most]
-        for found in compared(name, scene, [str(way) for way in chosen], seed, samples):
+        scene = made()
+        if mode is not None:
+            name = f"{name}, {mode}"
+            scene = dataclasses.replace(scene, film=dataclasses.replace(scene.film, mode=mode))
+        ways = given.way or chosen(scene, seed, given.ways)
+        for found in compared(name, scene, ways, seed, given.samples):
             lit = max(found.means) > 0.0
             yield found if lit else {"scene": name, "way": found.way, "dark": True}
     except ClptError as error:
@@ -264,22 +276,29 @@ def attempt(seed: int, samples: int, most: int) -> Iterator[dict[str, Any] | Com
 
 
 def main() -> int:
-    """Compare drawn scenes; 1 where some differ, or cannot be rendered."""
+    """Compare scenes; 1 where some differ, or cannot be rendered."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--scenes", type=int, default=200)
+    parser.add_argument("--scenes", type=int, default=200, help="that are drawn")
+    parser.add_argument("--fixed", action="store_true", help="those of the tests before these")
+    parser.add_argument("--both", action="store_true", help="each in RGB and in spectral mode")
     parser.add_argument("--seed", type=int, default=1, help="of the first scene")
+    parser.add_argument("--way", action="append", choices=list(WAYS), help="in place of drawn ones")
     parser.add_argument("--ways", type=int, default=1, help="of a scene, drawn too; at most")
     parser.add_argument("--samples", type=int, default=SAMPLES, help="of each exposure")
     given = parser.parse_args()
+    scenes = dict(SCENES) if given.fixed else {}
+    seeds = range(given.seed, given.seed + given.scenes)
+    scenes |= {f"seed {seed}": functools.partial(drawn, seed) for seed in seeds}
     found: list[Comparison] = []
     failed = 0
-    for seed in range(given.seed, given.seed + given.scenes):
-        for one in attempt(seed, given.samples, given.ways):
-            if isinstance(one, Comparison):
-                found.append(one)
-            else:
-                failed += "failed" in one
-            print(json.dumps(one.row() if isinstance(one, Comparison) else one), flush=True)
+    for seed, (name, made) in enumerate(scenes.items(), given.seed):
+        for mode in ("rgb", "spectral") if given.both else (None,):
+            for one in attempt(name, made, mode, seed, given):
+                if isinstance(one, Comparison):
+                    found.append(one)
+                else:
+                    failed += "failed" in one
+                print(json.dumps(one.row() if isinstance(one, Comparison) else one), flush=True)
     different = judged(found, given.seed, given.samples)
     for one in found:
         if one.called:

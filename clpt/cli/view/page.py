@@ -65,7 +65,7 @@ def show(scene: Path, settings: Settings) -> int:
         if begins is not None:
             session.post(begins, server.message)
         server.show(session)
-        session.start()
+        session.start(solid=True)
         return _attend(session, opened)
 
 

@@ -37,8 +37,7 @@ class SceneIndex:
     warnings: of instances that became triangles; motions: what moves; lit_media: why no paths can
     start at some light in a medium, "" if they can; lit_before: whether light paths were ghosts of
     a lens before an edit, whose film has sums for them or none; candidates: integrators between
-    which a trial decides, the one that was chosen first; none where there is no trial; long_guide:
-    whether a guide learns for long, as nobody has asked for it and many samples are to come.
+    which a trial decides, the one that was chosen first; none where there is no trial.
     """
 
     scene: Scene
@@ -52,7 +51,6 @@ class SceneIndex:
     lit_media: str = UNKNOWN
     lit_before: bool | None = None
     candidates: tuple[Integrator, ...] = ()
-    long_guide: bool = False
 
     @classmethod
     def of(cls, scene: Scene) -> SceneIndex:
@@ -159,6 +157,11 @@ class SceneIndex:
         ghosts = isinstance(camera, Lens) and (wanted if before is None else before)
         alone = isinstance(integrator, (Path, Direct)) and not integrator.guiding
         return ghosts and alone and not self.light_layers and not self.emitting
+
+    @property
+    def samples(self) -> int:
+        """The samples of the whole film that the scene asks for."""
+        return self.spp * self.film.width * self.film.height
 
     @property
     def lights_reach(self) -> bool:

@@ -6,6 +6,7 @@ material in a scene rebuilds nothing else.
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 
 from clpt import bvh, device
@@ -19,6 +20,7 @@ from clpt.render.codegen import (
     flags,
     lights,
     parameters,
+    registers,
     rough_coat_table,
     shapes,
     signatures,
@@ -37,8 +39,11 @@ Files = dict[str, str | device.Part | tuple[str, ...]]
 # Files of kernels that take the place of others where a work-item shades one path.
 _ALONE: device.Virtual = {
     **bvh.ALONE,
+    "core/spectrum_at_once.cl": ("core/spectrum_in_turn.cl",),
     "core/texels_between.cl": ("core/texels_in_turn.cl",),
+    "optics/thin_film.cl": ("optics/thin_film_in_turn.cl",),
 }
+_FEW: device.Virtual = {"bvh/no_vectorize.cl": ("interface/few_registers.cl",)}
 
 
 def sources(
@@ -228,8 +233,12 @@ def _source(
     """The text of a program; stage: its file, if it is not called so; part: of a loop."""
     own: flags.Defines = {"PART": f"loop_{name}"} if part else {}
     given = {"LANES": lanes, "QUEUED": 0, **own, **defines}
-    alone = _ALONE if given["SLAB_BLOCK"] else {}  # a CPU's rays go alone, too
-    return device.assemble(f"stage/{stage or name}.cl", {**virtual, **alone}, given)
+    file = f"stage/{stage or name}.cl"
+    if not given["SLAB_BLOCK"]:  # a CPU's rays go alone, too
+        return device.assemble(file, virtual, given)
+    few = _FEW if registers.are_few(name) else {}
+    source = device.assemble(file, {**virtual, **_ALONE, **few}, given)
+    return dataclasses.replace(source, registers=registers.limits(name))
 
 
 def _shared(features: Features, layout: str) -> Files:

@@ -58,12 +58,13 @@ class Origin:
     @property
     def way(self) -> Integrator | None:
         """The integrator, without its depths, if it is one that may have been chosen."""
-        names = ("integrator", "light_paths", "guiding")
-        kind, paths, guiding = (self.settings.get(f"chosen.{name}") for name in names)
+        names = ("integrator", "light_paths", "guide_paths")
+        kind, paths, guide = (self.settings.get(f"chosen.{name}") for name in names)
         if kind == Vcm.kind:
             return Vcm(light_paths=int(paths or 1))
         if kind == Path.kind:
-            return Path(light_paths=float(paths or 0), guiding=bool(guiding))
+            count = int(guide or 0)
+            return Path(light_paths=float(paths or 0), guiding=count > 0, guide_paths=count)
         return None
 
     def check_same(self, other: Origin) -> None:

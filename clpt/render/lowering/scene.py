@@ -73,10 +73,10 @@ class Lowered:
     where an instance's tree begins is filled in when trees are built. zero_copy: tables that are
     the caller's buffers. owners: of each row of `shapes`. layer_names: what layers tell of.
     glass_rows: of the camera, see `lower_camera`. integrator: of the scene, or what was chosen;
-    reason: why, "" where there was no choice; candidates: see `SceneIndex`. encoder: what made the
-    tables, for values that are edited. cache: what the next lowering need not make again. around:
-    media at the camera, or the matter of bodies. device_grids: densities whose bricks kernels put
-    into `images`.
+    reason: why, "" where there was no choice; candidates: see `SceneIndex`; samples: of the
+    whole film, as the scene asks for. encoder: what made the tables, for values that are edited.
+    cache: what the next lowering need not make again. around: media at the camera, or the matter of
+    bodies. device_grids: densities whose bricks kernels put into `images`.
     """
 
     features: Features
@@ -95,6 +95,7 @@ class Lowered:
     integrator: Integrator
     reason: str
     candidates: tuple[Integrator, ...]
+    samples: int
     encoder: Encoder
     cache: LoweringCache
     around: tuple[Any, ...] = ()
@@ -180,6 +181,7 @@ def encode(found: Analysis, cache: LoweringCache, texture_budget: int | None = N
         integrator=index.integrator,
         reason=found.reason,
         candidates=index.candidates,
+        samples=index.samples,
         around=found.around,
         encoder=encoder,
         cache=cache,

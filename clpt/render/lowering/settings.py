@@ -62,7 +62,7 @@ def settings_of(
         _set_photons(settings, index, geometry, sphere[1], found.disperses)
     if index.guided:
         settings["photon_cells"] = guides.CELLS
-        settings["guide_paths"] = guides.LONG_PATHS if index.long_guide else guides.PATHS
+        settings["guide_paths"] = index.integrator.guide_paths or guides.PATHS
         settings["guide_side"] = guides.SIDE * sphere[1]
     settings["rival_area"] = rival_area(sphere[1])
     settings["aims"], settings["aim_count"] = found.aims

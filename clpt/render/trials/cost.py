@@ -14,8 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.arrays import Floats
+from clpt.render.analysis import worth
 
-PIXELS = 2048  # of the small film, about
+FEWEST, PIXELS = 512, 2048  # of the small film, about
+ROUNDS = 8  # pictures of each way, each of another seed
+SAMPLES = 16  # of a pixel of each
 BLOCK = 8  # side of a block of pixels
 TRIM = 0.001  # share of the pixels that is left out, the worst
 ODD = 0.01  # the same, where the noise of ordinary pixels is asked for
@@ -33,11 +36,17 @@ class Trial:
     ray: float = 1.0
 
 
-def settings(of: NDArray[np.void]) -> NDArray[np.void]:
+def pixels_for(samples: int) -> int:
+    """Return how many pixels a small film has, about, where a film has so many samples."""
+    wanted = samples // (worth.SHARE * ROUNDS * SAMPLES)
+    return min(max(wanted, FEWEST), PIXELS)
+
+
+def settings(of: NDArray[np.void], pixels: int = PIXELS) -> NDArray[np.void]:
     """Return the settings of a small film of the whole picture; of: those of the picture."""
     small = of.copy()
     width, height = int(of["film_width"]), int(of["film_height"])
-    scale = math.sqrt(PIXELS / (width * height))
+    scale = math.sqrt(pixels / (width * height))
     width, height = (max(round(size * scale), BLOCK) for size in (width, height))
     margin = int(of["margin"])
     small["width"], small["height"] = small["film_width"], small["film_height"] = width, height

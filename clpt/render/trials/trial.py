@@ -14,20 +14,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from clpt import device
-from clpt.render.analysis import guides
+from clpt.render.analysis import worth
 from clpt.render.lowering.scene import Lowered
 from clpt.render.trials import cost
-from clpt.render.trials.cost import GUIDED_RAY, LIGHT_RAY, Trial
+from clpt.render.trials.cost import GUIDED_RAY, LIGHT_RAY, ROUNDS, SAMPLES, Trial
+from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.render.wavefront.strategy import Tuning
 from clpt.render.wavefront.wavefront import Wavefront
 from clpt.scene.integrators import Integrator
 
 log = logging.getLogger(__name__)
 
-ROUNDS = 8  # pictures of each way, each of another seed
-SAMPLES = 16  # of a pixel of each
 SEED = 0x2545F491
 QUIET = 0.4  # variance of such pictures up to which no guide is tried: that takes a compilation
+LESSON = 8  # of the light paths from which a guide learns at last, for each in a trial
+FEWEST_LESSONS = 1 << 18
 
 
 @dataclass(frozen=True)
@@ -39,26 +40,68 @@ class Ground:
     looped: bool | None
 
 
+class Tries:
+    """Ways of which each has been tried, the one that the scene chose first; costs: of each."""
+
+    def __init__(self, ground: Ground, samples: int):
+        self._ground, self._samples = ground, samples
+        self._scene: DeviceScene | None = None  # of the first way, whose trees all share
+        self.ways: list[Lowered] = []
+        self._trials: list[Trial] = []
+
+    def add(self, way: Lowered) -> None:
+        """Try a way. Raises what `Wavefront.create` raises."""
+        trial, self._scene = tried(self._ground, way, self._samples, self._scene)
+        self.ways.append(way)
+        self._trials.append(trial)
+
+    @property
+    def costs(self) -> list[float]:
+        """The cost of each way over that of the first one."""
+        return cost.costs(self._trials)
+
+    @property
+    def best(self) -> int:
+        """The number of the way of the lowest cost."""
+        found = self.costs
+        return min(range(len(found)), key=lambda i: (found[i], i))
+
+    @property
+    def noise(self) -> float:
+        """The variance of the ordinary pixels of the best way's pictures."""
+        return cost.variances(self._trials, cost.ODD)[self.best]
+
+    @property
+    def rays(self) -> float:
+        """How many rays the best way would trace for the whole film."""
+        trial = self._trials[self.best]
+        return trial.rays / (trial.pictures[..., 0].size * SAMPLES) * self._samples
+
+
 def decided(ground: Ground, lowered: Lowered, lower_as: Callable[[Integrator], Lowered]) -> Lowered:
     """Return a scene lowered for the best of its candidates, and why in its reason.
 
-    lowered: for the first one; lower_as: lowers it for another. The first one is tried at first:
-    if it has little noise, guiding is not.
+    lowered: for the first one; lower_as: lowers it for another. What has to be compiled is tried
+    where the best way so far has much to trace, and a guide where that leaves noise too.
 
     Raises what `Wavefront.create` raises.
     """
-    ways, trials = [lowered], [tried(ground, lowered)]
-    (noise,) = cost.variances(trials, cost.ODD)
+    tries = Tries(ground, lowered.samples)
+    tries.add(lowered)
     for way in lowered.candidates[1:]:
-        if not way.guiding or noise > QUIET:
-            ways.append(lower_as(way))
-            trials.append(tried(ground, ways[-1]))
-    found = cost.costs(trials)
-    best = min(range(len(ways)), key=lambda i: (found[i], i))
-    told = ", ".join(f"{name_of(w.integrator)} {c:.2f}" for w, c in zip(ways, found, strict=True))
-    log.info("a trial of small pictures: noise %.3g; costs: %s", noise, told)
-    reason = f"{lowered.reason}; of a trial's costs the lowest: {told}" if found[1:] else ""
-    return replace(ways[best], reason=reason or lowered.reason, candidates=())
+        if is_worth(way, tries.rays) and (not way.guiding or tries.noise > QUIET):
+            tries.add(lower_as(way))
+    costs, best = tries.costs, tries.ways[tries.best]
+    named = zip(tries.ways, costs, strict=True)
+    told = ", ".join(f"{name_of(way.integrator)} {figure:.2f}" for way, figure in named)
+    log.info("a trial of small pictures: noise %.3g; costs: %s", tries.noise, told)
+    reason = f"{lowered.reason}; of a trial's costs the lowest: {told}" if costs[1:] else ""
+    return replace(best, reason=reason or lowered.reason, candidates=())
+
+
+def is_worth(way: Integrator, rays: float) -> bool:
+    """Return whether a film of so many rays is worth the compilation that trying a way takes."""
+    return rays >= (worth.GUIDE_RAYS if way.guiding else worth.PLAIN_RAYS)
 
 
 def name_of(way: Integrator) -> str:
@@ -68,13 +111,19 @@ def name_of(way: Integrator) -> str:
     return "light paths" if way.light_paths else "path"
 
 
-def tried(ground: Ground, lowered: Lowered) -> Trial:
-    """Return the pictures that a way makes of a scene, and what they took."""
-    transport, settings = lowered.features.transport, cost.settings(lowered.settings)
-    settings["guide_paths"] = min(settings["guide_paths"], guides.PATHS)  # it learns better later
+def tried(
+    ground: Ground, lowered: Lowered, samples: int, like: DeviceScene | None
+) -> tuple[Trial, DeviceScene]:
+    """Return the pictures that a way makes of a scene, and what they took.
+
+    samples: of the whole film; like: the scene as another way has it, None for the first one.
+    """
+    settings = cost.settings(lowered.settings, cost.pixels_for(samples))
+    learned_from = int(settings["guide_paths"])
+    settings["guide_paths"] = min(max(learned_from // LESSON, FEWEST_LESSONS), learned_from)
     small = replace(lowered, settings=settings)
     wavefront = Wavefront.create(
-        ground.device, small, ground.tuning, looped=ground.looped, tree_quality="fast"
+        ground.device, small, ground.tuning, looped=ground.looped, trees=like or "fast"
     )
     seed, rays, pictures = int(lowered.settings["seed"]) ^ SEED, 0, []
     wavefront.paths.set_seed(seed)
@@ -85,5 +134,11 @@ def tried(ground: Ground, lowered: Lowered) -> Trial:
         wavefront.render_samples(0, SAMPLES)
         pictures.append(wavefront.film.picture.get()[..., :3].astype(np.float64))
         rays += wavefront.counts.rays
-    time = GUIDED_RAY if transport.guided else LIGHT_RAY if transport.weighed else 1.0
-    return Trial(np.array(pictures), rays, time)
+    return Trial(np.array(pictures), rays, _ray(lowered)), wavefront.scene
+
+
+def _ray(lowered: Lowered) -> float:
+    """Return the time of a way's ray over one of `path`."""
+    if lowered.features.transport.guided:
+        return GUIDED_RAY
+    return LIGHT_RAY if lowered.features.transport.weighed else 1.0

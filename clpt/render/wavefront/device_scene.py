@@ -28,6 +28,7 @@ class DeviceScene:
     tables: the buffers of its tables by name; trees: over its triangles, shapes and instances.
     moved_tables: tables that kernels have written since, whose words differ from those of
     `lowered`; tree_refitted: whether the tree over triangles is another than would be built.
+    quality: of the trees, see clpt.bvh.build; or a scene of the same shapes, whose trees it shares.
 
     Raises MemoryBudgetError, DeviceError.
     """
@@ -38,17 +39,20 @@ class DeviceScene:
         buffers: Buffers,
         lowered: Lowered,
         strategy: Strategy,
-        tree_quality: bvh.Quality = "high",
+        quality: bvh.Quality | DeviceScene = "high",
     ):
         self.device, self.stream, self.buffers = buffers.device, stream, buffers
-        self.lowered, self.strategy, self.tree_quality = lowered, strategy, tree_quality
+        self.lowered, self.strategy = lowered, strategy
         self.tables: dict[str, cl.Buffer] = {
             name: lowered.zero_copy.get(name) or self.upload(name, lowered.table(name))
             for name in UPLOADED
         }
-        self.trees = trees.build(
-            buffers, lowered, self.tables["vertices"], strategy.layout, tree_quality
-        )
+        vertices, layout = self.tables["vertices"], strategy.layout
+        if isinstance(quality, DeviceScene):
+            self.tree_quality, self.trees = quality.tree_quality, quality.trees
+        else:
+            self.tree_quality = quality
+            self.trees = trees.build(buffers, lowered, vertices, layout, quality)
         self._building = bvh.Building(self.device, stream=stream)
         self.fill_grids()
         self.moved_tables: set[str] = set()

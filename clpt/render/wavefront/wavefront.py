@@ -117,13 +117,13 @@ class Wavefront:
         *,
         slots: int | None = None,
         looped: bool | None = None,
-        tree_quality: bvh.Quality = "high",
+        trees: bvh.Quality | DeviceScene = "high",
         halves: bool = False,
     ) -> Wavefront:
         """Return a wavefront of a lowered scene, which others may render too.
 
         slots: paths in flight; looped: whether a kernel on the device runs all bounces. Each is
-        chosen to suit the device where it is None. tree_quality: see clpt.bvh.build; halves:
+        chosen to suit the device where it is None. trees: see `DeviceScene`; halves:
         whether even and odd samples are kept apart.
 
         Raises as `Wavefront` does, SceneError for a layout that cannot hold the scene.
@@ -144,7 +144,7 @@ class Wavefront:
         )
         if "variance" in lowered.features.film.layers.names:
             divided = replace(divided, octaves=2)
-        scene = DeviceScene(stream, buffers, lowered, chosen, tree_quality)
+        scene = DeviceScene(stream, buffers, lowered, chosen, trees)
         share = strategy.loop_share(on)
         blocks = -(-divided.total // share) * on.lanes if share > on.lanes else 0  # one each
         in_flight = PathBuffers(

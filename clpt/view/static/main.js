@@ -254,6 +254,7 @@ picture.addEventListener("shown", ({ detail }) => {
   figures.perSecond = span ? ((figures.times.length - 1) / span) * 1000 : 0;
   if (!document.body.classList.contains("shows")) welcome();
   document.body.classList.add("shows");
+  $("solid").hidden = !detail.solid;
   legend(detail);
 });
 

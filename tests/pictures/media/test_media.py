@@ -69,7 +69,7 @@ FURNACES = [
     pytest.param(phase, mode, id=f"{phase.kind}-{mode}", marks=marks)
     for phase in (*LOSSLESS, VARIED)
     for mode in MODES
-    for marks in (() if mode == "rgb" or phase is VARIED else pytest.mark.slow,)
+    for marks in (() if mode == "spectral" and phase is VARIED else pytest.mark.slow,)
 ]
 
 
@@ -78,6 +78,23 @@ def test_furnace(phase: phases.Phase, mode: str) -> None:
     """What scatters all light cannot be seen under the same light from everywhere."""
     scene = ball(media.Homogeneous(sigma_s=CHROMATIC, phase=phase))
     assert_mean(exposures(with_mode(scene, mode), 8, 64), 1.0, WITHIN)
+
+
+@pytest.mark.parametrize("number", range(len(LOSSLESS) + 1))
+def test_furnace_beside_others(number: int) -> None:
+    """A ball of each phase function, one of which is seen: all of them by one program."""
+    places = [9.0 * i for i in range(len(LOSSLESS) + 1)]
+    balls = [
+        ball(media.Homogeneous(sigma_s=CHROMATIC, phase=phase), to_world=tf.translate([x, 0, 0]))
+        for phase, x in zip((*LOSSLESS, VARIED), places, strict=True)
+    ]
+    x = places[number]
+    scene = dataclasses.replace(
+        balls[0],
+        shapes=[shape for one in balls for shape in one.shapes],
+        camera=Perspective(fov=12.0, to_world=tf.look_at([x, 0, 5], [x, 0, 0], [0, 1, 0])),
+    )
+    assert_mean(exposures(with_mode(scene, "rgb"), 8, 64), 1.0, WITHIN)
 
 
 GLASS = [

@@ -18,8 +18,8 @@ from clpt.scene.lights import Area, Constant, Point
 from clpt.scene.params import device_params
 from clpt.scene.shapes import Cube, Rectangle, Sphere
 from clpt.spectra import Fluorophore, Tabulated
+from tests.front_end import CLANG, errors
 
-QUICK_TO_COMPILE = ("-cl-opt-disable",)  # here programs are built, not run
 GREY = Tabulated((400.0, 700.0), (0.2, 0.8))
 
 
@@ -50,13 +50,21 @@ def plain(cls: type[m.Material]) -> m.Material:
     return cls()
 
 
+def build(*sources: device.Source) -> None:
+    """Give programs that are not run to clang's front end, or else to the device's compiler."""
+    if CLANG is None:
+        device.build_all(device.choose(), {str(i): source for i, source in enumerate(sources)})
+    else:
+        assert errors(source.text for source in sources) == [""] * len(sources)
+
+
 @pytest.mark.parametrize("mode", ["rgb", "spectral"])
 @pytest.mark.parametrize("cls", m.LEAVES, ids=lambda c: c.kind)
 def test_loaders_of_materials_build(cls: type[m.Material], mode: str) -> None:
     """The loader of a kind with constants, tables and textures, eight lanes wide."""
     features = lowered([textured(cls), plain(cls)], mode).features
     texts = programs.sources(features, "wide8", 8, queued=False)
-    device.build(device.choose(), texts[f"shade_{cls.kind}"], QUICK_TO_COMPILE)
+    build(texts[f"shade_{cls.kind}"])
 
 
 @pytest.mark.parametrize("lanes", [1, 8, 16])
@@ -69,7 +77,7 @@ def test_stages_build(lanes: int, queued: bool) -> None:
     texts |= programs.film_sources(features, "binary")
     assert {"mix", "shade_diffuse", "shade_null"} <= set(texts)
     assert ("append" in texts) == (queued and lanes == 1)
-    device.build_all(device.choose(), texts, QUICK_TO_COMPILE)
+    build(*texts.values())
 
 
 @pytest.mark.parametrize("lanes", [1, 8, 16])
@@ -80,8 +88,7 @@ def test_stages_of_a_spectral_film_build(lanes: int) -> None:
     banded = lower(Scene(camera=Perspective(), lights=[Constant()], film=film)).features
     texts = programs.sources(banded, "brute", lanes, queued=False)
     texts |= programs.film_sources(banded, "brute")
-    built = {name: texts[name] for name in ("generate", "accumulate")}
-    device.build_all(device.choose(), built, QUICK_TO_COMPILE)
+    build(texts["generate"], texts["accumulate"])
     others = programs.sources(plain_, "brute", lanes, queued=False)
     others |= programs.film_sources(plain_, "brute")
     assert "wavelengths_weigh" in texts["generate"].text
@@ -124,7 +131,7 @@ def test_only_what_absorbs_is_asked_for_a_medium(mode: str) -> None:
             text = texts[name].text
             assert ("inline Spectrum medium_transmittance(" in text) == there
         assert ("inline integer medium_beyond(" in texts["shade_diffuse"].text) == there
-        device.build(device.choose(), texts["shade_rough_dielectric"], QUICK_TO_COMPILE)
+        build(texts["shade_rough_dielectric"])
 
 
 def test_only_what_fluoresces_shifts_wavelengths() -> None:
@@ -168,3 +175,15 @@ def test_index_by_name_is_a_spectrum() -> None:
     for glass in (m.Dielectric(int_ior="bk7"), m.Principled(eta="bk7", spec_trans=1.0)):
         assert lowered([glass], "spectral").features.dispersion
     assert spectra.glass("bk7")
+
+
+def test_gpus_are_told_with_how_few_registers_to_run() -> None:
+    """By a number with the text and, of those that need few, in the text; a CPU's has neither."""
+    features = lowered([m.Diffuse(), m.Dielectric()], "rgb").features
+    own = programs.sources(features, "wide8", 1, queued=True)
+    limits = {name: text.registers for name, text in own.items()}
+    assert limits["generate"] == (96,) and limits["append"] == ()
+    few = {name for name, text in own.items() if "amdgpu_waves_per_eu" in text.text}
+    assert {"generate", "shade_diffuse"} <= few and not {"intersect", "shade_dielectric"} & few
+    for text in programs.sources(features, "wide8", 8, queued=False).values():
+        assert text.registers == () and "amdgpu" not in text.text

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib as files
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 
 import clpt
-from clpt.render.analysis import guides
+from clpt.errors import SceneError
+from clpt.render.analysis import guides, worth
 from clpt.render.lowering.scene import Lowered, lower
 from clpt.render.trials import cost, trial
 from clpt.scene import Scene
@@ -21,14 +23,18 @@ from tests.pictures.transport.test_guiding import slit
 from tests.pictures.transport.test_hybrid import caustic, lamp, narrow
 
 AUTO = Path(light_paths="auto", max_depth=5)
-WAYS = [(0.5, False), (0, False), (0, True)]
+WAYS: list[tuple[Any, bool]] = [(0.25, False), (0, False), (0, True)]
 
 
 def long(scene: Scene, integrator: Integrator = AUTO, **changes: Any) -> Scene:
     """A scene of which so many samples are wanted that a trial is worth it."""
     pixels = scene.film.width * scene.film.height
-    changes = {"spp": -(-guides.WORTH // pixels), "integrator": integrator, **changes}
+    changes = {"spp": -(-worth.PLAIN_RAYS // pixels), "integrator": integrator, **changes}
     return dataclasses.replace(scene, **changes)
+
+
+def lower_way(scene: Scene, way: Integrator) -> Lowered:
+    return lower(dataclasses.replace(scene, integrator=way))
 
 
 def ways(scene: Scene) -> list[tuple[Any, bool]]:
@@ -38,10 +44,11 @@ def ways(scene: Scene) -> list[tuple[Any, bool]]:
 def test_ways_that_are_tried() -> None:
     """The chosen one first; with the depths that the scene says."""
     assert ways(long(caustic())) == WAYS
-    assert ways(long(slit())) == WAYS[1:]
+    assert ways(long(slit())) == [(0, False), (0, True)]
     assert {one.max_depth for one in lower(long(caustic())).candidates} == {5}
     shallow = Path(light_paths="auto", max_depth=2)
     assert ways(long(slit(), shallow)) == []
+    assert ways(long(caustic(), spp=worth.SAMPLES // (16 * 12))) == []
 
 
 @pytest.mark.parametrize(
@@ -72,24 +79,48 @@ def test_an_edit_has_no_trial() -> None:
     assert lower(scene, former=lower(scene)).candidates == ()
 
 
-def test_a_guide_that_nobody_asked_for_learns_for_long() -> None:
+def test_a_guide_learns_the_longer_the_more_samples_there_are() -> None:
+    """Unless somebody says from how many light paths."""
+    learned = {1 << 20: 20, worth.SAMPLES: 20, worth.GUIDE_RAYS: 22, 1 << 40: 22}
+    for samples, power in learned.items():
+        assert guides.paths_for(samples) == 1 << power
+    assert guides.paths_for(3 << 23) == 1 << 21
     scene = long(caustic())
     *_, guided = lower(scene).candidates
     former = dataclasses.replace(lower(scene), integrator=guided)
     assert lower(scene, former=former).settings["guide_paths"] == guides.LONG_PATHS
-    asked = dataclasses.replace(scene, integrator=guided)
-    assert lower(asked).settings["guide_paths"] == guides.PATHS
+    for said, taken in ((0, guides.PATHS), (1000, 1000)):
+        asked = Path(light_paths=0, guiding=True, guide_paths=said)
+        assert lower(long(caustic(), asked)).settings["guide_paths"] == taken
 
 
-def made_up(monkeypatch: pytest.MonkeyPatch, noise: dict[tuple[Any, bool], float]) -> list[Any]:
+@pytest.mark.parametrize("wrong", [-1, 1.5, True, 1 << 25])
+def test_a_guide_learns_from_a_whole_number_of_light_paths(wrong: Any) -> None:
+    with pytest.raises(SceneError, match="guide_paths: must be a whole number"):
+        Path(guiding=True, guide_paths=wrong)
+
+
+def test_a_trial_takes_a_share_of_the_film() -> None:
+    """Where it is long enough for more pixels than the fewest that tell something."""
+    trial_samples = cost.ROUNDS * cost.SAMPLES
+    for samples in (worth.SAMPLES, 1 << 24, 1 << 27):
+        share = cost.pixels_for(samples) * trial_samples / samples
+        assert share <= 1.0 / worth.SHARE
+    assert cost.pixels_for(1) == cost.FEWEST
+    assert cost.pixels_for(1 << 40) == cost.PIXELS
+
+
+def made_up(
+    monkeypatch: pytest.MonkeyPatch, noise: dict[tuple[Any, bool], float], rays: int = 1 << 20
+) -> list[Any]:
     """Let trials find these variances at equal rays; return what is tried, as it is."""
     asked: list[Any] = []
 
-    def tried(_: trial.Ground, lowered: Lowered) -> cost.Trial:
+    def tried(_: trial.Ground, lowered: Lowered, *__: Any) -> tuple[cost.Trial, None]:
         way = lowered.integrator.light_paths, lowered.integrator.guiding
         asked.append(way)
         drawn = np.random.default_rng(len(asked)).normal(1.0, noise[way] ** 0.5, (8, 32, 64, 3))
-        return cost.Trial(drawn, 1000)
+        return cost.Trial(drawn, rays), None
 
     monkeypatch.setattr(trial, "tried", tried)
     return asked
@@ -100,11 +131,7 @@ def test_the_cheapest_way_is_taken(monkeypatch: pytest.MonkeyPatch, best: tuple[
     scene = long(caustic())
     asked = made_up(monkeypatch, {way: 0.5 if way == best else 1.0 for way in WAYS})
     ground: Any = None
-
-    def lower_as(way: Integrator) -> Lowered:
-        return lower(dataclasses.replace(scene, integrator=way))
-
-    found = trial.decided(ground, lower(scene), lower_as)
+    found = trial.decided(ground, lower(scene), partial(lower_way, scene))
     assert asked == WAYS
     assert (found.integrator.light_paths, found.integrator.guiding) == best
     assert found.features.transport.guided == best[1]
@@ -116,13 +143,35 @@ def test_no_guide_is_compiled_where_there_is_little_noise(monkeypatch: pytest.Mo
     asked = made_up(monkeypatch, dict.fromkeys(WAYS, 0.9 * trial.QUIET))
     ground: Any = None
     scene = long(caustic())
-    lowered = lower(scene)
-    trial.decided(ground, lowered, lambda way: lower(dataclasses.replace(scene, integrator=way)))
+    trial.decided(ground, lower(scene), partial(lower_way, scene))
     assert asked == WAYS[:2]
     asked.clear()
+    asked = made_up(monkeypatch, dict.fromkeys([(0, False), (0, True)], 0.9 * trial.QUIET))
     alone = lower(long(slit()))
     found = trial.decided(ground, alone, lambda way: alone)
-    assert asked == WAYS[1:2] and found.reason == alone.reason
+    assert asked == [(0, False)] and found.reason == alone.reason
+
+
+def test_no_guide_is_compiled_for_few_rays(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = long(caustic(), spp=-(-worth.SAMPLES // (16 * 12)))
+    ground: Any = None
+    pictures = cost.ROUNDS * cost.SAMPLES * 32 * 64
+    for each, guides_too in ((15, False), (17, True)):  # rays of a sample
+        asked = made_up(monkeypatch, dict.fromkeys(WAYS, 1.0), each * pictures)
+        trial.decided(ground, lower(scene), partial(lower_way, scene))
+        assert asked == ([WAYS[0], WAYS[2]] if guides_too else WAYS[:1])
+
+
+def test_path_without_light_paths_is_compiled_for_very_many_rays(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    ground: Any = None
+    for power, without in ((27, False), (29, True)):  # of four rays each
+        scene = long(caustic(), spp=-(-(1 << power) // (16 * 12)))
+        asked = made_up(monkeypatch, {way: 0.1 if way == (0, False) else 0.3 for way in WAYS})
+        found = trial.decided(ground, lower(scene), partial(lower_way, scene))
+        assert asked == (WAYS[:2] if without else WAYS[:1])
+        assert (found.integrator.light_paths == 0) == without
 
 
 @pytest.fixture
@@ -130,11 +179,12 @@ def little(monkeypatch: pytest.MonkeyPatch) -> None:
     """Trials of few samples, in which guides learn from few light paths."""
     monkeypatch.setattr(guides, "PATHS", 1 << 12)
     monkeypatch.setattr(guides, "LONG_PATHS", 1 << 12)
-    monkeypatch.setattr(guides, "WORTH", 1)
+    for name in ("SAMPLES", "GUIDE_RAYS"):
+        monkeypatch.setattr(worth, name, 1)
     monkeypatch.setattr(trial, "ROUNDS", 2)
     monkeypatch.setattr(trial, "SAMPLES", 4)
     monkeypatch.setattr(trial, "QUIET", 0.0)
-    monkeypatch.setattr(cost, "PIXELS", 256)
+    monkeypatch.setattr(cost, "FEWEST", 256)
 
 
 @pytest.mark.usefixtures("little")
@@ -154,7 +204,7 @@ def test_a_film_is_that_of_the_way(monkeypatch: pytest.MonkeyPatch, guiding: boo
     parts[0].merge(parts[1].film_state())
     assert np.array_equal(parts[0].image(), whole.image())
     origin = parts[0]._origin().settings
-    assert origin["chosen.guiding"] is guiding
+    assert origin["chosen.guide_paths"] == (guides.PATHS if guiding else 0)
     crop = clpt.Renderer(with_film(scene, crop=(3, 2, 7, 5)), narrow())
     assert crop._wavefront.features.transport.guided == guiding
 
@@ -168,8 +218,8 @@ def test_a_film_is_gone_on_with_in_its_way(
     monkeypatch.setattr(trial, "GUIDED_RAY", 0.0)
     scene, file = dataclasses.replace(slit(), integrator=Auto()), tmp_path / "a.film"
 
-    def made(worth: int) -> clpt.Renderer | clpt.MultiRenderer:
-        monkeypatch.setattr(guides, "WORTH", worth)
+    def made(samples: int) -> clpt.Renderer | clpt.MultiRenderer:
+        monkeypatch.setattr(worth, "SAMPLES", samples)
         return clpt.MultiRenderer(scene, [narrow()]) if several else clpt.Renderer(scene, narrow())
 
     for first, guiding in ((1 << 40, False), (1, True)):

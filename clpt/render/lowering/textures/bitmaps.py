@@ -443,7 +443,7 @@ class _Spectra:
 
     def __init__(self) -> None:
         self.states = np.zeros(1 << 24, np.uint8)  # of each colour: UNKNOWN, NEW or MADE
-        self.words = np.zeros((1 << 24, 2), np.uint32)  # pages that are not written take no memory
+        self.words = np.zeros(1 << 24, np.uint64)  # pages that are not written take no memory
 
     def packed(self, codes: Words, curved: bool) -> Words:
         """Two words for each colour of `_codes`, (2 n,)."""
@@ -454,9 +454,10 @@ class _Spectra:
         made = (RUN * np.flatnonzero(runs)[:, None] + np.arange(RUN)).reshape(-1)
         made = made[self.states[made] == NEW]
         channels = np.stack([made & 255, made >> 8 & 255, made >> 16], axis=1)
-        self.words[made] = pack(spectra.uplift(_meaning(curved)[channels]))
+        packed = pack(spectra.uplift(_meaning(curved)[channels]))
+        self.words[made] = packed.view(np.uint64).reshape(-1)
         self.states[made] = MADE
-        return self.words[codes].reshape(-1)
+        return self.words[codes].view(np.uint32)
 
 
 def pack(coefficients: NDArray[np.float32]) -> Words:

@@ -1,0 +1,116 @@
+"""A scene in plain colours, which is shown while its own kernels are compiled.
+
+A path that ends at the first surface tells the colour and the normal there, and a lamp beside the
+camera lights it. Its few kernels are the same for most scenes.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import images
+from clpt.arrays import Bytes, Floats
+from clpt.render.renderer import Renderer
+from clpt.scene import Film, Scene
+from clpt.scene.integrators import Path
+from clpt.scene.materials import Diffuse, Material, Null
+from clpt.scene.params import Kind, fields_of, params
+from clpt.scene.pixels import pixels
+from clpt.scene.roles import REFLECTANCE
+from clpt.scene.shapes import Mesh, Shape
+from clpt.scene.textures import Bitmap
+from clpt.spectra import Spectrum
+from clpt.view.bare import bare, each
+
+SAMPLES = 4  # of a pixel
+LAYERS = ("albedo", "shading_normal")
+LAMP = np.array([0.35, 0.5, -0.8])  # where it is in the camera's space: left, up, behind
+SHADE = 0.3  # what is left where the lamp does not reach
+BEHIND = 0.06  # radiance where there is no surface
+SHINES, OTHER = 1.0, 0.5  # albedo of lamps, and of what has no colour of its own
+SIDE = 64  # texels of an image along a side that its mean is of, about
+
+
+def solid(scene: Scene) -> Scene:
+    """Return a scene with the shapes and the camera of another one, and nothing else of it.
+
+    What is seen through, as a surface around a medium, is left out.
+    """
+    colours: dict[int, Diffuse] = {}
+    lamp = _painted(np.full(3, SHINES))
+
+    def paint(shape: Shape) -> Shape:
+        material = shape.material
+        if shape.emission is None and id(material) not in colours:
+            colours[id(material)] = _painted(colour(material))
+        painted = colours[id(material)] if shape.emission is None else lamp
+        return bare(shape, material=painted, **_without(shape))
+
+    seen = [shape for shape in scene.shapes if not isinstance(shape.material, Null)]
+    film = Film(
+        width=scene.film.width, height=scene.film.height, crop=scene.film.crop, mode="rgb",
+        layers=LAYERS,
+    )  # fmt: skip
+    return Scene(
+        camera=dataclasses.replace(scene.camera, medium=None),
+        shapes=each(seen, paint),
+        film=film,
+        integrator=Path(max_depth=1, light_paths=0),
+        spp=SAMPLES,
+    )
+
+
+def shaded(renderer: Renderer) -> Bytes:
+    """Return the picture of a solid scene for a screen, (h, w, 3) uint8."""
+    layers = renderer.layers()
+    albedo, normals = (layers[name].astype(np.float64) for name in LAYERS)
+    turn = np.asarray(renderer.scene.camera.to_world, np.float64)[:3, :3]
+    towards = turn @ LAMP
+    towards /= np.linalg.norm(towards)
+    lit = SHADE + (1.0 - SHADE) * np.abs(normals @ towards)[..., None]
+    covered = np.linalg.norm(normals, axis=2, keepdims=True).clip(0.0, 1.0)
+    return images.to_srgb8((albedo * lit + BEHIND * (1.0 - covered)).astype(np.float32))
+
+
+def colour(part: Kind) -> Floats:
+    """Return about what a material reflects, linear (3,): the mean of the colours in it."""
+    found = [_mean(value) for value in _colours(part)]
+    return np.mean(found, axis=0) if found else np.full(3, OTHER)
+
+
+def _colours(part: Kind) -> list[Any]:
+    """Return the first colour of each material in a material."""
+    given = fields_of(part)
+    inner = [value for value in given.values() if isinstance(value, Material)]
+    if inner:
+        return [one for value in inner for one in _colours(value)]
+    own = [given[name] for name, param in params(type(part)).items() if param.role is REFLECTANCE]
+    return own[:1]
+
+
+def _mean(value: object) -> Floats:
+    """Return the mean colour of a spectrum or a texture."""
+    if isinstance(value, Spectrum):
+        return np.asarray(value.to_rgb("reflectance"), np.float64)
+    if isinstance(value, Bitmap):
+        mean = pixels(value, REFLECTANCE, side=SIDE).mean(axis=(0, 1), dtype=np.float64)
+        return np.broadcast_to(mean, 3)
+    inner = [] if not isinstance(value, Kind) else [
+        one for one in fields_of(value).values() if isinstance(one, (Spectrum, Kind))
+    ]  # fmt: skip
+    return np.mean([_mean(one) for one in inner], axis=0) if inner else np.full(3, OTHER)
+
+
+def _painted(rgb: NDArray[Any]) -> Diffuse:
+    return Diffuse(reflectance=tuple(np.clip(rgb, 0.0, 1.0).tolist()))
+
+
+def _without(shape: Shape) -> dict[str, Any]:
+    """Return the fields of a mesh that only textures need, as they are without them."""
+    if not isinstance(shape, Mesh) or shape.displacement is not None:
+        return {}
+    return {"uvs": None, "tangents": None, "attributes": {}}
