@@ -181,7 +181,7 @@ def _in_fog(lit: Lit) -> tuple[Integrator, str] | None:
     if power < LEAST:
         return None
     name = next(name for name, part in small if part)
-    number = FOGGY[power >= MOSTLY]
+    number = FOGGY[int(power >= MOSTLY)]
     return Path(light_paths=number), f"{name} is a small light in a medium that scatters"
 
 
