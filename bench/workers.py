@@ -123,7 +123,8 @@ class Mitsuba:
 def find_llvm() -> None:
     """Point Mitsuba at the newest LLVM there is, unless DRJIT_LIBLLVM_PATH is set.
 
-    It takes the library of that name without a version by itself, and fails with LLVM 14.
+    It takes the library of that name without a version by itself. LLVM 14 fails; so does LLVM 15 on
+    a processor with AVX-512 ("Cannot select: fminimum"), and the process aborts.
     """
     found = [
         path
@@ -134,8 +135,11 @@ def find_llvm() -> None:
     def version(path: str) -> tuple[int, ...]:
         return tuple(int(n) for n in re.findall(r"\d+", Path(path).name))
 
-    if found:
-        os.environ.setdefault("DRJIT_LIBLLVM_PATH", max(found, key=version))
+    if found and "DRJIT_LIBLLVM_PATH" not in os.environ:
+        newest = max(found, key=version)
+        os.environ["DRJIT_LIBLLVM_PATH"] = newest
+        if version(newest) < (16,):
+            print(f"{newest}: Mitsuba may abort; install LLVM 16 or newer, such as libllvm19")
 
 
 def _begin(cores: tuple[int, ...]) -> None:

@@ -135,9 +135,9 @@ class Builds:
     """The programs that have been built so far, and the seconds that took (summed over threads).
 
     cached: how many of them came from clpt's own cache; drivers do not tell about theirs.
-    on_compile: called when a program, or a part of one, is about to be given to a compiler; on_new:
-    when one is that is in none of clpt's caches, after other processes have got their share. Threads
-    call both, and wait for them.
+    on_compile: called when a program, or a part of one, is about to be given to a compiler. on_new:
+    called when that is in none of clpt's caches, after other processes have got their share.
+    Threads call both, and wait for them.
     """
 
     programs: int = 0

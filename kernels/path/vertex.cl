@@ -108,6 +108,10 @@ inline vec3 vertex_hemisphere(Scene scene, Frame frame, vec3 wo)
     return scale3(frame.n, sign);
 }
 
+/* The same, and its gloss for light that leaves along `away`: for the choice of a light. */
+#define vertex_receiver(scene, v, scatter, away) \
+    receiver_at(scene, (v).row, vertex_hemisphere(scene, (scatter).shading.frame, (scatter).wo), away)
+
 /* Whether what leaves by such a lobe has met a null surface. */
 inline mask vertex_is_null(integer lobe)
 {

@@ -13,6 +13,7 @@ from clpt.render.analysis.lights.aims import is_sharp
 from clpt.render.editing.rebuild import ranges
 from clpt.render.editing.scene_edit import Replacements
 from clpt.render.lowering.camera.cameras import lower_camera
+from clpt.render.lowering.materials import gloss
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera, Lens
@@ -37,6 +38,10 @@ def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> Callable[[], N
         return "light paths aim at what is sharp, and a material is so now, or no more"
     if lowered.features.media.bodies and pairs:
         return "bodies that overlap know each other's indices"
+    if lowered.features.lights.gloss and any(
+        gloss.word(old) != gloss.word(new) for old, new in pairs
+    ):
+        return "lights are chosen by the gloss of materials"
     camera = None
     if scene.camera is not former.camera:
         if dispersive_glasses(scene.camera) != dispersive_glasses(former.camera):

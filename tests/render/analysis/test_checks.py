@@ -217,6 +217,16 @@ def test_a_quick_update_keeps_the_rules() -> None:
         patch(cast(Any, SimpleNamespace(lowered=lower(former))), former, edited)
 
 
+def test_a_quick_update_leaves_gloss_as_it_is() -> None:
+    """The tree over lights chooses by it, as in a new scene: other words than the material's."""
+    lamps = [Point(position=(i, 9.0, 0.0), intensity=1.0) for i in range(16)]
+    given = {"camera": Perspective(), "lights": lamps}
+    balls = (Sphere(material=m.RoughConductor(alpha=alpha)) for alpha in (0.1, 0.2))
+    former, edited = (Scene(shapes=[ball], **given) for ball in balls)
+    told = patch(cast(Any, SimpleNamespace(lowered=lower(former))), former, edited)
+    assert told == "lights are chosen by the gloss of materials"
+
+
 def test_few_drawn_scenes_are_refused() -> None:
     """As they are drawn by the same rules; that the others are lowered is shown by test_builds."""
     count = 60
