@@ -218,7 +218,7 @@ def test_a_quick_update_keeps_the_rules() -> None:
 
 
 def test_a_quick_update_tells_gloss() -> None:
-    """The tree over lights chooses by it, as in a new scene: a word before those of the material."""
+    """The tree over lights chooses by it, as in a new scene: a word before the material."""
     lamps = [Point(position=(i, 9.0, 0.0), intensity=1.0) for i in range(16)]
     given = {"camera": Perspective(), "lights": lamps}
     balls = (Sphere(material=m.RoughConductor(alpha=alpha)) for alpha in (0.1, 0.2))
