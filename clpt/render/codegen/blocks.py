@@ -26,7 +26,7 @@ NEEDED: dict[str, Callable[[Features], bool]] = {
     "bodies": lambda f: f.media.bodies,
     "lead": lambda f: f.media.absorbing,
     "through": lambda f: f.shadow_media,
-    "into": lambda f: f.lights.bricks,
+    "into": lambda f: f.lights.volumes,
     "rival": lambda f: f.transport.balanced,
     "pending": lambda f: f.transport.merged,
     "expected": lambda f: f.transport.guided,

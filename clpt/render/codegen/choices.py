@@ -20,6 +20,15 @@ def either(holds: object, file: str) -> tuple[str, ...]:
     return (file if holds else f"{file.removesuffix('.cl')}_none.cl",)
 
 
+def _grid_meet(features: Features) -> str:
+    """Return the file about collisions in grids."""
+    grids = features.media.grids
+    if grids.mixed:
+        return "grid_meet_mixed"
+    varied = features.ratios and (grids.coloured or grids.tinted)
+    return "grid_meet_coloured" if varied else "grid_meet"
+
+
 # name: the files that stand for it, for a scene's features and the layout of its triangles
 CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/spectrum.cl": lambda f, _: (f"spectrum/{f.spectra.mode}.cl",),
@@ -76,8 +85,11 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         + either(f.media.bodies, "media/bodies.cl") * f.media.present
     ),
     "generated/grid_flight.cl": lambda f, _: (
-        *when(f.media.grids.emissive, "generated/lights.cl", "path/met_light.cl"),
-        *when(f.media.grids.present and not f.media.grids.emissive, "lighting/receiver_none.cl"),
+        *(
+            ("generated/lights.cl", "path/met_light.cl")
+            if f.media.grids.emissive or f.lights.bodies
+            else when(f.media.grids.present, "lighting/receiver_none.cl")
+        ),
         *when(f.media.grids.present, "media/grid_flight.cl"),
     ),
     "generated/kept_hemisphere.cl": lambda f, _: (
@@ -111,9 +123,11 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/flight_steps_of_grids.cl": lambda f, _: (
         *either(f.ratios, "media/grid_weigh.cl"),
         *either(f.media.grids.emissive, "media/grid_gather.cl"),
-        f"media/grid_meet{'_mixed' * bool(f.media.grids.mixed)}.cl",
+        f"media/{_grid_meet(f)}.cl",
     ),
     "generated/brick_weight.cl": lambda f, _: either(f.lights.bricks, "media/brick_weight.cl"),
+    "generated/body_weight.cl": lambda f, _: either(f.lights.bodies, "media/body_weight.cl"),
+    "generated/aim_cone.cl": lambda f, _: either(f.media.aim_cones, "media/aim_cone.cl"),
     "generated/grid_origin.cl": lambda f, _: either(f.media.grids.emissive, "media/grid_origin.cl"),
     "generated/flight_steps.cl": lambda f, _: (
         f"media/flight_medium{'_bodies' * f.media.bodies}.cl",

@@ -10,13 +10,15 @@ from clpt.render.contract import light_records
 from clpt.render.contract.features import Features
 from clpt.render.contract.light_records import (
     BASES,
+    BODY,
     BOTH,
+    BRICK,
     INFINITE,
     KINDS,
     LINE,
     RECORDS,
     VALUES,
-    VOLUME,
+    VOLUMES,
     WIDTH,
 )
 
@@ -74,9 +76,10 @@ def dispatch_text(features: Features, densities: str = "") -> str:
     includes = ["path/surface_flags.cl", "interface/shape.cl", "interface/light.cl", "core/mis.cl"]
     includes += [f"lighting/receiver{'_none' * (not features.lights.gloss)}.cl"]
     includes += ["lighting/light_choice.cl"]
-    includes += ["generated/textures.cl", "generated/medium.cl"] if VOLUME in others else []
+    includes += ["generated/textures.cl", "generated/medium.cl"] if features.lights.volumes else []
     includes += [f"generated/light/{kind}.cl" for kind in others]
     includes += [f"generated/shape/{kind}.cl" for kind in surfaces]
+    includes += ["lighting/volume_lights.cl"] if features.lights.volumes else []
     includes += ["light/area.cl"] if surfaces else []
     includes += ["light/moving.cl"] if features.motion.lights else []
     includes += ["light/deforming.cl"] if features.motion.emitters else []
@@ -84,10 +87,11 @@ def dispatch_text(features: Features, densities: str = "") -> str:
     parts = [f"#define TRIANGLE_ROW_WORDS {words}"] * features.motion.emitters
     parts += [f"#define LIGHT_{kind.upper()} {KINDS.index(kind)}" for kind in present]
     parts += [f"#define GLOSS_BEFORE {features.lights.gloss}"] * (features.lights.gloss > 0)
+    parts += [f"#define LIGHT_VOLUMES {KINDS.index(VOLUMES[0])}"] * features.lights.volumes
     parts += [f'#include "{name}"' for name in includes]
     parts += _tree_text() if features.lights.tree else []
     parts += [_sides_text(features), _sample_text(features), _pdf_text(features), densities]
-    parts += [_brick_pdf_text(features)] if VOLUME in present else []
+    parts += _volumes_text(features)
     parts += _infinite_text(features)
     return "\n".join(parts) + "\n"
 
@@ -201,7 +205,7 @@ def _sample_text(features: Features) -> str:
         ]
     pmf = "pmf" if features.lights.tree else "l.pmf"
     rows.append(f"s = light_chosen(s, {pmf});")
-    if weighed or features.film.layers.light_groups or VOLUME in others:
+    if weighed or features.film.layers.light_groups or features.lights.volumes:
         rows.append("s.row = row;")
     if weighed:
         rows.append(f"s.chance = {pmf};")
@@ -239,13 +243,22 @@ def _pdf_text(features: Features) -> str:
     ).text()
 
 
-def _brick_pdf_text(features: Features) -> str:
-    """`brick_light_pdf`: of a point of a medium that emits, at a distance t from p."""
-    head = "real brick_light_pdf(Scene scene, integer row, vec3 p, Receiver receiver, real t)"
-    rows = ["LightRow l = light_at(scene, row);", "mask m = mask_of(1);"]
-    pdf = f"emissive_brick_pdf({row_text(features, VOLUME)}, t)"
-    rows.append(f"return {pdf} * {pmf_text(features)};")
-    return function(head, *rows)
+def _volumes_text(features: Features) -> list[str]:
+    """Functions of parts of media that emit, with the densities [1/sr] of choosing them from p.
+
+    `brick_light_pdf`: of a point of a brick at a distance t; `body_light_pdf`: of a direction d in
+    which a body is.
+    """
+    made = []
+    ways = (BRICK, "brick", "real t", "t"), (BODY, "body", "vec3 d", "p, d")
+    for kind, name, given, seen in ways:
+        if kind in features.lights.kinds:
+            given = f"Scene scene, integer row, vec3 p, Receiver receiver, {given}"
+            head = f"real {name}_light_pdf({given})"
+            pdf = f"{kind}_pdf({row_text(features, kind)}, {seen})"
+            rows = ["LightRow l = light_at(scene, row);", "mask m = mask_of(1);"]
+            made.append(function(head, *rows, f"return {pdf} * {pmf_text(features)};"))
+    return made
 
 
 def pmf_text(features: Features) -> str:
