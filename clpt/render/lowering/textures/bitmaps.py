@@ -477,9 +477,17 @@ class _Spectra:
         runs = np.flatnonzero(seen & (self.places == 0)).astype(np.uint32)
         self.places[runs] = np.arange(len(self.runs), len(self.runs) + len(runs), dtype=np.uint32)
         self.runs = np.concatenate([self.runs, runs])
-        more = RUN * len(runs)
-        self.states = np.concatenate([self.states, np.zeros(more, np.uint8)])
-        self.words = np.concatenate([self.words, np.zeros(more, np.uint64)])
+        needed = RUN * len(self.runs)
+        if needed > len(self.words):
+            self.states = _longer(self.states, max(needed, 2 * len(self.states)))
+            self.words = _longer(self.words, max(needed, 2 * len(self.words)))
+
+
+def _longer(array: NDArray[Any], size: int) -> NDArray[Any]:
+    """Return an array (n,) with zeros after it, (size,)."""
+    made = np.zeros(size, array.dtype)
+    made[: len(array)] = array
+    return made
 
 
 def pack(coefficients: NDArray[np.float32]) -> Words:
