@@ -1,5 +1,4 @@
-/* Stands for lighting/receiver.cl where lights are chosen by the hemisphere alone to which a surface sends light: its
- * unit normal, 0 if it is the sphere. */
+/* Stands for lighting/receiver.cl where only its `hemisphere` matters. */
 #define Receiver vec3
 #define receiver_hemisphere(r) (r)
 #define receiver_at(scene, row, hemisphere, away) (hemisphere)
