@@ -12,7 +12,8 @@ APT := $(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get
 # $(call apt,packages): install them, quietly; fails where that is not allowed
 apt = { [ "$(SUDO)" != false ] && echo "make: apt-get install $(1)" && $(APT) update -qq >/dev/null \
 	&& $(APT) install -y -qq --no-install-recommends $(1) >/dev/null; }
-# tests are mostly the compiling of kernels, on one core each; neighbours in a file share theirs
+# tests are mostly the compiling of kernels, on one core each; neighbours in a file share theirs.
+# auto: a worker more than there are cores, see tests/conftest.py
 SHARED := -n auto --maxprocesses 8 --dist worksteal
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 OFFLINE := "make: pip could not install clpt; the lines above tell why (is there a network?)"

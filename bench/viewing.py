@@ -2,11 +2,12 @@
 
 The command in a process of its own, with programs cached, and a client of its socket without a
 browser. `first`: from the start of the process to the first picture; `render`: to the first samples
-of `clpt render` of the same scene. `solid` and `cold`: with empty caches, to the first picture, which
-may be in plain colours, and to the first one of the scene's own kernels. `drag`: from a message to the first picture of it, while the
-whole picture is being rendered; `own`: the part of that in which the device does not render (the
-same drag, less the seconds that the header of the picture tells). `per_second`: pictures in a drag
-of 2 s. `cost`: processor time of a sample with a viewer, above that of a sample without. Medians.
+of `clpt render` of the same scene. `cold`: with empty caches, to the first picture, which is in
+plain colours where kernels are compiled, and to the first one of the scene's own kernels. `drag`:
+from a message to the first picture of it, while the whole picture is being rendered; `own`: the
+part of that in which the device does not render (the same drag, less the seconds that the header of
+the picture tells). `per_second`: pictures in a drag of 2 s. `cost`: processor time of a sample with
+a viewer, above that of a sample without. Medians.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import json
+import os
 import re
 import signal
 import statistics
@@ -22,7 +24,9 @@ import sys
 import tempfile
 import time
 import urllib.request
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import click
@@ -31,6 +35,7 @@ from websockets.sync.client import ClientConnection, connect
 
 import clpt
 from bench import machine
+from clpt.benchmark.starting import CACHES
 from clpt.render.renderer import Renderer
 from clpt.scene import Scene
 from clpt.view.session import Session
@@ -74,12 +79,13 @@ def first_of_render(scene: Path, size: str, out: Path) -> float:
 class Client:
     """A viewer without a browser, of a `clpt view` in a process of its own."""
 
-    def __init__(self, scene: Path, size: str):
+    def __init__(self, scene: Path, size: str, caches: Mapping[str, str] = MappingProxyType({})):
         self.start, self.changes = time.monotonic(), 0
         options = command(scene, size, "--no-browser", "--spp", "1000000")
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "clpt", "view", *options], stdout=subprocess.PIPE, text=True
-        )
+            [sys.executable, "-m", "clpt", "view", *options],
+            env={**os.environ, **caches}, stdout=subprocess.PIPE, text=True,
+        )  # fmt: skip
         assert self.process.stdout
         address = self.process.stdout.readline().strip()
         self.address_after = time.monotonic() - self.start
@@ -132,6 +138,28 @@ class Client:
         self.stack.close()
         self.process.send_signal(signal.SIGINT)
         self.process.wait()
+
+
+def first_pictures(client: Client) -> tuple[float, float]:
+    """Seconds from the start to the first picture, and to the first one without plain colours."""
+    first: float | None = None
+    while True:
+        is_solid, after = client.frame()["solid"], time.monotonic() - client.start
+        first = after if first is None else first
+        if not is_solid:
+            return first, after
+
+
+def cold(scene: Path, size: str) -> dict[str, float]:
+    """The first pictures with empty caches."""
+    with tempfile.TemporaryDirectory() as folder:
+        caches = {name: str(Path(folder) / name.lower()) for name in CACHES}
+        for name in caches.values():
+            os.makedirs(name)
+        client = Client(scene, size, caches)
+        first, own = first_pictures(client)
+        client.close()
+    return {"cold_first": first, "cold_own": own}
 
 
 def drags(client: Client, rounds: int) -> dict[str, float]:
@@ -203,19 +231,21 @@ def cost(scene: Scene, seconds: float, rounds: int) -> float:
 def main(
     names: tuple[str, ...], size: str, rounds: int, seconds: float, json_file: str | None
 ) -> None:
-    columns = ("scene", "render [s]", "first [s]", "drag [ms]", "own [ms]", "at 1/n", "pictures/s")
+    columns = (
+        "scene", "cold: first, own [s]", "render [s]", "first [s]", "drag [ms]", "own [ms]",
+        "at 1/n", "pictures/s",
+    )  # fmt: skip
     table = Table(*columns, "cost", title=f"{machine.processor()}, {size}")
     for name in names or SCENES:
-        file = machine.ROOT / "scenes" / name
-        row: dict[str, Any] = {"scene": name, "size": size}
+        file = machine.ROOT / "scenes" / name  # or the path of any other
+        row: dict[str, Any] = {"scene": name, "size": size, **cold(file, size)}
         first: list[float] = []
         render: list[float] = []
         for i in range(rounds + 1):  # the first one fills caches
             with tempfile.TemporaryDirectory() as folder:
                 render.append(first_of_render(file, size, Path(folder) / "out.png"))
             client = Client(file, size)
-            client.frame()
-            first.append(time.monotonic() - client.start)
+            first.append(first_pictures(client)[0])
             if i == rounds:
                 row |= drags(client, 4 * rounds)
             client.close()
@@ -229,7 +259,8 @@ def main(
         machine.append(json_file, "viewing", [row])
         shown = (row["render"], row["first"], row["drag_ms"], row["own_ms"])
         table.add_row(
-            name, *(f"{value:.3g}" for value in shown), f"{row['divider']}",
+            name, f"{row['cold_first']:.3g}, {row['cold_own']:.3g}",
+            *(f"{value:.3g}" for value in shown), f"{row['divider']}",
             f"{row['per_second']:.1f}", f"{100 * row['cost']:.1f} %" if seconds else "",
         )  # fmt: skip
     machine.console().print(table)

@@ -111,7 +111,8 @@ def transform_normals(matrix: ArrayLike, normals: ArrayLike) -> Matrix:
     Raises SceneError for a singular matrix.
     """
     turned = np.asarray(normals, np.float64) @ inverse(matrix)[:3, :3]
-    length = np.linalg.norm(turned, axis=-1, keepdims=True)
+    x, y, z = np.moveaxis(turned, -1, 0)
+    length = np.sqrt(x * x + y * y + z * z)[..., None]
     return turned / np.where(length > 0.0, length, 1.0)
 
 

@@ -6,7 +6,9 @@ import gc
 import os
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -27,11 +29,34 @@ PROCESSES = [HERE / name for name in ("benchmark", "cli", "cluster", "device", "
 PROCESSES += [HERE / name for name in ("faults", "test_output_files.py", "view")]
 
 
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Let quick tests of processes try twice more; the summary tells of each that did so.
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """One more than there are cores: tests that wait for processes and disks use no core."""
+    own = hasattr(os, "sched_getaffinity")  # a process may have fewer than the machine
+    return (len(os.sched_getaffinity(0)) if own else os.cpu_count() or 1) + 1
 
-    Who asks for slow tests gets each failure: `make test-all`, `-m slow`, `-m ""`.
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection(session: pytest.Session) -> None:
+    """Let workers import test files in different orders: what one has compiled others load."""
+    config = session.config
+    if not hasattr(config, "workerinput") or config.args_source.name != "TESTPATHS":
+        return
+    number = int(config.workerinput["workerid"].removeprefix("gw"))
+    files = sorted(HERE.rglob("test_*.py"))
+    first = number * len(files) // config.workerinput["workercount"]
+    for path in [*files[first:], *files[:first]]:
+        with suppress(Exception, pytest.skip.Exception):  # collection tells of it
+            import_module(".".join(path.relative_to(HERE.parent).with_suffix("").parts))
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Let long tests be the first, and quick tests of processes try twice more.
+
+    The summary tells of each that did so. Who asks for slow tests gets each failure: `make
+    test-all`, `-m slow`, `-m ""`.
     """
+    items.sort(key=lambda item: item.get_closest_marker("long") is None)
     if config.getoption("markexpr") != "not slow":
         return
     retried = {path for path in {item.path for item in items} if _starts_processes(path)}

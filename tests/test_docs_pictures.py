@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -70,8 +71,11 @@ def test_the_gallery_has_every_scene():
         assert f"clpt render scenes/{picture.parent.name}" in page
 
 
+measured = cache(gallery.pictures)
+
+
 def test_pictures_of_the_gallery_are_clean():
-    pictures = gallery.pictures()
+    pictures = measured()
     page = gallery.PAGE.read_text("utf-8").split("## Every kind")[0]
     assert len(pictures) == page.count("![") > 20
     assert [p for p in pictures if p.grain > 3.0 or p.sparks > 0.0025] == []
@@ -79,7 +83,7 @@ def test_pictures_of_the_gallery_are_clean():
 
 def test_pictures_of_the_gallery_are_large():
     """1280 pixels along the longer side; the animation is small."""
-    sizes = {p.name: max(p.size) for p in gallery.pictures()}
+    sizes = {p.name: max(p.size) for p in measured()}
     small = sorted(name for name, size in sizes.items() if size < 1280 and name != "turn.webp")
     assert len(small) <= SMALL, f"smaller than 1280: {', '.join(small)}"
 

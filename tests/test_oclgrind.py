@@ -107,7 +107,7 @@ def caustic(film: Film) -> Scene:
             shapes.Disk(emission=lights.Area(radiance=50.0), to_world=lamp @ transforms.scale(0.2)),
         ],
         lights=[lights.Point(position=(0.5, 0.5, 1.5))],
-        integrator=integrators.Vcm(light_paths=4, radius=0.3),
+        integrator=integrators.Vcm(light_paths=1, radius=0.3),
         film=film,
     )
 

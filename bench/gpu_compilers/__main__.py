@@ -26,7 +26,7 @@ def compiled(vendor: Vendor, device: str, program: programs.Program) -> Row:
     row: Row = {"device": device, "digest": program.digest, "stage": program.stage}
     row |= {"scene": program.scene, "mode": program.mode}
     try:
-        return row | vars(vendor.figures(program.text, device))
+        return row | vars(vendor.figures(program.text, device, program.registers))
     except CompilerError as error:
         return row | {"error": str(error)}
 

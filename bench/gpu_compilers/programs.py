@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import itertools
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path as FilePath
 
 import click
 
@@ -17,35 +18,40 @@ from clpt.errors import SceneError
 from clpt.render.codegen import programs
 from clpt.render.contract.features import Features
 from clpt.render.lowering.scene import lower
+from clpt.scene import Scene
+from clpt.scene.integrators import Path
 
 MODES = ("rgb", "spectral")
 LAYOUTS = ("compact", "wide8")
+GUIDED = ("pool", "three_spheres")  # scenes whose paths are compiled with a guide, too
 
 
 @dataclass(frozen=True)
 class Program:
     """A text, and where it stands first.
 
-    stage: with its layout, if the text hangs on that.
+    stage: with its layout, if the text hangs on that; registers: as of `device.Source`.
     """
 
     text: str
     stage: str
     scene: str
     mode: str
+    registers: tuple[int, ...] = ()
 
     @property
     def digest(self) -> str:
-        """What is equal for equal texts."""
-        return hashlib.sha256(self.text.encode()).hexdigest()[:16]
+        """What is equal for equal texts and limits."""
+        limits = "".join(map(str, self.registers))
+        return hashlib.sha256((self.text + limits).encode()).hexdigest()[:16]
 
 
-def scenes() -> list[Path]:
+def scenes() -> list[FilePath]:
     """The scenes that stand in files."""
     return sorted(path.parent for path in (machine.ROOT / "scenes").glob("*/scene.json"))
 
 
-def of_scenes(paths: Iterable[Path], modes: Iterable[str] = MODES) -> list[Program]:
+def of_scenes(paths: Iterable[FilePath], modes: Iterable[str] = MODES) -> list[Program]:
     """Every text of scenes once; scenes whose files are not made are told and left out."""
     found: dict[str, Program] = {}
     layouts: dict[str, set[str]] = {}
@@ -55,15 +61,22 @@ def of_scenes(paths: Iterable[Path], modes: Iterable[str] = MODES) -> list[Progr
         except SceneError as error:
             click.echo(f"{path.name} is left out: {error}", err=True)
             continue
-        for mode in modes:
+        for one, mode in itertools.product(_ways(scene, path.name), modes):
             film = dataclasses.replace(scene.film, mode=mode)
-            features = lower(dataclasses.replace(scene, film=film)).features
+            features = lower(dataclasses.replace(one, film=film)).features
             for layout in LAYOUTS:
                 for stage, source in _sources(features, layout):
-                    program = Program(source.text, stage, path.name, mode)
+                    program = Program(source.text, stage, path.name, mode, source.registers)
                     found.setdefault(source.text, program)
                     layouts.setdefault(source.text, set()).add(layout)
     return [_named(program, layouts[text]) for text, program in found.items()]
+
+
+def _ways(scene: Scene, name: str) -> list[Scene]:
+    """A scene as it is and, where its paths are to be guided, so."""
+    if name not in GUIDED:
+        return [scene]
+    return [scene, dataclasses.replace(scene, integrator=Path(guiding=True))]
 
 
 def longest(given: Iterable[Program], count: int) -> list[Program]:
@@ -76,6 +89,8 @@ def longest(given: Iterable[Program], count: int) -> list[Program]:
 
 def _sources(features: Features, layout: str) -> Iterator[tuple[str, device.Source]]:
     """The texts of a picture, by the names of their stages."""
+    for name, root in (("guide", "guiding/sum.cl"), ("photons", "merging/sort.cl")):
+        yield name, device.assemble(root)
     for own in features.passes:
         yield from programs.sources(own, layout, 1, queued=True).items()
     yield from programs.film_sources(features, layout).items()

@@ -20,6 +20,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from clpt.device import registers
+
 FOLDER = "GPU_COMPILERS"  # the variable that names where they were unpacked
 PLACES = ("usr/lib/llvm-19/bin", "usr/bin", "nvidia/*/bin", "usr/lib/clc")
 LANGUAGE = ("-x", "cl", "-cl-std=CL1.2", "-O3", "-w", "-nogpulib")
@@ -60,7 +62,7 @@ class Vendor:
     name: str
     devices: tuple[str, ...]
     tools: tuple[str, ...]
-    compile: Callable[[str, str, Path], Figures]
+    compile: Callable[[str, str, Path, tuple[int, ...]], Figures]
 
     @property
     def missing(self) -> list[str]:
@@ -72,11 +74,11 @@ class Vendor:
         own = tuple(name for name in self.devices if not devices or name in devices)
         return dataclasses.replace(self, devices=own)
 
-    def figures(self, text: str, device: str) -> Figures:
-        """Compile a text; raises CompilerError."""
+    def figures(self, text: str, device: str, limits: tuple[int, ...] = ()) -> Figures:
+        """Compile a text; limits: of registers, to try. Raises CompilerError."""
         with tempfile.TemporaryDirectory() as folder:
             Path(folder, "k.cl").write_text(text, encoding="utf-8")
-            return self.compile(text, device, Path(folder))
+            return self.compile(text, device, Path(folder), limits)
 
 
 @functools.lru_cache
@@ -166,23 +168,35 @@ def size_of(elf: bytes, section: str = ".text") -> int:
 WARPS = {"sm_75": 32, "sm_80": 64, "sm_86": 48, "sm_89": 48, "sm_90": 64}
 
 
-def nvidia(text: str, device: str, folder: Path) -> Figures:
-    """By clang, as PTX for the oldest device of all, and NVIDIA's assembler for this one."""
+def nvidia(text: str, device: str, folder: Path, limits: tuple[int, ...]) -> Figures:
+    """By clang, as PTX for the oldest device of all, and NVIDIA's assembler for this one.
+
+    Divisions and roots are as exact as OpenCL C asks, 2.5 and 3 ulp: exact ones are calls.
+    """
     began = time.perf_counter()
     (folder / "k.ptx").write_text(_ptx(text), encoding="utf-8")
-    said = run(folder, "ptxas", "-v", "-O3", f"-arch={device}", "k.ptx", "-o", "k.cubin")
+
+    def build(limit: int | None) -> tuple[str, tuple[int, int]]:
+        limited = ("-maxrregcount", str(limit)) if limit else ()
+        out = f"k{limit or ''}.cubin"
+        said = run(folder, "ptxas", "-v", "-O3", f"-arch={device}", *limited, "k.ptx", "-o", out)
+        (folder / f"{out}.txt").write_text(said, encoding="utf-8")
+        return out, registers.told(said)
+
+    cubin = registers.fewest(limits, build)
     seconds = time.perf_counter() - began
+    said = (folder / f"{cubin}.txt").read_text(encoding="utf-8")
     counts = (-1, -1, -1)
     if find("nvdisasm"):
-        lines = run(folder, "nvdisasm", "-c", "k.cubin")
+        lines = run(folder, "nvdisasm", "-c", cubin)
         counts = counted(SASS_NAME.findall(lines), SASS)
-    registers = most(r"Used (\d+) registers", said)
+    used, spilled = registers.told(said)
     return Figures(
-        registers,
+        used,
         most(r"(\d+) bytes stack frame", said),
-        most(r"(\d+) bytes spill stores", said),
-        min(WARPS[device], 65536 // (256 * -(-registers // 8))),
-        size_of((folder / "k.cubin").read_bytes()),
+        spilled,
+        min(WARPS[device], 65536 // (256 * -(-used // 8))),
+        size_of((folder / cubin).read_bytes()),
         *counts,
         round(seconds, 2),
     )
@@ -191,11 +205,10 @@ def nvidia(text: str, device: str, folder: Path) -> Figures:
 def fits(text: str, device: str) -> int:
     """Return the fewest registers, in eights, with which NVIDIA's assembler spills nothing.
 
-    Left alone it takes more than it needs; a driver is told by `-cl-nv-maxrregcount`. Divisions and
-    roots are only as exact as OpenCL C asks (2.5 and 3 ulp): exact ones are calls.
+    Left alone it takes more than it needs; a driver is told by `-cl-nv-maxrregcount`.
     """
     with tempfile.TemporaryDirectory() as folder:
-        Path(folder, "k.ptx").write_text(_ptx(text, ROUGHLY), encoding="utf-8")
+        Path(folder, "k.ptx").write_text(_ptx(text), encoding="utf-8")
         build = ("ptxas", "-v", "-O3", f"-arch={device}", "k.ptx", "-o", "k.cubin", "-maxrregcount")
         few, enough = 2, 32  # eights
         while few < enough:
@@ -207,7 +220,7 @@ def fits(text: str, device: str) -> int:
 
 
 @functools.cache
-def _ptx(text: str, options: tuple[str, ...] = ()) -> str:
+def _ptx(text: str) -> str:
     """PTX of a text, once for all devices."""
     library = str(find("nvptx64--nvidiacl.bc"))
     with tempfile.TemporaryDirectory() as folder:
@@ -219,7 +232,7 @@ def _ptx(text: str, options: tuple[str, ...] = ()) -> str:
             "clang",
             *target,
             *LANGUAGE,
-            *options,
+            *ROUGHLY,
             *linked,
             "-S",
             "-o",
@@ -229,8 +242,8 @@ def _ptx(text: str, options: tuple[str, ...] = ()) -> str:
         return Path(folder, "k.ptx").read_text(encoding="utf-8")
 
 
-def amd(text: str, device: str, folder: Path) -> Figures:
-    """By clang, whose remarks tell what a kernel takes."""
+def amd(text: str, device: str, folder: Path, limits: tuple[int, ...]) -> Figures:
+    """By clang, whose remarks tell what a kernel takes; the text itself limits registers."""
     began = time.perf_counter()
     library = str(find(f"{device}-amdgcn-mesa-mesa3d.bc"))
     said = run(
@@ -254,8 +267,8 @@ def amd(text: str, device: str, folder: Path) -> Figures:
     )
 
 
-def intel(text: str, device: str, folder: Path) -> Figures:
-    """By `ocloc`; what a kernel takes stands in the patch tokens of its binary."""
+def intel(text: str, device: str, folder: Path, limits: tuple[int, ...]) -> Figures:
+    """By `ocloc`; what a kernel takes stands in its binary's patch tokens. It takes no limit."""
     began = time.perf_counter()
     options = ("-options", "-cl-std=CL1.2", "-out_dir", "made", "-output", "k")
     said = run(folder, "ocloc", "compile", "-file", "k.cl", "-device", device, *options)

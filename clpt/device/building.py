@@ -14,7 +14,13 @@ from functools import partial
 import pyopencl as cl
 from pyopencl.characterize import has_src_build_cache
 
-from clpt.device import compile_limits, declarations, disk_cache, native_programs
+from clpt.device import (
+    compile_limits,
+    declarations,
+    disk_cache,
+    native_programs,
+    registers,
+)
 
 from ..errors import DeviceError, KernelBuildError
 from .compilers import Job
@@ -248,8 +254,7 @@ def _is_oclgrind(device: Device) -> bool:
 
 def _from_source(device: Device, source: Source, flags: list[str]) -> Program:
     try:
-        make = partial(native_programs.build, device.context, device.info.cl_device)
-        built = declarations.built(device, source.text, flags, make)
+        built = _natively(device, source, flags)
     except cl.Error as error:
         raise _build_error(source, str(error)) from error
     try:
@@ -259,6 +264,20 @@ def _from_source(device: Device, source: Source, flags: list[str]) -> Program:
             f"{device.info.label} does not tell the arguments of its kernels ({error}); "
             "clpt cannot run on this driver"
         ) from error
+
+
+def _natively(device: Device, source: Source, flags: list[str]) -> cl.Program:
+    """Return a program that the driver builds of a text. Raises pyopencl.Error."""
+    cl_device = device.info.cl_device
+    make = partial(native_programs.build, device.context, cl_device)
+    if not (source.registers and device.info.limits_registers):
+        return declarations.built(device, source.text, flags, make)
+
+    def limited(limit: int | None) -> tuple[cl.Program, tuple[int, int]]:
+        program = make(source.text, [*flags, *registers.option(limit)])
+        return program, registers.told(native_programs.said(program, cl_device))
+
+    return registers.fewest(source.registers, limited)
 
 
 def _from_cache(device: Device, source: Source, flags: list[str], entry: str) -> Program | None:

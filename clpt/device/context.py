@@ -89,6 +89,11 @@ class DeviceInfo:
         """
         return self.platform.casefold() != "rusticl"
 
+    @property
+    def limits_registers(self) -> bool:
+        """Whether the driver's compiler takes and tells numbers of registers: NVIDIA's."""
+        return "cl_nv_compiler_options" in self.cl_device.extensions.split()
+
     @cached_property
     def shares_words(self) -> bool:
         """Whether kernels that run see what the host writes: fine-grained shared memory."""
@@ -130,9 +135,9 @@ class Builds:
     """The programs that have been built so far, and the seconds that took (summed over threads).
 
     cached: how many of them came from clpt's own cache; drivers do not tell about theirs.
-    on_compile: called when a program, or a part of one, is about to be given to a compiler; on_new:
-    when one is that is in none of clpt's caches, after other processes have got their share. Threads
-    call both, and wait for them.
+    on_compile: called when a program, or a part of one, is about to be given to a compiler. on_new:
+    called when that is in none of clpt's caches, after other processes have got their share.
+    Threads call both, and wait for them.
     """
 
     programs: int = 0

@@ -56,6 +56,11 @@ def binary(program: cl.Program) -> bytes:
     return next(filter(None, program.get_info(cl.program_info.BINARIES)))
 
 
+def said(program: cl.Program, device: cl.Device) -> str:
+    """Return what the driver's compiler said of a program that was built for a device."""
+    return str(program.get_build_info(device, cl.program_build_info.LOG))
+
+
 def _tried(program: Any, device: cl.Device, action: Callable[[], Any]) -> cl.Program:
     """Return a program after the action; what the driver says is in the error, or is logged."""
     try:

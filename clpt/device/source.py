@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from pathlib import Path, PurePath
 from typing import NoReturn
@@ -32,12 +32,14 @@ class Source:
     """A whole program as text.
 
     name: the root it was assembled from; text: what the compiler gets; files: every file and
-    virtual file that went in, in order, as errors name them.
+    virtual file that went in, in order, as errors name them; registers: limits of a work-item of a
+    GPU to try, see clpt/device/registers.py.
     """
 
     name: str
     text: str
     files: tuple[str, ...]
+    registers: tuple[int, ...] = ()
 
     def place(self, row: int) -> tuple[str | None, int | None]:
         """Return the file and line that a row of the text comes from, counted from 1.
@@ -60,7 +62,7 @@ class Source:
         functions that a macro names, stay as they are. A compiler leaves out what is not used, and
         does not optimise by itself what it puts into its callers: a third less time.
         """
-        return Source(self.name, _PRIVATE.sub(r"static \g<rest>", self.text), self.files)
+        return replace(self, text=_PRIVATE.sub(r"static \g<rest>", self.text))
 
     def with_private(self, prefix: str) -> Source:
         """Return a source whose functions and constants other programs do not see, to be linked.
@@ -76,7 +78,7 @@ class Source:
 
         text = _PRIVATE.sub(note, self.text)
         head = [f"#define {name} in_{prefix}_{name}" for name in names]
-        return Source(self.name, "\n".join([*head, text]), self.files)
+        return replace(self, text="\n".join([*head, text]))
 
 
 @dataclass(frozen=True)

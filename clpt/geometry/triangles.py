@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from clpt import transforms
 from clpt.arrays import Faces, Points, Words, on_host, single
@@ -29,7 +29,7 @@ SUMMED = 1 << 20  # triangles whose normals are summed at a time
 
 FAR = 2.0**61  # from where on the product of two edges may be beyond float32
 LEAST_CROSS = 2.0**-75  # up to which a square is zero in float32
-CHUNK = 1 << 16  # triangles that are looked at at a time: what is made of them stays in the cache
+CHUNK = 1 << 16  # rows that are looked at at a time: what is made of them stays in the cache
 
 # Corners of the cube's sides in the order of _CORNER_UVS, as Mitsuba has them.
 _CUBE = (
@@ -219,16 +219,26 @@ def _in_world(
     matrix = placement(shape)
     vertices, faces, normals, uvs = local(shape, alike)
     if not np.array_equal(matrix, transforms.IDENTITY):
-        vertices = single(transforms.transform_points(matrix, vertices))
+        vertices = _moved(transforms.transform_points, matrix, vertices)
         if not np.isfinite(vertices).all():
             raise SceneError("its transform moves vertices out of float32", where=where(shape))
         if normals is not None:
-            normals = transforms.transform_normals(matrix, normals).astype(np.float32)
+            normals = _moved(transforms.transform_normals, matrix, normals)
     if normals is not None and shape.flip_normals:
         normals = -normals
     if transforms.flips_handedness(matrix) != shape.flip_normals:
         faces = faces[:, ::-1]
     return vertices, faces, normals, uvs
+
+
+def _moved(
+    move: Callable[[ArrayLike, ArrayLike], NDArray[Any]], matrix: NDArray[Any], rows: Points
+) -> Points:
+    """Return rows (n, 3) as a matrix moves them; a chunk at a time, whose memory is used again."""
+    made = np.empty(rows.shape, np.float32)
+    for first in range(0, len(rows), CHUNK):
+        made[first : first + CHUNK] = single(move(matrix, rows[first : first + CHUNK]))
+    return made
 
 
 def _solid(vertices: Points, faces: Faces) -> NDArray[np.bool_]:
@@ -351,9 +361,9 @@ def _array(shape: Shape, name: str, columns: int, rows: int | None = None) -> Po
         raise SceneError(f"the mesh is empty: it has no {name}", where=where(shape))
     if values.ndim != 2 or values.shape[1] != columns or rows not in (None, len(values)):
         raise SceneError(f"{name} must be {wanted}, found {values.shape}", where=where(shape))
-    wrong = ~np.isfinite(values).all(axis=1)
-    if wrong.any():
-        first = int(np.argmax(wrong))
+    finite = np.isfinite(values)
+    if not finite.all():
+        first = int(np.argmin(finite.all(axis=1)))
         raise SceneError(
             f"{name}[{first}] is not finite: {values[first].tolist()}", where=where(shape)
         )

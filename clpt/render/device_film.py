@@ -93,8 +93,8 @@ class DeviceFilm:
     it was lowered; start: when it was begun to be made [s of time.perf_counter];
     built: how many programs were built, and how many of them came from clpt's cache; seconds: of
     each part of that. options: see `RenderOptions`. share: makes things once for several devices,
-    by a key and a function; without it the scene may have arrays in the memory of the device. former:
-    a lowered scene that has much in common with this one.
+    by a key and a function; without it the scene may have arrays in the memory of the device.
+    former: a lowered scene that has much in common with this one.
 
     Raises as `Renderer` does.
     """

@@ -12,7 +12,7 @@ from clpt.scene.shapes import Group, Instance, Shape
 PLAIN: dict[str, Any] = {"emission": None, "interior": None, "exterior": None, "priority": 0}
 
 
-def bare(shape: Shape, **more: Any) -> Shape:
+def bare(shape: Shape, **more: object) -> Shape:
     """Return a shape without light and media; more: further fields that it is to have."""
     given = fields_of(shape)
     wanted = PLAIN | more

@@ -23,8 +23,8 @@ PATIENCE = 0.4  # [s]
 class Beginning:
     """Makes the first renderer of a session, and pictures of a solid scene until it is there.
 
-    make: makes the renderer of `variant` of the scene, on the device. There are pictures of the solid
-    scene where programs are in no cache, or where preparing the scene takes longer than PATIENCE.
+    make: makes the renderer of `variant` of the scene, on the device. There are pictures of the
+    solid scene where programs are in no cache, or where the scene takes longer than PATIENCE.
     """
 
     def __init__(self, device: Device, make: Make, variant: Variant, scene: Scene):
@@ -61,7 +61,8 @@ class Beginning:
             renderer = self._solid.follow(scene)
             renderer.reset()
             renderer.run(SAMPLES)
-            offer(shaded(renderer))
+            if not self.is_over:
+                offer(shaded(renderer))
         except Exception:  # the scene's own renderer tells what is wrong
             log.debug("the scene is not shown in plain colours", exc_info=True)
             self._fails = True

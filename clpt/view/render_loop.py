@@ -267,7 +267,7 @@ class RenderLoop:
         return target.follow(self.scene)
 
     def _resize_preview(self, divider: int, *, now: bool = False) -> None:
-        """Let previews be of another size; now: not in a drag, and by the kernels that there are."""
+        """Let previews be of another size; now: not in a drag, by the kernels that there are."""
         former = self._preview
         self._divider, self._slow_previews, self._fast_previews = divider, 0, 0
         self._preview = preview = Target(self._make, smaller(divider))
@@ -329,7 +329,7 @@ class RenderLoop:
         self._budget.spend(time.perf_counter() - began)
         self.tell(renderer)
 
-    def _send(self, pixels: Bytes, divider: int, *, rest: bool = False, **told: Any) -> None:
+    def _send(self, pixels: Bytes, divider: int, *, rest: bool = False, **told: object) -> None:
         """Send a picture, with a header of its size and of what else is `told` of it."""
         data = pictures.png(pixels) if rest else pictures.jpeg(pixels)
         self._frame += 1

@@ -30,7 +30,7 @@ inline Spectrum rough_plastic_value(RoughPlastic m, vec3 wo, vec3 wi, Spectrum t
     Spectrum t_wi = coat_transmittance_spectrum(d, fabs(wi.z), eta), r;
     Spectrum inside = coat_inside_reflectance_spectrum(d, eta);
     mask nonlinear = m.nonlinear != 0;
-#define C(c)                                                          \
+#define C(c)                                                           \
     inside.c *= sel(nonlinear, m.diffuse_reflectance.c, (real)(1.0f)); \
     r.c = m.diffuse_reflectance.c * t_wo.c * t_wi.c / (eta.c * eta.c * (1.0f - inside.c));
     SPECTRUM_EACH(C)

@@ -25,7 +25,7 @@ inline vec4 gather4(global const float *p, integer at)
 typedef float2 Row2 __attribute__((aligned(4)));
 typedef float4 Row4 __attribute__((aligned(4)));
 #define ROW_2(i) (*(global const Row2 *)(p + at.s##i))
-#define ROW_3(i) (float4)(vload3(0, p + at.s##i), 0.0f)
+#define ROW_3(i) JOINED_4(*(global const Row2 *)(p + at.s##i), *(global const Row2 *)(p + at.s##i + 1))
 #define ROW_4(i) (*(global const Row4 *)(p + at.s##i))
 /* Of two vectors: one after the other, and every second word of both. By clang's function, of which all compilers for
  * CPUs are made, each is one instruction. `.even` and a vector of vectors are three, vload4 a call. */
@@ -54,15 +54,19 @@ typedef float4 Row4 __attribute__((aligned(4)));
 #endif
 inline vec2 gather2(global const float *p, integer at)
 {
+#ifdef NATIVE_PAIRS
+    real a = NATIVE_PAIRS(p, at.lo), b = NATIVE_PAIRS(p, at.hi);
+#else
     ROW_HALVES(ROW_2)
+#endif
     vec2 r = {EVENS(a, b), ODDS(a, b)};
     return r;
 }
 inline vec3 gather3(global const float *p, integer at)
 {
     ROW_QUARTERS(ROW_3)
-    real xz = EVENS(a, b), last_xz = EVENS(c, d), y = ODDS(a, b), last_y = ODDS(c, d);
-    vec3 r = {EVENS(xz, last_xz), EVENS(y, last_y), ODDS(xz, last_xz)};
+    real xy = EVENS(a, b), last_xy = EVENS(c, d), yz = ODDS(a, b), last_yz = ODDS(c, d);
+    vec3 r = {EVENS(xy, last_xy), EVENS(yz, last_yz), ODDS(yz, last_yz)};
     return r;
 }
 inline vec4 gather4(global const float *p, integer at)

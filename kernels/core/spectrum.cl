@@ -66,34 +66,4 @@ inline mask spectrum_varies(Spectrum a)
 #undef C
     return m;
 }
-
-/* For what is long: SPECTRUM_IN_TURN(F) expands F(c) for all components at once or, on a GPU, for one after the other, as
- * all at once need too many of its registers. SPECTRUM_AT(s, c) is a component there, SPECTRUM_PUT(s, c, v) sets it. */
-#if LANES == 1
-inline real spectrum_part(Spectrum s, int number)
-{
-    int n = 0;
-    real v = s.x;
-#define C(c) v = number == n++ ? s.c : v;
-    SPECTRUM_EACH(C)
-#undef C
-    return v;
-}
-inline Spectrum spectrum_with_part(Spectrum s, int number, real v)
-{
-    int n = 0;
-#define C(c) s.c = number == n++ ? v : s.c;
-    SPECTRUM_EACH(C)
-#undef C
-    return s;
-}
-#define SPECTRUM_IN_TURN(F) \
-    ROLLED                  \
-    for (int part = 0; part < SPECTRUM_SIZE; part++) { F(part) }
-#define SPECTRUM_AT(s, c) spectrum_part(s, c)
-#define SPECTRUM_PUT(s, c, v) s = spectrum_with_part(s, c, v)
-#else
-#define SPECTRUM_IN_TURN(F) SPECTRUM_EACH(F)
-#define SPECTRUM_AT(s, c) (s).c
-#define SPECTRUM_PUT(s, c, v) (s).c = v
-#endif
+#include "core/spectrum_at_once.cl"

@@ -48,10 +48,7 @@ inline Spectrum fresnel_spectrum(real cos_i, Spectrum eta)
 inline Spectrum relative_index(Spectrum inside, Spectrum outside)
 {
     Spectrum eta = spectrum_div(inside, outside);
-#if SPECTRUM_SIZE == 3
-    eta = spectrum_of(spectrum_mean(eta));
-#endif
-    return eta;
+    return SPECTRUM_SIZE == 3 ? spectrum_of(spectrum_mean(eta)) : eta;
 }
 
 /* Vacuum and a metal of index eta + i k (Born and Wolf 1999, 14.4; as in Lazanyi and
@@ -71,9 +68,9 @@ inline real fresnel_metal(real cos_i, real eta, real k)
 }
 inline Spectrum fresnel_conductor(real cos_i, Spectrum eta, Spectrum k)
 {
-    Spectrum f;
-#define C(c) f.c = fresnel_metal(cos_i, eta.c, k.c);
-    SPECTRUM_EACH(C)
+    Spectrum f = spectrum_of(0.0f);
+#define C(c) SPECTRUM_PUT(f, c, fresnel_metal(cos_i, SPECTRUM_AT(eta, c), SPECTRUM_AT(k, c)));
+    SPECTRUM_IN_TURN(C)
 #undef C
     return f;
 }

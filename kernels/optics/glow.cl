@@ -4,10 +4,5 @@
 inline Spectrum with_glow(Spectrum elastic, Spectrum glow, real amount)
 {
     Spectrum r = spectrum_madd(glow, amount, elastic);
-#if SPECTRUM_SIZE == 3
-#define C(c) r.c = clamp_r(r.c, (real)(0.0f), (real)(1.0f));
-    SPECTRUM_EACH(C)
-#undef C
-#endif
-    return r;
+    return SPECTRUM_SIZE == 3 ? spectrum_clamped(r) : r;
 }

@@ -1,6 +1,6 @@
 /* What a texture may look at: every loader of parameters gets it. What a scene's textures do not ask for
  * is never computed. USES_ATTRIBUTES: some texture reads what a mesh says per vertex or face. STOCHASTIC_FILTERING:
- * a random texel stands for some parameter of the material. */
+ * a random texel stands for some parameter of the material; TEXELS_AT_RANDOM: of some material of a loop. */
 typedef struct {
     vec2 uv;
     vec3 p; /* in the world [m] */
@@ -9,7 +9,7 @@ typedef struct {
     integer face;       /* of `faces`; below 0: of a sphere, see texture_face_of_sphere */
     vec2 b;             /* barycentrics of its vertices 1 and 2 */
 #endif
-#if STOCHASTIC_FILTERING
+#if STOCHASTIC_FILTERING || TEXELS_AT_RANDOM
     vec2 u; /* uniform numbers, which choose the texel */
 #endif
     real footprint; /* how wide what is looked at is, in units of uv; 0: a point */
@@ -37,7 +37,7 @@ inline TexturePoint texture_point(vec2 uv, vec3 p)
     t.b.x = 0.0f;
     t.b.y = 0.0f;
 #endif
-#if STOCHASTIC_FILTERING
+#if STOCHASTIC_FILTERING || TEXELS_AT_RANDOM
     t.u.x = 0.0f;
     t.u.y = 0.0f;
 #endif

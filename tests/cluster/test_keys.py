@@ -41,9 +41,7 @@ def context(folder: Path | None) -> ssl.SSLContext:
     return found
 
 
-def answer(
-    port: int, tls: ssl.SSLContext | None, request: bytes, seconds: float = 0.5
-) -> bytes:
+def answer(port: int, tls: ssl.SSLContext | None, request: bytes, seconds: float = 0.5) -> bytes:
     """What a listener says to a request: nothing, where it hangs up, or waits for some seconds."""
     with ExitStack() as resources:
         try:
@@ -116,6 +114,7 @@ def three(tmp_path):
             one.wait()
 
 
+@pytest.mark.long
 def test_nobody_without_the_keys_gets_an_answer(three, tmp_path):
     """Four processes listen at one port each; a stranger is heard by none of them."""
     started, address, folder, render = three

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import logging
 import sys
 import warnings
@@ -238,3 +239,32 @@ def test_remarks_of_a_driver_are_no_warnings(device, cache_folder, monkeypatch, 
         link(opened, {"main": source()}, "main", build(opened, source()).signatures)
         assert warnings.filters == before
     assert "kernel was vectorised" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("spills", "kept"), [({}, 96), ({96}, 128), ({96, 128}, None)], ids=["none", "some", "all"]
+)
+def test_few_registers_are_tried_where_a_driver_tells(device, monkeypatch, spills, kept):
+    """In its log, as NVIDIA's. What it takes alone is the most that is tried."""
+    limits = {}
+
+    def made(_context, _device, _code, options):
+        (*_, last) = options
+        limit = int(last.split("=")[1]) if "maxrregcount" in last else None
+        program = native(device.context, device.info.cl_device, TEXT, list(building.OPTIONS))
+        limits[program.int_ptr] = limit
+        return program
+
+    def said(program, _device):
+        limit = limits[program.int_ptr]
+        spilled = 8 if limit in spills else 0
+        return f"{spilled} bytes spill stores\nptxas info : Used {limit or 150} registers"
+
+    native = native_programs.build
+    monkeypatch.setattr(native_programs, "build", made)
+    monkeypatch.setattr(native_programs, "said", said)
+    limited = dataclasses.replace(source(), registers=(96, 128, 160))
+    assert building._natively(device, limited, []) and not limits.popitem()[1]
+    monkeypatch.setattr(context.DeviceInfo, "limits_registers", True)
+    program = building._natively(device, limited, [])
+    assert limits[program.int_ptr] == kept and 160 not in limits.values()

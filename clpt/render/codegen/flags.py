@@ -56,8 +56,14 @@ def has_lobe(features: Features, cls: type[Scatterer], name: str) -> bool:
 
 
 def is_chromatic(features: Features, cls: type[Scatterer]) -> bool:
-    """Whether densities of a material's directions differ between wavelengths."""
-    return features.materials.phase_varies(cls) if cls.is_phase else cls.chromatic
+    """Whether a material is asked at each wavelength: densities of its directions may differ.
+
+    Without dispersion they do not. Then eta alone tells what carried light has instead of radiance
+    (kernels/steps/adjoint_weight.cl), unless lobes that refract and others share directions.
+    """
+    if cls.is_phase:
+        return features.materials.phase_varies(cls)
+    return cls.chromatic and (features.told_dispersion or not cls.lobes_apart)
 
 
 def is_null(features: Features, cls: type[Scatterer]) -> bool:
@@ -70,6 +76,12 @@ def is_guided(features: Features, cls: type[Scatterer]) -> bool:
     unsuited = cls.delta or cls.is_null or cls.is_phase or cls.no_back or fluoresces(features, cls)
     alone = cls.refracts and features.told_dispersion  # a direction may be of one wavelength
     return features.transport.guided and not (unsuited or alone)
+
+
+def asks_chance(features: Features, cls: type[Scatterer]) -> bool:
+    """Whether light paths ask at a material how often its gloss chooses their light."""
+    glossy = features.transport.balanced and features.lights.gloss > 0
+    return glossy and not is_null(features, cls)
 
 
 def between_bodies(features: Features, cls: type[Scatterer]) -> bool:

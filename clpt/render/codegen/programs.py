@@ -6,6 +6,7 @@ material in a scene rebuilds nothing else.
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 
 from clpt import bvh, device
@@ -19,6 +20,7 @@ from clpt.render.codegen import (
     flags,
     lights,
     parameters,
+    registers,
     rough_coat_table,
     shapes,
     signatures,
@@ -37,9 +39,11 @@ Files = dict[str, str | device.Part | tuple[str, ...]]
 # Files of kernels that take the place of others where a work-item shades one path.
 _ALONE: device.Virtual = {
     **bvh.ALONE,
+    "core/spectrum_at_once.cl": ("core/spectrum_in_turn.cl",),
     "core/texels_between.cl": ("core/texels_in_turn.cl",),
     "optics/thin_film.cl": ("optics/thin_film_in_turn.cl",),
 }
+_FEW: device.Virtual = {"bvh/no_vectorize.cl": ("interface/few_registers.cl",)}
 
 
 def sources(
@@ -63,9 +67,9 @@ def sources(
 
 
 def _stages(
-    features: Features, layout: str, lanes: int, interleaved: bool, part: bool = False
+    features: Features, layout: str, lanes: int, interleaved: bool, part: Files | None = None
 ) -> dict[str, device.Source]:
-    """The texts of a bounce but for queues and shading, see `sources`; part: of a loop."""
+    """The texts of a bounce but for queues and shading, see `sources`; part: see `_source`."""
     files, defines = _shared(features, layout), _defines(features, lanes)
     make = functools.partial(_source, part=part)
     begin, join = bounce.begin_and_join(features)
@@ -102,23 +106,23 @@ def _stages(
 
 
 def _shading(
-    features: Features, layout: str, lanes: int, *, queued: bool = False, part: bool = False
+    features: Features, layout: str, lanes: int, *, queued: bool = False, part: Files | None = None
 ) -> dict[str, device.Source]:
-    """The texts that shade, see `sources`; part: of a loop, for all kinds of paths of the scene."""
+    """The texts that shade, see `sources`; part: of a loop, all kinds of paths, see `_source`."""
     files, defines = _shared(features, layout), _defines(features, lanes)
     texts: dict[str, device.Source] = {}
-    for vertex in vertices.vertices(features, lanes if part else 1):
+    for vertex in vertices.vertices(features, lanes if part is not None else 1):
         cls = vertices.leader(features, vertex)
         own = {**files, **choices.material_files(features, cls), **_material(features, cls)}
         if vertex.shared:
             own |= vertices.virtual_files(features, vertex)
-            texts |= _materials(features, vertex, files, defines, lanes)
-        if part:
+            texts |= _materials(features, vertex, files, lanes, part)
+        if part is not None:
             own["generated/common.cl"] = common.calls_text(common.shared(features, lanes))
         if cls.is_phase:
             own["generated/shading_frame.cl"] = ("path/phase_frame.cl",)
         kind = {**vertices.defines(features, vertex), "QUEUED": int(queued)}
-        if part and bounce.has_both(features):
+        if part is not None and bounce.has_both(features):
             own["generated/integrator.cl"] = BOTH
             kind["SHADES_BOTH"] = 1
         given = {**defines, **kind}
@@ -135,16 +139,16 @@ def _material(features: Features, cls: type[Scatterer]) -> Files:
 
 
 def _materials(
-    features: Features, vertex: vertices.Vertex, files: Files, defines: flags.Defines, lanes: int
+    features: Features, vertex: vertices.Vertex, files: Files, lanes: int, part: Files | None
 ) -> dict[str, device.Source]:
     """The parts of the kinds of a shared vertex, by program name."""
     texts = {}
     for cls in (features.materials.leaves[kind] for kind in vertex.kinds):
         own = {**files, **choices.material_files(features, cls), **_material(features, cls)}
         own["generated/material_part.cl"] = vertices.part_text(features, cls)
-        kind = vertices.part_defines(features, vertex, cls)
+        given = {**_defines(features, lanes), **flags.of_material(features, cls)}
         name = f"material_{cls.kind}"
-        texts[name] = _source(name, own, {**defines, **kind}, lanes, "material")
+        texts[name] = _source(name, own, given, lanes, "material", part=part)
     return texts
 
 
@@ -178,18 +182,17 @@ def loop_sources(
     stages that are the same for them stand there once. They are kept, since a renderer asks twice:
     to compile ahead, and to link.
     """
-    made = _shading(features, layout, lanes, part=True)
+    looks_up = lanes > 1 and features.textures.roles
+    part = _textures(features, "elsewhere") if looks_up else {}
+    made = _shading(features, layout, lanes, part=part)
     used: dict[str, None] = {}
     for own in features.passes:
-        made |= _stages(own, layout, lanes, interleaved, part=True)
+        made |= _stages(own, layout, lanes, interleaved, part)
         stages_ = bounce.order(own, layout, lanes, interleaved)
         used |= dict.fromkeys(stage.program for stage in stages_ if stage.verb != "shade")
     used |= dict.fromkeys(name for name in made if name.startswith(("shade_", "material_")))
-    if shared := common.shared(features, lanes):
-        own_files = _shared(features, layout)
-        own_files["generated/common_part.cl"] = common.part_text(shared)
-        made["common"] = _source("common", own_files, _defines(features, lanes), lanes)
-        used["common"] = None
+    made |= (shared := _shared_parts(features, layout, lanes, part))
+    used |= dict.fromkeys(shared)
     files = {
         **_shared(features, layout),
         **signatures.loop_files(features, layout),
@@ -199,6 +202,29 @@ def loop_sources(
     loop = _source("loop", files, _defines(features, lanes), lanes)
     parts = {name: made[name].with_private(name) for name in used}
     return {**parts, "loop": loop.with_private("loop")}
+
+
+def _shared_parts(
+    features: Features, layout: str, lanes: int, part: Files
+) -> dict[str, device.Source]:
+    """The texts of what other parts of a loop call: for kinds of materials, and of textures."""
+    own: dict[str, Files] = {}
+    if found := common.shared(features, lanes):
+        own["common"] = {"generated/common_part.cl": common.part_text(found), **part}
+    if part:
+        own["textures"] = _textures(features, "part")
+    files, defines = _shared(features, layout), _defines(features, lanes)
+    return {name: _source(name, {**files, **its}, defines, lanes) for name, its in own.items()}
+
+
+def _textures(features: Features, where: textures.Where) -> Files:
+    text = textures.dispatch_text(features.textures, stochastic=_stochastic(features), where=where)
+    return {"generated/textures.cl": text}
+
+
+def _stochastic(features: Features) -> bool:
+    """Whether a random texel stands for some parameter of a material."""
+    return any(flags.filters_at_random(features, cls) for cls in features.materials.leaves)
 
 
 def _alone(features: Features, layout: str, *names: str) -> dict[str, device.Source]:
@@ -214,7 +240,9 @@ def _static(texts: dict[str, device.Source]) -> dict[str, device.Source]:
 @functools.lru_cache(maxsize=8)
 def _defines(features: Features, lanes: int) -> flags.Defines:
     """Return what all programs of a scene define; lanes: paths that a work-item shades."""
-    return {**flags.of_scene(features), "SLAB_BLOCK": SLAB_BLOCK if lanes == 1 else 0}
+    passed = int(lanes > 1 and _stochastic(features))  # by parts of a loop, in one form
+    block = SLAB_BLOCK if lanes == 1 else 0
+    return {**flags.of_scene(features), "SLAB_BLOCK": block, "TEXELS_AT_RANDOM": passed}
 
 
 def _source(
@@ -224,13 +252,25 @@ def _source(
     lanes: int,
     stage: str | None = None,
     *,
-    part: bool = False,
+    part: Files | None = None,
 ) -> device.Source:
-    """The text of a program; stage: its file, if it is not called so; part: of a loop."""
-    own: flags.Defines = {"PART": f"loop_{name}"} if part else {}
+    """The text of a program; stage: its file, if it is not called so.
+
+    part: of a loop; the files that its parts have in the place of a scene's.
+    """
+    own: flags.Defines = {"PART": f"loop_{name}"} if part is not None else {}
     given = {"LANES": lanes, "QUEUED": 0, **own, **defines}
-    alone = _ALONE if given["SLAB_BLOCK"] else {}  # a CPU's rays go alone, too
-    return device.assemble(f"stage/{stage or name}.cl", {**virtual, **alone}, given)
+    if part and lanes > 1:
+        virtual = {**virtual, **part}
+    file = f"stage/{stage or name}.cl"
+    if not given["SLAB_BLOCK"]:  # a CPU's rays go alone, too
+        return device.assemble(file, virtual, given)
+    alone = {**virtual, **_ALONE}
+    if few := registers.of_amd(name):
+        alone |= _FEW
+        given["FEW_REGISTERS"] = few
+    source = device.assemble(file, alone, given)
+    return dataclasses.replace(source, registers=registers.limits(name))
 
 
 def _shared(features: Features, layout: str) -> Files:
@@ -254,12 +294,7 @@ def _generated(features: Features, layout: str) -> Files:
         "generated/screen.cl": stages.screen_text(features),
         "generated/photon.cl": stages.photon_text(features) if features.transport.merged else "",
         "generated/emission.cl": emission.dispatch_text(features),
-        "generated/textures.cl": textures.dispatch_text(
-            features.textures,
-            stochastic=any(
-                flags.filters_at_random(features, cls) for cls in features.materials.leaves
-            ),
-        ),
+        **_textures(features, "own"),
         "generated/lights.cl": stages.lights_text(features),
         "generated/null_transmittance.cl": stages.null_transmittance_text(features),
         "generated/shapes.cl": shapes.points_text(features),

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from clpt.render.codegen.dispatch import Case, Function, active, function
+from typing import Literal
+
+from clpt.render.codegen.dispatch import Case, Function, active, function, indented
 from clpt.render.contract.features import TextureFeatures
 from clpt.render.contract.texture_records import (
     END,
@@ -21,11 +23,15 @@ from clpt.scene.textures import MAPPINGS, Texture
 
 _LOOKED_UP = "(Scene scene, integer row, TexturePoint point, Wavelengths lambdas)"
 
+# Of the loaders: a part of the loop has them for all others, another part calls them, or a text
+# has its own.
+Where = Literal["part", "elsewhere", "own"]
 
-def dispatch_text(features: TextureFeatures, *, stochastic: bool = False) -> str:
+
+def dispatch_text(features: TextureFeatures, stochastic: bool = False, where: Where = "own") -> str:
     """Return the look-ups of the (kind, role) pairs in the scene, and the loaders that call them.
 
-    stochastic: for some material a random texel stands for a reflectance.
+    stochastic: for some material a random texel stands for a reflectance. where: the loaders are.
 
     texture_<role>(scene, row, point, lambdas)                 whose row is at a word
     spectrum_texture_<role>(scene, source, point, lambdas)     of 1 + the row, or no texture
@@ -39,8 +45,7 @@ def dispatch_text(features: TextureFeatures, *, stochastic: bool = False) -> str
         f"#define TEXTURE_PERMUTATION {RECORDS['spectral_bitmap'].words}",
     ]
     used |= {level for kind, level in MIPS.items() if kind in used}
-    if used & {"spectral_bitmap", "packed_bitmap"}:
-        used.add("bitmap")  # whose file has their addressing
+    used |= {"bitmap"} if used & {"spectral_bitmap", "packed_bitmap"} else set()  # addresses texels
     present = [kind for kind in RECORDS if kind in used]
     by_kind = {cls.kind: cls for cls in TEXTURE_KINDS}
     parts = [*lines, '#include "interface/texture.cl"'] if used else []
@@ -58,18 +63,18 @@ def dispatch_text(features: TextureFeatures, *, stochastic: bool = False) -> str
         parts += _operand_text(leaves, features.depth)
     for role in leaves:
         parts += [_with_programs(role, role in programs)] if programs else []
-        parts.append(_parameter(role))
+        parts.append(_parameter(role, where))
     if stochastic:
-        parts += _texel_text(leaves["reflectance"], "reflectance" in programs)
+        parts += _texel_text(leaves["reflectance"], "reflectance" in programs, where)
     return "\n".join([*parts, ""])
 
 
-def _texel_text(kinds: list[str], programs: bool) -> list[str]:
+def _texel_text(kinds: list[str], programs: bool, where: Where) -> list[str]:
     """`spectrum_texture_texel`; programs: some texture is one, all of which is filtered."""
     text = _look_up("texel", kinds, "texture_leaf" if programs else "texture")
     own = [text, _with_programs("texel", True)] if programs else [text]
-    own.append(_parameter("texel", how="inline"))  # short, and in few places
-    return ["#if STOCHASTIC_FILTERING", *own, "#endif"]
+    own.append(_parameter("texel", where, how="inline"))  # short, and in few places
+    return ["#if STOCHASTIC_FILTERING || TEXELS_AT_RANDOM", *own, "#endif"]
 
 
 def _choice_lines(cls: type[Texture]) -> list[str]:
@@ -112,15 +117,17 @@ def _with_programs(role: str, some: bool) -> str:
     return Function(signature, leaf, [case] if some else []).text()
 
 
-def _parameter(role: str, how: str = "called") -> str:
+def _parameter(role: str, where: Where, how: str = "called") -> str:
     """The texture that a parameter in a row names; how: see `function`."""
     form = _type(role)
-    return function(
-        f"{form} {form.lower()}_texture_{role}"
-        "(Scene scene, integer source, TexturePoint point, Wavelengths lambdas)",
-        f"return texture_{role}(scene, max_i(source - 1, (integer)(0)), point, lambdas);",
-        how=how,
-    )
+    name = f"{form.lower()}_texture_{role}"
+    takes = "(Scene scene, integer source, TexturePoint point, Wavelengths lambdas)"
+    if where == "elsewhere":
+        return f"{form} loop_{name}{takes};\n#define {name} loop_{name}"
+    looked_up = f"return texture_{role}(scene, max_i(source - 1, (integer)(0)), point, lambdas);"
+    if where == "part":
+        return "\n".join([f"APART({form}, loop_{name}){takes}", "{", *indented(looked_up), "}"])
+    return function(f"{form} {name}{takes}", looked_up, how=how)
 
 
 def _operand_text(kinds: dict[str, list[str]], depth: int) -> list[str]:

@@ -18,8 +18,6 @@ from clpt.scene.scatterer import Scatterer
 RUN_TIME = ("BSDF_KIND", "BSDF_TRANSMITS", "BSDF_SHINES", "BSDF_ABSORBS", "USES_CHOICE",
             "STOCHASTIC_FILTERING")  # flags in which kinds of one vertex may differ  # fmt: skip
 
-OF_STRUCTS = ("STOCHASTIC_FILTERING",)  # which structs follow that the vertex passes to its kinds
-
 
 @dataclass(frozen=True)
 class Vertex:
@@ -81,19 +79,13 @@ def defines(features: Features, vertex: Vertex) -> flags.Defines:
         return each[0]
     # Of black materials a path's end is known late, when it has no light to carry.
     found = {**each[0], "SHADES_SEVERAL": 1, "BSDF_KIND": "scene.kind", "BSDF_ABSORBS": 0}
-    for name in ("BSDF_SHINES", *OF_STRUCTS):
+    for name in ("BSDF_SHINES", "STOCHASTIC_FILTERING"):
         found[name] = max(own[name] for own in each)
     for name in ("BSDF_TRANSMITS", "USES_CHOICE"):
         bits = sum(1 << kind for kind, own in zip(vertex.kinds, each, strict=True) if own[name])
         every = sum(1 << kind for kind in vertex.kinds)
         found[name] = int(bits > 0) if bits in (0, every) else f"((0x{bits:x} >> scene.kind) & 1)"
     return found
-
-
-def part_defines(features: Features, vertex: Vertex, cls: type[Scatterer]) -> flags.Defines:
-    """Return the flags of the part of a kind: structs that it is given are those of its vertex."""
-    whole = defines(features, vertex)
-    return {**flags.of_material(features, cls), **{name: whole[name] for name in OF_STRUCTS}}
 
 
 def virtual_files(features: Features, vertex: Vertex) -> dict[str, str | tuple[str, ...]]:

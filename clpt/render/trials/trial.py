@@ -21,7 +21,7 @@ from clpt.render.trials.cost import GUIDED_RAY, LIGHT_RAY, ROUNDS, SAMPLES, Tria
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.render.wavefront.strategy import Tuning
 from clpt.render.wavefront.wavefront import Wavefront
-from clpt.scene.integrators import FEWEST_LIGHT_PATHS, Integrator
+from clpt.scene.integrators import Integrator, Vcm
 
 log = logging.getLogger(__name__)
 
@@ -73,7 +73,7 @@ class Tries:
 
     @property
     def rays(self) -> float:
-        """How many rays the best way would trace for the whole film."""
+        """The rays that the best way would trace for the whole film."""
         trial = self._trials[self.best]
         return trial.rays / (trial.pictures[..., 0].size * SAMPLES) * self._samples
 
@@ -101,8 +101,6 @@ def decided(ground: Ground, lowered: Lowered, lower_as: Callable[[Integrator], L
 
 def is_worth(way: Integrator, rays: float) -> bool:
     """Return whether a film of so many rays is worth the compilation that trying a way takes."""
-    if way.light_paths:
-        return True  # it has the kernels of the first one
     return rays >= (worth.GUIDE_RAYS if way.guiding else worth.PLAIN_RAYS)
 
 
@@ -110,8 +108,8 @@ def name_of(way: Integrator) -> str:
     """Return what a candidate is called, for people."""
     if way.guiding:
         return "guiding"
-    if way.light_paths == FEWEST_LIGHT_PATHS:
-        return "few light paths"
+    if isinstance(way, Vcm):
+        return way.kind
     return "light paths" if way.light_paths else "path"
 
 

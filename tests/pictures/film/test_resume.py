@@ -56,7 +56,15 @@ def test_another_scene_is_refused_by_what_differs(tmp_path: Path, changes, told)
         np.testing.assert_array_equal(renderer.image(), before)
 
 
-@pytest.mark.parametrize("phase", [Isotropic(), HenyeyGreenstein(), Blend()], ids=lambda p: p.kind)
+@pytest.mark.parametrize(
+    "phase",
+    [
+        pytest.param(Isotropic(), marks=pytest.mark.slow),
+        pytest.param(HenyeyGreenstein(), marks=pytest.mark.slow),
+        Blend(second=HenyeyGreenstein()),  # of both
+    ],
+    ids=lambda p: p.kind,
+)
 def test_a_film_of_a_medium_is_saved(phase, scenes: Path, tmp_path: Path):
     """A phase function is a part of the kernels, as materials are."""
     fog = shapes.Sphere(material=Null(), interior=Homogeneous(sigma_t=1.0, phase=phase))

@@ -175,3 +175,15 @@ def test_index_by_name_is_a_spectrum() -> None:
     for glass in (m.Dielectric(int_ior="bk7"), m.Principled(eta="bk7", spec_trans=1.0)):
         assert lowered([glass], "spectral").features.dispersion
     assert spectra.glass("bk7")
+
+
+def test_gpus_are_told_with_how_few_registers_to_run() -> None:
+    """By a number with the text and, of those that need few, in the text; a CPU's has neither."""
+    features = lowered([m.Diffuse(), m.Dielectric()], "rgb").features
+    own = programs.sources(features, "wide8", 1, queued=True)
+    limits = {name: text.registers for name, text in own.items()}
+    assert limits["generate"] == (96, 112) and limits["append"] == ()
+    few = {name for name, text in own.items() if "amdgpu_waves_per_eu" in text.text}
+    assert {"generate", "shade_diffuse"} <= few and not {"intersect", "shade_dielectric"} & few
+    for text in programs.sources(features, "wide8", 8, queued=False).values():
+        assert text.registers == () and "amdgpu" not in text.text

@@ -16,21 +16,20 @@ from clpt.render.analysis import guides, worth
 from clpt.render.lowering.scene import Lowered, lower
 from clpt.render.trials import cost, trial
 from clpt.scene import Scene
-from clpt.scene.integrators import FEWEST_LIGHT_PATHS, Auto, Integrator, Path
+from clpt.scene.integrators import Auto, Integrator, Path
 from clpt.scene.media import Homogeneous
 from tests.pictures.support import assert_agree, blocks, with_film
 from tests.pictures.transport.test_guiding import slit
 from tests.pictures.transport.test_hybrid import caustic, lamp, narrow
 
 AUTO = Path(light_paths="auto", max_depth=5)
-EVERY = [(0.5, False), (FEWEST_LIGHT_PATHS, False), (0, False), (0, True)]
-WAYS = [EVERY[0], EVERY[1], EVERY[3]]  # of which a film of 2^27 samples is worth a trial
+WAYS: list[tuple[Any, bool]] = [(0.25, False), (0, False), (0, True)]
 
 
 def long(scene: Scene, integrator: Integrator = AUTO, **changes: Any) -> Scene:
     """A scene of which so many samples are wanted that a trial is worth it."""
     pixels = scene.film.width * scene.film.height
-    changes = {"spp": -(-worth.GUIDE_RAYS // pixels), "integrator": integrator, **changes}
+    changes = {"spp": -(-worth.PLAIN_RAYS // pixels), "integrator": integrator, **changes}
     return dataclasses.replace(scene, **changes)
 
 
@@ -44,9 +43,11 @@ def ways(scene: Scene) -> list[tuple[Any, bool]]:
 
 def test_ways_that_are_tried() -> None:
     """The chosen one first; with the depths that the scene says."""
-    assert ways(long(caustic())) == EVERY
+    assert ways(long(caustic())) == WAYS
     assert ways(long(slit())) == [(0, False), (0, True)]
     assert {one.max_depth for one in lower(long(caustic())).candidates} == {5}
+    photons = long(caustic(), Auto())
+    assert ways(photons) == [(1, False), (0, True)] and lower(photons).integrator.kind == "vcm"
     shallow = Path(light_paths="auto", max_depth=2)
     assert ways(long(slit(), shallow)) == []
     assert ways(long(caustic(), spp=worth.SAMPLES // (16 * 12))) == []
@@ -57,7 +58,6 @@ def test_ways_that_are_tried() -> None:
     [
         {"spp": 64},
         {"noise": 0.1},
-        {"integrator": Auto()},  # photons suit it
         {"integrator": Path(light_paths=0)},
         {"integrator": Path(guiding=True)},
     ],
@@ -127,7 +127,7 @@ def made_up(
     return asked
 
 
-@pytest.mark.parametrize("best", WAYS, ids=["light paths", "few", "guiding"])
+@pytest.mark.parametrize("best", WAYS, ids=["light paths", "path", "guiding"])
 def test_the_cheapest_way_is_taken(monkeypatch: pytest.MonkeyPatch, best: tuple[Any, bool]) -> None:
     scene = long(caustic())
     asked = made_up(monkeypatch, {way: 0.5 if way == best else 1.0 for way in WAYS})
@@ -160,7 +160,7 @@ def test_no_guide_is_compiled_for_few_rays(monkeypatch: pytest.MonkeyPatch) -> N
     for each, guides_too in ((15, False), (17, True)):  # rays of a sample
         asked = made_up(monkeypatch, dict.fromkeys(WAYS, 1.0), each * pictures)
         trial.decided(ground, lower(scene), partial(lower_way, scene))
-        assert asked == (WAYS if guides_too else WAYS[:2])
+        assert asked == ([WAYS[0], WAYS[2]] if guides_too else WAYS[:1])
 
 
 def test_path_without_light_paths_is_compiled_for_very_many_rays(
@@ -169,9 +169,9 @@ def test_path_without_light_paths_is_compiled_for_very_many_rays(
     ground: Any = None
     for power, without in ((27, False), (29, True)):  # of four rays each
         scene = long(caustic(), spp=-(-(1 << power) // (16 * 12)))
-        asked = made_up(monkeypatch, {way: 0.1 if way == (0, False) else 0.3 for way in EVERY})
+        asked = made_up(monkeypatch, {way: 0.1 if way == (0, False) else 0.3 for way in WAYS})
         found = trial.decided(ground, lower(scene), partial(lower_way, scene))
-        assert asked == (EVERY[:3] if without else EVERY[:2])
+        assert asked == (WAYS[:2] if without else WAYS[:1])
         assert (found.integrator.light_paths == 0) == without
 
 
@@ -234,6 +234,29 @@ def test_a_film_is_gone_on_with_in_its_way(
             renderer.run(4)
             whole.run(7)
             assert np.array_equal(renderer.image(), whole.image())
+
+
+@pytest.mark.usefixtures("little")
+def test_a_guide_stays_as_it_is_if_more_samples_are_wanted(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: files.Path
+) -> None:
+    """A longer film learns from more light paths, but not one that has begun with fewer."""
+    monkeypatch.setattr(trial, "GUIDED_RAY", 0.0)
+    monkeypatch.setattr(guides, "LONG_PATHS", 1 << 13)
+    monkeypatch.setattr(guides, "LESSON", 1)
+    file, made = tmp_path / "a.film", []
+    for spp, learned in ((16, 1 << 12), (32, 1 << 13)):
+        scene = dataclasses.replace(slit(), integrator=Auto(), spp=spp)
+        made.append(clpt.Renderer(scene, narrow()))
+        assert made[-1]._wavefront.paths.settings["guide_paths"] == learned
+    begun, longer = made
+    begun.run(3)
+    begun.save_state(file)
+    begun.run(4)
+    longer.load_state(file)
+    longer.run(4)
+    assert longer._wavefront.paths.settings["guide_paths"] == 1 << 12
+    assert np.array_equal(longer.image(), begun.image())
 
 
 @pytest.mark.usefixtures("little")

@@ -25,7 +25,7 @@ from clpt.render.analysis.lights.look import Look
 from clpt.render.analysis.lights.sources import Sources
 from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.scene import materials as mt
-from clpt.scene.integrators import FEWEST_LIGHT_PATHS, Auto, Integrator, Path, Vcm, shared
+from clpt.scene.integrators import Auto, Integrator, Path, Vcm, shared
 from clpt.scene.lights import CubeMap, Envmap, Sky
 from clpt.scene.shapes import Shape
 
@@ -34,13 +34,16 @@ NEAR = 0.25  # of the scene's radius: a light counts as no nearer to what it shi
 SUN = 0.25  # of an image's power: where it comes from a small part the image is a small light
 FEWEST = 3  # edges of a path from a light over two surfaces to the camera: the shortest caustic
 MOSTLY = 0.5  # of the power of all lights: where small ones have less, few paths start at lights
-FEW = 0.25  # a sample
-SOME = 0.5  # where they have more; `vcm` has one, as its photons are these
+FEW = 0.125  # a sample
+SOME = 0.25  # where they have more; `vcm` has one, as its photons are these
+FOGGY = 0.25, 0.5  # the same two where lights are in media that scatter
 MANY = 4  # where they are in bulbs: the camera's paths find next to nothing there
 DIRECTIONS = 128  # in which a light looks for what is sharp
+SLACK = 1e-6  # of the cosine of a cone around what may be met, for roundings
 BULB = 0.75  # of them: where what is sharp fills more, the light is in a bulb
 SEEN = 0.02  # of the picture: where what is sharp fills more, caustics may be seen through it
 
+LEAST = 0.25  # of the power of all lights: where small ones in media have less, they do not count
 THIN, DENSE = 0.3, 5.0  # optical depths from a light to the camera, see bench/NOTES.md
 ALL_AROUND = 0.49 * np.pi  # [rad] from a light's axis: what shines so far is no spot
 
@@ -98,20 +101,18 @@ def decided(lit: Lit, former: Integrator | None = None) -> tuple[SceneIndex, str
 def _candidates(index: SceneIndex, chosen: Integrator) -> tuple[Integrator, ...]:
     """The integrators between which a trial may decide, the chosen one first; else none.
 
-    Beside light paths few of them are tried, by the same kernels. It pays if many samples are to
-    come. Where a limit of noise ends the picture nobody knows how many; photons blur the
-    picture, which no variance tells; and some scenes cannot have a guide.
+    It pays if many samples are to come. Where a limit of noise ends the picture nobody knows how
+    many, and some scenes cannot have a guide. Photons blur the picture, which no variance tells: so
+    they are left where another way is cheaper all the same, and never taken.
     """
     samples = index.samples
     if samples < worth.SAMPLES or index.adaptive or index.lit_ghosts or chosen.guiding:
         return ()
-    if not isinstance(chosen, Path):
-        return ()
-    fewer = (FEWEST_LIGHT_PATHS, 0) if chosen.light_paths else ()
-    plain = [replace(chosen, light_paths=number) for number in fewer]
+    path = Path(light_paths=0, **shared(chosen, Path()))
+    plain = [path] if isinstance(chosen, Path) and chosen.light_paths else []
     several = chosen.max_depth < 0 or chosen.max_depth > 2
     can_guide = several and not index.has_media
-    guide = replace(chosen, light_paths=0, guiding=True, guide_paths=guides.paths_for(samples))
+    guide = replace(path, guiding=True, guide_paths=guides.paths_for(samples))
     guided = [guide] if can_guide else []
     return (chosen, *plain, *guided) if plain or guided else ()
 
@@ -177,10 +178,10 @@ def _in_fog(lit: Lit) -> tuple[Integrator, str] | None:
         pays = np.isnan(depth) | (depth > np.where(spots[rows], 0.0, THIN)) & (depth < DENSE)
         small.append((name, share[rows][pays].sum()))
     power = sum(part for _, part in small)
-    if power < FEW:
+    if power < LEAST:
         return None
     name = next(name for name, part in small if part)
-    number = SOME if power >= MOSTLY else FEW
+    number = FOGGY[int(power >= MOSTLY)]
     return Path(light_paths=number), f"{name} is a small light in a medium that scatters"
 
 
@@ -199,14 +200,26 @@ def _is_enclosed(geometry: Geometry, place: NDArray[np.float64] | None) -> bool:
     directions = np.stack([level * np.cos(turn), level * np.sin(turn), z])
     covered = np.zeros(DIRECTIONS, bool)
     for pieces in sharp_pieces(geometry, (), lambda one: is_sharp(one) and not _is_dull(one)):
-        a, b, c = (pieces[:, i : i + 3] - place for i in (0, 3, 6))
-        ahead = np.sign(np.einsum("ij,ij->i", a, np.cross(b, c)))[:, None]
-        edges = [np.cross(p, q) @ directions * ahead for p, q in ((a, b), (b, c), (c, a))]
-        middle, reach = (a + b + c) / 3.0, pieces[:, 9:]
-        along = np.maximum(middle @ directions, 0.0)
-        apart = (middle * middle).sum(axis=1, keepdims=True) - along * along
-        covered |= ((apart <= reach * reach) | (np.minimum.reduce(edges) > 0.0)).any(axis=0)
+        covered[_covered(pieces, place, directions)] = True
     return bool(covered.mean() > BULB)
+
+
+def _covered(
+    pieces: NDArray[np.float64], place: NDArray[np.float64], directions: NDArray[np.float64]
+) -> NDArray[np.intp]:
+    """Return which directions (3, n) from a place meet pieces, some more than once."""
+    a, b, c = (pieces[:, i : i + 3] - place for i in (0, 3, 6))
+    middle, reach = (a + b + c) / 3.0, pieces[:, 9]
+    size = reach + np.max([np.linalg.norm(p - middle, axis=1) for p in (a, b, c)], axis=0)
+    away, along = np.linalg.norm(middle, axis=1), middle @ directions
+    edge = np.where(size < away, np.sqrt(np.maximum(away * away - size * size, 0.0)), -away)
+    piece, way = np.nonzero(along >= (edge - SLACK * away)[:, None])  # a cone around each piece
+    a, b, c, middle, reach = (one[piece] for one in (a, b, c, middle, reach))
+    ahead = np.sign(np.einsum("ij,ij->i", a, np.cross(b, c)))
+    towards = directions.T[way]
+    sides = [np.einsum("ij,ij->i", np.cross(p, q), towards) for p, q in ((a, b), (b, c), (c, a))]
+    apart = (middle * middle).sum(axis=1) - np.maximum(along[piece, way], 0.0) ** 2
+    return way[(apart <= reach * reach) | (np.min(sides * ahead, axis=0) > 0.0)]
 
 
 def _share_seen(index: SceneIndex, geometry: Geometry) -> float:

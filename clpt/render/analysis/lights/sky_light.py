@@ -57,7 +57,7 @@ def content(lamp: Sky, look: Look) -> Content:
     return look.cache(_content, *given, by=(repr(given),))
 
 
-def _kept(numbers: tuple[float, ...], ground: tuple[float, ...]) -> tuple[Floats, Floats]:
+def kept(numbers: tuple[float, ...], ground: tuple[float, ...]) -> tuple[Floats, Floats]:
     """Return what `dome.unscaled` does, from the cache folder where it is there."""
     code = *Path(dome.__file__).parent.glob("*.py"), Path(air.__file__)
     tables = (data.ROOT / name for name in ("sky.csv", "air.csv"))
@@ -69,7 +69,7 @@ def _content(
     numbers: tuple[float, ...], ground: tuple[float, ...], spectral: bool, lo: float, hi: float
 ) -> Content:
     """The tables of a sky; its spectra from lo to hi [nm]."""
-    around, sun = dome.images(_kept, numbers, ground)
+    around, sun = dome.images(kept, numbers, ground)
     at = horizon(numbers[1])
     flat = (f.reshape(1, -1, f.shape[-1]) for f in (around, sun))
     images = [SpectralImage(f.astype(np.float32), LAMBDAS, True) for f in flat]

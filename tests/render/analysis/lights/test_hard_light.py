@@ -13,6 +13,7 @@ import pytest
 
 from clpt import transforms as tf
 from clpt.render.analysis.lights import image_lights
+from clpt.render.analysis.lights.hard_light import FEW, SOME
 from clpt.render.lowering.scene import Lowered, lower
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
@@ -74,7 +75,7 @@ def sky(share: float, side: int = 64) -> np.ndarray:
 )
 def test_small_lights(lamp: Light) -> None:
     reason = "sphere is sharp, and lights[0] is a small light"
-    assert chosen(scene_of(ROOM, BALL, lights=[lamp])) == (0.5, reason)
+    assert chosen(scene_of(ROOM, BALL, lights=[lamp])) == (SOME, reason)
 
 
 def test_few_light_paths_where_most_light_is_of_large_lights() -> None:
@@ -83,7 +84,7 @@ def test_few_light_paths_where_most_light_is_of_large_lights() -> None:
         lamps = [Constant(radiance=1.0), Directional(irradiance=irradiance)]
         for integrator in (Path(), Auto()):
             found, reason = chosen(scene_of(ROOM, BALL, lights=lamps, integrator=integrator))
-            assert found == (0.25 if few else 0.5) and ("though most light" in reason) == few
+            assert found == (FEW if few else SOME) and ("though most light" in reason) == few
 
 
 @pytest.mark.parametrize(
@@ -108,7 +109,7 @@ def test_large_lights(lamp: Light) -> None:
 def test_a_ball_that_shines_is_small_by_its_distance(height: float, distance: float) -> None:
     """4 pi r^2 is 3 % of 4 pi d^2; d is a fourth of the room's radius or more."""
     limit = 0.03**0.5 * distance
-    for radius, number in ((0.99 * limit, 0.5), (1.01 * limit, 0)):
+    for radius, number in ((0.99 * limit, SOME), (1.01 * limit, 0)):
         lamp = Sphere(center=(0.0, height, 0.0), radius=radius, emission=Area())
         assert chosen(scene_of(ROOM, BALL, lamp, lights=()))[0] == number
         balls = Spheres(centers=[[0.0, height, 0.0]], radii=radius, emission=Area())
@@ -119,7 +120,7 @@ def test_triangles_that_shine_are_small_by_their_area() -> None:
     """The area of a square of side 2 s is 4 s^2, of a cube's faces 24 s^2."""
     for shape, faces in ((Rectangle, 1), (Cube, 6)):
         limit = (0.03 * np.pi * 0.8**2 / faces) ** 0.5
-        for side, number in ((0.98 * limit, 0.5), (1.02 * limit, 0)):
+        for side, number in ((0.98 * limit, SOME), (1.02 * limit, 0)):
             flat = tf.rotate([1.0, 0.0, 0.0], 90.0)
             to_world = tf.translate([0.0, 0.8, 0.0]) @ flat @ tf.scale(side)
             lamp = shape(to_world=to_world, emission=Area(), name="lamp")
@@ -150,7 +151,7 @@ def test_where_there_are_none(scene: Scene, words: str) -> None:
 
 def test_one_material_may_be_sharp_and_dull() -> None:
     waxed = m.Blend(first=m.Diffuse(), second=m.Conductor(), weight=0.5)
-    assert chosen(scene_of(dataclasses.replace(ROOM, material=waxed)))[0] == 0.5
+    assert chosen(scene_of(dataclasses.replace(ROOM, material=waxed)))[0] == SOME
 
 
 AT_LAMP = tf.translate(LAMP.position) @ tf.scale(0.1)
@@ -165,8 +166,8 @@ GLASS_BALL = Sphere(radius=1.0, material=m.Dielectric())
         (Sphere(center=LAMP.position, radius=0.1, material=m.Diffuse()), 0),
         (Cube(to_world=AT_LAMP, material=m.Dielectric()), 4),
         (Instance(group=Group(shapes=[GLASS_BALL]), to_world=AT_LAMP), 4),
-        (Rectangle(to_world=PANE, material=m.Dielectric()), 0.5),
-        (Sphere(center=(0.0, 0.5, 0.0), radius=0.2, material=m.Dielectric()), 0.5),
+        (Rectangle(to_world=PANE, material=m.Dielectric()), SOME),
+        (Sphere(center=(0.0, 0.5, 0.0), radius=0.2, material=m.Dielectric()), SOME),
     ],
     ids=["ball", "dull", "cube", "instance", "pane", "beside"],
 )
@@ -174,19 +175,19 @@ def test_a_light_in_a_bulb_has_many_light_paths(bulb: Shape, number: float) -> N
     found, reason = chosen(scene_of(ROOM, bulb))
     assert found == number and ("in a bulb" in reason) == (number == 4)
     lamp = dataclasses.replace(LAMP, position=(0.0, 0.0, 0.0), intensity=3.0)  # has most power
-    assert chosen(scene_of(ROOM, bulb, lights=[LAMP, lamp]))[0] in (0, 0.5)
+    assert chosen(scene_of(ROOM, bulb, lights=[LAMP, lamp]))[0] in (0, SOME)
     made = lower(scene_of(ROOM, bulb, camera=looking(*LAMP.position), integrator=Auto()))
-    assert made.settings["light_paths"] == {4: 4, 0.5: 1, 0: 0}[number]
+    assert made.settings["light_paths"] == {4: 4, SOME: 1, 0: 0}[number]
 
 
 def test_what_instances_show_counts() -> None:
     group = Group(shapes=[BALL])
     copies = [Instance(group=group, to_world=tf.translate([x, 0.0, 0.0])) for x in (-0.3, 0.3)]
-    assert chosen(scene_of(ROOM, *copies))[0] == 0.5
+    assert chosen(scene_of(ROOM, *copies))[0] == SOME
     assert chosen(scene_of(*copies))[0] == 0
 
 
-@pytest.mark.parametrize(("shapes", "number"), [([ROOM], 0), ([ROOM, BALL], 0.5)])
+@pytest.mark.parametrize(("shapes", "number"), [([ROOM], 0), ([ROOM, BALL], SOME)])
 @pytest.mark.parametrize("mode", ["rgb", "spectral"])
 def test_all_is_as_with_the_number(shapes: list[Shape], number: float, mode: str) -> None:
     made = lower(scene_of(*shapes, mode=mode))
@@ -201,7 +202,7 @@ def test_all_is_as_with_the_number(shapes: list[Shape], number: float, mode: str
 def test_an_edit_keeps_the_number() -> None:
     """A film has a place for light paths, or none, as long as it lives."""
     sharp, dull = scene_of(ROOM, BALL), scene_of(ROOM)
-    assert chosen(dull, former=lower(sharp)) == (0.5, "as before the scene was edited")
+    assert chosen(dull, former=lower(sharp)) == (SOME, "as before the scene was edited")
     assert chosen(sharp, former=lower(dull))[0] == 0
 
 
@@ -217,9 +218,9 @@ AT_BALL, AT_WALL = looking(0.3, -0.5, 0.2), looking(-0.9, 1.0, 0.5)
     ("scene", "kind", "number"),
     [
         (scene_of(ROOM, BALL, camera=AT_BALL, integrator=Auto()), Vcm, 1),
-        (scene_of(ROOM, BALL, camera=AT_WALL, integrator=Auto()), Path, 0.5),
-        (scene_of(ROOM, BALL, camera=AT_BALL, integrator=Auto(), noise=0.1), Path, 0.5),
-        (scene_of(ROOM, BALL, camera=AT_BALL, integrator=Path()), Path, 0.5),
+        (scene_of(ROOM, BALL, camera=AT_WALL, integrator=Auto()), Path, SOME),
+        (scene_of(ROOM, BALL, camera=AT_BALL, integrator=Auto(), noise=0.1), Path, SOME),
+        (scene_of(ROOM, BALL, camera=AT_BALL, integrator=Path()), Path, SOME),
         (scene_of(ROOM, camera=AT_BALL, integrator=Auto()), Path, 0),
         (scene_of(ROOM, BALL, camera=Orthographic(), integrator=Auto()), Path, 0),
     ],

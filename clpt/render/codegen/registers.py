@@ -1,0 +1,37 @@
+"""With how few registers a work-item of a GPU each program may do.
+
+Left alone, compilers take more than some programs need, and fewer work-items run at once. These
+limits are tried (clpt/device/registers.py). With one that spills nothing a program of the scenes
+has some 4 % more instructions at most: `python -m bench.gpu_compilers` compiles by them.
+"""
+
+from __future__ import annotations
+
+_LIMITS: dict[str, tuple[int, ...]] = {
+    "generate": (96, 112),
+    "flight": (128,),
+    "intersect": (96, 128),
+    "shadow": (80, 96),
+    "splat": (80, 96),
+    "shade_diffuse": (80, 96, 112),
+    "shade_dielectric": (112,),
+    "shade_plastic": (96, 112),
+    "shade_rough_conductor": (112, 128),
+    "shade_rough_plastic": (112, 128),
+    "shade_rough_dielectric": (112, 128),
+}
+_OF_AMD = {
+    **dict.fromkeys(("generate", "emit", "shadow", "splat", "shade_diffuse"), 128),
+    "shade_reradiating": 96,
+    "shade_rough_plastic": 168,
+}
+
+
+def limits(program: str) -> tuple[int, ...]:
+    """Return the limits to try for a program; none where its compiler may choose."""
+    return _LIMITS.get(program, ())
+
+
+def of_amd(program: str) -> int | None:
+    """Return the registers of which the text of a program tells AMD's compilers that they do."""
+    return _OF_AMD.get(program)

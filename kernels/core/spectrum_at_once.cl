@@ -1,0 +1,5 @@
+/* For what is long: SPECTRUM_IN_TURN(F) expands F(c) for all components, in which SPECTRUM_AT(s, c) is one, and
+ * SPECTRUM_PUT(s, c, v) sets it. A GPU has core/spectrum_in_turn.cl. */
+#define SPECTRUM_IN_TURN(F) SPECTRUM_EACH(F)
+#define SPECTRUM_AT(s, c) (s).c
+#define SPECTRUM_PUT(s, c, v) (s).c = v
