@@ -27,6 +27,8 @@ PATH = Record(
         "vec3",
         "normal of the hemisphere that d was chosen from; 0: the whole sphere",
     ),
+    sampled_wo=("natural", "to where that surface sends light, see kernels/core/octahedral.cl"),
+    sampled_gloss=("natural", "its gloss, see kernels/lighting/receiver.cl"),
     null_distance=(
         "real",
         "distance from the point where d was chosen to o, through null surfaces [m]",

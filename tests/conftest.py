@@ -51,10 +51,12 @@ def pytest_collection(session: pytest.Session) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Let quick tests of processes try twice more; the summary tells of each that did so.
+    """Let long tests be the first, and quick tests of processes try twice more.
 
-    Who asks for slow tests gets each failure: `make test-all`, `-m slow`, `-m ""`.
+    The summary tells of each that did so. Who asks for slow tests gets each failure: `make
+    test-all`, `-m slow`, `-m ""`.
     """
+    items.sort(key=lambda item: item.get_closest_marker("long") is None)
     if config.getoption("markexpr") != "not slow":
         return
     retried = {path for path in {item.path for item in items} if _starts_processes(path)}

@@ -145,24 +145,3 @@ def test_registers_only_fall(kept: Row) -> None:
         figures = vendor.figures(program.text, kept["device"], program.registers)
         for name in ("registers", "stack", "spilled"):
             assert getattr(figures, name) <= kept[name], (name, figures)
-
-
-# With so few registers the program of each stage that takes most spills nothing on sm_89.
-FITS = {
-    "generate": 96,
-    "shade_diffuse": 80,
-    "shade_rough_conductor": 128,
-    "intersect compact": 96,
-    "shadow compact": 96,
-}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("stage", FITS)
-def test_few_registers_would_do(stage: str) -> None:
-    """Where divisions and roots are as exact as OpenCL C asks."""
-    kept = next(row for row in ROWS if (row["device"], row["stage"]) == ("sm_89", stage))
-    if FIRST["sm_89"].missing:
-        pytest.skip(f"{', '.join(FIRST['sm_89'].missing)} not found")
-    own = [p for p in of_scene(kept["scene"]) if (p.stage, p.mode) == (stage, kept["mode"])]
-    assert own and all(vendors.fits(p.text, "sm_89") <= FITS[stage] for p in own)

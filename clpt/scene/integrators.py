@@ -121,7 +121,7 @@ class Path(Integrator):
             raise SceneError(message, where=f"{self.kind}.light_paths")
 
     def _check_guide_paths(self) -> None:
-        given: Any = self.guide_paths
+        given = self.guide_paths
         whole = isinstance(given, int) and not isinstance(given, bool)
         if not whole or not 0 <= given <= MOST_GUIDE_PATHS:
             message = f"must be a whole number of 0 to {MOST_GUIDE_PATHS}, not {given!r}"

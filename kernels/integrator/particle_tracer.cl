@@ -22,7 +22,8 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
     Sampler sampler = light_path_sampler(scene.settings, pixel_index, load_path_sample(path, at));
     Scattering scatter = vertex_scattering(scene, path, at, active, v, sampler);
     real arrives = 1.0f / max_r(VERTEX_COSINE(v.s.n, v.d), (real)(1e-6f));
-    Rival rival = rival_of_emission(scene, path, at, v, vertex_hemisphere(scene, scatter.shading.frame, scatter.wo));
+    Rival rival = rival_of_emission(scene, path, at, v, vertex_receiver(scene, v, scatter, neg3(v.d)));
+    if (BSDF_IS_PHASE) rival = rival_chosen(scene, path, at, v, rival, vertex_receiver(scene, v, scatter, neg3(v.d)));
 
     CameraJoint joint = join_camera_seek(scene, v, scatter);
     bsdf_ask(scene, scatter, join_camera_to(joint, scatter), 1);
@@ -37,6 +38,7 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
     beta = spectrum_scale(beta, shading_frame_share(scatter.shading, neg3(v.d)));
     next = light_path_roulette(scene, path, at, next, null, v, scatter, &beta);
 
+    if (!BSDF_IS_PHASE) rival = rival_chosen(scene, path, at, v, rival, vertex_receiver(scene, v, scatter, onward));
     next = rival_goes_to_camera(scene, path, at, next, null, rival, &v, onward, bs);
     if (BSDF_IS_PANE) path_scattered(path, at, next & !null);
     vertex_leave(path, at, next, null, v, onward, beta);

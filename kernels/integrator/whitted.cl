@@ -20,8 +20,8 @@ inline integer whitted_light(Scene scene, Slab shadow, uint at, mask active, Ver
 {
     Frame frame = scatter.shading.frame;
     vec2 point = sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_LIGHT);
-    vec3 side = vertex_hemisphere(scene, frame, scatter.wo);
-    LightSample ls = common_light_sample(scene, v.s.p, side, scatter.choice.x, point, scatter.lambdas);
+    Receiver receiver = vertex_receiver(scene, v, scatter, neg3(v.d));
+    LightSample ls = common_light_sample(scene, v.s.p, receiver, scatter.choice.x, point, scatter.lambdas);
     Spectrum f = bsdf_eval(scatter.bsdf, scatter.wo, to_frame(frame, ls.wi));
     f = spectrum_scale(f, shading_frame_share(scatter.shading, ls.wi));
     mask shine = active & (ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);

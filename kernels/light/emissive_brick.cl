@@ -25,12 +25,3 @@ LightSample emissive_brick_sample(EmissiveBrick l, Scene scene, vec3 p, vec2 u, 
     s.pdf = sel(known & (spectrum_max(emits) > 0.0f), emissive_brick_pdf(l, t), (real)(0.0f));
     return s;
 }
-
-/* The medium that a row of `lights` is a part of, 0 for any other light. */
-inline integer brick_medium(Scene scene, integer row)
-{
-    LightRow l = light_at(scene, row);
-    mask part = l.kind == LIGHT_EMISSIVE_BRICK;
-    integer medium = gather_i(scene.light_params, sel_i(part, l.params, (integer)(0)));
-    return sel_i(part, medium, (integer)(0));
-}

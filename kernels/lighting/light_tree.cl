@@ -16,11 +16,11 @@ inline void light_tree_minus(real cos_a, real sin_a, real cos_b, real sin_b, rea
 }
 
 /* What the lights below a node may send to p, all surfaces there shading them: their power, times the cosine at the
- * light, over the squared distance; and times the cosine at p, where light from one hemisphere only matters. The
- * cosine at the light is the largest that any of these may have, the other that of the sphere's highest point, over the
- * distance of its centre; lift: 1 where light from both sides matters, else 0. Lights that shine on the whole scene
- * count as much everywhere. */
-inline real light_tree_importance(LightNode n, vec3 p, vec3 hemisphere, real lift)
+ * light, over the squared distance; and times what p reflects, which of a dull surface is the cosine there if light
+ * from one hemisphere only matters. The cosine at the light is the largest that any of these may have, the other that
+ * of the sphere's highest point, over the distance of its centre; lift: 1 where light from both sides matters, else 0.
+ * Lights that shine on the whole scene count as much everywhere. */
+inline real light_tree_importance(LightNode n, vec3 p, Receiver receiver, real lift)
 {
     vec3 from = sub3(p, n.center);
     real d2 = dot3(from, from), r2 = sqr(n.radius);
@@ -31,25 +31,26 @@ inline real light_tree_importance(LightNode n, vec3 p, vec3 hemisphere, real lif
     light_tree_minus(cos_w, sqrt_r(1.0f - cos_w * cos_w), n.cos_o, sin_o, &cos_x, &sin_x);
     light_tree_minus(cos_x, sin_x, cos_b, sin_b, &cos_p, &sin_p);
     cos_p = sel(d2 > r2, cos_p, (real)(1.0f));
-    real cos_r = min_r(lift + sin_b - dot3(hemisphere, from) * inverse, (real)(1.0f));
-    real arrives = max_r(cos_p, (real)(LIGHT_TREE_SLACK)) * max_r(cos_r, (real)(LIGHT_TREE_SLACK));
+    real cos_r = min_r(lift + sin_b - dot3(receiver_hemisphere(receiver), from) * inverse, (real)(1.0f));
+    real arrives = max_r(cos_p, (real)(LIGHT_TREE_SLACK));
+    arrives *= receiver_reflects(receiver, scale3(from, -inverse), sin_b, max_r(cos_r, (real)(LIGHT_TREE_SLACK)));
     mask faces = (cos_p > n.cos_e - LIGHT_TREE_SLACK) & (cos_r > -LIGHT_TREE_SLACK);
     real importance = sel(faces, n.power * arrives * sqr(inverse), (real)(0.0f));
     return sel(n.radius < 0.0f, n.power, importance);
 }
 
 /* The importance of the nodes of a group, and where each leads; their sum. */
-inline real light_tree_group(Scene scene, integer group, vec3 p, vec3 hemisphere, real value[LIGHT_TREE_WIDTH],
+inline real light_tree_group(Scene scene, integer group, vec3 p, Receiver receiver, real value[LIGHT_TREE_WIDTH],
                              integer child[LIGHT_TREE_WIDTH])
 {
     int words = scene.settings->light_count * (LIGHT_ROW_WORDS + 1);
     global const uint *nodes = scene.lights + (words + LIGHT_TREE_LINE - 1) / LIGHT_TREE_LINE * LIGHT_TREE_LINE;
     integer at = group * (LIGHT_TREE_WIDTH * LIGHT_NODE_WORDS);
-    real lift = sel(hemisphere_given(hemisphere), (real)(0.0f), (real)(1.0f)), sum = 0.0f;
+    real lift = sel(hemisphere_given(receiver_hemisphere(receiver)), (real)(0.0f), (real)(1.0f)), sum = 0.0f;
     mask placed = mask_of(0), everywhere = mask_of(0); /* of the root's group: the first node and the middle one */
     for (int i = 0; i < LIGHT_TREE_WIDTH; i++) {
         LightNode n = light_node_row(nodes + i * LIGHT_NODE_WORDS, at);
-        value[i] = light_tree_importance(n, p, hemisphere, lift);
+        value[i] = light_tree_importance(n, p, receiver, lift);
         child[i] = n.child;
         if (i == 0) placed = n.radius >= 0.0f;
         if (i == LIGHT_TREE_WIDTH / 2) everywhere = n.radius < 0.0f;
@@ -64,7 +65,7 @@ inline real light_tree_group(Scene scene, integer group, vec3 p, vec3 hemisphere
 
 /* A row, and its chance at p, for a surface that sends light to `hemisphere` (interface/light.cl): 0 where no light
  * reaches p. What is left of *u is uniform in [0, 1) again. other: see light_bits. */
-inline integer light_tree_pick(Scene scene, vec3 p, vec3 hemisphere, real *u, real other, real *pmf)
+inline integer light_tree_pick(Scene scene, vec3 p, Receiver receiver, real *u, real other, real *pmf)
 {
     integer at = 0, child[LIGHT_TREE_WIDTH];
     real value[LIGHT_TREE_WIDTH];
@@ -74,7 +75,7 @@ inline integer light_tree_pick(Scene scene, vec3 p, vec3 hemisphere, real *u, re
     real grain = UNIT_GRAIN; /* of *u: grows as its bits are spent */
 #endif
     while (any(open)) {
-        real sum = light_tree_group(scene, max_i(at, (integer)(0)), p, hemisphere, value, child);
+        real sum = light_tree_group(scene, max_i(at, (integer)(0)), p, receiver, value, child);
         real target = min_r(*u, (real)(0.9999998f)) * sum, below = 0.0f, part = value[0], above = value[0];
         integer next = child[0];
         for (int i = 1; i < LIGHT_TREE_WIDTH; i++) {
@@ -103,7 +104,7 @@ inline integer light_tree_pick(Scene scene, vec3 p, vec3 hemisphere, real *u, re
 }
 
 /* The chance of a row at p. */
-inline real light_tree_pmf(Scene scene, integer row, vec3 p, vec3 hemisphere)
+inline real light_tree_pmf(Scene scene, integer row, vec3 p, Receiver receiver)
 {
     int trails = scene.settings->light_count * LIGHT_ROW_WORDS;
     natural trail = as_natural(gather_i(scene.lights, row + trails));
@@ -112,7 +113,7 @@ inline real light_tree_pmf(Scene scene, integer row, vec3 p, vec3 hemisphere)
     mask open = at >= 0;
     real pmf = 1.0f;
     while (any(open)) {
-        real sum = light_tree_group(scene, max_i(at, (integer)(0)), p, hemisphere, value, child), part = value[0];
+        real sum = light_tree_group(scene, max_i(at, (integer)(0)), p, receiver, value, child), part = value[0];
         integer slot = as_integer(trail & (LIGHT_TREE_WIDTH - 1)), next = child[0];
         for (int i = 1; i < LIGHT_TREE_WIDTH; i++) {
             part = sel(slot == i, value[i], part);

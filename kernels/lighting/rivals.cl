@@ -129,7 +129,7 @@ inline real rival_to_light(Rival r, Surface s, vec3 d, mask delta, real p, real 
 }
 
 /* Of a light path. hemisphere: to which a camera's path would send next-event estimation here. */
-inline Rival rival_of_emission(Scene scene, Slab path, uint at, Vertex v, vec3 hemisphere)
+inline Rival rival_of_emission(Scene scene, Slab path, uint at, Vertex v, Receiver receiver)
 {
     Rival r;
     r.arrives = load_path_rival(path, at) / max_r(VERTEX_COSINE(v.s.n, v.d), (real)(1e-7f));
@@ -140,7 +140,7 @@ inline Rival rival_of_emission(Scene scene, Slab path, uint at, Vertex v, vec3 h
         integer row = sel_i(r.first, load_path_light(path, at), (integer)(0));
         vec3 wi = neg3(v.d), n = load_path_sampled_hemisphere(path, at);
         real t = v.t + load_path_null_distance(path, at);
-        real emission = common_light_begins_pdf(scene, row, v.s.p, hemisphere, wi, t, n, &r.found);
+        real emission = common_light_begins_pdf(scene, row, v.s.p, receiver, wi, t, n, &r.found);
         r.arrives = r.arrives / sel(r.first, max_r(emission, (real)(1e-30f)), (real)(1.0f));
         r.met = !r.first | rival_light_met(scene, row);
     }

@@ -6,7 +6,7 @@ inline real brick_weight(Scene scene, integer row, mask active, GridOrigin origi
     real w_met = 1.0f;
     if (any(sought)) {
         integer one = sel_i(sought, row - 1, (integer)(0));
-        real pdf = brick_light_pdf(scene, one, origin.from, origin.hemisphere, origin.before + t);
+        real pdf = brick_light_pdf(scene, one, origin.from, origin.receiver, origin.before + t);
         w_met = sel(sought, mis_weight(origin.pdf, pdf), w_met);
     }
     return w_met;

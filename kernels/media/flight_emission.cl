@@ -1,5 +1,6 @@
 /* Light that a flight gathers from media that emit. */
 #include "generated/light_of_flight.cl"
+#include "generated/body_weight.cl"
 
 inline Spectrum flight_emission(Scene scene, mask flies, integer name, Medium m, real end, Wavelengths lambdas)
 {
@@ -9,7 +10,7 @@ inline Spectrum flight_emission(Scene scene, mask flies, integer name, Medium m,
 /* Adds it to what the path has brought. */
 inline void flight_light(Scene scene, Slab path, uint at, mask flies, integer state, Spectrum light FLIGHT_ARGS)
 {
-    light = spectrum_mul(load_path_beta(path, at), light);
+    light = spectrum_mul(load_path_beta(path, at), body_weighed(scene, path, at, flies, light));
     store_path_radiance(path, at, flies, spectrum_add(load_path_radiance(path, at), light));
     flight_light_layers(scene, path, at, flies, state, light);
 }

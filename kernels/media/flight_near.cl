@@ -11,7 +11,7 @@ typedef struct {
 inline FlightNear flight_near(Scene scene, Sampler sampler, integer vertex, integer name, vec3 o, vec3 d, real end,
                               Medium m, mask scatters, real *u)
 {
-    real choice = MEDIUM_AIMS > 1 ? sampler_pair(sampler, as_natural(DIMENSION_AIM + vertex)).x : (real)(0.0f);
+    real choice = AIM_COUNT > 1 ? sampler_pair(sampler, as_natural(DIMENSION_AIM + vertex)).x : (real)(0.0f);
     FlightNear n;
     n.ends = equiangular(scene, o, d, end, spectrum_mean(m.sigma_t), choice);
     n.ends.share = flight_near_share(name, n.ends.share);

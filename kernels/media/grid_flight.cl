@@ -16,7 +16,8 @@ typedef struct {
 /* How a flight's direction was chosen: see Path.pdf, and from where. It matters where some grids emit. */
 typedef struct {
     real pdf, before; /* [1/sr]; [m] from there to the flight's origin */
-    vec3 from, hemisphere;
+    vec3 from;
+    Receiver receiver;
 } GridOrigin;
 
 #include "generated/flight_steps_of_grids.cl"

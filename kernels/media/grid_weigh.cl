@@ -1,14 +1,20 @@
 /* Weights of flights through grids over all wavelengths of a path. */
 
-/* After so much of the highest density, times metres, since the last collision the path is as likely as `pdf` at each
- * wavelength, and `value` of light is left; both lack what passes at the least extinction. */
-inline void grid_weigh(Medium m, real thickness, Spectrum value, Spectrum pdf, mask active, GridFlight *f)
+/* What passes so much of the highest density, times metres, at each wavelength over the most of them. */
+inline Spectrum grid_passes(Medium m, real thickness)
 {
     real least = m.sigma_t.x;
 #define C(c) least = min_r(least, m.sigma_t.c);
     SPECTRUM_EACH(C)
 #undef C
-    Spectrum passes = spectrum_exp(spectrum_scale(spectrum_sub(m.sigma_t, spectrum_of(least)), -thickness));
+    return spectrum_exp(spectrum_scale(spectrum_sub(m.sigma_t, spectrum_of(least)), -thickness));
+}
+
+/* After that since the last collision the path is as likely as `pdf` at each wavelength, and `value` of light is left;
+ * both lack what passes at the least extinction. */
+inline void grid_weigh(Medium m, real thickness, Spectrum value, Spectrum pdf, mask active, GridFlight *f)
+{
+    Spectrum passes = grid_passes(m, thickness);
     Spectrum pdfs = spectrum_mul(f->ratio, spectrum_mul(pdf, passes));
     real mean = spectrum_mean(pdfs), inverse = sel(mean > 1e-30f, 1.0f / mean, (real)(0.0f));
     Spectrum weight = spectrum_scale(spectrum_mul(value, passes), inverse);

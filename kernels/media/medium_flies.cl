@@ -26,18 +26,34 @@ inline Medium medium_load(Scene scene, integer name, Wavelengths lambdas)
     return m;
 }
 
-/* What t metres of a medium that is the same everywhere emit, and let through: by Kirchhoff's law a metre emits as much
- * of `light`, the radiance of a thick body, as it absorbs of any. */
-inline Spectrum medium_emission(Scene scene, integer name, Medium m, real t, Wavelengths lambdas)
+/* 1 + the row of `lights` that a medium is, 0 for none. */
+inline integer medium_light_row(Scene scene, integer name)
+{
+    integer row = max_i(MEDIUM_ROW(name), (integer)(MEDIUM_LIGHT + 1));
+    return sel_i(name != 0, gather_i(scene.materials, row - MEDIUM_LIGHT - 1), (integer)(0));
+}
+
+/* What a metre of a medium that is the same everywhere emits [W m^-3 sr^-1 nm^-1]: by Kirchhoff's law as much of
+ * `light`, the radiance of a thick body, as it absorbs of any. */
+inline Spectrum medium_metre(Scene scene, integer name, Medium m, Wavelengths lambdas)
 {
     integer row = max_i(MEDIUM_ROW(name), (integer)(MEDIUM_LIGHT)) - MEDIUM_LIGHT;
     Spectrum light = medium_light(scene, row, texture_point_nowhere(), lambdas);
-    Spectrum r = spectrum_sub(m.sigma_t, m.sigma_s); /* absorbs, and so emits */
+    Spectrum absorbs = spectrum_sub(m.sigma_t, m.sigma_s);
+#define C(c) light.c *= max_r(absorbs.c, (real)(0.0f));
+    SPECTRUM_EACH(C)
+#undef C
+    return light;
+}
+
+/* What t metres of such a medium emit, and let through. */
+inline Spectrum medium_emission(Scene scene, integer name, Medium m, real t, Wavelengths lambdas)
+{
+    Spectrum r = medium_metre(scene, name, m, lambdas);
 #define C(c)                                                                             \
     real depth_##c = m.sigma_t.c * t;                                                    \
     real some_##c = (1.0f - exp_r(-depth_##c)) / max_r(m.sigma_t.c, (real)(1e-30f));     \
-    r.c = max_r(r.c, (real)(0.0f)) * light.c *                                           \
-          sel(depth_##c > 1e-2f, some_##c, t * (1.0f - depth_##c * (0.5f - depth_##c * (1.0f / 6.0f))));
+    r.c *= sel(depth_##c > 1e-2f, some_##c, t * (1.0f - depth_##c * (0.5f - depth_##c * (1.0f / 6.0f))));
     SPECTRUM_EACH(C)
 #undef C
     return r;

@@ -1,3 +1,3 @@
 /* The hemisphere to which the surface sends light where a ray was chosen: lights are chosen by it. */
-#define path_hemisphere(path, at) load_path_sampled_hemisphere(path, at)
-#define path_hemisphere_keep(path, at, m, hemisphere) store_path_sampled_hemisphere(path, at, m, hemisphere)
+#define path_receiver(path, at) load_path_sampled_hemisphere(path, at)
+#define path_receiver_keep(path, at, m, receiver) store_path_sampled_hemisphere(path, at, m, receiver)

@@ -101,11 +101,11 @@ inline Scattering vertex_scattering(Scene scene, Slab path, uint at, mask active
 #define vertex_sealed(v) mask_of(0)
 #endif
 
-/* The normal of the hemisphere to which the material sends light, 0 if to the whole sphere: for interface/light.cl. */
-inline vec3 vertex_hemisphere(Scene scene, Frame frame, vec3 wo)
+/* To which hemisphere the material sends light, or to the whole sphere, and with what gloss along `away`. */
+inline Receiver vertex_receiver(Scene scene, Vertex v, Scattering scatter, vec3 away)
 {
-    real sign = BSDF_TRANSMITS ? (real)(0.0f) : sel(wo.z < 0.0f, (real)(-1.0f), (real)(1.0f));
-    return scale3(frame.n, sign);
+    real sign = BSDF_TRANSMITS ? (real)(0.0f) : sel(scatter.wo.z < 0.0f, (real)(-1.0f), (real)(1.0f));
+    return receiver_at(scene, v.row, scale3(scatter.shading.frame.n, sign), away);
 }
 
 /* Whether what leaves by such a lobe has met a null surface. */

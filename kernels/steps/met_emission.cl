@@ -21,8 +21,8 @@ inline mask met_emission(Scene scene, Slab path, uint at, mask active, Vertex v 
     if (any(lit)) {
         integer light = sel_i(lit, s.light, (integer)(0));
         real pdf = load_path_pdf(path, at), null_distance = load_path_null_distance(path, at);
-        vec3 from = madd3(v.d, -null_distance, v.o), side = path_hemisphere(path, at);
-        real other = light_pdf(scene, light, from, side, v.d, v.t + null_distance, s.n);
+        vec3 from = madd3(v.d, -null_distance, v.o);
+        real other = light_pdf(scene, light, from, path_receiver(path, at), v.d, v.t + null_distance, s.n);
         real w = met_weight(scene, path, at, v, light, pdf, other);
         Spectrum le = emission_load(scene, light_at(scene, light).radiance, surface_texture_point(s), v.lambdas);
         le = spectrum_scale(spectrum_mul(v.beta, le), w);

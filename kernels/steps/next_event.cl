@@ -12,15 +12,14 @@ typedef struct {
 inline NextEvent next_event_seek(Scene scene, mask next, Vertex v, Scattering scatter)
 {
     NextEvent e;
-    Frame frame = scatter.shading.frame;
-    vec3 hemisphere = vertex_hemisphere(scene, frame, scatter.wo);
+    Receiver receiver = vertex_receiver(scene, v, scatter, neg3(v.d));
     vec2 point = sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_LIGHT);
     e.shine = next & !vertex_sealed(v);
     e.ls = light_sample_nothing();
     if (!(BSDF_ABSORBS || BSDF_IS_SEALED) || any(e.shine))
-        e.ls = common_light_sample(scene, v.s.p, hemisphere, scatter.choice.x, point, scatter.lambdas);
+        e.ls = common_light_sample(scene, v.s.p, receiver, scatter.choice.x, point, scatter.lambdas);
     e.begins = event_begins(scene, v.s, e.ls);
-    e.wi = to_frame(frame, e.ls.wi);
+    e.wi = to_frame(scatter.shading.frame, e.ls.wi);
     return e;
 }
 

@@ -7,5 +7,5 @@ inline void path_scatters(Scene scene, Slab path, uint at, mask next, mask null,
     delta = delta | vertex_sealed(*v); /* where light that is met has its whole weight */
     bs.pdf = rival_goes_to_light(path, at, scatters, rival, v, onward, delta, bs);
     store_path_pdf(path, at, scatters, sel(delta, (real)(-1.0f), bs.pdf));
-    if (!BSDF_DELTA) path_hemisphere_keep(path, at, next, vertex_hemisphere(scene, scatter.shading.frame, scatter.wo));
+    if (!BSDF_DELTA) path_receiver_keep(path, at, next, vertex_receiver(scene, *v, scatter, neg3(v->d)));
 }

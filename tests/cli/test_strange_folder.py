@@ -66,6 +66,7 @@ def run(folder: Path, *words: str, module: bool = False) -> None:
     assert process.returncode == 0, told
 
 
+@pytest.mark.long
 def test_commands_that_end(folder: Path) -> None:
     """Each of them, with a small job; the first makes what the others read."""
     run(folder, *RENDER, "out/a.film", "-o", "out/a.exr", "-o", "out/a.png")

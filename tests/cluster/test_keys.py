@@ -114,6 +114,7 @@ def three(tmp_path):
             one.wait()
 
 
+@pytest.mark.long
 def test_nobody_without_the_keys_gets_an_answer(three, tmp_path):
     """Four processes listen at one port each; a stranger is heard by none of them."""
     started, address, folder, render = three

@@ -38,6 +38,7 @@ class Lit:
     rows: lights.LightRows
     files: tuple[str, ...] = ()
     radius: float = 1.0
+    gloss: bool = False
     buffers: dict[str, Any] = field(default_factory=dict)
 
     def __call__(self, body: str, given: np.ndarray, results: int, lanes: int = 8) -> np.ndarray:
@@ -82,7 +83,8 @@ class Lit:
         if factors:
             text += parameters.factor_text(factors)
         features = Features(
-            lights=of_lights(self.rows), materials=MaterialFeatures(sources=encoder.sources)
+            lights=of_lights(self.rows, int(self.gloss)),
+            materials=MaterialFeatures(sources=encoder.sources),
         )
         return text + light_dispatch.dispatch_text(features)
 
@@ -137,8 +139,12 @@ def lit(
     radius: float = 1.0,
     files=(),
     tree: bool = False,
+    gloss: bool = False,
 ) -> Lit:
-    """A scene of lamps and emissive shapes; `files` are further includes; `tree` chooses lights."""
+    """A scene of lamps and emissive shapes; `files` are further includes.
+
+    tree: it chooses lights; gloss: by the gloss of surfaces.
+    """
     encoder = Encoder(mode)
     made, first = [], 0
     for number, shape in enumerate(emitters):
@@ -163,7 +169,7 @@ def lit(
     encoder.textures.finish()
     if rows.tree is not None:
         encoder.store.append("lights", rows.tree)
-    return Lit(encoder, rows, tuple(files), radius)
+    return Lit(encoder, rows, tuple(files), radius, gloss)
 
 
 def shape_probe(shape) -> Lit:

@@ -57,8 +57,8 @@ inline Lamp lamp(integer row)
 #define light_at(scene, row) lamp(row)
 #define light_path_pdf(scene, row, p, wi, t, n) (scene).emission
 #define light_emit_pdf(scene, row, wi, t) (scene).emission
-#define light_found_pdf(scene, row, p, hemisphere, wi, t, n) (scene).found
-#define common_light_begins_pdf(scene, row, p, hemisphere, wi, t, n, there) \
+#define light_found_pdf(scene, row, p, receiver, wi, t, n) (scene).found
+#define common_light_begins_pdf(scene, row, p, receiver, wi, t, n, there) \
     (*(there) = (scene).found, (scene).emission)
 #define load_path_rival(path, at) (path).rival
 #define load_path_pending(path, at) (path).pending
@@ -67,6 +67,7 @@ inline Lamp lamp(integer row)
 #define load_path_null_distance(path, at) ((real)(0.0f))
 #define store_path_pending(path, at, m, value)
 #define load_path_sampled_hemisphere(path, at) v3(0.0f, 0.0f, 0.0f)
+#include "lighting/receiver_none.cl"
 #include "lighting/rivals.cl"
 #undef Scene
 #undef Slab

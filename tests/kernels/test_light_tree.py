@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -37,7 +38,21 @@ INFINITE = """
     Spectrum le;
     infinite_light(scene, 0, v3(x[0], x[1], x[2]), side, d, lambdas, &le, &r[0]);
 """
+GLOSSY = """
+    natural gloss = to_natural(x[11]) << 16u | to_natural(x[12]);
+    natural away = octahedral_pack(v3(x[8], x[9], x[10]));
+    Receiver receiver = receiver_of(v3(x[5], x[6], x[7]), away, gloss);
+    real u = x[3], pmf;
+    vec3 p = v3(x[0], x[1], x[2]);
+    integer row = light_tree_pick(scene, p, receiver, &u, x[4], &pmf);
+    r[0] = to_real(row);
+    r[1] = pmf;
+    r[2] = u;
+    r[3] = light_tree_pmf(scene, to_integer(x[13]), p, receiver);
+    r[4] = light_tree_pmf(scene, row, p, receiver);
+"""
 LEAST = 0.05  # LIGHT_TREE_LEAST
+SPREAD, MOST = 0.1, 0.95  # RECEIVER_SPREAD and RECEIVER_MOST
 SAMPLE = """
     vec2 u = {x[4], x[5]};
     vec3 side = v3(x[6], x[7], x[8]);
@@ -55,7 +70,7 @@ def scattered(count: int, seed: int = 1) -> Mesh:
     return Mesh(vertices=vertices, faces=faces, emission=Area(radiance=(1.0, 2.0, 3.0)))
 
 
-def mixed(tree: bool) -> Lit:
+def mixed(tree: bool, gloss: bool = False) -> Lit:
     """Lights of all sorts; the last two rows of lamps are not placed."""
     both = Area(radiance=(3.0, 3.0, 3.0), two_sided=True)
     place = T.translate([0.5, 1.0, 0.2]) @ T.rotate([1, 1, 0], 70)
@@ -73,12 +88,44 @@ def mixed(tree: bool) -> Lit:
         Projector(to_world=T.translate([0, 0, 2]) @ place, irradiance=(1.0, 1.0, 1.0)),
         Goniometric(to_world=place, intensity=(0.2, 0.2, 0.2)),
     ]
-    return lit(lamps, emitters, radius=3.0, tree=tree)
+    return lit(lamps, emitters, radius=3.0, tree=tree, gloss=gloss)
 
 
 @cache
 def scene() -> Lit:
     return mixed(True)
+
+
+@cache
+def glossy_scene() -> Lit:
+    return mixed(True, gloss=True)
+
+
+@dataclass(frozen=True)
+class Gloss:
+    """What is seen from a direction (3,) of a surface that has these microfacets in a share."""
+
+    away: np.ndarray
+    alpha: float
+    share: float
+    side: np.ndarray
+
+    def reflects(self, wi: np.ndarray, sine: np.ndarray, cosine: np.ndarray) -> np.ndarray:
+        """Pi f cos, over the albedo, of light from around wi (k, 3), float64.
+
+        GGX by Walter et al. 2007 eq. 33, and G1 by eq. 34; Fresnel by Schlick 1994.
+        """
+        cos_o = float(self.away @ self.side)
+        if cos_o <= 0.0 or self.share == 0.0:
+            return cosine
+        share = MOST * (self.share + (1.0 - self.share) * (1.0 - cos_o) ** 5)
+        h = self.away + wi
+        c = np.maximum(h @ self.side, 0.0) / np.linalg.norm(h, axis=1)
+        a2 = np.minimum(self.alpha**2 + SPREAD * sine**2, 1.0)
+        d = a2 / (np.pi * (c**2 * (a2 - 1.0) + 1.0) ** 2)
+        tan2 = 1.0 / cos_o**2 - 1.0
+        g1 = 2.0 / (1.0 + np.sqrt(1.0 + self.alpha**2 * tan2))
+        return (1.0 - share) * cosine + share * np.pi * d * g1 / (4.0 * cos_o)
 
 
 def points(count: int, seed: int = 2) -> np.ndarray:
@@ -103,7 +150,9 @@ def pmfs(there: Lit, p: np.ndarray, side: np.ndarray | None = None) -> np.ndarra
     return there(PMF, given, 1)[0].reshape(count, -1).astype(float)
 
 
-def importance(nodes: np.ndarray, p: np.ndarray, side: np.ndarray) -> np.ndarray:
+def importance(
+    nodes: np.ndarray, p: np.ndarray, side: np.ndarray, gloss: Gloss | None = None
+) -> np.ndarray:
     """Of all nodes at one point, (k,) float64, with angles instead of their cosines."""
     away = p - nodes["center"].astype(float)
     radius = nodes["radius"].astype(float)
@@ -120,11 +169,17 @@ def importance(nodes: np.ndarray, p: np.ndarray, side: np.ndarray) -> np.ndarray
     near = near if side.any() else 1.0
     value = nodes["power"] * np.maximum(least, 1e-3) / np.maximum(d2, radius**2)
     faces = (least > nodes["cos_e"] - 1e-3) & (near > -1e-3)
-    value = np.where(faces, value * np.maximum(near, 1e-3), 0.0)
+    reflected = np.maximum(near, 1e-3)
+    if gloss is not None:
+        far = np.sqrt(np.maximum(d2, radius**2))
+        reflected = gloss.reflects(-away / far[:, None], radius / far, reflected)
+    value = np.where(faces, value * reflected, 0.0)
     return np.where(radius < 0.0, nodes["power"], value)
 
 
-def reference(there: Lit, p: np.ndarray, side: np.ndarray) -> np.ndarray:
+def reference(
+    there: Lit, p: np.ndarray, side: np.ndarray, gloss: Gloss | None = None
+) -> np.ndarray:
     """Probabilities (rows,) at one point, from the root down."""
     count = len(there.rows.rows)
     first = -(-count * (LIGHT.words + 1) // LINE) * LINE - count * LIGHT.words
@@ -132,7 +187,7 @@ def reference(there: Lit, p: np.ndarray, side: np.ndarray) -> np.ndarray:
     chance = np.zeros(len(nodes))
     chance[0], found = 1.0, np.zeros(count)
     for at, group in enumerate(nodes):  # children stand behind their parents
-        value = importance(group, p, side)
+        value = importance(group, p, side, gloss)
         if group["radius"][2] < 0.0 <= group["radius"][0] and value[0] * value[2] > 0.0:
             near, far = value[0], value[2]
             value[0], value[2] = max(near, LEAST * far), max(far, LEAST * near)
@@ -201,6 +256,32 @@ def test_choices_follow_the_probabilities():
         assert (counts[chances == 0.0] == 0).all()
         assert abs(rest[~none].mean() - 0.5) < SIGMAS / np.sqrt(12 * (~none).sum())
         assert rest.min() >= 0.0 and rest.max() < 1.0
+
+
+def test_gloss_chooses_as_the_tree_says():
+    """Chances are those of float64, and sum to one; choices follow them, with the same chance."""
+    there, rng, n = glossy_scene(), np.random.default_rng(5), 20_000
+    count, sums = len(there.rows.rows), []
+    cases = [(a, s) for a in (0.02, 0.1, 0.4, 1.0) for s in (0.0, 0.1, 1.0)] * 2
+    for p, (alpha, share) in zip(points(len(cases), 8).T, cases, strict=True):
+        side, away = (v / np.linalg.norm(v) for v in rng.normal(size=(2, 3)))
+        gloss = Gloss(away, alpha, share, side)
+        words = [int(alpha * 65535) * (share > 0.0), int(share * 65535)]
+        fixed = np.tile(np.concatenate([side, away, words])[:, None], n)
+        row = np.arange(n) % count
+        given = np.vstack([np.tile(p[:, None], n), rng.random((2, n)), fixed, row])
+        chosen, pmf, rest, chance, again = there(GLOSSY, given, 5).astype(float)
+        expected = reference(there, p, side, gloss)
+        np.testing.assert_allclose(chance[:count], expected, rtol=0.01, atol=2e-6)
+        found = pmf > 0.0
+        np.testing.assert_allclose(again[found], pmf[found], rtol=1e-5)
+        sums.append(expected.sum())
+        seen = np.bincount(chosen[found].astype(int), minlength=count)
+        full = expected * n > 8.0
+        statistic = ((seen - expected * n)[full] ** 2 / (expected * n)[full]).sum()
+        assert chi2.sf(statistic, full.sum()) > 1e-4 / len(cases)
+        assert (seen[chance[:count] == 0.0] == 0).all() and (rest >= 0.0).all() and rest.max() < 1
+    assert max(sums) < 1.0 + 1e-9 and np.mean(sums) > 0.7  # what is dark below is lost
 
 
 def test_many_lights_are_chosen_with_enough_bits():

@@ -200,7 +200,12 @@ def test_all_lights_together_are_their_sum():
     alone = [lit([lamp]) for lamp in lamps] + [lit(emitters=[shape]) for shape in glowing]
     parts = [irradiance(scene, p, n, seed=i) for i, scene in enumerate(alone)]
     together = lit(lamps, glowing, radius=3.0)
-    other_mode = {"spectral_envmap", "spectral_sky", "emissive_brick"}  # and of media
+    other_mode = {
+        "spectral_envmap",
+        "spectral_sky",
+        "emissive_brick",
+        "emissive_body",
+    }  # and of media
     assert set(together.rows.kinds) == set(light_records.KINDS) - other_mode
     mean, error = irradiance(together, p, n, count=1 << 18, seed=77)
     expected = np.sum([m for m, _ in parts], axis=0)

@@ -32,6 +32,7 @@ ALTERNATIVES = (  # files, of each row of which a program has one at most
     ("optics/thin_film*.cl",),
     ("optics/boundary_bare.cl", "optics/layers_*.cl"),
     ("path/*_frame*.cl",),
+    ("path/kept_*.cl",),
     ("path/first_ray*.cl",),
     ("path/vertex_bodies.cl", "path/vertex_media.cl", "path/vertex_media_none.cl"),
     ("path/vertex_bodies_ways.cl", "path/vertex_media_ways*.cl"),

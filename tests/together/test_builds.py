@@ -101,6 +101,7 @@ def test_parts_that_once_did_not_go_together(parts: str, mode: str) -> None:
     assert errors(dict.fromkeys(made)) == [""] * len(dict.fromkeys(made))
 
 
+@pytest.mark.long
 @hypothesis.seed(1)
 @hypothesis.settings(
     max_examples=SCENES,

@@ -18,6 +18,7 @@ from tests.together.builds import Way
 ENOUGH = 4  # scenes of which each is made small in a second or two
 
 
+@pytest.mark.long
 def test_the_smallest_scene_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """As if disks under images failed."""
 

@@ -49,6 +49,7 @@ def check(tally: campaign.Tally) -> None:
     assert not [kind for kind in tally.came if kind.startswith("watch closed")]
 
 
+@pytest.mark.long
 def test_random_messages_end_nothing() -> None:
     """Seven clients, quick, slow and broken, for some seconds."""
     check(campaign.run(8.0))

@@ -1,19 +1,70 @@
-"""Media whose bricks are lights: what a grid emits."""
+"""Media that are lights: bricks of what a grid emits, and homogeneous media in their boundaries."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from clpt.arrays import on_device
+from clpt.geometry import analytic, shapes
+from clpt.geometry.tessellate import keeps_its_kind
+from clpt.geometry.winding import box
 from clpt.render.analysis.bricks import Glow, black_bodies, glow
-from clpt.scene.media import Grid, Medium
+from clpt.render.analysis.index import SceneIndex, leaves_of
+from clpt.render.analysis.open_boundaries import HOLE, hole_around
+from clpt.render.analysis.surroundings import every
+from clpt.scene.media import Grid, Lattice, Medium
+from clpt.scene.shapes import Cube, Cylinder, Disk, Mesh, Rectangle, SdfGrid, Shape, Sphere
+
+SOLID = Sphere | Cube | Mesh | SdfGrid
+WALLS = Cylinder | Disk | Rectangle  # which may enclose something together
+FILLED = 0.1  # share of a box that bodies must fill, so that it is worth to aim at it
+
+Cached = Callable[..., Any] | None
 
 
-def glows(emitting: Iterable[Medium], spectral: bool) -> dict[Medium, Glow]:
-    """Return the bricks that are lights, of each medium with a density that emits."""
-    return {medium: _glow(medium, spectral) for medium in emitting if isinstance(medium, Grid)}
+@dataclass(frozen=True)
+class GlowingBody:
+    """A homogeneous medium as one light, see kernels/light/emissive_body.cl.
+
+    matrix (3, 4): the axes and the middle of the ball or box that holds it [m]; ball: which of
+    them; power [W/nm].
+    """
+
+    matrix: NDArray[np.float64]
+    ball: bool
+    power: float
+
+    @property
+    def volume(self) -> float:
+        """The volume of the ball or box [m^3]."""
+        return _volume(self.matrix, self.ball)
+
+    @property
+    def reach(self) -> NDArray[np.float64]:
+        """Its extent from the middle along x, y and z (3,) [m]."""
+        edges = self.matrix[:, :3]
+        found = np.linalg.norm(edges, axis=1) if self.ball else np.abs(edges).sum(axis=1)
+        return np.asarray(found)
+
+
+def glows(index: SceneIndex, cached: Cached) -> dict[Medium, Glow | GlowingBody]:
+    """Return the lights that media are: of each with a density, and of each that is homogeneous.
+
+    cached: `LoweringCache`, which keeps the triangles of boundaries.
+    """
+    found: dict[Medium, Glow | GlowingBody] = {}
+    for medium in index.emitting:
+        if isinstance(medium, Grid):
+            found[medium] = _glow(medium, index.spectral)
+        elif not isinstance(medium, Lattice):
+            body = _body(medium, index, cached)
+            found.update({medium: body} if body is not None else {})
+    return found
 
 
 def _glow(medium: Grid, spectral: bool) -> Glow:
@@ -26,3 +77,72 @@ def _glow(medium: Grid, spectral: bool) -> Glow:
     else:
         strength = strength * np.asarray(light.to_rgb("emission"), float)
     return glow(medium, max(float(strength.mean()), 1e-30), brightness).brightest()
+
+
+def _body(medium: Medium, index: SceneIndex, cached: Cached) -> GlowingBody | None:
+    """Return a homogeneous medium as a light, None where rays to it are no use.
+
+    It must be in closed boundaries that rest, let light straight on, and fill a box well.
+    """
+    elsewhere = {index.camera.medium, *(shape.exterior for shape in index.shapes)}
+    around = [shape for shape in every(index.listed) if shape.interior is medium]
+    if medium in elsewhere or not around or not all(_encloses(shape) for shape in around):
+        return None
+    if hole_around(index, medium, cached) > HOLE:
+        return None
+    places = [_place(shape, cached) for shape in around]
+    if len(places) == 1:
+        matrix, ball = places[0]
+    else:
+        matrix, ball = _box_around([box(shape, cached) for shape in around]), False
+    whole = _volume(matrix, ball)
+    apart = all(isinstance(shape, SOLID) for shape in around)
+    filled = sum(_volume(*place) for place in places) if apart else whole
+    if not whole > 0.0 or filled < FILLED * whole:
+        return None
+    return GlowingBody(matrix, ball, _power(medium, matrix, ball, index.spectral))
+
+
+def _encloses(shape: Shape) -> bool:
+    """Whether a boundary is at rest, may be closed, and lets rays to lights through."""
+    if shape.motion is not None or shape.deformation is not None:
+        return False
+    if isinstance(shape, Mesh) and on_device(shape.vertices):
+        return False
+    return isinstance(shape, SOLID | WALLS) and any(
+        leaf.is_null for leaf in leaves_of(shape.material)
+    )
+
+
+def _place(shape: Shape, cached: Cached) -> tuple[NDArray[np.float64], bool]:
+    """The axes and the middle (3, 4) of a ball or box around a shape, and whether it is a ball."""
+    if isinstance(shape, Sphere) and keeps_its_kind(shape):
+        members = analytic.members_of(shape)
+        return np.column_stack([float(members["radius"]) * np.eye(3), members["center"]]), True
+    if isinstance(shape, Cube):
+        return shapes.placement(shape)[:3], False
+    return _box_around([box(shape, cached)]), False
+
+
+def _box_around(boxes: Iterable[tuple[Any, Any]]) -> NDArray[np.float64]:
+    """The axes and the middle (3, 4) of the box around boxes."""
+    lows, highs = zip(*boxes, strict=True)
+    low, high = np.min(lows, axis=0).astype(float), np.max(highs, axis=0).astype(float)
+    return np.column_stack([np.diag((high - low) / 2.0), (high + low) / 2.0])
+
+
+def _volume(matrix: NDArray[np.float64], ball: bool) -> float:
+    return (4.0 / 3.0 * np.pi if ball else 8.0) * abs(float(np.linalg.det(matrix[:, :3])))
+
+
+def _power(medium: Medium, matrix: NDArray[np.float64], ball: bool, spectral: bool) -> float:
+    """The power of a ball or box [W/nm]: pi, its surface and the radiance of its mean chord."""
+    light: Any = medium.light
+    absorbs = np.asarray(medium.coefficients(spectral)[0].to_rgb("unbounded"), float)
+    radiance = np.asarray(light.to_rgb("emission"), float)
+    volume, edges = _volume(matrix, ball), matrix[:, :3]
+    sides = [np.linalg.norm(np.cross(edges[:, i], edges[:, i - 1])) for i in range(3)]
+    surface = 4.0 * (np.pi * float(np.mean(sides)) if ball else 2.0 * float(np.sum(sides)))
+    chord = 4.0 * volume / surface
+    shown = radiance * -np.expm1(-np.maximum(absorbs, 0.0) * chord)
+    return max(float(np.pi * surface * shown.mean()), 1e-30)

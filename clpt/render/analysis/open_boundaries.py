@@ -41,7 +41,7 @@ def warnings_of(index: SceneIndex, cached: Callable[..., Any] | None = None) -> 
                 known = any(inside == other for other, _ in suspects)
                 if not known and _own_hole(shape, cached) > HOLE:
                     suspects.append((inside, shape))
-    found = [(shape, _hole(index, inside, cached)) for inside, shape in suspects]
+    found = [(shape, hole_around(index, inside, cached)) for inside, shape in suspects]
     holes = [(shape, share) for shape, share in found if share > HOLE]
     if not holes:
         return []
@@ -75,7 +75,7 @@ def _own_hole(shape: Shape, cached: Callable[..., Any] | None) -> float:
     return share
 
 
-def _hole(index: SceneIndex, inside: object, cached: Callable[..., Any] | None) -> float:
+def hole_around(index: SceneIndex, inside: object, cached: Callable[..., Any] | None) -> float:
     """The largest hole of all shapes around something, over their area."""
     around: list[tuple[float, Shape]] = []
     for shape in every(index.listed, lambda one: True):

@@ -8,15 +8,17 @@ from clpt.records import HIT, SHADOW, SLABS
 from clpt.render.contract.features import Features
 
 CHANGED = (
-    "o", "d", "beta", "radiance", "lambdas", "pdf", "sampled_hemisphere", "null_distance", "nulls",
-    "ratio", "eta", "medium", "bodies", "lead", "rival", "pending", "expected", "state",
-    "cone",
+    "o", "d", "beta", "radiance", "lambdas", "pdf", "sampled_hemisphere", "sampled_wo",
+    "sampled_gloss", "null_distance", "nulls", "ratio", "eta", "medium", "bodies", "lead", "rival",
+    "pending", "expected", "state", "cone",
 )  # fmt: skip
 READ = ("weight", "light", "time", "pixel_index", "pixel_key", "sample")  # and not changed
 # members that not every scene has, each with the features that ask for it
 NEEDED: dict[str, Callable[[Features], bool]] = {
     "lambdas": lambda f: f.spectra.spectral,
     "sampled_hemisphere": lambda f: f.hemispheres,
+    "sampled_wo": lambda f: f.lights.gloss > 0,
+    "sampled_gloss": lambda f: f.lights.gloss > 0,
     "null_distance": lambda f: f.materials.null_surfaces,
     "nulls": lambda f: f.materials.null_surfaces,
     "ratio": lambda f: f.ratios,
@@ -24,7 +26,7 @@ NEEDED: dict[str, Callable[[Features], bool]] = {
     "bodies": lambda f: f.media.bodies,
     "lead": lambda f: f.media.absorbing,
     "through": lambda f: f.shadow_media,
-    "into": lambda f: f.lights.bricks,
+    "into": lambda f: f.lights.volumes,
     "rival": lambda f: f.transport.balanced,
     "pending": lambda f: f.transport.merged,
     "expected": lambda f: f.transport.guided,

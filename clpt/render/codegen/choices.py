@@ -20,6 +20,15 @@ def either(holds: object, file: str) -> tuple[str, ...]:
     return (file if holds else f"{file.removesuffix('.cl')}_none.cl",)
 
 
+def _grid_meet(features: Features) -> str:
+    """Return the file about collisions in grids."""
+    grids = features.media.grids
+    if grids.mixed:
+        return "grid_meet_mixed"
+    varied = features.ratios and (grids.coloured or grids.tinted)
+    return "grid_meet_coloured" if varied else "grid_meet"
+
+
 # name: the files that stand for it, for a scene's features and the layout of its triangles
 CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/spectrum.cl": lambda f, _: (f"spectrum/{f.spectra.mode}.cl",),
@@ -76,10 +85,17 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         + either(f.media.bodies, "media/bodies.cl") * f.media.present
     ),
     "generated/grid_flight.cl": lambda f, _: (
-        ("generated/lights.cl", "path/met_light.cl") * f.media.grids.emissive
-        + ("media/grid_flight.cl",) * f.media.grids.present
+        *(
+            ("generated/lights.cl", "path/met_light.cl")
+            if f.media.grids.emissive or f.lights.bodies
+            else when(f.media.grids.present, "lighting/receiver_none.cl")
+        ),
+        *when(f.media.grids.present, "media/grid_flight.cl"),
     ),
-    "generated/kept_hemisphere.cl": lambda f, _: either(f.hemispheres, "path/kept_hemisphere.cl"),
+    "generated/kept_hemisphere.cl": lambda f, _: (
+        when(f.lights.gloss, "path/kept_receiver.cl")
+        or either(f.hemispheres, "path/kept_hemisphere.cl")
+    ),
     "generated/seen_wavelengths.cl": lambda f, _: either(
         f.fluorescence, "path/seen_wavelengths.cl"
     ),
@@ -107,9 +123,11 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/flight_steps_of_grids.cl": lambda f, _: (
         *either(f.ratios, "media/grid_weigh.cl"),
         *either(f.media.grids.emissive, "media/grid_gather.cl"),
-        f"media/grid_meet{'_mixed' * bool(f.media.grids.mixed)}.cl",
+        f"media/{_grid_meet(f)}.cl",
     ),
     "generated/brick_weight.cl": lambda f, _: either(f.lights.bricks, "media/brick_weight.cl"),
+    "generated/body_weight.cl": lambda f, _: either(f.lights.bodies, "media/body_weight.cl"),
+    "generated/aim_cone.cl": lambda f, _: either(f.media.aim_cones, "media/aim_cone.cl"),
     "generated/grid_origin.cl": lambda f, _: either(f.media.grids.emissive, "media/grid_origin.cl"),
     "generated/flight_steps.cl": lambda f, _: (
         f"media/flight_medium{'_bodies' * f.media.bodies}.cl",
@@ -245,6 +263,7 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
     ),
     "generated/light_path_steps.cl": lambda f, cls: (
         *either(f.transport.joined and not cls.delta, "steps/join_camera.cl"),
+        *either(flags.asks_chance(f, cls), "lighting/rival_chosen.cl"),
         "steps/adjoint_weight.cl",
         *either(not flags.is_null(f, cls), "steps/light_path_roulette.cl"),
     ),

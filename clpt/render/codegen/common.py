@@ -48,16 +48,25 @@ FUNCTIONS = (
     Common(
         "LightSample",
         "light_sample",
-        _parameters("Scene scene, vec3 p, vec3 hemisphere, real pick, vec2 u, Wavelengths lambdas"),
+        _parameters(
+            "Scene scene, vec3 p, Receiver receiver, real pick, vec2 u, Wavelengths lambdas"
+        ),
         lambda f, cls: f.lights.kinds and not cls.delta,
     ),
     Common(
         "real",
         "light_begins_pdf",
         _parameters(
-            "Scene scene, integer row, vec3 p, vec3 side, vec3 wi, real t, vec3 n, real *found"
+            "Scene scene, integer row, vec3 p, Receiver receiver, vec3 wi, real t, vec3 n, "
+            "real *found"
         ),
         lambda f, cls: f.transport.balanced and not flags.is_null(f, cls),
+    ),
+    Common(
+        "real",
+        "light_tree_pmf",
+        _parameters("Scene scene, integer row, vec3 p, Receiver receiver"),
+        flags.asks_chance,
     ),
 )
 

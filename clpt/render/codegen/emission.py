@@ -69,9 +69,10 @@ def densities_text(features: Features) -> str:
     across it at distance t; over the cosine at a light on a shape. Of that, what is left where
     squared distances cancel: [1/(m^2 sr)], and of a light at a point per t^2 [1/m^2], in units of
     Settings.rival_area.
-    light_found_pdf(scene, row, p, hemisphere, wi, t, n): the density with which next-event
+    light_found_pdf(scene, row, p, receiver, wi, t, n): the density with which next-event
     estimation at p finds that point of the light [1/sr]; n: the normal there. Of a delta light it
-    is the chance of its row.
+    is the chance of its row. Where the tree asks for gloss it is without that chance, which is
+    known later, see kernels/lighting/rival_chosen.cl.
     light_path_pdf(scene, row, p, wi, t, n): light_emit_pdf of light that is aimed, too.
     """
     present, moving = kinds_of(features), features.motion.lights
@@ -89,8 +90,8 @@ def densities_text(features: Features) -> str:
         "value * l.pmf * scene.settings->rival_area",
     )
     found = Function(
-        "real light_found_pdf(Scene scene, integer row, vec3 p, vec3 hemisphere, vec3 wi, real t, "
-        "vec3 n)",
+        "real light_found_pdf(Scene scene, integer row, vec3 p, Receiver receiver, vec3 wi, "
+        "real t, vec3 n)",
         "1.0f",
         [
             Case(kind_test(kind, present), f"{kind}_pdf({row_text(features, kind)}, {given})")
@@ -98,7 +99,7 @@ def densities_text(features: Features) -> str:
             if (given := _pdf_arguments(kind, moving))
         ],
         ("LightRow l = light_at(scene, row);", *motion, *_BACK * moving),
-        f"value * {pmf_text(features)}",
+        "value" if features.lights.gloss else f"value * {pmf_text(features)}",
     )
     either = "#define light_path_pdf(scene, row, p, wi, t, n) light_emit_pdf(scene, row, wi, t)"
     if features.transport.aimed:
@@ -184,7 +185,8 @@ def _aimed_text(features: Features) -> list[str]:
 # of a point that a light shines on, where the light was lowered
 _BACK = (
     "vec3 rest = motion_point_back(motion, p), along = motion_back_unit(motion, wi);",
-    "vec3 front = motion_front_back(motion, n), side = motion_back_unit(motion, hemisphere);",
+    "vec3 front = motion_front_back(motion, n);",
+    "vec3 side = motion_back_unit(motion, receiver_hemisphere(receiver));",
     "real far = t * motion_length_back(motion, wi);",
 )
 
@@ -194,7 +196,7 @@ def _pdf_arguments(kind: str, moving: bool) -> str:
     if kind in shape_records.RECORDS:
         return "rest, along, far, front" if moving else "p, wi, t, n"
     if kind in INFINITE:
-        return "scene, side, along" if moving else "scene, hemisphere, wi"
+        return "scene, side, along" if moving else "scene, receiver_hemisphere(receiver), wi"
     return ""
 
 

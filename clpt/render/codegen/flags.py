@@ -78,6 +78,12 @@ def is_guided(features: Features, cls: type[Scatterer]) -> bool:
     return features.transport.guided and not (unsuited or alone)
 
 
+def asks_chance(features: Features, cls: type[Scatterer]) -> bool:
+    """Whether light paths ask at a material how often its gloss chooses their light."""
+    glossy = features.transport.balanced and features.lights.gloss > 0
+    return glossy and not is_null(features, cls)
+
+
 def between_bodies(features: Features, cls: type[Scatterer]) -> bool:
     """Whether the index outside of a material is that of a body there."""
     return features.media.bodies and cls.kind in BETWEEN_BODIES

@@ -10,13 +10,15 @@ from clpt.render.contract import light_records
 from clpt.render.contract.features import Features
 from clpt.render.contract.light_records import (
     BASES,
+    BODY,
     BOTH,
+    BRICK,
     INFINITE,
     KINDS,
     LINE,
     RECORDS,
     VALUES,
-    VOLUME,
+    VOLUMES,
     WIDTH,
 )
 
@@ -64,28 +66,32 @@ def dispatch_text(features: Features, densities: str = "") -> str:
     densities: the functions that weigh light paths, where there are some. It includes the files of
     `virtual_files`, here and in clpt.render.codegen.shapes.
 
-    light_sample(scene, p, hemisphere, pick, u, lambdas): chooses a light and a direction to it
-    light_pdf(scene, row, p, hemisphere, wi, t, n): of it, [1/sr], for a ray that met a shape
+    light_sample(scene, p, receiver, pick, u, lambdas): chooses a light and a direction to it
+    light_pdf(scene, row, p, receiver, wi, t, n): of it, [1/sr], for a ray that met a shape
     light_shows(scene, row, front): whether the side of a shape that was met emits
-    infinite_light(scene, row, p, hemisphere, d, lambdas, ...): radiance and pdf of an infinite one
-    infinite_gather(scene, p, hemisphere, d, pdf, lambdas): what they add to a path that left
+    infinite_light(scene, row, p, receiver, d, lambdas, ...): radiance and pdf of an infinite one
+    infinite_gather(scene, p, receiver, d, pdf, lambdas): what they add to a path that left
     """
     present, others, surfaces = kinds_of(features), others_of(features), surfaces_of(features)
     includes = ["path/surface_flags.cl", "interface/shape.cl", "interface/light.cl", "core/mis.cl"]
+    includes += [f"lighting/receiver{'_none' * (not features.lights.gloss)}.cl"]
     includes += ["lighting/light_choice.cl"]
-    includes += ["generated/textures.cl", "generated/medium.cl"] if VOLUME in others else []
+    includes += ["generated/textures.cl", "generated/medium.cl"] if features.lights.volumes else []
     includes += [f"generated/light/{kind}.cl" for kind in others]
     includes += [f"generated/shape/{kind}.cl" for kind in surfaces]
+    includes += ["lighting/volume_lights.cl"] if features.lights.volumes else []
     includes += ["light/area.cl"] if surfaces else []
     includes += ["light/moving.cl"] if features.motion.lights else []
     includes += ["light/deforming.cl"] if features.motion.emitters else []
     words = shape_records.RECORDS["triangle"].words
     parts = [f"#define TRIANGLE_ROW_WORDS {words}"] * features.motion.emitters
     parts += [f"#define LIGHT_{kind.upper()} {KINDS.index(kind)}" for kind in present]
+    parts += [f"#define GLOSS_BEFORE {features.lights.gloss}"] * (features.lights.gloss > 0)
+    parts += [f"#define LIGHT_VOLUMES {KINDS.index(VOLUMES[0])}"] * features.lights.volumes
     parts += [f'#include "{name}"' for name in includes]
     parts += _tree_text() if features.lights.tree else []
     parts += [_sides_text(features), _sample_text(features), _pdf_text(features), densities]
-    parts += [_brick_pdf_text(features)] if VOLUME in present else []
+    parts += _volumes_text(features)
     parts += _infinite_text(features)
     return "\n".join(parts) + "\n"
 
@@ -141,8 +147,13 @@ def _pick_text(features: Features) -> list[str]:
     number = "FEW_LIGHTS ? &u.x : &pick"
     if not features.lights.tree:
         return [f"integer row = light_pick(scene, {number}, u.y);"]
-    picked = f"light_tree_pick(scene, p, hemisphere, {number}, u.y, &pmf)"
+    picked = f"light_tree_pick(scene, p, receiver, {number}, u.y, &pmf)"
     return ["real pmf;", f"integer row = {picked};"]
+
+
+def _hemisphere(moving: bool) -> str:
+    """The hemisphere by which an infinite light is sampled, which turns with one that moves."""
+    return "hemisphere" if moving else "receiver_hemisphere(receiver)"
 
 
 def _sample_text(features: Features) -> str:
@@ -151,7 +162,7 @@ def _sample_text(features: Features) -> str:
     kinds, moving = [*others, *surfaces], features.motion.lights
     weighed = features.transport.balanced
     head = (
-        "LightSample light_sample(Scene scene, vec3 p, vec3 hemisphere, real pick, vec2 u, "
+        "LightSample light_sample(Scene scene, vec3 p, Receiver receiver, real pick, vec2 u, "
         "Wavelengths lambdas)"
     )
     if not kinds:
@@ -166,10 +177,10 @@ def _sample_text(features: Features) -> str:
             "Motion motion = motion_of_light(scene, row, l);",
             "vec3 seen_from = p;",
             "p = motion_point_back(motion, p);",
-            "hemisphere = motion_back_unit(motion, hemisphere);",
+            "vec3 hemisphere = motion_back_unit(motion, receiver_hemisphere(receiver));",
         ]
     for kind in others:
-        seen = "hemisphere" if kind in INFINITE else "p"
+        seen = _hemisphere(moving) if kind in INFINITE else "p"
         sampled = f"{kind}_sample({row_text(features, kind)}, scene, {seen}, u, lambdas)"
         rows += choose("s", "LightSample", Case(kind_test(kind, kinds), sampled))
     if surfaces:
@@ -194,7 +205,7 @@ def _sample_text(features: Features) -> str:
         ]
     pmf = "pmf" if features.lights.tree else "l.pmf"
     rows.append(f"s = light_chosen(s, {pmf});")
-    if weighed or features.film.layers.light_groups or VOLUME in others:
+    if weighed or features.film.layers.light_groups or features.lights.volumes:
         rows.append("s.row = row;")
     if weighed:
         rows.append(f"s.chance = {pmf};")
@@ -217,7 +228,7 @@ def _pdf_text(features: Features) -> str:
             "real far = t * motion_length_back(motion, wi);",
         ]
     return Function(
-        "real light_pdf(Scene scene, integer row, vec3 p, vec3 hemisphere, vec3 wi, real t, "
+        "real light_pdf(Scene scene, integer row, vec3 p, Receiver receiver, vec3 wi, real t, "
         "vec3 n)",
         "0.0f",
         [
@@ -232,18 +243,27 @@ def _pdf_text(features: Features) -> str:
     ).text()
 
 
-def _brick_pdf_text(features: Features) -> str:
-    """`brick_light_pdf`: of a point of a medium that emits, at a distance t from p."""
-    head = "real brick_light_pdf(Scene scene, integer row, vec3 p, vec3 hemisphere, real t)"
-    rows = ["LightRow l = light_at(scene, row);", "mask m = mask_of(1);"]
-    pdf = f"emissive_brick_pdf({row_text(features, VOLUME)}, t)"
-    rows.append(f"return {pdf} * {pmf_text(features)};")
-    return function(head, *rows)
+def _volumes_text(features: Features) -> list[str]:
+    """Functions of parts of media that emit, with the densities [1/sr] of choosing them from p.
+
+    `brick_light_pdf`: of a point of a brick at a distance t; `body_light_pdf`: of a direction d in
+    which a body is.
+    """
+    made = []
+    ways = (BRICK, "brick", "real t", "t"), (BODY, "body", "vec3 d", "p, d")
+    for kind, name, given, seen in ways:
+        if kind in features.lights.kinds:
+            given = f"Scene scene, integer row, vec3 p, Receiver receiver, {given}"
+            head = f"real {name}_light_pdf({given})"
+            pdf = f"{kind}_pdf({row_text(features, kind)}, {seen})"
+            rows = ["LightRow l = light_at(scene, row);", "mask m = mask_of(1);"]
+            made.append(function(head, *rows, f"return {pdf} * {pmf_text(features)};"))
+    return made
 
 
 def pmf_text(features: Features) -> str:
     """The chance of the light `l` in row `row`, for a surface at p."""
-    chosen = "light_tree_pmf(scene, (integer)(row), p, hemisphere)"
+    chosen = "light_tree_pmf(scene, (integer)(row), p, receiver)"
     return chosen if features.lights.tree else "l.pmf"
 
 
@@ -260,22 +280,20 @@ def _infinite_text(features: Features) -> list[str]:
     ]
     if moving:
         rows += [
-            "vec3 tree_hemisphere = hemisphere;",
             "Motion motion = motion_of_light(scene, (integer)(row), l);",
             "d = motion_back_unit(motion, d);",
-            "hemisphere = motion_back_unit(motion, hemisphere);",
+            "vec3 hemisphere = motion_back_unit(motion, receiver_hemisphere(receiver));",
         ]
     for kind in kinds:
         rows += masked(
             kind_test(kind, kinds),
             f"{RECORDS[kind].name} light = {row_text(features, kind)};",
             f"*radiance = spectrum_sel(m, {kind}_radiance(light, scene, d, lambdas), *radiance);",
-            f"*pdf = sel(m, {kind}_pdf(light, scene, hemisphere, d), *pdf);",
+            f"*pdf = sel(m, {kind}_pdf(light, scene, {_hemisphere(moving)}, d), *pdf);",
         )
-    rows += ["hemisphere = tree_hemisphere;"] if moving else []
     rows.append(f"*pdf *= {pmf_text(features)};")
     head = (
-        "void infinite_light(Scene scene, int row, vec3 p, vec3 hemisphere, vec3 d, "
+        "void infinite_light(Scene scene, int row, vec3 p, Receiver receiver, vec3 d, "
         "Wavelengths lambdas, Spectrum *radiance, real *pdf)"
     )
     return [function(head, *rows), '#include "lighting/infinite.cl"']

@@ -265,8 +265,11 @@ def _source(
     file = f"stage/{stage or name}.cl"
     if not given["SLAB_BLOCK"]:  # a CPU's rays go alone, too
         return device.assemble(file, virtual, given)
-    few = _FEW if registers.are_few(name) else {}
-    source = device.assemble(file, {**virtual, **_ALONE, **few}, given)
+    alone = {**virtual, **_ALONE}
+    if few := registers.of_amd(name):
+        alone |= _FEW
+        given["FEW_REGISTERS"] = few
+    source = device.assemble(file, alone, given)
     return dataclasses.replace(source, registers=registers.limits(name))
 
 

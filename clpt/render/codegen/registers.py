@@ -8,7 +8,7 @@ has some 4 % more instructions at most: `python -m bench.gpu_compilers` compiles
 from __future__ import annotations
 
 _LIMITS: dict[str, tuple[int, ...]] = {
-    "generate": (96,),
+    "generate": (96, 112),
     "flight": (128,),
     "intersect": (96, 128),
     "shadow": (80, 96),
@@ -20,7 +20,11 @@ _LIMITS: dict[str, tuple[int, ...]] = {
     "shade_rough_plastic": (112, 128),
     "shade_rough_dielectric": (112, 128),
 }
-_FEW = ("generate", "emit", "shadow", "splat", "shade_diffuse")
+_OF_AMD = {
+    **dict.fromkeys(("generate", "emit", "shadow", "splat", "shade_diffuse"), 128),
+    "shade_reradiating": 96,
+    "shade_rough_plastic": 168,
+}
 
 
 def limits(program: str) -> tuple[int, ...]:
@@ -28,6 +32,6 @@ def limits(program: str) -> tuple[int, ...]:
     return _LIMITS.get(program, ())
 
 
-def are_few(program: str) -> bool:
-    """Return whether AMD's compilers are told, by the text, that 128 registers do."""
-    return program in _FEW
+def of_amd(program: str) -> int | None:
+    """Return the registers of which the text of a program tells AMD's compilers that they do."""
+    return _OF_AMD.get(program)

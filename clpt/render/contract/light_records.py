@@ -148,11 +148,13 @@ COMPUTED: dict[str, Record] = {
     **SKY_RECORDS,
 }
 DECLARED = {cls.kind: cls for cls in LIGHTS if cls.reach != "surface" and cls.kind not in COMPUTED}
-VOLUME = "emissive_brick"  # what of a grid emits: eight cells along each axis
+BRICK = "emissive_brick"  # what of a grid emits: eight cells along each axis
+BODY = "emissive_body"  # a homogeneous medium that emits
+VOLUMES = (BRICK, BODY)
 RECORDS: dict[str, Record] = {
     **{kind: declared_record(cls) for kind, cls in DECLARED.items()},
     **COMPUTED,
-    VOLUME: Record(
+    BRICK: Record(
         "EmissiveBrick",
         "A brick of a grid that emits.",
         medium=("integer", "the medium, see kernels/media/medium.cl"),
@@ -162,6 +164,21 @@ RECORDS: dict[str, Record] = {
         y=("vec3", ""),
         z=("vec3", ""),
         chord=("real", "mean length of the lines through it [m]"),
+        inverse=("real", "of its volume [1/m^3]"),
+    ),
+    BODY: Record(
+        "EmissiveBody",
+        "A homogeneous medium that emits, in a ball or a box.",
+        medium=("integer", "the medium, see kernels/media/medium.cl"),
+        box=("integer", "1: it is a box, else a ball"),
+        x=("vec3", "rows of the matrix to the unit ball, or the cube from -1 to 1"),
+        y=("vec3", ""),
+        z=("vec3", ""),
+        at=("vec3", "and its last column"),
+        center=("vec3", "[m]"),
+        edge_x=("vec3", "from there to the ends of the axes [m]"),
+        edge_y=("vec3", ""),
+        edge_z=("vec3", ""),
         inverse=("real", "of its volume [1/m^3]"),
     ),
 }
@@ -181,7 +198,7 @@ BASES = {
 }  # whose functions a kind uses
 
 # LightRow.kind is a position in this tuple
-KINDS = (*(kind for kind in RECORDS if kind != VOLUME), *shape_records.RECORDS, VOLUME)
+KINDS = (*(kind for kind in RECORDS if kind not in VOLUMES), *shape_records.RECORDS, *VOLUMES)
 NODE = Record(
     "LightNode",
     "A node of the tree over lights; children of a node are a group, neighbours in the table.",

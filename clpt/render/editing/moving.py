@@ -134,6 +134,8 @@ class Moving:
             if number is None:
                 raise CannotMove(f"{_name(old)} is a group, or of one")
             _check_fields(old, new)
+            if features.lights.bodies and _holds_light(old):
+                raise CannotMove(f"{_name(new)} holds a medium that emits: a light follows from it")
             matrix = None
             if on_device(new.to_world):
                 matrix = self._locate(new.to_world, (4, 4), f"the transform of {_name(new)}")
@@ -393,6 +395,12 @@ def _check_fields(old: Shape, new: object) -> None:
     changed = {name for name, value in fields_of(new).items() if value is not before[name]}
     if changed - _MOVABLE:
         raise CannotMove(f"{_name(new)} has another {' and '.join(sorted(changed - _MOVABLE))}")
+
+
+def _holds_light(shape: Shape) -> bool:
+    """Whether a medium that emits is inside of a shape, or of those that an instance places."""
+    own = shape.members if isinstance(shape, Instance) else (shape,)
+    return any(one.interior is not None and one.interior.light is not None for one in own)
 
 
 def _name(thing: object) -> str:

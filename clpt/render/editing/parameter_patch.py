@@ -6,6 +6,8 @@ import dataclasses
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from clpt.geometry.instancing import distinct
 from clpt.render.analysis.cameras import dispersive_glasses
 from clpt.render.analysis.checks.materials import check_material
@@ -13,6 +15,7 @@ from clpt.render.analysis.lights.aims import is_sharp
 from clpt.render.editing.rebuild import ranges
 from clpt.render.editing.scene_edit import Replacements
 from clpt.render.lowering.camera.cameras import lower_camera
+from clpt.render.lowering.materials import gloss
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera, Lens
@@ -54,6 +57,9 @@ def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> Callable[[], N
         if changed is None:
             return f"parameters of a {new.kind} come from elsewhere, such as a texture or a table"
         rows += changed
+        if before := lowered.features.lights.gloss:
+            word = np.array([gloss.word(new)], np.uint32)
+            rows += [(row - before, word) for row, _ in changed]
     return lambda: _write(on_device, camera, rows)
 
 

@@ -74,7 +74,7 @@ def of_transport(index: SceneIndex, profile: int, *, aimed: bool) -> TransportFe
     )
 
 
-def of_lights(lights: LightRows) -> LightFeatures:
+def of_lights(lights: LightRows, gloss: int = 0) -> LightFeatures:
     """Return the features of the rows of `lights`."""
     return LightFeatures(
         kinds=lights.kinds,
@@ -83,6 +83,7 @@ def of_lights(lights: LightRows) -> LightFeatures:
         two_sided=lights.two_sided,
         tree=lights.tree is not None,
         few=len(lights.rows) <= FEW_LIGHTS,
+        gloss=gloss,
     )
 
 

@@ -41,7 +41,8 @@ from clpt.render.lowering.device_grids import DeviceGrid
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.geometry import lower_geometry, shape_words
 from clpt.render.lowering.layer_names import lower_names
-from clpt.render.lowering.lights.lights import LightRows, light_rows
+from clpt.render.lowering.lights.lights import LightRows, has_tree, light_rows
+from clpt.render.lowering.materials import gloss
 from clpt.render.lowering.materials.material_words import MaterialWords
 from clpt.render.lowering.media.body_words import BodyWords
 from clpt.render.lowering.media.light_media import light_media_words
@@ -207,7 +208,7 @@ def _encode_surfaces(found: Analysis, encoder: Encoder) -> _Surfaces:
     """Append shapes, materials, media and lights."""
     index = found.index
     filters.lower_filter(index.film.filter, encoder.store, index.splatting)
-    materials = _begin_materials(index, encoder)
+    materials = _begin_materials(found, encoder)
     moves = spheres_move(index)
     geometry = lower_geometry(found.geometry, encoder, materials, spheres_move=moves)
     media = MediumWords(index, encoder, materials, found.sealed, found.sources.glows)
@@ -260,7 +261,7 @@ def _features(
         camera=needs.of_camera(index),
         film=needs.of_film(index, layers),
         transport=needs.of_transport(index, rows.profile, aimed=len(found.aims) > 0),
-        lights=needs.of_lights(surfaces.lights),
+        lights=needs.of_lights(surfaces.lights, surfaces.materials.gloss_before),
         media=needs.of_media(index, surfaces.materials, surfaces.near, sealed=bool(found.sealed)),
         motion=needs.of_motion(index, surfaces.geometry, motion),
         geometry=_geometry_features(index, encoder, surfaces),
@@ -321,14 +322,24 @@ def _lower_density(index: SceneIndex, encoder: Encoder, wavelengths: Density) ->
     return density_row, tabulated
 
 
-def _begin_materials(index: SceneIndex, encoder: Encoder) -> MaterialWords:
+def _begin_materials(found: Analysis, encoder: Encoder) -> MaterialWords:
     """Append what idle lanes read as a material, and make the maker of material words."""
+    index = found.index
     if index.shifts:
         encoder.spectra.expect_light(emissions(index))
     leaves: tuple[type[Kind], ...] = (*mt.LEAVES, *index.leaves)
     longest = max(map(row_words, leaves))
     encoder.store.append("materials", np.zeros(longest, np.uint32))
-    return MaterialWords(encoder, index.leaves, index.normal_mapped)
+    tells = index.normal_mapped, _asks_gloss(found)
+    return MaterialWords(encoder, index.leaves, *tells)
+
+
+def _asks_gloss(found: Analysis) -> bool:
+    """Whether the tree over lights asks for the gloss of materials."""
+    index = found.index
+    tree = not index.light_paths and has_tree(found.sources.every, TREE_FROM)
+    leaves = (leaf for shape in index.shapes for leaf in mt.parts(shape.material))
+    return tree and any(gloss.word(leaf) for leaf in leaves)
 
 
 def _lower_medium_aims(index: SceneIndex, encoder: Encoder, lights: LightRows) -> int:

@@ -23,7 +23,7 @@ BLOCK = 8  # side of a block of pixels
 TRIM = 0.001  # share of the pixels that is left out, the worst
 ODD = 0.01  # the same, where the noise of ordinary pixels is asked for
 SURE = 3.0  # standard deviations
-LIGHT_RAY, GUIDED_RAY = 1.15, 1.5  # time of a ray over one of `path`, see bench/NOTES.md
+LIGHT_RAY, GUIDED_RAY = 1.15, 1.3  # time of a ray over one of `path`, see bench/NOTES.md
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,10 @@ def pixels_for(samples: int) -> int:
 
 
 def settings(of: NDArray[np.void], pixels: int = PIXELS) -> NDArray[np.void]:
-    """Return the settings of a small film of the whole picture; of: those of the picture."""
+    """Return the settings of a small film of the whole picture; of: those of the picture.
+
+    Its photons are as few as its pixels, so they are gathered in disks as much larger.
+    """
     small = of.copy()
     width, height = int(of["film_width"]), int(of["film_height"])
     scale = math.sqrt(pixels / (width * height))
@@ -53,6 +56,8 @@ def settings(of: NDArray[np.void], pixels: int = PIXELS) -> NDArray[np.void]:
     small["crop_x"] = small["crop_y"] = 0
     small["tiles_x"] = -(-(width + 2 * margin) // 4)
     small["padded_pixels"] = 16 * small["tiles_x"] * -(-(height + 2 * margin) // 4)
+    small["photon_pixels"] = min(int(of["photon_pixels"]), int(small["padded_pixels"]))
+    small["radius"] = of["radius"] / scale
     return small
 
 

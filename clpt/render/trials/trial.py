@@ -21,7 +21,7 @@ from clpt.render.trials.cost import GUIDED_RAY, LIGHT_RAY, ROUNDS, SAMPLES, Tria
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.render.wavefront.strategy import Tuning
 from clpt.render.wavefront.wavefront import Wavefront
-from clpt.scene.integrators import Integrator
+from clpt.scene.integrators import Integrator, Vcm
 
 log = logging.getLogger(__name__)
 
@@ -73,7 +73,7 @@ class Tries:
 
     @property
     def rays(self) -> float:
-        """How many rays the best way would trace for the whole film."""
+        """The rays that the best way would trace for the whole film."""
         trial = self._trials[self.best]
         return trial.rays / (trial.pictures[..., 0].size * SAMPLES) * self._samples
 
@@ -108,6 +108,8 @@ def name_of(way: Integrator) -> str:
     """Return what a candidate is called, for people."""
     if way.guiding:
         return "guiding"
+    if isinstance(way, Vcm):
+        return way.kind
     return "light paths" if way.light_paths else "path"
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ import clpt
 from clpt import transforms as tf
 from clpt.device import choose
 from clpt.render.lowering import scene as lowering
+from clpt.render.lowering.materials import gloss
 from clpt.scene import Film, Scene, materials
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Path
@@ -57,6 +60,40 @@ def test_the_tree_and_the_choice_by_power_agree(mode, monkeypatch):
     monkeypatch.setattr(lowering, "TREE_FROM", 1 << 30)
     theirs = blocks(exposures(scene, 24, 32))
     assert_agree(ours, theirs, "tree against power")
+
+
+def polished(mode: str, light_paths: float) -> Scene:
+    """The crowd over rough metal, with a principled ball, a wavy one, and a lamp in view."""
+    made = crowd(mode)
+    floor, ball, *lamps = made.shapes
+    wavy = materials.BumpMap(
+        material=materials.RoughConductor(alpha_u=0.05, alpha_v=0.2),
+        height=Bitmap(image=np.random.default_rng(2).random((8, 8, 1)).astype(np.float32)),
+        scale=0.02,
+    )
+    shapes = [
+        replace(floor, material=materials.RoughConductor(alpha=0.1)),
+        replace(ball, material=materials.Principled(roughness=0.3, metallic=0.4)),
+        Sphere(center=(1.1, 0.4, 0.6), radius=0.4, material=wavy),
+        *lamps,
+    ]
+    integrator = Path(max_depth=3, light_paths=light_paths)
+    return replace(made, shapes=shapes, integrator=integrator)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("light_paths", [0, 1])
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+def test_gloss_only_changes_how_lights_are_chosen(mode, light_paths, monkeypatch):
+    scene = polished(mode, light_paths)
+    assert lowering.lower(scene).features.lights.gloss > 0
+    ours = blocks(exposures(scene, 24, 24))
+    monkeypatch.setattr(gloss, "word", lambda material: 0)
+    assert lowering.lower(scene).features.lights.gloss == 0
+    theirs = blocks(exposures(scene, 24, 24))
+    assert_agree(ours, theirs, "by gloss against by cosine")
+    noise = [(a.var(axis=0) / a.mean(axis=0) ** 2).mean() for a in (ours, theirs)]
+    assert noise[0] < noise[1]
 
 
 @pytest.mark.slow

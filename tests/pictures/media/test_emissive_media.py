@@ -10,8 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+import clpt
 from clpt import spectra
 from clpt import transforms as tf
+from clpt.geometry.triangles import triangulate
+from clpt.render.analysis import glow
 from clpt.render.analysis.bricks import Glow
 from clpt.scene import Film, Scene, media
 from clpt.scene.cameras import Orthographic, Perspective
@@ -19,7 +22,7 @@ from clpt.scene.integrators import Box
 from clpt.scene.integrators import Path as PathIntegrator
 from clpt.scene.lights import Constant
 from clpt.scene.materials import Diffuse, Null
-from clpt.scene.shapes import Cube
+from clpt.scene.shapes import Cube, Mesh, Rectangle, Sphere
 from clpt.spectra import cie
 from clpt.spectra.emission import planck
 from tests.pictures.support import assert_agree, assert_mean, exposures
@@ -159,6 +162,83 @@ def test_albedo_on_a_grid() -> None:
         exposures(slab(one, 1.0), 6, 32).mean(axis=(1, 2), keepdims=True) for one in (tinted, plain)
     ]
     assert_agree(*pictures, "the albedo on a grid and the medium's own", 2e-4)
+
+
+def test_a_glowing_ball_that_moves() -> None:
+    """The light goes with it: the picture is that of a scene that has it there."""
+    scene, there = (under_a_ball(300.0, 0.3, at) for at in (0.8, 1.1))
+    moved = {0: there.shapes[0].to_world}
+    with clpt.Renderer(scene) as renderer:
+        renderer.update(transforms=moved)
+        renderer.run(2)
+        got = renderer.image()
+    with clpt.Renderer(there) as renderer:
+        renderer.run(2)
+        assert got.mean() > 0.0
+        np.testing.assert_array_equal(got, renderer.image())
+
+
+AWAY = 1.2  # of the floor that is seen from below the ball [m]
+
+
+def under_a_ball(scale: float, radius: float, height: float) -> Scene:
+    """A floor that a glowing ball lights, and nothing else, seen from above."""
+    strength = 1.0 / scale if scale < 1.0 else 1.0
+    glowing = media.Homogeneous(sigma_a=CHROMATIC, scale=scale, emission=strength * COLOUR)
+    scene = slab(glowing)
+    place = tf.translate([0.1, 0.2, height]) @ tf.scale(radius)
+    ball = Sphere(to_world=place, material=Null(), interior=glowing)
+    scene.shapes = [ball, Rectangle(to_world=tf.scale(9.0), material=Diffuse(reflectance=0.5))]
+    eye = tf.look_at([0.1 + AWAY, 0.2, 5], [0.1 + AWAY, 0.2, 0], [0, 1, 0])
+    scene.camera = Orthographic(to_world=eye @ tf.scale(1e-3))
+    scene.lights, scene.integrator = [], PathIntegrator(max_depth=2, light_paths=0)
+    return scene
+
+
+@pytest.mark.parametrize("scale", [1e-4, 300.0])
+def test_floor_under_a_glowing_ball(scale: float) -> None:
+    """A thin ball shines as a point in its middle would (Newton's shells), a thick one as a lamp.
+
+    With a camera that looks straight down, the floor shows rho / pi times j V z / d^3 [z the ball's
+    height, d its distance, j what a metre emits], or rho L (r / d)^2 z / d.
+    """
+    radius, height, reflects = 0.3, 0.8, 0.5
+    scene = under_a_ball(scale, radius, height)
+    distance = np.hypot(height, AWAY)
+    if scale < 1.0:
+        sent = CHROMATIC * COLOUR * 4.0 / 3.0 * np.pi * radius**3
+        wanted = reflects / np.pi * sent * height / distance**3
+    else:
+        wanted = reflects * COLOUR * (radius / distance) ** 2 * height / distance
+    assert_mean(exposures(scene, 6, 64), wanted, WITHIN)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+def test_bodies_as_lights(mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bodies in a room of haze: chosen as lights, or met by chance alone, they light the same."""
+    haze = media.Homogeneous(sigma_s=0.3, sigma_a=0.05)
+    one, two = (
+        media.Homogeneous(sigma_a=scale * CHROMATIC, sigma_s=0.5, emission=COLOUR)
+        for scale in (1.0, 5.0)
+    )
+    sides = {"material": Null(), "exterior": haze}
+    vertices, faces = triangulate(Cube(to_world=tf.rotate([1, 1, 0], 40) @ tf.scale(0.2)))[:2]
+    bodies = [
+        Cube(**sides, interior=one, to_world=tf.rotate([1, 2, 3], 30) @ tf.scale([0.9, 0.1, 0.2])),
+        Mesh(**sides, interior=two, vertices=vertices + np.float32([0, 1, 0]), faces=faces),
+        Sphere(center=(0.02, 0.01, 0.0), radius=0.05, material=Diffuse()),  # in the first
+    ]
+    scene = slab(haze, mode=mode)
+    walls = Cube(material=Diffuse(reflectance=0.6), interior=haze, to_world=tf.scale(2.0))
+    scene.shapes = [*bodies, walls]
+    scene.camera = Perspective(fov=70.0, to_world=tf.look_at([0.5, 0, 1.8], [0, -1, 0], [0, 1, 0]))
+    scene.integrator = PathIntegrator(max_depth=3, light_paths=0)
+    scene.lights = []
+    pictures = [exposures(scene, 12, 128).mean(axis=(1, 2), keepdims=True)]
+    monkeypatch.setattr(glow, "_body", lambda *_: None)
+    pictures.append(exposures(scene, 12, 512).mean(axis=(1, 2), keepdims=True))
+    assert_agree(*pictures, "bodies as lights and bodies that are met", 2e-4)
 
 
 @pytest.mark.slow

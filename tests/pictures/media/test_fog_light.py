@@ -215,7 +215,7 @@ def test_auto_in_fog() -> None:
         (room(thin, bulb), 0.0),
         (room(FOGS["grid"], bulb), 0.5),
         (room(fog, SUN), 0.0),
-        (room(fog, SUN, ball), 0.5),
+        (room(fog, SUN, ball), 0.25),
         (room(fog, SUN, dataclasses.replace(ball, interior=fog)), 0.0),
         (room(fog, Constant()), 0.0),
         (room(media.Homogeneous(sigma_a=1.0), SPOT), 0.0),

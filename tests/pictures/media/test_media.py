@@ -22,7 +22,7 @@ from clpt.scene import Film, Scene, media, phases
 from clpt.scene.cameras import Perspective, Spherical
 from clpt.scene.integrators import Box
 from clpt.scene.integrators import Path as PathIntegrator
-from clpt.scene.lights import Area, Constant, Point
+from clpt.scene.lights import Area, Constant, Point, Spot
 from clpt.scene.materials import Dielectric, Diffuse, GltfSurface, Null
 from clpt.scene.shapes import Cube, Rectangle, Sphere
 from tests.pictures.support import (
@@ -157,13 +157,43 @@ def test_absorbs_as_beer_and_lambert_say() -> None:
     np.testing.assert_allclose(bands, expected, rtol=0.02)
 
 
-LAMPS = {
-    "near": [((0.3, 0.0, -1.0), 1.0)],
-    "three": [((0.2, 0.1, -2.0), 1.0), ((0.0, -0.8, 2.0), 0.5), ((-4.0, 0.0, 1.0), 9.0)],
+LAMPS: dict[str, list[Point | Spot]] = {
+    "near": [Point(position=(0.3, 0.0, -1.0), intensity=1.0)],
+    "three": [
+        Point(position=at, intensity=power)
+        for at, power in (((0.2, 0.1, -2.0), 1.0), ((0.0, -0.8, 2.0), 0.5), ((-4.0, 0.0, 1.0), 9.0))
+    ],
 }
 
 
-@pytest.mark.parametrize("lamps", [pytest.param("near", marks=pytest.mark.slow), "three"])
+def _spot(at: list[float], to: list[float], power: float, cutoff: float) -> Spot:
+    matrix = tf.look_at(at, to, [0.1, 1, 0.2])
+    return Spot(to_world=matrix, intensity=power, cutoff=cutoff, beam_width=cutoff - 1e-3)
+
+
+LAMPS["spot"] = [_spot([0.5, 2.0, 0.0], [0.0, 0.0, 0.5], 2.0, 12.0)]
+LAMPS["spots"] = [  # across the ray, along it, against it, away from it, and one that is none
+    *LAMPS["spot"],
+    _spot([0.1, 0.3, 2.0], [0.0, 0.0, -2.0], 0.5, 15.0),
+    _spot([-0.2, 0.1, -4.0], [0.0, 0.0, 5.0], 0.5, 9.0),
+    _spot([0.2, 0.2, 3.0], [2.0, 2.0, 3.0], 0.2, 40.0),
+    LAMPS["three"][2],
+]
+SLOWLY = (pytest.param(name, marks=pytest.mark.slow) for name in ("near", "spot"))
+
+
+def shines(lamp: Point | Spot, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The ways (n, 3) from points to a lamp, and what it sends them [W/sr]."""
+    if isinstance(lamp, Point):
+        to = np.asarray(lamp.position) - points
+        return to, np.full(len(to), lamp.intensity.r)
+    to = lamp.to_world[:3, 3] - points
+    cosine = -(to @ lamp.to_world[:3, 2]) / np.linalg.norm(to, axis=1)
+    lit = cosine > np.cos(np.radians(lamp.cutoff))
+    return to, lit * lamp.intensity.r
+
+
+@pytest.mark.parametrize("lamps", [*SLOWLY, "three", "spots"])
 def test_light_scattered_once_is_an_integral_over_the_ray(lamps: str) -> None:
     """Of lamps in haze that flights end near: sigma_s p I / r^2 exp(-sigma_t (t + r))."""
     sigma, albedo, g, end = np.array([0.05, 0.2, 0.3]), 0.8, 0.5, 10.0
@@ -174,19 +204,19 @@ def test_light_scattered_once_is_an_integral_over_the_ray(lamps: str) -> None:
     )
     scene = with_mode(ball(haze), "rgb")
     scene.shapes = [wall]
-    scene.lights = [Point(position=at, intensity=power) for at, power in LAMPS[lamps]]
+    scene.lights = list(LAMPS[lamps])
     scene.integrator = dataclasses.replace(LONG, max_depth=2)
     scene.camera = Perspective(
         fov=0.01, to_world=tf.look_at([0, 0, 5], [0, 0, 0], [0, 1, 0]), medium=haze
     )
     t = (np.arange(200_000) + 0.5) / 200_000 * end
     expected = np.zeros(3)
-    for at, power in LAMPS[lamps]:
-        to = np.array(at) - np.column_stack([0 * t, 0 * t, 5.0 - t])
+    for lamp in LAMPS[lamps]:
+        to, power = shines(lamp, np.column_stack([0 * t, 0 * t, 5.0 - t]))
         r = np.linalg.norm(to, axis=1)
         cosine = -to[:, 2] / r  # of how far it turns
         hg = (1 - g * g) / (4 * np.pi * (1 + g * g - 2 * g * cosine) ** 1.5)
-        lit = hg[:, None] * power / r[:, None] ** 2 * np.exp(-sigma * (t + r)[:, None])
+        lit = (hg * power / r**2)[:, None] * np.exp(-sigma * (t + r)[:, None])
         expected += (sigma * albedo * lit).mean(axis=0) * end
     assert_mean(exposures(scene, 8, 256), expected, WITHIN)
 

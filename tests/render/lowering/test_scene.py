@@ -12,7 +12,8 @@ from clpt.errors import SceneError
 from clpt.records import SETTINGS, SHAPE, SHAPE_BITS, TABLES
 from clpt.render.analysis import geometry
 from clpt.render.contract.parameter_words import MIXTURE
-from clpt.render.lowering.scene import lower
+from clpt.render.lowering.materials import gloss
+from clpt.render.lowering.scene import TREE_FROM, lower
 from clpt.render.lowering.settings import DEEPEST
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
@@ -20,6 +21,7 @@ from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Direct, Path
 from clpt.scene.lights import Area, Constant, Directional, Point
 from clpt.scene.shapes import Cube, Mesh, Rectangle, Shape, Sphere
+from clpt.scene.textures import Bitmap
 
 CORNERS = np.eye(3, dtype=np.float32)
 FACE = np.array([[0, 1, 2]], np.uint32)
@@ -172,3 +174,36 @@ def test_more_triangles_than_kernels_count(monkeypatch: pytest.MonkeyPatch) -> N
     assert len(lower(scene(Rectangle())).faces) == 2
     with pytest.raises(SceneError, match="use instances"):
         lower(scene(Cube(), Rectangle()))
+
+
+def test_gloss_stands_before_rows_where_a_tree_asks_for_it() -> None:
+    lamps = [Point(position=(i, 5.0, 0.0), intensity=1.0) for i in range(TREE_FROM)]
+    rough, dull = m.RoughConductor(alpha_u=0.1, alpha_v=0.4), m.Diffuse()
+    wavy = m.BumpMap(material=rough, height=Bitmap(image=np.zeros((2, 2, 1), np.float32)))
+    for shapes, words in (((rough, dull), 1), ((rough, wavy), 12), ((dull,), 0)):
+        made = lower(scene(*(Sphere(material=one) for one in shapes), lights=lamps))
+        assert made.features.lights.tree and made.features.lights.gloss == words
+        for material, row in zip(shapes, rows(made)["front"] & 0xFFFFFF, strict=True):
+            leaf = rough if material is wavy else material
+            assert not words or made.tables["materials"][row - words] == gloss.word(leaf)
+    few = lower(scene(Sphere(material=rough), lights=lamps[:2]))
+    assert not few.features.lights.tree and few.features.lights.gloss == 0
+
+
+def test_gloss_is_that_of_the_material() -> None:
+    image = Bitmap(image=np.full((2, 2, 1), 0.7, np.float32))
+    found = {
+        m.RoughConductor(alpha_u=0.1, alpha_v=0.4): (0.2, 1.0),
+        m.CoatedConductor(alpha_u=0.3, alpha_v=0.3): (0.3, 1.0),
+        m.RoughPlastic(alpha=0.2, diffuse_reflectance=0.36): (0.2, 0.1),
+        m.Principled(roughness=0.5, metallic=1.0): (0.25, 1.0),
+        m.Principled(roughness=image, base_color=0.46): (0.25, 0.08),
+        m.Phong(exponent=49.5, specular=0.3, diffuse=0.1): (0.1, 0.75),
+    }
+    for material, (alpha, share) in found.items():
+        word = gloss.word(material)
+        assert (word >> 16) / 65535 == pytest.approx(alpha, abs=2e-5), material
+        assert (word & 0xFFFF) / 65535 == pytest.approx(share, abs=2e-5), material
+    glass = m.RoughDielectric(alpha=0.1), m.Principled(spec_trans=0.5)
+    for material in (m.Diffuse(), m.Plastic(), m.Conductor(), *glass):
+        assert gloss.word(material) == 0

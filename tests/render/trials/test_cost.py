@@ -12,6 +12,7 @@ from clpt.render.trials import cost
 from clpt.render.trials.cost import Trial
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Perspective
+from clpt.scene.integrators import Vcm
 
 ROUNDS, SIZE = 4, (32, 64)
 
@@ -55,3 +56,13 @@ def test_the_small_film_shows_the_whole_picture() -> None:
     small = [cost.settings(one) for one in made]
     assert small[0] == small[1]
     assert (small[0]["width"], small[0]["height"]) == (64, 32)
+
+
+def test_photons_of_a_small_film_are_as_dense_in_their_disks() -> None:
+    film = Film(width=400, height=200, mode="rgb")
+    scene = Scene(camera=Perspective(), film=film, integrator=Vcm(radius=0.01))
+    large = lower(scene).settings
+    small = cost.settings(large, 512)
+    assert small["photon_pixels"] == small["padded_pixels"] == 512
+    density = [one["photon_pixels"] * one["radius"] ** 2 for one in (large, small)]
+    assert density[0] == pytest.approx(density[1], rel=0.01)

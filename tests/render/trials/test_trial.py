@@ -46,6 +46,8 @@ def test_ways_that_are_tried() -> None:
     assert ways(long(caustic())) == WAYS
     assert ways(long(slit())) == [(0, False), (0, True)]
     assert {one.max_depth for one in lower(long(caustic())).candidates} == {5}
+    photons = long(caustic(), Auto())
+    assert ways(photons) == [(1, False), (0, True)] and lower(photons).integrator.kind == "vcm"
     shallow = Path(light_paths="auto", max_depth=2)
     assert ways(long(slit(), shallow)) == []
     assert ways(long(caustic(), spp=worth.SAMPLES // (16 * 12))) == []
@@ -56,7 +58,6 @@ def test_ways_that_are_tried() -> None:
     [
         {"spp": 64},
         {"noise": 0.1},
-        {"integrator": Auto()},  # photons suit it
         {"integrator": Path(light_paths=0)},
         {"integrator": Path(guiding=True)},
     ],
@@ -233,6 +234,29 @@ def test_a_film_is_gone_on_with_in_its_way(
             renderer.run(4)
             whole.run(7)
             assert np.array_equal(renderer.image(), whole.image())
+
+
+@pytest.mark.usefixtures("little")
+def test_a_guide_stays_as_it_is_if_more_samples_are_wanted(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: files.Path
+) -> None:
+    """A longer film learns from more light paths, but not one that has begun with fewer."""
+    monkeypatch.setattr(trial, "GUIDED_RAY", 0.0)
+    monkeypatch.setattr(guides, "LONG_PATHS", 1 << 13)
+    monkeypatch.setattr(guides, "LESSON", 1)
+    file, made = tmp_path / "a.film", []
+    for spp, learned in ((16, 1 << 12), (32, 1 << 13)):
+        scene = dataclasses.replace(slit(), integrator=Auto(), spp=spp)
+        made.append(clpt.Renderer(scene, narrow()))
+        assert made[-1]._wavefront.paths.settings["guide_paths"] == learned
+    begun, longer = made
+    begun.run(3)
+    begun.save_state(file)
+    begun.run(4)
+    longer.load_state(file)
+    longer.run(4)
+    assert longer._wavefront.paths.settings["guide_paths"] == 1 << 12
+    assert np.array_equal(longer.image(), begun.image())
 
 
 @pytest.mark.usefixtures("little")

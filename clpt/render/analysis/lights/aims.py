@@ -92,7 +92,7 @@ def sharp_pieces(
     tells of a material whether a shape of it is meant.
     """
     own, placed = geometry.owners, geometry.instances
-    ends = [*(face for _, _, _, face in own[1:]), len(geometry.faces)]
+    ends = [*(face for _, _, _, face in own), len(geometry.faces)][1:]
     firsts = len(geometry.faces) - sum(placed.triangles) + np.cumsum((0, *placed.triangles))[:-1]
     boxes = geometry.boxes.astype(np.float64)
     for i, ((row, shape, _, face), end) in enumerate(zip(own, ends, strict=True)):

@@ -102,17 +102,17 @@ def _candidates(index: SceneIndex, chosen: Integrator) -> tuple[Integrator, ...]
     """The integrators between which a trial may decide, the chosen one first; else none.
 
     It pays if many samples are to come. Where a limit of noise ends the picture nobody knows how
-    many; photons blur the picture, which no variance tells; and some scenes cannot have a guide.
+    many, and some scenes cannot have a guide. Photons blur the picture, which no variance tells: so
+    they are left where another way is cheaper all the same, and never taken.
     """
     samples = index.samples
     if samples < worth.SAMPLES or index.adaptive or index.lit_ghosts or chosen.guiding:
         return ()
-    if not isinstance(chosen, Path):
-        return ()
-    plain = [replace(chosen, light_paths=0)] if chosen.light_paths else []
+    path = Path(light_paths=0, **shared(chosen, Path()))
+    plain = [path] if isinstance(chosen, Path) and chosen.light_paths else []
     several = chosen.max_depth < 0 or chosen.max_depth > 2
     can_guide = several and not index.has_media
-    guide = replace(chosen, light_paths=0, guiding=True, guide_paths=guides.paths_for(samples))
+    guide = replace(path, guiding=True, guide_paths=guides.paths_for(samples))
     guided = [guide] if can_guide else []
     return (chosen, *plain, *guided) if plain or guided else ()
 
@@ -181,7 +181,7 @@ def _in_fog(lit: Lit) -> tuple[Integrator, str] | None:
     if power < LEAST:
         return None
     name = next(name for name, part in small if part)
-    number = FOGGY[power >= MOSTLY]
+    number = FOGGY[int(power >= MOSTLY)]
     return Path(light_paths=number), f"{name} is a small light in a medium that scatters"
 
 

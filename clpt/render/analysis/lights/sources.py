@@ -16,7 +16,7 @@ from clpt.geometry import analytic, shape_records, shapes, triangles
 from clpt.geometry.motion import corners, swept
 from clpt.render.analysis.bricks import Glow
 from clpt.render.analysis.geometry import Emitter, Geometry
-from clpt.render.analysis.glow import glows
+from clpt.render.analysis.glow import GlowingBody, glows
 from clpt.render.analysis.index import SceneIndex
 from clpt.render.analysis.lights import image_lights, light_bounds, light_power, sky_light
 from clpt.render.analysis.lights.light_bounds import Bounds
@@ -53,14 +53,14 @@ class Source:
 class Sources:
     """All lights of a scene.
 
-    order: as `row_order`; lamps: in that order; glows: the bricks that are lights of each medium
-    that has some; media: of these; emitters: shapes. Their rows follow one another.
+    order: as `row_order`; lamps: in that order; glows: the lights that each medium is that
+    emits; media: of these; emitters: shapes. Their rows follow one another.
     """
 
     order: tuple[int, ...]
     infinite: int
     lamps: tuple[Source, ...]
-    glows: dict[Medium, Glow]
+    glows: dict[Medium, Glow | GlowingBody]
     media: tuple[Source, ...]
     emitters: tuple[Source, ...]
 
@@ -94,7 +94,7 @@ def sources_of(index: SceneIndex, geometry: Geometry, scene_radius: float, look:
 
     Raises SceneError for a light that has no place, and for an image that is none.
     """
-    found = glows(index.emitting, index.spectral)
+    found = glows(index, look.cache)
     around = _around(index, geometry) if index.motions else None
     return measured(index.lights, geometry.emitters, scene_radius, look, found, around)
 
@@ -104,18 +104,18 @@ def measured(
     emitters: Sequence[Emitter],
     scene_radius: float,
     look: Look,
-    glows: dict[Medium, Glow] | None = None,
+    glows: dict[Medium, Glow | GlowingBody] | None = None,
     around: Around = None,
 ) -> Sources:
     """Return what lamps, shapes and media send.
 
-    glows: the bricks of media; around: makes bounds of a lamp (by its index) or emitter hold while
-    it moves.
+    glows: the lights that media are; around: makes bounds of a lamp (by its index) or emitter hold
+    while it moves.
     """
     order = row_order(lamps)
     glows = glows or {}
     made = [_of_lamp(lamps[i], scene_radius, look) for i in order]
-    media = [Source(glow.power, _of_bricks(glow), glow.power) for glow in glows.values()]
+    media = [_of_medium(glow) for glow in glows.values()]
     shining = [_of_emitter(emitter, look.cache) for emitter in emitters]
     if around is not None:
         made = [_moved(one, around(i, one.bounds)) for i, one in zip(order, made, strict=True)]
@@ -156,12 +156,21 @@ def _of_lamp(lamp: Light, scene_radius: float, look: Look) -> Source:
     return Source(np.array([power]), light_bounds.of_lamp(lamp), np.array([counts]))
 
 
-def _of_bricks(glow: Glow) -> Bounds:
-    """Boxes around bricks, which shine in all directions."""
-    count = len(glow.corners)
+def _of_medium(glow: Glow | GlowingBody) -> Source:
+    """Return the source of the bricks of a medium, or of a whole one."""
+    if isinstance(glow, GlowingBody):
+        power, middle, reach = np.array([glow.power]), glow.matrix[:, 3], glow.reach
+        return Source(power, _all_around((middle - reach)[None], (middle + reach)[None]), power)
+    low = glow.corners + np.minimum(glow.edges, 0.0).sum(axis=1)
+    high = glow.corners + np.maximum(glow.edges, 0.0).sum(axis=1)
+    return Source(glow.power, _all_around(low, high), glow.power)
+
+
+def _all_around(low: NDArray[np.float64], high: NDArray[np.float64]) -> Bounds:
+    """Boxes (n, 3) of what shines in all directions."""
+    count = len(low)
     return Bounds(
-        glow.corners + np.minimum(glow.edges, 0.0).sum(axis=1),
-        glow.corners + np.maximum(glow.edges, 0.0).sum(axis=1),
+        low, high,
         np.tile([0.0, 0.0, 1.0], (count, 1)),
         np.full(count, np.pi), np.full(count, np.pi / 2.0), np.full(count, False),
         np.full(count, True),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from clpt.render.contract.features.macros import flag, macro
-from clpt.render.contract.light_records import VOLUME
+from clpt.render.contract.light_records import BODY, BRICK, VOLUMES
 
 
 @dataclass(frozen=True)
@@ -17,6 +17,7 @@ class LightFeatures:
     visible: bool = False  # some light is no delta light: a camera may see it
     two_sided: bool = False  # some shape emits from its back too
     tree: bool = False  # a tree chooses among the lights
+    gloss: int = 0  # words before a material's row where its gloss stands; 0: nobody asks for it
     few: bool = flag("FEW_LIGHTS", True)  # the number that chooses one also places the point on it
 
     @property
@@ -26,6 +27,16 @@ class LightFeatures:
         return bool(self.kinds)
 
     @property
+    def volumes(self) -> bool:
+        """Whether parts of media are lights: bricks of grids, or whole bodies."""
+        return any(kind in self.kinds for kind in VOLUMES)
+
+    @property
     def bricks(self) -> bool:
         """Whether bricks of media are lights."""
-        return VOLUME in self.kinds
+        return BRICK in self.kinds
+
+    @property
+    def bodies(self) -> bool:
+        """Whether homogeneous media are lights."""
+        return BODY in self.kinds

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from clpt.render.contract.features.macros import flag, macro, number
 
+MOST_AIMS = 8  # lamps near which flights end, see kernels/media/equiangular.cl
+
 
 @dataclass(frozen=True)
 class GridFeatures:
@@ -31,8 +33,13 @@ class MediaFeatures:
     dyed: bool = False  # some have a dye that gives out light
     sealed: bool = flag("SEALED_MEDIA")  # no ray to a light can leave some
     bodies: bool = False  # they may overlap, of different priorities
-    aims: int = number("MEDIUM_AIMS")  # places of lamps near which flights through media end
+    aims: int = number("MEDIUM_AIMS")  # rows about lamps near which flights through media end
     grids: GridFeatures = GridFeatures()
+
+    @property
+    def aim_cones(self) -> bool:
+        """Whether some of these lamps shine into a cone; then each has two rows."""
+        return self.aims > 0 and self.aims != 1 and self.aims != MOST_AIMS
 
     @property
     @macro("USES_ABSORPTION")

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from clpt.render.analysis.bricks import Glow
-from clpt.render.contract.light_records import RECORDS, VOLUME
+from clpt.render.contract.light_records import BRICK, RECORDS
 from clpt.render.lowering.encoder import Encoder
 
 
@@ -15,12 +16,14 @@ from clpt.render.lowering.encoder import Encoder
 class BrickLights:
     """The bricks of a medium that are lights; word: of the medium."""
 
+    kind: ClassVar[str] = BRICK
+
     word: int
     glow: Glow
 
     def rows(self, encoder: Encoder) -> np.ndarray:
         """Append a record for each brick; return the first word of each in `light_params`."""
-        glow, record = self.glow, RECORDS[VOLUME]
+        glow, record = self.glow, RECORDS[BRICK]
         words = np.zeros(len(glow.numbers), record.dtype)
         across = np.cross(glow.edges[:, [1, 2, 0]], glow.edges[:, [2, 0, 1]])
         surface = 2.0 * np.linalg.norm(across, axis=2).sum(axis=1)

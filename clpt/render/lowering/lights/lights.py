@@ -20,9 +20,10 @@ from clpt.render.analysis.geometry import Emitter
 from clpt.render.analysis.lights import light_bounds
 from clpt.render.analysis.lights.sources import Source, Sources, is_whole
 from clpt.render.analysis.lowering_cache import content
-from clpt.render.contract.light_records import ALONG, BOTH, FRONT, KINDS, VOLUME
+from clpt.render.contract.light_records import ALONG, BOTH, FRONT, KINDS
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.lights import light_tree
+from clpt.render.lowering.lights.body_lights import BodyLight
 from clpt.render.lowering.lights.brick_lights import BrickLights
 from clpt.render.lowering.lights.non_shape_lights import blank_row, lower_lamp
 from clpt.scene.lights import Area, DirectionalArea, Light
@@ -65,18 +66,18 @@ def light_rows(
     encoder: Encoder,
     sources: Sources,
     tree_from: int | None = None,
-    volumes: Sequence[BrickLights] = (),
+    volumes: Sequence[BrickLights | BodyLight] = (),
 ) -> LightRows:
     """Put the parameters of all lights into the tables, and make the rows of `lights`.
 
     sources: what they send; tree_from: the number of rows from which a tree chooses among them, or
-    1 / PLACED_LIGHT_WEIGHT of it of lights at places; volumes: bricks of media, whose rows follow
+    1 / PLACED_LIGHT_WEIGHT of it of lights at places; volumes: parts of media, whose rows follow
     those of the lamps. Raises SceneError for a light that has no place.
     """
     if encoder.store.append("light_params", blank_row()) != 0:
         raise ValueError("`light_params` must be empty before the lights are put in")
     blocks = [_lamp_rows(lamps[i], encoder) for i in sources.order]
-    blocks += [_brick_rows(bricks, encoder) for bricks in volumes]
+    blocks += [_volume_rows(part, encoder) for part in volumes]
     blocks += [_emitter_rows(emitter, encoder) for emitter in emitters]
     every, infinite, power = sources.every, sources.infinite, sources.power
     rows = np.concatenate([np.zeros(0, LIGHT.dtype), *blocks])
@@ -85,7 +86,7 @@ def light_rows(
         weights = _shared(power, infinite)
         same = content(weights)
         rows["pmf"], rows["keep"], rows["alias"] = encoder.cache(alias_table, weights, by=(same,))
-        if tree_from is not None and _count(every, len(rows)) >= tree_from:
+        if tree_from is not None and has_tree(every, tree_from):
             tree = _tree(every, encoder)
     shine = (rows["shape"] >= 0) & (rows["emission_mode"] != ALONG)
     return LightRows(
@@ -103,10 +104,10 @@ def light_rows(
     )
 
 
-def _count(every: Sequence[Source], rows: int) -> int:
-    """Return how many lights there are; each at a place of its own counts for several."""
+def has_tree(every: Sequence[Source], tree_from: int) -> bool:
+    """Whether there are so many lights; each at a place of its own counts for several."""
     apart = sum(bool(one.bounds.placed.any()) for one in every)
-    return max(rows, PLACED_LIGHT_WEIGHT * apart)
+    return max(sum(len(one.power) for one in every), PLACED_LIGHT_WEIGHT * apart) >= tree_from
 
 
 def _tree(every: Sequence[Source], encoder: Encoder) -> NDArray[np.uint32]:
@@ -135,10 +136,10 @@ def _lamp_rows(lamp: Light, encoder: Encoder) -> np.ndarray:
     return _block(1, made.kind, made.row, made.radiance, -1)
 
 
-def _brick_rows(bricks: BrickLights, encoder: Encoder) -> np.ndarray:
+def _volume_rows(part: BrickLights | BodyLight, encoder: Encoder) -> np.ndarray:
     """The rows of a medium that emits."""
-    at = bricks.rows(encoder)
-    return _block(len(at), VOLUME, at, 0, -1)
+    at = part.rows(encoder)
+    return _block(len(at), part.kind, at, 0, -1)
 
 
 def _emitter_rows(emitter: Emitter, encoder: Encoder) -> np.ndarray:

@@ -10,10 +10,13 @@ import dataclasses
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from clpt.errors import SceneError
 from clpt.render.analysis.index import any_of
-from clpt.render.contract.parameter_words import MIXTURE
+from clpt.render.contract.parameter_words import MIXTURE, NORMAL_MAP_WORDS
 from clpt.render.lowering.encoder import Encoder
+from clpt.render.lowering.materials import gloss
 from clpt.render.lowering.materials.normal_maps import NormalPerturbation
 from clpt.scene import materials as mt
 from clpt.scene import roles
@@ -47,12 +50,20 @@ class _Side:
 class MaterialWords:
     """Makes material words, and notes what the materials that it has met need of the kernels.
 
+    gloss_before: words before a row where its gloss stands, 0 if nobody asks for it;
     uvs, tangents, absorption: whether a material needs them; transmitting: kinds of leaves of which
     some let light through; mixture_depth: how deep masks and blends nest.
     """
 
-    def __init__(self, encoder: Encoder, leaves: tuple[type[Scatterer], ...], normal_mapped: bool):
+    def __init__(
+        self,
+        encoder: Encoder,
+        leaves: tuple[type[Scatterer], ...],
+        normal_mapped: bool,
+        asks_gloss: bool,
+    ):
         self._encoder, self._leaves, self._normal_mapped = encoder, leaves, normal_mapped
+        self.gloss_before = (1 + NORMAL_MAP_WORDS * normal_mapped) * asks_gloss
         self._words: dict[tuple[int, tuple[Any, ...]], int] = {}
         self._depths: dict[int, int] = {}  # of mixtures, by their words
         self.uvs = self.tangents = self.absorption = False
@@ -108,6 +119,9 @@ class MaterialWords:
 
     def _leaf(self, material: Scatterer, side: _Side) -> int:
         before = side.perturbation.words(self._encoder) if self._normal_mapped else None
+        if self.gloss_before:
+            maps = () if before is None else before
+            before = np.array([gloss.word(material), *maps], np.uint32)
         row = self._encoder.row(material, "materials", before)
         if row >= 1 << 24:
             raise SceneError("the scene has more than 16 million words of material parameters")

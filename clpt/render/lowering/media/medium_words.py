@@ -12,10 +12,14 @@ from numpy.typing import NDArray
 from clpt.arrays import Words
 from clpt.records import MEDIUM_BITS
 from clpt.render.analysis.bricks import Glow, black_bodies, brick_counts
+from clpt.render.analysis.glow import GlowingBody
 from clpt.render.analysis.index import SceneIndex
+from clpt.render.analysis.lights.light_bounds import Bounds
+from clpt.render.contract.features.media import MOST_AIMS
 from clpt.render.contract.parameter_words import SPECTRUM_WORDS
 from clpt.render.lowering import grids
 from clpt.render.lowering.encoder import Encoder
+from clpt.render.lowering.lights.body_lights import BodyLight
 from clpt.render.lowering.lights.brick_lights import BrickLights
 from clpt.render.lowering.lights.lights import LightRows
 from clpt.render.lowering.materials.material_words import MaterialWords
@@ -27,7 +31,7 @@ from clpt.scene.phases import Phase
 from clpt.scene.shapes import Shape
 from clpt.spectra import Constant, Spectrum
 
-MOST_AIMS = 8  # lamps near which flights end, see kernels/media/equiangular.cl
+BROAD = 1.4  # [rad] half angle from which a cone is none
 
 
 def medium_aims(lights: LightRows) -> NDArray[np.float32]:
@@ -35,22 +39,36 @@ def medium_aims(lights: LightRows) -> NDArray[np.float32]:
 
     (n, 4) float32: x, y, z [m], and the sum of the shares of those up to it; n is 0, 1 or
     MOST_AIMS, so that kernels do not change with the number of lamps. The lamps of most power are
-    taken, each in its middle; the share is that of its power.
+    taken, each in its middle; the share is that of its power. Where some of them shine into a cone
+    as many rows follow: its axis and the cosine of its half angle, -1 for no cone.
     """
-    places, powers, row = [], [], 0
+    places, powers, cones, row = [], [], [], 0
     for bounds in lights.bounds:
         power = lights.power[row : row + len(bounds)]
         row += len(bounds)
         if bounds.placed.all() and power.sum() > 0.0:
             places.append(np.average((bounds.low + bounds.high) / 2.0, axis=0, weights=power))
             powers.append(power.sum())
+            cones.append(_cone(bounds))
     if not places:
         return np.zeros((0, 4), np.float32)
     first = np.argsort(-np.array(powers), kind="stable")[:MOST_AIMS]
     sums = np.cumsum(np.array(powers)[first])
     rows = np.column_stack([np.array(places)[first], sums / sums[-1]]).astype(np.float32)
     count = 1 if len(rows) == 1 else MOST_AIMS
-    return np.concatenate([rows, np.repeat(rows[-1:], count - len(rows), axis=0)])
+    around = np.array(cones, np.float32)[first]
+    kinds = [rows, around] if (around[:, 3] >= 0.0).any() else [rows]
+    return np.concatenate(
+        [part for one in kinds for part in (one, np.repeat(one[-1:], count - len(one), axis=0))]
+    )
+
+
+def _cone(bounds: Bounds) -> tuple[float, float, float, float]:
+    """The cone into which a lamp shines: its axis and the cosine of its half angle, -1: none."""
+    angle = float(bounds.theta_o[0] + bounds.theta_e[0])
+    point = len(bounds) == 1 and bool((bounds.low == bounds.high).all())
+    x, y, z = bounds.axis[0].tolist()
+    return x, y, z, float(np.cos(angle)) if point and angle < BROAD else -1.0
 
 
 class MediumWords:
@@ -62,13 +80,13 @@ class MediumWords:
         encoder: Encoder,
         materials: MaterialWords,
         sealed: frozenset[Medium] = frozenset(),
-        glows: Mapping[Medium, Glow] = MappingProxyType({}),
+        glows: Mapping[Medium, Glow | GlowingBody] = MappingProxyType({}),
     ):
         self._index, self._encoder, self._materials = index, encoder, materials
         self._sealed, self._glows = sealed, glows
         self._words: dict[Medium, int] = {}
-        self.lights: list[BrickLights] = []  # of media whose words are made
-        self._row = len(index.lights)  # in `lights`, of the next brick
+        self.lights: list[BrickLights | BodyLight] = []  # of media whose words are made
+        self._row = len(index.lights)  # in `lights`, of the next part of a medium
         self._has_media = bool(index.media)  # not of an integrator that sees none
 
     def word(self, medium: Medium | None) -> int:
@@ -91,8 +109,11 @@ class MediumWords:
         absorbs, scatters = medium.coefficients(spectral)
         phases = medium.collisions(spectral) if medium.scatters else ()
         rows = []
+        body = self._glows.get(medium)
+        body = body if isinstance(body, GlowingBody) else None
         if self._index.emitting:
             light = medium.light or Constant(0.0)
+            rows.append(np.array([1 + self._row if body else 0], np.uint32))
             rows.append(self._encoder.named_words("medium", "light", light, roles.EMISSION)[0])
         rows += self._part_words(phases, (absorbs, scatters))
         mixture = self._mixture_words(medium)
@@ -103,8 +124,11 @@ class MediumWords:
             rows.append(grids.row(medium, self._encoder))
             word |= MEDIUM_BITS["grid"]
             word |= MEDIUM_BITS["bytes"] if isinstance(medium, Grid) and medium.bits == 8 else 0
-        before = 2 + (SPECTRUM_WORDS if self._index.emitting else 0)
+        before = 2 + (1 + SPECTRUM_WORDS) * bool(self._index.emitting)
         word |= before + self._encoder.store.size("materials")
+        if body is not None:
+            self._row += 1
+            self.lights.append(BodyLight(word, body))
         if isinstance(medium, Lattice) and self._index.grids.emissive:
             rows.append(self._glow(medium, word))
         if isinstance(medium, Lattice) and self._index.grids.tinted:
@@ -177,6 +201,7 @@ class MediumWords:
         if source is not None:
             words[2] = store.append("images", self._encoder.cache(grids.bricks, source))
         bright = self._glows[medium]
+        assert isinstance(bright, Glow)
         rows = np.zeros(np.prod(brick_counts(medium.size)), np.int32)
         rows[bright.emitting] = -1
         rows[bright.numbers] = 1 + self._row + np.arange(len(bright.numbers))

@@ -37,6 +37,7 @@ NODES = np.array([400.0, 550.0, 700.0])  # [nm] of packed spectra, as in spectra
 LARGEST = 2**31 - 1  # words in `images` that an index reaches
 THREADS = 8
 UNKNOWN, NEW, MADE = range(3)
+CHUNK = 1 << 17  # texels of an image that are looked at at a time
 RUN = 64  # colours that are looked through together for new ones
 
 
@@ -431,33 +432,62 @@ def _stored_as(values: NDArray[Any], made: NDArray[Any], curved: bool) -> NDArra
 
 def _codes(values: NDArray[np.uint8]) -> Words:
     """r, g and b of each texel in the three lower bytes of a word, (n,)."""
-    r, g, b = (values[..., i % values.shape[2]].reshape(-1) for i in range(3))
-    made = r.astype(np.uint32)
-    made |= g.astype(np.uint32) << np.uint32(8)
-    made |= b.astype(np.uint32) << np.uint32(16)
-    return made
+    made = np.zeros((values.shape[0] * values.shape[1], 4), np.uint8)
+    for i in range(3):
+        made[:, i] = values[..., i % values.shape[2]].reshape(-1)
+    return made.view("<u4").reshape(-1)
 
 
 class _Spectra:
     """Packed spectra of colours of 8 bits a channel; each is made once, whatever images have it."""
 
     def __init__(self) -> None:
-        self.states = np.zeros(1 << 24, np.uint8)  # of each colour: UNKNOWN, NEW or MADE
-        self.words = np.zeros(1 << 24, np.uint64)  # pages that are not written take no memory
+        self.places = np.zeros((1 << 24) // RUN, np.uint32)  # of a run of colours: its row; 0: none
+        self.runs = np.zeros(1, np.uint32)  # of each row: its run
+        self.states = np.zeros(RUN, np.uint8)  # of each colour of a row: UNKNOWN, NEW or MADE
+        self.words = np.zeros(RUN, np.uint64)
 
     def packed(self, codes: Words, curved: bool) -> Words:
         """Two words for each colour of `_codes`, (2 n,)."""
-        new = codes[self.states[codes] == UNKNOWN]
-        self.states[new] = NEW
-        runs = np.zeros((1 << 24) // RUN, bool)
-        runs[new // np.uint32(RUN)] = True  # few of them, so most pages are not touched
-        made = (RUN * np.flatnonzero(runs)[:, None] + np.arange(RUN)).reshape(-1)
-        made = made[self.states[made] == NEW]
+        parts = np.split(codes, range(CHUNK, len(codes), CHUNK))
+        self._add_rows(parts)
+        for part in parts:
+            at = self._at(part)
+            self.states[at[self.states[at] == UNKNOWN]] = NEW
+        new = np.flatnonzero(self.states == NEW)
+        made = self.runs[new // RUN] * np.uint32(RUN) + (new % RUN).astype(np.uint32)
         channels = np.stack([made & 255, made >> 8 & 255, made >> 16], axis=1)
         packed = pack(spectra.uplift(_meaning(curved)[channels]))
-        self.words[made] = packed.view(np.uint64).reshape(-1)
-        self.states[made] = MADE
-        return self.words[codes].view(np.uint32)
+        self.words[new] = packed.view(np.uint64).reshape(-1)
+        self.states[new] = MADE
+        words = np.empty(len(codes), np.uint64)
+        for first, part in zip(range(0, len(codes), CHUNK), parts, strict=True):
+            words[first : first + CHUNK] = self.words[self._at(part)]
+        return words.view(np.uint32)
+
+    def _at(self, codes: Words) -> Words:
+        """Return the places of colours, whose runs have rows, in `states` and `words`."""
+        return self.places[codes // np.uint32(RUN)] * np.uint32(RUN) + codes % np.uint32(RUN)
+
+    def _add_rows(self, parts: list[Words]) -> None:
+        """Give rows to runs of colours that have none; a table of all would be slow to clear."""
+        seen = np.zeros(len(self.places), bool)
+        for part in parts:
+            seen[part // np.uint32(RUN)] = True
+        runs = np.flatnonzero(seen & (self.places == 0)).astype(np.uint32)
+        self.places[runs] = np.arange(len(self.runs), len(self.runs) + len(runs), dtype=np.uint32)
+        self.runs = np.concatenate([self.runs, runs])
+        needed = RUN * len(self.runs)
+        if needed > len(self.words):
+            self.states = _longer(self.states, max(needed, 2 * len(self.states)))
+            self.words = _longer(self.words, max(needed, 2 * len(self.words)))
+
+
+def _longer(array: NDArray[Any], size: int) -> NDArray[Any]:
+    """Return an array (n,) with zeros after it, (size,)."""
+    made = np.zeros(size, array.dtype)
+    made[: len(array)] = array
+    return made
 
 
 def pack(coefficients: NDArray[np.float32]) -> Words:

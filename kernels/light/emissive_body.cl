@@ -1,0 +1,114 @@
+/* A homogeneous medium that emits, inside of a boundary. A direction to it is that to a point chosen evenly in a ball
+ * or box around: where the ray is inside from t0 to t1 it has the density (t1^3 - t0^3) / (3 V) [1/sr], much where the
+ * way is long, as the light of a thin medium. Rays that go through the medium weigh all that they gather along their
+ * direction against that, see media/body_weight.cl.
+ *
+ * Where on the way light comes from is chosen as the extinction has it; a shadow ray goes there, dims the light, and
+ * tells whether that point is in the medium. So where nothing stands in the medium, and it is grey and fills ball or
+ * box, every direction has just its radiance. */
+#define BODY_THIN 1e-3f /* optical depth below which light begins anywhere on its way */
+
+typedef struct {
+    mask meets;
+    real near, length; /* the way of a ray in the body [m] */
+} BodyWay;
+
+inline BodyWay emissive_body_way(EmissiveBody l, vec3 p, vec3 d)
+{
+    vec3 o = v3(dot3(l.x, p) + l.at.x, dot3(l.y, p) + l.at.y, dot3(l.z, p) + l.at.z);
+    vec3 w = v3(dot3(l.x, d), dot3(l.y, d), dot3(l.z, d));
+    real speed2 = max_r(dot3(w, w), (real)(1e-30f)), middle = -dot3(o, w) / speed2;
+    vec3 across = madd3(w, middle, o);
+    real half_way = sqrt_r(max_r(1.0f - dot3(across, across), (real)(0.0f)) / speed2);
+    real in = middle - half_way, out = middle + half_way;
+    if (any(l.box != 0)) {
+        real first = -(real)(FAR), last = FAR;
+#define AXIS(a)                                                                                  \
+    real step_##a = 1.0f / sel(fabs(w.a) > 1e-20f, w.a, (real)(1e-20f));                         \
+    real one_##a = (-1.0f - o.a) * step_##a, two_##a = (1.0f - o.a) * step_##a;                  \
+    first = max_r(first, min_r(one_##a, two_##a));                                               \
+    last = min_r(last, max_r(one_##a, two_##a));
+        AXIS(x)
+        AXIS(y)
+        AXIS(z)
+#undef AXIS
+        in = sel(l.box != 0, first, in);
+        out = sel(l.box != 0, last, out);
+    }
+    BodyWay way;
+    way.near = max_r(in, (real)(0.0f));
+    way.length = sel(in > 0.0f, out - in, out);
+    way.meets = way.length > 0.0f;
+    return way;
+}
+
+/* [1/sr] */
+inline real emissive_body_way_pdf(EmissiveBody l, BodyWay way)
+{
+    real far = way.near + way.length;
+    real cubes = way.length * (far * far + far * way.near + way.near * way.near);
+    return sel(way.meets, cubes * l.inverse * (1.0f / 3.0f), (real)(0.0f));
+}
+
+real emissive_body_pdf(EmissiveBody l, vec3 p, vec3 d)
+{
+    return emissive_body_way_pdf(l, emissive_body_way(l, p, d));
+}
+
+/* A point in the ball or box, of a cube of random numbers; then in the world. */
+inline vec3 emissive_body_point(EmissiveBody l, vec2 u, real third)
+{
+    vec3 unit = v3(2.0f * u.x - 1.0f, 2.0f * u.y - 1.0f, 2.0f * third - 1.0f);
+    vec3 ball = scale3(uniform_sphere(u), exp_r(log_r(max_r(third, (real)(1e-12f))) * (1.0f / 3.0f)));
+    unit = sel3(l.box != 0, unit, ball);
+    return madd3(l.edge_x, unit.x, madd3(l.edge_y, unit.y, madd3(l.edge_z, unit.z, l.center)));
+}
+
+/* How far on its way light begins [m]: chosen as one of the wavelengths is dimmed, which `choice` chooses evenly: not
+ * the hero's, as others may be dimmed far less. */
+inline real body_depth(Spectrum sigma_t, real length, real u, real choice)
+{
+    real place = 0.0f, sigma = 0.0f;
+#define C(c)                                                        \
+    sigma = sel(choice * SPECTRUM_SIZE >= place, sigma_t.c, sigma); \
+    place += 1.0f;
+    SPECTRUM_EACH(C)
+#undef C
+    sigma = max_r(sigma, (real)(1e-30f));
+    real depth = sigma * length;
+    real lost = 1.0f - exp_r(-min_r(depth, (real)(80.0f)));
+    real inside = -log_r(max_r(1.0f - u * lost, (real)(1e-9f))) / sigma;
+    return min_r(sel(depth < BODY_THIN, u * length, inside), length);
+}
+
+/* Its density [1/m], over all wavelengths. */
+inline real body_depth_pdf(Spectrum sigma_t, real length, real inside)
+{
+    Spectrum r;
+#define C(c)                                                                                                  \
+    real depth_##c = sigma_t.c * length, lost_##c = 1.0f - exp_r(-min_r(depth_##c, (real)(80.0f)));           \
+    r.c = sel(depth_##c < BODY_THIN, 1.0f / length,                                                           \
+              sigma_t.c * exp_r(-min_r(sigma_t.c * inside, (real)(80.0f))) / max_r(lost_##c, (real)(1e-30f)));
+    SPECTRUM_EACH(C)
+#undef C
+    return spectrum_mean(r);
+}
+
+LightSample emissive_body_sample(EmissiveBody l, Scene scene, vec3 p, vec2 u, Wavelengths lambdas)
+{
+    natural bits = hash_natural(as_natural(u.y) ^ 0x68bc21ebu); /* u.x may be what a choice left, and rounded */
+    real more = unit_interval(hash_natural(bits ^ 0x3c6ef372u));
+    vec3 to = sub3(emissive_body_point(l, u, unit_interval(bits)), p);
+    LightSample s = light_sample_nothing();
+    s.wi = scale3(to, 1.0f / sqrt_r(max_r(dot3(to, to), (real)(1e-20f))));
+    BodyWay way = emissive_body_way(l, p, s.wi);
+    mask known = (l.medium != 0) & way.meets;
+    Medium m = medium_load(scene, sel_i(known, l.medium, (integer)(0)), lambdas);
+    real inside = body_depth(m.sigma_t, way.length, more, unit_interval(hash_natural(bits ^ 0xdaa66d2bu)));
+    real chance = body_depth_pdf(m.sigma_t, way.length, inside);
+    s.t = way.near + inside;
+    Spectrum emits = medium_metre(scene, sel_i(known, l.medium, (integer)(0)), m, lambdas);
+    s.radiance = spectrum_scale(emits, 1.0f / sel(known, chance, (real)(1.0f)));
+    s.pdf = sel(known & (spectrum_max(emits) > 0.0f), emissive_body_way_pdf(l, way), (real)(0.0f));
+    return s;
+}
