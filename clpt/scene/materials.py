@@ -211,6 +211,7 @@ class RoughDielectric(Material):
     uses_lobe_sample = True
     refracts = True
     chromatic = True
+    lobes_apart = True
 
     int_ior: IndexLike = index(1.5046, "inside index")
     ext_ior: IndexLike = index(1.000277, "outside index")

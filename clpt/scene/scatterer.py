@@ -19,6 +19,7 @@ class Scatterer(Kind):
     delta: ClassVar[bool] = False  # every lobe is one: a light cannot be sampled through it
     uses_lobe_sample: ClassVar[bool] = False  # `sample` uses u.z
     chromatic: ClassVar[bool] = False  # the pdf differs between wavelengths: it has `pdfs`
+    lobes_apart: ClassVar[bool] = False  # no direction has light of two lobes, if one refracts
     disperses: ClassVar[bool] = False  # whatever its parameters, directions depend on wavelength
     refracts: ClassVar[bool] = False  # they do so where a parameter of the role index does
     fluoresces: ClassVar[bool] = False  # light may leave at another wavelength: it has `shift`

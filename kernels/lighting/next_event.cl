@@ -1,10 +1,8 @@
 /* Rays to lights. */
 
-/* Puts a shadow ray into its slab, for the lanes that `shine`; the other active ones have none. It goes
- * from off the surface to the point of the light sample: along ls.wi it would end beside it.
- *
- * On a GPU all active ones store: what is stored under a condition is computed behind it, and too many registers keep
- * what that needs. */
+/* Puts a shadow ray into its slab, for the lanes that `shine`; the other active ones have none. It goes from off the
+ * surface to the point of the light sample: along ls.wi it would end beside it. On a GPU all active ones store: what
+ * hangs on a condition is computed behind it, and registers keep what that needs. */
 inline void shadow_toward(Slab shadow, uint at, mask active, mask shine, Surface s, LightSample ls, Spectrum value)
 {
     vec3 from = surface_offset(s, ls.wi), to = sub3(madd3(ls.wi, ls.t, s.p), from);

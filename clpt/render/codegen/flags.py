@@ -56,8 +56,14 @@ def has_lobe(features: Features, cls: type[Scatterer], name: str) -> bool:
 
 
 def is_chromatic(features: Features, cls: type[Scatterer]) -> bool:
-    """Whether densities of a material's directions differ between wavelengths."""
-    return features.materials.phase_varies(cls) if cls.is_phase else cls.chromatic
+    """Whether a material is asked at each wavelength: densities of its directions may differ.
+
+    Without dispersion they do not. Then eta alone tells what carried light has instead of radiance
+    (kernels/steps/adjoint_weight.cl), unless lobes that refract and others share directions.
+    """
+    if cls.is_phase:
+        return features.materials.phase_varies(cls)
+    return cls.chromatic and (features.told_dispersion or not cls.lobes_apart)
 
 
 def is_null(features: Features, cls: type[Scatterer]) -> bool:

@@ -22,6 +22,7 @@ _LIMITS: dict[str, tuple[int, ...]] = {
 }
 _OF_AMD = {
     **dict.fromkeys(("generate", "emit", "shadow", "splat", "shade_diffuse"), 128),
+    "shade_reradiating": 96,
     "shade_rough_plastic": 168,
 }
 

@@ -6,6 +6,8 @@ import dataclasses
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from clpt.geometry.instancing import distinct
 from clpt.render.analysis.cameras import dispersive_glasses
 from clpt.render.analysis.checks.materials import check_material
@@ -38,10 +40,6 @@ def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> Callable[[], N
         return "light paths aim at what is sharp, and a material is so now, or no more"
     if lowered.features.media.bodies and pairs:
         return "bodies that overlap know each other's indices"
-    if lowered.features.lights.gloss and any(
-        gloss.word(old) != gloss.word(new) for old, new in pairs
-    ):
-        return "lights are chosen by the gloss of materials"
     camera = None
     if scene.camera is not former.camera:
         if dispersive_glasses(scene.camera) != dispersive_glasses(former.camera):
@@ -59,6 +57,9 @@ def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> Callable[[], N
         if changed is None:
             return f"parameters of a {new.kind} come from elsewhere, such as a texture or a table"
         rows += changed
+        if before := lowered.features.lights.gloss:
+            word = np.array([gloss.word(new)], np.uint32)
+            rows += [(row - before, word) for row, _ in changed]
     return lambda: _write(on_device, camera, rows)
 
 

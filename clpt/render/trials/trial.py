@@ -73,7 +73,7 @@ class Tries:
 
     @property
     def rays(self) -> float:
-        """How many rays the best way would trace for the whole film."""
+        """The rays that the best way would trace for the whole film."""
         trial = self._trials[self.best]
         return trial.rays / (trial.pictures[..., 0].size * SAMPLES) * self._samples
 

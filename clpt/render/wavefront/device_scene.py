@@ -48,6 +48,8 @@ class DeviceScene:
             for name in UPLOADED
         }
         vertices, layout = self.tables["vertices"], strategy.layout
+        self.tree_quality: bvh.Quality
+        self.trees: trees.Trees
         if isinstance(quality, DeviceScene):
             self.tree_quality, self.trees = quality.tree_quality, quality.trees
         else:

@@ -217,14 +217,19 @@ def test_a_quick_update_keeps_the_rules() -> None:
         patch(cast(Any, SimpleNamespace(lowered=lower(former))), former, edited)
 
 
-def test_a_quick_update_leaves_gloss_as_it_is() -> None:
-    """The tree over lights chooses by it, as in a new scene: other words than the material's."""
+def test_a_quick_update_tells_gloss() -> None:
+    """The tree over lights chooses by it, as in a new scene: a word before the material."""
     lamps = [Point(position=(i, 9.0, 0.0), intensity=1.0) for i in range(16)]
     given = {"camera": Perspective(), "lights": lamps}
     balls = (Sphere(material=m.RoughConductor(alpha=alpha)) for alpha in (0.1, 0.2))
     former, edited = (Scene(shapes=[ball], **given) for ball in balls)
-    told = patch(cast(Any, SimpleNamespace(lowered=lower(former))), former, edited)
-    assert told == "lights are chosen by the gloss of materials"
+    device = SimpleNamespace(lowered=lower(former), tables={"materials": None})
+    device.stream = SimpleNamespace(write=lambda *_: None)
+    write = patch(cast(Any, device), former, edited)
+    assert callable(write)
+    write()
+    expected = lower(edited).tables["materials"]
+    np.testing.assert_array_equal(device.lowered.tables["materials"], expected)
 
 
 def test_few_drawn_scenes_are_refused() -> None:
