@@ -1,4 +1,4 @@
-"""How much of a film makes a trial worth it, see clpt.render.trials: what it takes is not large."""
+"""Sizes of films that make a trial worth it, see clpt.render.trials: what it takes is not large."""
 
 SAMPLES = 1 << 23  # of the film, for a first way to be tried, which compiles nothing more
 GUIDE_RAYS = 1 << 27  # rays, some 20 s of a core, beside which to compile a guide is little
