@@ -183,7 +183,7 @@ def nvidia(text: str, device: str, folder: Path, limits: tuple[int, ...]) -> Fig
         (folder / f"{out}.txt").write_text(said, encoding="utf-8")
         return out, registers.told(said)
 
-    cubin = registers.fewest(limits, build)
+    cubin, _ = registers.fewest(limits, build)
     seconds = time.perf_counter() - began
     said = (folder / f"{cubin}.txt").read_text(encoding="utf-8")
     counts = (-1, -1, -1)

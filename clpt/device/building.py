@@ -273,11 +273,22 @@ def _natively(device: Device, source: Source, flags: list[str]) -> cl.Program:
     if not (source.registers and device.info.limits_registers):
         return declarations.built(device, source.text, flags, make)
 
-    def limited(limit: int | None) -> tuple[cl.Program, tuple[int, int]]:
-        program = make(source.text, [*flags, *registers.option(limit)])
-        return program, registers.told(native_programs.said(program, cl_device))
+    entry = _entry(device, source, [*flags, f"limits of registers: {source.registers}"])
+    if stored := disk_cache.load(entry):
+        return make(source.text, [*flags, *registers.option(int(stored[0]) or None)])
 
-    return registers.fewest(source.registers, limited)
+    def limited(limit: int | None) -> tuple[cl.Program, tuple[int, int]]:
+        options = [*flags, *registers.option(limit)]
+        program = make(source.text, options)
+        took = registers.told(native_programs.said(program, cl_device))
+        if not took[0]:  # it comes from the driver's cache, and a new one of its kind is asked
+            new = make(f"{source.text}\n/* {time.time_ns()} */\n", options)
+            took = registers.told(native_programs.said(new, cl_device))
+        return program, took
+
+    program, limit = registers.fewest(source.registers, limited)
+    disk_cache.store(entry, str(limit or 0), b"")
+    return program
 
 
 def _from_cache(device: Device, source: Source, flags: list[str], entry: str) -> Program | None:

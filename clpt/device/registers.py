@@ -1,7 +1,8 @@
 """Programs with few registers a work-item, of compilers that take more than a program needs.
 
 NVIDIA's takes a limit as an option and tells what it took. It fills what a limit allows, so one is
-tried only below what it takes left alone; and a program that then spills is not kept.
+tried only below what it takes left alone; and a program that then spills is not kept. A program
+that comes from the driver's cache tells nothing: what was chosen must be remembered.
 """
 
 from __future__ import annotations
@@ -27,8 +28,10 @@ def told(log: str) -> tuple[int, int]:
     return max(next(found), default=0), max(next(found), default=0)
 
 
-def fewest(limits: Sequence[int], build: Callable[[int | None], tuple[_P, tuple[int, int]]]) -> _P:
-    """Return a program of the least limit with which nothing spills; of none, if all spill.
+def fewest(
+    limits: Sequence[int], build: Callable[[int | None], tuple[_P, tuple[int, int]]]
+) -> tuple[_P, int | None]:
+    """Return a program of the least limit with which nothing spills, and that limit, if one does.
 
     build: with a limit; returns a program, and what `told` does.
     """
@@ -37,5 +40,5 @@ def fewest(limits: Sequence[int], build: Callable[[int | None], tuple[_P, tuple[
         if limit < used:
             limited, (_, spilled) = build(limit)
             if not spilled:
-                return limited
-    return program
+                return limited, limit
+    return program, None
