@@ -32,6 +32,7 @@ log = logging.getLogger(__name__)
 
 OPTIONS = ("-cl-std=CL1.2", "-cl-kernel-arg-info", "-w")
 _PART = "a part, to be linked"
+_LIMIT = "the limit of registers that suits it"
 _COUNTED = re.compile(r"^<kernel>:(\d+):")
 
 
@@ -272,12 +273,18 @@ def _natively(device: Device, source: Source, flags: list[str]) -> cl.Program:
     make = partial(native_programs.build, device.context, cl_device)
     if not (source.registers and device.info.limits_registers):
         return declarations.built(device, source.text, flags, make)
+    entry = _entry(device, source, [*flags, _LIMIT, *map(str, source.registers)])
+    if chosen := disk_cache.load(entry):
+        return make(source.text, [*flags, *registers.option(int(chosen[0]))])
 
-    def limited(limit: int | None) -> tuple[cl.Program, tuple[int, int]]:
+    def limited(limit: int) -> tuple[cl.Program, tuple[int, int]]:
         program = make(source.text, [*flags, *registers.option(limit)])
         return program, registers.told(native_programs.said(program, cl_device))
 
-    return registers.fewest(source.registers, limited)
+    program, limit = registers.fewest(source.registers, limited)
+    if limit is not None:
+        disk_cache.store(entry, str(limit), b"")
+    return program
 
 
 def _from_cache(device: Device, source: Source, flags: list[str], entry: str) -> Program | None:
