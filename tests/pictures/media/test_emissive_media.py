@@ -18,9 +18,9 @@ from clpt.render.analysis import glow
 from clpt.render.analysis.bricks import Glow
 from clpt.scene import Film, Scene, media
 from clpt.scene.cameras import Orthographic, Perspective
-from clpt.scene.integrators import Box
+from clpt.scene.integrators import Box, Direct, Whitted
 from clpt.scene.integrators import Path as PathIntegrator
-from clpt.scene.lights import Constant
+from clpt.scene.lights import Constant, Point
 from clpt.scene.materials import Diffuse, Null
 from clpt.scene.shapes import Cube, Mesh, Rectangle, Sphere
 from clpt.spectra import cie
@@ -211,6 +211,28 @@ def test_floor_under_a_glowing_ball(scale: float) -> None:
     else:
         wanted = reflects * COLOUR * (radius / distance) ** 2 * height / distance
     assert_mean(exposures(scene, 6, 64), wanted, WITHIN)
+
+
+def test_whitted_sees_lights_through_media() -> None:
+    """As `direct` does: haze dims a lamp, and a body does not shine where its box is empty."""
+    haze = media.Homogeneous(sigma_a=0.3)
+    body = media.Homogeneous(sigma_a=0.5, emission=COLOUR)
+    corners = np.float32([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) * np.float32(0.5)
+    sides = {"material": Null(), "interior": body, "exterior": haze}
+    floor = tf.translate([0, 0, -1]) @ tf.scale(4.0)
+    scene = slab(haze)
+    scene.shapes = [
+        Mesh(vertices=corners, faces=[[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]], **sides),
+        Rectangle(material=Diffuse(), interior=haze, exterior=haze, to_world=floor),
+        Cube(material=Null(), interior=haze, to_world=tf.scale(10.0)),
+    ]
+    scene.camera = Perspective(fov=20.0, to_world=tf.look_at([0, -6, 1], [0, -1, -1], [0, 0, 1]))
+    scene.lights = [Point(position=(0.0, 1.0, 2.0), intensity=1.0)]
+    pictures = []
+    for integrator in (Direct(), Whitted(ambient=0.0)):
+        scene.integrator = integrator
+        pictures.append(exposures(scene, 8, 64).mean(axis=(1, 2), keepdims=True))
+    assert_agree(*pictures, "direct and whitted")
 
 
 @pytest.mark.slow
