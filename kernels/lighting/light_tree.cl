@@ -63,8 +63,8 @@ inline real light_tree_group(Scene scene, integer group, vec3 p, Receiver receiv
     return sum;
 }
 
-/* A row, and its chance at p, for a surface that sends light to `hemisphere` (interface/light.cl): 0 where no light
- * reaches p. What is left of *u is uniform in [0, 1) again. other: see light_bits. */
+/* A row, and its chance at p, for a surface that does with light what `receiver` says: 0 where no light reaches p. What
+ * is left of *u is uniform in [0, 1) again. other: see light_bits. */
 inline integer light_tree_pick(Scene scene, vec3 p, Receiver receiver, real *u, real other, real *pmf)
 {
     integer at = 0, child[LIGHT_TREE_WIDTH];

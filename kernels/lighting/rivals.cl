@@ -128,7 +128,7 @@ inline real rival_to_light(Rival r, Surface s, vec3 d, mask delta, real p, real 
     return rival_limited(rival_arrives(r, delta, p, p_back) * change * VERTEX_COSINE(s.n, d));
 }
 
-/* Of a light path. hemisphere: to which a camera's path would send next-event estimation here. */
+/* Of a light path. receiver: by which a camera's path would choose a light here. */
 inline Rival rival_of_emission(Scene scene, Slab path, uint at, Vertex v, Receiver receiver)
 {
     Rival r;

@@ -7,7 +7,7 @@ inline void flight_grids(Scene scene, Slab path, uint at, mask flies, integer na
     mask gridded = flies & ((name & MEDIUM_GRID) != 0);
     if (any(gridded)) {
         natural key = grid_key(scene, load_path_pixel_key(path, at), load_path_sample(path, at), r.vertex);
-        GridOrigin origin = {(real)(0.0f), (real)(0.0f), r.o, r.d};
+        GridOrigin origin = {(real)(0.0f)};
         grid_origin_load(path, at, r, &origin);
         GridFlight own = grid_flight(scene, name, *m, r.o, r.d, r.end, ratio, r.u, key, gridded, lambdas, origin);
         *light = spectrum_sel(gridded, own.light, *light);

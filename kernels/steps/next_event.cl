@@ -37,8 +37,8 @@ inline NextEvent next_event_weigh(Scene scene, NextEvent e, Vertex v, Scattering
     return e;
 }
 
-/* Keeps it, after the next direction is sampled: between them compilers would read tables of materials again. Returns
- * what Path.state gains. */
+/* Keeps it. On a CPU that is after the next direction is sampled: between them compilers would read tables of materials
+ * again. Returns what Path.state gains. */
 inline integer next_event_keep(Scene scene, Slab path, Slab shadow, uint at, mask active, Vertex v, NextEvent e)
 {
     shadow_toward(shadow, at, active, e.shine, v.s, e.ls, e.value);
