@@ -32,7 +32,7 @@ from rich.table import Table
 
 import clpt
 from bench import machine
-from bench.efficiency import APART, WAYS, relative_mse, watched
+from bench.efficiency import APART, WAYS, relative_mse, watched, way_option
 from bench.hard_light.scenes import (
     GLASS,
     SCENES,
@@ -163,7 +163,8 @@ def measure(contenders: list[Contender], seconds: float, seeds: int) -> list[Row
     for one in contenders:  # compiles
         one.render(1, 1)
     start = {one.name: min(one.render(1, seed)[0] for seed in (2, 3)) for one in contenders}
-    start["clpt:guiding"] = start["clpt:path"]
+    if "clpt:guiding" in start:  # which learns before its first sample
+        start["clpt:guiding"] = start["clpt:path"]
     each = {}
     for one in contenders:
         plain = one.render(1, 4)[0]
@@ -223,7 +224,7 @@ def has_cycles(python: str) -> bool:
 @click.option("--blender", default=sys.executable, help="an interpreter that has bpy")
 @click.option("--assets", type=click.Path(path_type=Path, file_okay=False), envvar="ASSETS")
 @click.option("--scene", "scenes", multiple=True, type=click.Choice(list(MADE)))
-@click.option("--way", "ways", multiple=True, type=click.Choice(list(WAYS)), help="of clpt  [all]")
+@way_option
 @click.option("--side", default=128, show_default=True, help="of the picture [pixels]")
 @click.option("--seconds", default=10.0, show_default=True, help="of processor time each")
 @click.option("--seeds", default=2, show_default=True)
@@ -240,7 +241,7 @@ def main(
             try:
                 write(MADE[name](assets), Path(folder), side)
                 sides_ = (Path(folder), side)
-                ours = [Contender(way, *sides_, None) for way in given["ways"] or WAYS]
+                ours = [Contender(way, *sides_, None) for way in given["ways"]]
                 theirs = [Contender(way, *sides_, blender) for way in ("path", "guiding")]
                 found = measure(ours + theirs, given["seconds"], given["seeds"])
             except (RuntimeError, OSError) as error:

@@ -284,7 +284,7 @@ def figures(
     own = relative_mse(long[0], reference)  # which is that of the reference
     pixels, found = reference.shape[0] * reference.shape[1], {}
     for name in contenders:
-        begun = [run["path" if name == "guiding" and "path" in run else name] for run in warm]
+        begun = [run["path" if name == "guiding" else name] for run in warm]
         start, clock = min(run.cpu for run in begun), min(run.seconds for run in begun)
         cpu = min(run[name].cpu for run in full) - start
         seconds = min(run[name].seconds for run in full) - clock
@@ -342,13 +342,26 @@ def cells(row: Row) -> list[str]:
     ]
 
 
+def with_path(_context: click.Context, _option: click.Parameter, ways: Any) -> tuple[str, ...]:
+    """Return ways, by default all. Raises click.BadParameter for guiding whose start is unknown."""
+    if "guiding" in ways and "path" not in ways:
+        raise click.BadParameter("the start of guiding is that of path: give --way path, too")
+    return tuple(ways or WAYS)
+
+
+way_option = click.option(
+    "--way", "ways", multiple=True, type=click.Choice(list(WAYS)), callback=with_path,
+    help="of clpt  [all]",
+)  # fmt: skip
+
+
 @click.command(help=__doc__)
 @click.argument("scenes", nargs=-1)
 @click.option("--assets", type=click.Path(path_type=Path, file_okay=False), envvar="ASSETS")
 @click.option("--width", default=200, show_default=True, help="of the film [pixels]")
 @click.option("--mode", "modes", multiple=True, type=click.Choice(["rgb", "spectral"]))
 @click.option("--threads", multiple=True, type=int, help="cores that both are held to  [1, 2]")
-@click.option("--way", "ways", multiple=True, type=click.Choice(list(WAYS)), help="of clpt  [all]")
+@way_option
 @click.option("--spp", default=64, show_default=True)
 @click.option("--long", default=512, show_default=True, help="samples a pixel of the references")
 @click.option("--as-file", is_flag=True, help="with each file's own pixel filter")
@@ -358,7 +371,7 @@ def main(scenes: tuple[str, ...], assets: Path | None, json_file: str | None, **
     every = list(scenes) or list(SCENES)
     if assets is not None:
         every += [str(path) for path in sorted(assets.glob("mitsuba/*/*.xml"))]
-    usual = {"modes": ("rgb", "spectral"), "threads": (1, 2), "ways": tuple(WAYS)}
+    usual = {"modes": ("rgb", "spectral"), "threads": (1, 2)}
     settings = Settings(**{name: value or usual.get(name, value) for name, value in given.items()})
     table = Table(*HEADINGS, title=f"{machine.processor()}; clpt / Mitsuba")
     with tempfile.TemporaryDirectory() as folder:

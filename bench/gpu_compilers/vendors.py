@@ -176,7 +176,7 @@ def nvidia(text: str, device: str, folder: Path, limits: tuple[int, ...]) -> Fig
     began = time.perf_counter()
     (folder / "k.ptx").write_text(_ptx(text), encoding="utf-8")
 
-    def build(limit: int | None) -> tuple[str, tuple[int, int]]:
+    def build(limit: int) -> tuple[str, tuple[int, int]]:
         limited = ("-maxrregcount", str(limit)) if limit else ()
         out = f"k{limit or ''}.cubin"
         said = run(folder, "ptxas", "-v", "-O3", f"-arch={device}", *limited, "k.ptx", "-o", out)

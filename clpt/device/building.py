@@ -32,6 +32,7 @@ log = logging.getLogger(__name__)
 
 OPTIONS = ("-cl-std=CL1.2", "-cl-kernel-arg-info", "-w")
 _PART = "a part, to be linked"
+_LIMIT = "the limit of registers that suits it"
 _COUNTED = re.compile(r"^<kernel>:(\d+):")
 
 
@@ -272,22 +273,17 @@ def _natively(device: Device, source: Source, flags: list[str]) -> cl.Program:
     make = partial(native_programs.build, device.context, cl_device)
     if not (source.registers and device.info.limits_registers):
         return declarations.built(device, source.text, flags, make)
+    entry = _entry(device, source, [*flags, _LIMIT, *map(str, source.registers)])
+    if chosen := disk_cache.load(entry):
+        return make(source.text, [*flags, *registers.option(int(chosen[0]))])
 
-    entry = _entry(device, source, [*flags, f"limits of registers: {source.registers}"])
-    if stored := disk_cache.load(entry):
-        return make(source.text, [*flags, *registers.option(int(stored[0]) or None)])
-
-    def limited(limit: int | None) -> tuple[cl.Program, tuple[int, int]]:
-        options = [*flags, *registers.option(limit)]
-        program = make(source.text, options)
-        took = registers.told(native_programs.said(program, cl_device))
-        if not took[0]:  # it comes from the driver's cache, and a new one of its kind is asked
-            new = make(f"{source.text}\n/* {time.time_ns()} */\n", options)
-            took = registers.told(native_programs.said(new, cl_device))
-        return program, took
+    def limited(limit: int) -> tuple[cl.Program, tuple[int, int]]:
+        program = make(source.text, [*flags, *registers.option(limit)])
+        return program, registers.told(native_programs.said(program, cl_device))
 
     program, limit = registers.fewest(source.registers, limited)
-    disk_cache.store(entry, str(limit or 0), b"")
+    if limit is not None:
+        disk_cache.store(entry, str(limit), b"")
     return program
 
 

@@ -322,7 +322,7 @@ class DeviceFilm:
         """Whether the camera or a light of a changed scene may be in other media than before."""
         lowered = self.wavefront.scene.lowered
         if not lowered.features.media.present:
-            return False
+            return scene.camera.medium is not self.scene.camera.medium
         if lowered.features.light_media and _lights_moved(self.scene, scene):
             return True
         readable = resolve_device_arrays(scene, self.device.queue)

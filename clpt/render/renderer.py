@@ -32,7 +32,7 @@ class Renderer(DevicePictures):
     device: where to render, a name or index (see clpt.device.choose), or a clpt.device.Device.
     progress: called when a step has ended, in a thread of the driver. beside: another renderer, of
     a scene that has much in common with this one, such as the same in another size: what both need
-    is prepared once. options: see `RenderOptions`.
+    is prepared once, so an array that both have is to hold the same. options: see `RenderOptions`.
 
     It may be used from several threads: one method runs at a time. With `with`, `close`, or when it
     is dropped, it gives the device's memory back.

@@ -20,16 +20,20 @@ def bare(shape: Shape, **more: object) -> Shape:
     return dataclasses.replace(shape, **own) if own else shape
 
 
-def each(shapes: Iterable[Shape], change: Callable[[Shape], Shape]) -> list[Shape]:
-    """Return the shapes as `change` makes them; what several instances place is changed once."""
+def each(shapes: Iterable[Shape], change: Callable[[Shape], Shape | None]) -> list[Shape]:
+    """Return the shapes as `change` makes them, without those of which it makes None.
+
+    What several instances place is changed once.
+    """
     groups: dict[int, Group] = {}
-    changed: list[Shape] = []
+    changed: list[Shape | None] = []
     for shape in shapes:
         if isinstance(shape, Instance):
             group = shape.group
             if id(group) not in groups:
-                groups[id(group)] = Group(shapes=tuple(map(change, group.shapes)), name=group.name)
+                kept = [one for one in map(change, group.shapes) if one is not None]
+                groups[id(group)] = Group(shapes=tuple(kept), name=group.name)
             changed.append(dataclasses.replace(shape, group=groups[id(group)]))
         else:
             changed.append(change(shape))
-    return changed
+    return [shape for shape in changed if shape is not None]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import logging
 import time
 from collections.abc import Callable
@@ -29,16 +30,17 @@ class Beginning:
 
     def __init__(self, device: Device, make: Make, variant: Variant, scene: Scene):
         self.variant = variant
-        self._making = Making(device, lambda: make(variant(scene)))
         own = Device.open(device.info, context=device.context)  # nobody waits for these programs
         own.compilers, own.hurries = device.compilers, True
         small = partial(Renderer, device=own, tree_quality="fast")
         self._solid = Target(small, lambda scene: solid(variant(scene)))
+        self._making = Making(device, lambda: make(variant(scene)))
         self._fails, self._began = False, time.monotonic()
 
     def note(self, change: Change) -> None:
-        """Note that the scene has changed."""
-        self._solid.note(change)
+        """Note that the scene has changed; no camera of a solid scene is in a medium."""
+        camera = change.camera and dataclasses.replace(change.camera, medium=None)
+        self._solid.note(dataclasses.replace(change, camera=camera))
 
     @property
     def is_over(self) -> bool:

@@ -43,21 +43,22 @@ def solid(scene: Scene) -> Scene:
     colours: dict[int, Diffuse] = {}
     lamp = _painted(np.full(3, SHINES))
 
-    def paint(shape: Shape) -> Shape:
+    def paint(shape: Shape) -> Shape | None:
         material = shape.material
+        if isinstance(material, Null):
+            return None
         if shape.emission is None and id(material) not in colours:
             colours[id(material)] = _painted(colour(material))
         painted = colours[id(material)] if shape.emission is None else lamp
         return bare(shape, material=painted, **_without(shape))
 
-    seen = [shape for shape in scene.shapes if not isinstance(shape.material, Null)]
     film = Film(
         width=scene.film.width, height=scene.film.height, crop=scene.film.crop, mode="rgb",
         layers=LAYERS,
     )  # fmt: skip
     return Scene(
         camera=dataclasses.replace(scene.camera, medium=None),
-        shapes=each(seen, paint),
+        shapes=each(scene.shapes, paint),
         film=film,
         integrator=Path(max_depth=1, light_paths=0),
         spp=SAMPLES,

@@ -23,5 +23,5 @@ inline BsdfAnswer material_answer(Bsdf m, vec3 wo, vec3 wi, vec3 u, int adjoint)
     return a;
 }
 
-#define APART(type, name) __attribute__((noinline)) type name
+#include "stage/apart.cl"
 #include "generated/material_part.cl"

@@ -72,10 +72,12 @@ def test_kernels_of_a_preview_are_those_of_other_scenes() -> None:
     assert len(solid(rich).shapes) == 3
     one, other = (lower(solid(scene)).features for scene in (plain, rich))
     assert one == other
-    group = Group(shapes=[Cube(material=Dielectric())])
+    smoke = Cube(material=Null(), interior=Homogeneous(sigma_s=1.0))
+    group = Group(shapes=[Cube(material=Dielectric()), smoke])
     placed = solid(furnished(shapes=[Instance(group=group), Instance(group=group)], lights=[]))
     assert placed.shapes[0].group is placed.shapes[1].group
-    assert isinstance(placed.shapes[0].group.shapes[0].material, Diffuse)
+    (cube,) = placed.shapes[0].group.shapes
+    assert isinstance(cube.material, Diffuse)
 
 
 def test_a_preview_shows_colours_lit_from_the_camera() -> None:
@@ -126,6 +128,25 @@ def test_what_is_given_up_is_not_compiled() -> None:
     made.wait(LONG)
     made.give_up()
     assert made.is_done and not compiled
+
+
+def test_no_camera_of_a_preview_is_in_a_medium(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It would have to be compiled for that."""
+
+    def refuse(_: Scene) -> Any:
+        raise SceneError("not made")
+
+    noted: list[Change] = []
+    monkeypatch.setattr(beginning.Target, "note", lambda _, change: noted.append(change))
+    begun = beginning.Beginning(device.choose(), refuse, lambda scene: scene, small())
+    camera = Perspective(medium=Homogeneous(sigma_s=1.0), fov=20.0)
+    begun.note(Change(camera=camera))
+    begun.note(Change(whole=True))
+    begun.close()
+    moved, whole = noted
+    assert moved.camera is not None and moved.camera.medium is None
+    assert isinstance(moved.camera, Perspective) and moved.camera.fov == 20.0
+    assert whole.camera is None and whole.whole
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""With how few registers a work-item of a GPU each program may do.
+"""The fewest registers that a work-item of a GPU is to have, by program.
 
 Left alone, compilers take more than some programs need, and fewer work-items run at once. These
 limits are tried (clpt/device/registers.py). With one that spills nothing a program of the scenes
@@ -33,5 +33,5 @@ def limits(program: str) -> tuple[int, ...]:
 
 
 def of_amd(program: str) -> int | None:
-    """Return the registers of which the text of a program tells AMD's compilers that they do."""
+    """Return the registers that a program's text allows AMD's compilers; None: they choose."""
     return _OF_AMD.get(program)

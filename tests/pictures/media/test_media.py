@@ -140,6 +140,19 @@ def test_camera_enters_a_medium_and_leaves_it() -> None:
         assert renderer.image().mean() == pytest.approx(1.0, rel=1e-3)
 
 
+def test_camera_is_told_a_medium_where_there_was_none() -> None:
+    scene = with_mode(ball(media.Homogeneous()), "rgb")
+    wall = Rectangle(emission=Area(radiance=1.0), material=BLACK, to_world=tf.scale(2.0))
+    scene.shapes, scene.lights = [wall], []
+    away = tf.look_at([0, 0, 2.0], [0, 0, 0], [0, 1, 0])
+    scene.camera = Perspective(fov=1.0, near=0.0, to_world=away)
+    fog = media.Homogeneous(sigma_a=0.5)
+    with clpt.Renderer(scene) as renderer:
+        renderer.update(camera=dataclasses.replace(scene.camera, medium=fog))
+        renderer.run(4)
+        assert renderer.image().mean() == pytest.approx(np.exp(-1.0), rel=1e-3)
+
+
 def test_absorbs_as_beer_and_lambert_say() -> None:
     """exp(-sigma_a t) through a cube, without any noise, and for each wavelength of its own."""
     dye = spectra.Tabulated((360.0, 500.0, 560.0, 830.0), (0.1, 0.4, 1.5, 0.2))

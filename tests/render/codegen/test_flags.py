@@ -21,6 +21,7 @@ OTHERS = {
     "NOT_INLINED",
     "USES_MAPPINGS",
     "SLAB_BLOCK",
+    "TEXELS_AT_RANDOM",
 }
 OPENCL = {"FP_FAST_FMAF"}  # what compilers define
 TABLES = flags.SCENE | flags.MATERIAL.keys()

@@ -73,7 +73,7 @@ def features_of(name: str, integrator: PathTracer | Vcm | None = None) -> Featur
 def test_only_stages_are_seen_outside(name: str) -> None:
     features = features_of(name)
     for layout, lanes, interleaved in WAYS:
-        outside: list[str] = []
+        outside, look_ups = [], []
         made = programs.loop_sources(features, layout, lanes, interleaved)
         for program, source in made.items():
             private = dict(re.findall(r"^#define (\w+) (\w+)$", source.text, re.MULTILINE))
@@ -88,10 +88,14 @@ def test_only_stages_are_seen_outside(name: str) -> None:
                     outside.append(f"loop_{shared[1]}")
                 elif apart := re.match(r"APART\(\w+, loop_(\w+)_answer\)", head):
                     outside.append(f"loop_material_{apart[1]}")
+                elif looked_up := re.match(r"APART\(\w+, (loop_\w+_texture_\w+)\)", head):
+                    look_ups.append(looked_up[1])
                 else:
                     assert head.startswith("kernel "), f"{program}: {head} is not private"
                     outside.append(own)
-        stages = made.keys() - {"loop", "common"}
+        others = "".join(one.text for name, one in made.items() if name != "textures")
+        assert ("textures" in made) == any(f"{own}(" in others for own in look_ups)
+        stages = made.keys() - {"loop", "common", "textures"}
         wanted = {"loop", *(f"loop_{name}" for name in stages)}
         wanted |= {f"loop_{one.name}" for one in common.shared(features, lanes)}
         assert sorted(outside) == sorted(wanted)
