@@ -3,6 +3,6 @@
 
 inline integer vertex_medium(Vertex v, vec3 w)
 {
-    return sel_i(dot3(v.s.n, w) < 0.0f, v.media.inside, v.media.outside);
+    return sel_i(vertex_inward(v, w), v.media.inside, v.media.outside);
 }
-inline integer vertex_through(Vertex v, vec3 w) { return bodies_beyond(v.media.bodies, dot3(v.s.n, w) < 0.0f); }
+inline integer vertex_through(Vertex v, vec3 w) { return bodies_beyond(v.media.bodies, vertex_inward(v, w)); }

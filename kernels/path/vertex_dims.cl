@@ -6,5 +6,12 @@ inline Spectrum vertex_arriving(Scene scene, Slab path, uint at, mask active, Ve
     return spectrum_mul(v.beta, left);
 }
 
+/* Whether w leads to the inside of the shape: the normal of a two-sided one is turned to the viewer. */
+inline mask vertex_inward(Vertex v, vec3 w)
+{
+    mask crosses = dot3(v.s.n, w) * dot3(v.s.n, v.d) > 0.0f;
+    return sel_i(crosses, v.front, !v.front);
+}
+
 /* `value` after t metres along w, which leads away from the vertex. */
 #define vertex_beyond(scene, v, w, t, lambdas, value) medium_dims(scene, vertex_medium(v, w), t, lambdas, value)

@@ -3,6 +3,6 @@
 
 inline integer vertex_medium(Vertex v, vec3 w)
 {
-    return medium_beyond(v.media.medium, v.media.inside, v.media.outside, v.front, dot3(v.s.n, w) < 0.0f);
+    return medium_beyond(v.media.medium, v.media.inside, v.media.outside, v.front, vertex_inward(v, w));
 }
 inline integer vertex_through(Vertex v, vec3 w) { return vertex_medium(v, w); }

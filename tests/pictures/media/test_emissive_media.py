@@ -5,6 +5,7 @@ Significance as in tests/pictures/support.py. All quick tests in a mode share th
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from clpt.scene.cameras import Orthographic, Perspective
 from clpt.scene.integrators import Box, Direct, Whitted
 from clpt.scene.integrators import Path as PathIntegrator
 from clpt.scene.lights import Constant, Point
-from clpt.scene.materials import Diffuse, Null
+from clpt.scene.materials import Diffuse, Null, TwoSided
 from clpt.scene.shapes import Cube, Mesh, Rectangle, Sphere
 from clpt.spectra import cie
 from clpt.spectra.emission import planck
@@ -213,6 +214,20 @@ def test_floor_under_a_glowing_ball(scale: float) -> None:
     assert_mean(exposures(scene, 6, 64), wanted, WITHIN)
 
 
+def test_two_sided_walls_of_a_room_of_haze() -> None:
+    """Light that they send inwards goes through it, whoever says that it is there."""
+    haze = media.Homogeneous(sigma_a=0.35)
+    scene = slab(haze)
+    room = Cube(material=TwoSided(front=Diffuse(reflectance=0.6)), to_world=tf.scale(2.0))
+    scene.camera = Perspective(fov=70.0, to_world=tf.look_at([0.5, 0, 1.8], [0, -1, 0], [0, 1, 0]))
+    scene.lights, scene.integrator = [Point(position=(0.0, 1.5, 0.0))], Direct()
+    scene.shapes = [dataclasses.replace(room, interior=haze)]
+    got = exposures(scene, 2, 16)
+    scene.shapes = [room, Cube(material=Null(), interior=haze, to_world=tf.scale(9.0))]
+    assert got.mean() > 0.0
+    np.testing.assert_allclose(got, exposures(scene, 2, 16), rtol=1e-4)
+
+
 def test_whitted_sees_lights_through_media() -> None:
     """As `direct` does: haze dims a lamp, and a body does not shine where its box is empty."""
     haze = media.Homogeneous(sigma_a=0.3)
@@ -252,7 +267,8 @@ def test_bodies_as_lights(mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
         Sphere(center=(0.02, 0.01, 0.0), radius=0.05, material=Diffuse()),  # in the first
     ]
     scene = slab(haze, mode=mode)
-    walls = Cube(material=Diffuse(reflectance=0.6), interior=haze, to_world=tf.scale(2.0))
+    dull = TwoSided(front=Diffuse(reflectance=0.6))
+    walls = Cube(material=dull, interior=haze, to_world=tf.scale(2.0))
     scene.shapes = [*bodies, walls]
     scene.camera = Perspective(fov=70.0, to_world=tf.look_at([0.5, 0, 1.8], [0, -1, 0], [0, 1, 0]))
     scene.integrator = PathIntegrator(max_depth=3, light_paths=0)
@@ -273,7 +289,8 @@ def test_bricks_as_lights(mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
     haze = media.Homogeneous(sigma_s=0.3, sigma_a=0.05)
     scene = slab(flame, mode=mode)
     box = Cube(material=Null(), interior=flame, exterior=haze, to_world=tf.scale(0.6))
-    walls = Cube(material=Diffuse(reflectance=0.6), interior=haze, to_world=tf.scale(2.0))
+    dull = TwoSided(front=Diffuse(reflectance=0.6))
+    walls = Cube(material=dull, interior=haze, to_world=tf.scale(2.0))
     scene.shapes = [box, walls]
     scene.camera = Perspective(fov=70.0, to_world=tf.look_at([0.5, 0, 1.8], [0, -1, 0], [0, 1, 0]))
     scene.integrator = PathIntegrator(max_depth=3, light_paths=0)
