@@ -233,7 +233,7 @@ def in_mode(scene: Path, mode: str, settings: Settings) -> list[Row]:
 
         long, means = long_renders(contenders(len(every)), settings)
         about = {
-            "scene": name_of(scene),
+            "scene": machine.scene_name(scene),
             "mode": mode,
             "as_file": settings.as_file,
             "size": [*size],
@@ -261,11 +261,6 @@ def long_renders(
     if abs(means[0] - means[1]) > APART * means[1]:
         raise RuntimeError(f"{pair[0].mode}: the two have other pictures, of means {means}")
     return both, means
-
-
-def name_of(scene: Path) -> str:
-    """Return what a scene is called: its file or, where that is `scene.xml`, its folder."""
-    return scene.parent.name if scene.stem == "scene" else scene.stem
 
 
 def figures(

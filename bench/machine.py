@@ -13,7 +13,16 @@ from rich.console import Console
 from clpt.benchmark import records
 from clpt.benchmark.records import ROOT, circumstances, processor, vectors
 
-__all__ = ["ROOT", "append", "circumstances", "console", "kind", "processor", "settle"]
+__all__ = [
+    "ROOT",
+    "append",
+    "circumstances",
+    "console",
+    "kind",
+    "processor",
+    "scene_name",
+    "settle",
+]
 
 
 def kind() -> str:
@@ -26,6 +35,11 @@ def console() -> Console:
     """Where tables are printed; a file or a pipe has no edge to wrap at."""
     there = Console()
     return there if there.is_terminal else Console(width=200)
+
+
+def scene_name(scene: Path) -> str:
+    """Return what a scene is called: its file or, where that is `scene.xml`, its folder."""
+    return scene.parent.name if scene.stem == "scene" else scene.stem
 
 
 def append(path: str | Path | None, bench: str, rows: Iterable[dict[str, object]]) -> None:

@@ -89,9 +89,12 @@ def starting(rows: Sequence[Row]) -> str:
             for name in names
         )
         memory = (f"{row[f'{name}_memory'] / 2**20:.0f} MiB" for name in ("cold", "warm"))
-        return [str(row["scene"]), str(row["renderer"]), *times, *memory]
+        ours = row["renderer"] == "clpt"
+        device = str(row.get("device", "")) if ours else ""
+        return [str(row["scene"]), str(row["renderer"]), device, *times, *memory]
 
-    return table(["scene", "renderer", *names, "peak cold", "peak warm"], map(cells, rows))
+    names_of = ["scene", "renderer", "device", *names, "peak cold", "peak warm"]
+    return table(names_of, map(cells, rows))
 
 
 def plain(rows: Sequence[Row]) -> str:

@@ -24,7 +24,6 @@ from rich.table import Table
 
 import clpt
 from bench import machine
-from bench.efficiency import name_of
 from bench.renders import MODES, SCENES
 from bench.traversal import HIT, KERNELS
 from clpt import bvh, device
@@ -110,7 +109,7 @@ def measure(path: Path, mode: str, bounces: int = BOUNCES) -> dict[str, Any]:
     total = sum(seconds.values()) - alone
     millions = counts["intersect"] * 1e-6
     row: dict[str, Any] = {
-        "scene": name_of(path),
+        "scene": machine.scene_name(path),
         "mode": mode,
         "layout": tree.layout,
         "ms": {name: s * 1e3 / millions for name, s in seconds.items()},

@@ -32,6 +32,7 @@ from rich.table import Table
 from bench import machine
 from bench.peer_scenes import write_atrium, write_cornell, write_glass
 from bench.workers import find_llvm
+from clpt import device
 from clpt.benchmark.starting import CACHES
 
 MITSUBA = """
@@ -167,8 +168,10 @@ def rows_of(
     find_llvm()
     bytecode = [sys.executable, "-m", "compileall", "-q", "clpt"]
     run(bytecode, folder / "bytecode", checkout)
+    info = device.choose().info
+    taken = f"{info.platform} {info.name}"
     for name, scene in scenes.items():
-        which = {"scene": name, "size": size}
+        which = {"scene": name, "size": size, "device": taken}
         command = ours(scene, size, out)
         row = which | {"renderer": "clpt"} | measure(command, folder, rounds, checkout)
         yield row | _figures("another", run(command, folder / "others", checkout))
@@ -181,7 +184,7 @@ def rows_of(
 def _scenes(given: Sequence[Path], folder: Path) -> dict[str, Path]:
     """The scenes by their names: those that are given, else SCENES and OWN."""
     if given:
-        return {path.name: path.resolve() for path in given}
+        return {machine.scene_name(path): path.resolve() for path in given}
     made = [write_cornell(folder), write_glass(folder), write_atrium(folder)]
     of_peers = dict(zip(SCENES, made, strict=True))
     return of_peers | {name: machine.ROOT / "scenes" / name for name in OWN}

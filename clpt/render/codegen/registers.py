@@ -9,7 +9,7 @@ from __future__ import annotations
 
 _LIMITS: dict[str, tuple[int, ...]] = {
     "generate": (96, 112),
-    "flight": (128,),
+    "flight": (128, 144),
     "intersect": (96, 128),
     "shadow": (80, 96),
     "splat": (80, 96),
@@ -21,9 +21,9 @@ _LIMITS: dict[str, tuple[int, ...]] = {
     "shade_rough_dielectric": (112, 128),
 }
 _OF_AMD = {
-    **dict.fromkeys(("generate", "emit", "shadow", "splat", "shade_diffuse"), 128),
+    **dict.fromkeys(("generate", "emit", "shadow", "splat"), 128),
     "shade_reradiating": 96,
-    "shade_rough_plastic": 168,
+    **dict.fromkeys(("shade_diffuse", "shade_rough_plastic"), 168),
 }
 
 
