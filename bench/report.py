@@ -93,8 +93,9 @@ def starting(rows: Sequence[Row]) -> str:
         device = str(row.get("device", "")) if ours else ""
         return [str(row["scene"]), str(row["renderer"]), device, *times, *memory]
 
-    names_of = ["scene", "renderer", "device", *names, "peak cold", "peak warm"]
-    return table(names_of, map(cells, rows))
+    newest = {(row["scene"], row["renderer"], row.get("device")): row for row in rows}
+    heads = ["scene", "renderer", "device", *names, "peak cold", "peak warm"]
+    return table(heads, map(cells, newest.values()))
 
 
 def plain(rows: Sequence[Row]) -> str:
