@@ -238,7 +238,7 @@ def main(
     table = Table(*columns, "cost", title=f"{machine.processor()}, {size}")
     for name in names or SCENES:
         file = machine.ROOT / "scenes" / name  # or the path of any other
-        row: dict[str, Any] = {"scene": name, "size": size, **cold(file, size)}
+        row: dict[str, Any] = {"scene": machine.scene_name(file), "size": size, **cold(file, size)}
         first: list[float] = []
         render: list[float] = []
         for i in range(rounds + 1):  # the first one fills caches
