@@ -233,4 +233,4 @@ def test_a_lamp_that_moves_is_in_another_medium() -> None:
         first = renderer._wavefront.scene.lowered.tables["media"].copy()
         renderer.update(scene=dataclasses.replace(scene, lights=[out]))
         second = renderer._wavefront.scene.lowered.tables["media"]
-        assert first[5] != 0 and second[5] == 0  # behind one aim of four words
+        assert first[9] != 0 and second[9] == 0  # behind one aim and its cone, of four words each

@@ -124,7 +124,7 @@ def irradiance(
     """
     changes |= {"radius": radius} if isinstance(WAYS[way], Vcm) else {}
     integrator: Any = dataclasses.replace(WAYS[way], max_depth=depth, rr_depth=depth, **changes)
-    number = scene.film.width * scene.film.height * getattr(integrator, "light_paths", 1)
+    number = scene.film.width * scene.film.height * (integrator.light_paths or 1)
     lit = dataclasses.replace(scene, integrator=integrator)
     spp = max(1, round(paths / number)) * (UNAIMED if way == "particle_tracer" else 1)
     made = exposures(lit, COUNT, spp, device=narrow(), layout="wide8")
