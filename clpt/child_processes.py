@@ -18,3 +18,10 @@ def command(code: str, *arguments: str) -> list[str]:
     paths = dict.fromkeys([*(path for path in sys.path if os.path.isabs(path)), _HOME])
     code = f"import sys; sys.path[:] = {list(paths)!r}; {code}"
     return [sys.executable, "-I", "-c", code, *arguments]
+
+
+def cores() -> int:
+    """Return how many cores this process may use, which may be fewer than the machine has."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

@@ -15,7 +15,7 @@ from typing import Any
 import pyopencl as cl
 import pytest
 
-from clpt import device
+from clpt import child_processes, device
 
 # the processes that tests start take a second each to parse all sources, where none keeps bytecode
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
@@ -32,8 +32,7 @@ PROCESSES += [HERE / name for name in ("faults", "test_output_files.py", "view")
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
     """One more than there are cores: tests that wait for processes and disks use no core."""
-    own = hasattr(os, "sched_getaffinity")  # a process may have fewer than the machine
-    return (len(os.sched_getaffinity(0)) if own else os.cpu_count() or 1) + 1
+    return child_processes.cores() + 1
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -235,7 +235,7 @@ def local_cluster(
     threads: of each worker; by default the cores are divided. All of it listens on the loopback
     interface alone, to those who have keys that are made here and are gone at the end.
     """
-    each = threads or max(1, _cores() // workers)
+    each = threads or max(1, child_processes.cores() // workers)
     options = ["--threads", str(each)] + (["--device", device] if device else [])
     with local_scheduler() as (client, folder):
         started: list[subprocess.Popen[bytes]] = []
@@ -284,9 +284,3 @@ def end(processes: list[subprocess.Popen[bytes]]) -> None:
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
-
-
-def _cores() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

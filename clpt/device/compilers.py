@@ -7,7 +7,6 @@ not start, or dies, the caller compiles by itself.
 from __future__ import annotations
 
 import logging
-import os
 import pickle
 import signal
 import subprocess
@@ -202,9 +201,7 @@ def _was_ended_at_limit(process: subprocess.Popen[bytes]) -> bool:
 
 def spare_cores() -> int:
     """Return how many processes may compile beside this one: a core each."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0)) - 1
-    return (os.cpu_count() or 1) - 1
+    return child_processes.cores() - 1
 
 
 def _command() -> list[str]:

@@ -111,7 +111,7 @@ class Path(Integrator):
         if self.guiding and given not in (0, AUTO):
             message = "guiding is for paths from the camera alone: ask for no light_paths"
             raise SceneError(message, where=f"{self.kind}.guiding")
-        self._check_guide_paths()
+        _check_whole(self.guide_paths, f"{self.kind}.guide_paths", 0, MOST_GUIDE_PATHS)
         if isinstance(given, str) and given == AUTO:
             return
         number = isinstance(given, (int, float)) and not isinstance(given, bool)
@@ -119,13 +119,6 @@ class Path(Integrator):
             fewest = f"{FEWEST_LIGHT_PATHS:g}"
             message = f"must be 0, {fewest} to {MOST_LIGHT_PATHS}, or {AUTO!r}, not {given!r}"
             raise SceneError(message, where=f"{self.kind}.light_paths")
-
-    def _check_guide_paths(self) -> None:
-        given = self.guide_paths
-        whole = isinstance(given, int) and not isinstance(given, bool)
-        if not whole or not 0 <= given <= MOST_GUIDE_PATHS:
-            message = f"must be a whole number of 0 to {MOST_GUIDE_PATHS}, not {given!r}"
-            raise SceneError(message, where=f"{self.kind}.guide_paths")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

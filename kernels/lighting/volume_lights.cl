@@ -1,7 +1,7 @@
 /* Lights that are parts of media. */
 
 /* The medium that a row of `lights` is a brick or all of, 0 for any other light. */
-inline integer brick_medium(Scene scene, integer row)
+inline integer volume_medium(Scene scene, integer row)
 {
     LightRow l = light_at(scene, row);
     mask part = l.kind >= LIGHT_VOLUMES;

@@ -43,7 +43,7 @@ inline integer next_event_keep(Scene scene, Slab path, Slab shadow, uint at, mas
 {
     shadow_toward(shadow, at, active, e.shine, v.s, e.ls, e.value);
     light_layers_chosen(path, at, e.shine, e.ls.row);
-    store_shadow_into(shadow, at, e.shine, brick_medium(scene, sel_i(e.shine, e.ls.row, (integer)(0))));
+    store_shadow_into(shadow, at, e.shine, volume_medium(scene, sel_i(e.shine, e.ls.row, (integer)(0))));
     store_shadow_through(shadow, at, e.shine, vertex_through(v, e.ls.wi));
     return sel_i(e.shine, (integer)(PATH_SHADOW), (integer)(0));
 }

@@ -61,9 +61,8 @@ def glows(index: SceneIndex, cached: Cached) -> dict[Medium, Glow | GlowingBody]
     for medium in index.emitting:
         if isinstance(medium, Grid):
             found[medium] = _glow(medium, index.spectral)
-        elif not isinstance(medium, Lattice):
-            body = _body(medium, index, cached)
-            found.update({medium: body} if body is not None else {})
+        elif not isinstance(medium, Lattice) and (body := _body(medium, index, cached)):
+            found[medium] = body
     return found
 
 

@@ -46,15 +46,13 @@ def _number(value: object, other: float = TEXTURED) -> float:
 
 
 def _metal(values: Values) -> tuple[float, float]:
-    return float(
-        np.sqrt(_number(values["alpha_u"], ROUGHLY**2) * _number(values["alpha_v"], ROUGHLY**2))
-    ), 1.0
+    u, v = (_number(values[name], ROUGHLY**2) for name in ("alpha_u", "alpha_v"))
+    return float(np.sqrt(u * v)), 1.0
 
 
 def _plastic(values: Values) -> tuple[float, float]:
-    return _number(values["alpha"], ROUGHLY**2), _share(
-        STRAIGHT, _number(values["diffuse_reflectance"])
-    )
+    share = _share(STRAIGHT, _number(values["diffuse_reflectance"]))
+    return _number(values["alpha"], ROUGHLY**2), share
 
 
 def _principled(values: Values) -> tuple[float, float]:
