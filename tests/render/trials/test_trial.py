@@ -111,6 +111,16 @@ def test_a_trial_takes_a_share_of_the_film() -> None:
     assert cost.pixels_for(1 << 40) == cost.PIXELS
 
 
+@pytest.mark.parametrize(
+    ("power", "paths", "learned"),
+    [(23, 20, 18), (25, 22, 19), (27, 22, 20), (29, 22, 22), (40, 22, 22), (40, 10, 10)],
+)
+def test_a_trials_guide_comes_near_that_of_a_long_film(
+    power: int, paths: int, learned: int
+) -> None:
+    assert trial.lessons(1 << paths, 1 << power) == 1 << learned
+
+
 def made_up(
     monkeypatch: pytest.MonkeyPatch, noise: dict[tuple[Any, bool], float], rays: int = 1 << 20
 ) -> list[Any]:
