@@ -39,6 +39,7 @@ from bench import machine
 from bench.renders import SCENES
 from bench.starting import WATCH
 from bench.workers import find_llvm
+from clpt import device
 
 MITSUBA = """
 import os, sys
@@ -248,6 +249,7 @@ def in_mode(scene: Path, mode: str, settings: Settings) -> list[Row]:
         long, means = long_renders(contenders(len(every)), settings)
         about = {
             "scene": machine.scene_name(scene),
+            "runtime": device.choose().info.platform,
             "mode": mode,
             "as_file": settings.as_file,
             "size": [*size],
