@@ -12,7 +12,8 @@ RESULTS = Path(__file__).parent / "results"
 POCL = "Portable Computing Language"  # its platform's name
 WHICH = (
     "scene", "mode", "renderer", "sampler", "threads", "layout", "rays", "query", "effect",
-    "figure", "triangles", "builder", "bent", "as_file", "size", "benchmark_version", "way", "runtime",
+    "figure", "triangles", "builder", "bent", "as_file", "size", "benchmark_version", "way",
+    "runtime",
 )  # fmt: skip
 
 HEAD = """# What was measured
