@@ -52,9 +52,8 @@
  * in others: rivals stay inside a float, and far from the limits below.
  *
  * What is sharp depends on the densities of both ways alone, and so is the same for both sides: a delta lobe, or a
- * density above SHARP_PDF. */
+ * density above SHARP_PDF (merging/weight.cl). */
 #define RIVAL_MOST 1e18f /* so that its square is finite */
-#define SHARP_PDF 8.0f /* [1/sr]; an even hemisphere has 0.16 */
 
 inline real rival_limited(real rival) { return min_r(rival, (real)(RIVAL_MOST)); }
 
@@ -63,8 +62,6 @@ inline mask rival_ends(Scene scene, Vertex v)
 {
     return BSDF_ENDS_LIGHT_PATHS ? mask_of(1) : shading_frame_turns(scene, v.row);
 }
-
-inline mask rival_sharp(mask delta, real p, real p_back) { return delta | (max_r(p, p_back) > SHARP_PDF); }
 
 /* What a vertex knows of the rival of its path. */
 typedef struct {

@@ -15,6 +15,7 @@
 #include "generated/photon_numbers.cl"
 #include "merging/weight.cl"
 #include "generated/photon.cl"
+#include "merging/media.cl"
 
 STAGE(deposit)(SLAB_ARGS, SCENE_ARGS DEPOSIT_ARGS STAGE_AT_ARG)
 {
@@ -25,6 +26,11 @@ STAGE(deposit)(SLAB_ARGS, SCENE_ARGS DEPOSIT_ARGS STAGE_AT_ARG)
     integer pixel_index = load_path_pixel_index(path, at), kind = MATERIAL_KIND(load_hit_material(hit, at));
     mask active = ((state & PATH_ALIVE) != 0) & ((state & PATH_SHARP) != 0) & (load_hit_prim(hit, at) >= 0);
     active = active & (depth < settings->max_depth) & (pixel_index < settings->photon_pixels) & photon_met(kind);
+#if USES_MEDIA
+    integer name = sel_i(active, load_path_medium(path, at), (integer)(0));
+    mask collides = photon_collides(MATERIAL_KIND(merging_part(scene, active, load_hit_material(hit, at))));
+    active = active & (!collides | photon_along(MATERIAL_KIND(merging_phase(scene, name))));
+#endif
     if (any(active)) {
         scene.time = load_path_time(path, at);
         integer sample = load_path_sample(path, at), pass = merging_pass(scene, sample), group = 0;
@@ -32,6 +38,9 @@ STAGE(deposit)(SLAB_ARGS, SCENE_ARGS DEPOSIT_ARGS STAGE_AT_ARG)
         vec3 d = load_path_d(path, at);
         Surface s = surface_load(scene, hit, at, active, load_path_o(path, at), d, &front);
         Photon photon;
+#if USES_MEDIA
+        s.p = sel3(collides, madd3(d, load_hit_t(hit, at), load_path_o(path, at)), s.p);
+#endif
         photon.p = s.p;
         photon.power = load_path_beta(path, at);
 #if USES_RATIO && SPECTRUM_SIZE == 4 /* whose hero the other path shares */
@@ -42,6 +51,10 @@ STAGE(deposit)(SLAB_ARGS, SCENE_ARGS DEPOSIT_ARGS STAGE_AT_ARG)
         photon.to_light = octahedral_pack(neg3(d));
         photon.normal = octahedral_pack(s.n);
         photon.rival = photon_rival(load_path_rival(path, at), dot3(s.n, d));
+#if USES_MEDIA /* by which medium it is in, and without a cosine */
+        photon.normal = sel_n(collides, as_natural(name), photon.normal);
+        photon.rival = sel(collides, load_path_rival(path, at), photon.rival);
+#endif
 #if USES_ABSORPTION
         integer medium = sel_i(active, load_path_medium(path, at), (integer)(0));
         real through = load_hit_t(hit, at) + sel(active, load_path_lead(path, at), (real)(0.0f));
@@ -52,6 +65,9 @@ STAGE(deposit)(SLAB_ARGS, SCENE_ARGS DEPOSIT_ARGS STAGE_AT_ARG)
 #if SPECTRUM_SIZE == 4
         Sampler sampler = light_path_sampler(settings, pixel_index, sample);
         group = merging_group(scene, sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH)).x);
+#endif
+#if USES_MEDIA
+        group = group | sel_i(collides, (integer)(MERGING_IN_MEDIUM), (integer)(0));
 #endif
         photon.depth = depth | group << 16;
         int number = (int)settings->light_paths, places = settings->photon_places;

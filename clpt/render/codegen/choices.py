@@ -129,6 +129,9 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/body_weight.cl": lambda f, _: either(f.lights.bodies, "media/body_weight.cl"),
     "generated/aim_cone.cl": lambda f, _: either(f.media.aim_cones, "media/aim_cone.cl"),
     "generated/grid_origin.cl": lambda f, _: either(f.media.grids.emissive, "media/grid_origin.cl"),
+    "generated/flight_medium.cl": lambda f, _: (
+        f"media/flight_medium{'_bodies' * f.media.bodies}.cl",
+    ),
     "generated/flight_steps.cl": lambda f, _: (
         f"media/flight_medium{'_bodies' * f.media.bodies}.cl",
         *either(f.media.grids.present, "media/near_grids.cl"),
@@ -232,6 +235,9 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
     "generated/rival_steps.cl": lambda f, cls: (
         *either(f.transport.merged, "lighting/rivals_merging.cl"),
         *either(f.transport.joined and not cls.delta, "lighting/rivals_camera.cl"),
+    ),
+    "generated/rival_area.cl": lambda f, cls: (
+        f"lighting/rival_area{'_along' * cls.is_phase}.cl",
     ),
     "generated/hero_steps.cl": lambda f, cls: (
         *either(

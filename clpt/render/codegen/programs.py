@@ -97,6 +97,10 @@ def _stages(
         texts["deposit"] = make("deposit", files, defines, lanes)
     if bounce.trains(features):
         texts["train"] = make("train", files, defines, lanes)
+    for cls in bounce.gathered(features):
+        own = {**files, **choices.material_files(features, cls), **_material(features, cls)}
+        kind, name = flags.of_material(features, cls), f"gather_{cls.kind}"
+        texts[name] = make(name, own, {**defines, **kind}, lanes, "gather")
     if features.media.present:
         flight = bounce.flight(features)
         texts[flight] = make(flight, files, defines, lanes, "flight")
