@@ -77,9 +77,9 @@ inline Spectrum merge_photon_along(Photon photon, mask near, MergingRay ray, Mer
 inline Spectrum merge_along(Scene scene, mask active, MergingRay ray, Bsdf bsdf, integer pass, real u MERGE_ARGS)
 {
     global const Settings *settings = scene.settings;
-    real radius = merging_radius(scene, pass), area = merging_area_along(scene, pass);
-    real unit = settings->rival_area, number = settings->light_paths, beside = MERGING_BESIDE * radius;
-    real step = 2.0f * beside, begins = 0.0f, ends = 0.0f;
+    real radius = merging_radius(scene, pass), half_step = MERGING_BESIDE * radius, step = 2.0f * half_step;
+    real beside = merging_beside(scene, pass, ray.m.sigma_t), area = merging_area_along(scene, pass, ray.m.sigma_t);
+    real unit = settings->rival_area, number = settings->light_paths, begins = 0.0f, ends = 0.0f;
     MergingWindow window = merging_window(ray, step, u);
     Frame frame = frame_of(neg3(ray.d));
     Spectrum sum = spectrum_of(0.0f);
@@ -91,7 +91,7 @@ inline Spectrum merge_along(Scene scene, mask active, MergingRay ray, Bsdf bsdf,
             real at = to_real(corner >> 3);
             begins = sel(empty, window.from + at * step, begins);
             ends = sel(empty, min_r(window.from + (at + 1.0f) * step, window.to), ends);
-            vec3 low = sub3(madd3(ray.d, begins + beside, ray.o), v3(radius, radius, radius));
+            vec3 low = sub3(madd3(ray.d, begins + half_step, ray.o), v3(radius, radius, radius));
             Cell c = cell_at(scene, low, 2.0f * radius);
             c.x += corner & 1;
             c.y += corner >> 1 & 1;

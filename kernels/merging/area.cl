@@ -21,13 +21,6 @@ inline real merging_area(Scene scene, integer pass)
     return PI * scene.settings->photon_paths * sqr(merging_radius(scene, pass));
 }
 
-/* In a medium photons are merged along a ray. A step is a cylinder inside the sphere of that radius, MERGING_BESIDE of it
- * wide and half of it long, so that it lies in eight cells as a disk does. */
-#define MERGING_BESIDE 0.70710678f
-
-/* The cylinder's section, as `merging_area`. */
-inline real merging_area_along(Scene scene, integer pass) { return sqr(MERGING_BESIDE) * merging_area(scene, pass); }
-
 /* Whether a path from the camera in such a state is merged: where all its surfaces so far were sharp. Where light paths
  * are joined to the camera, what it sees by itself is left to them. */
 inline mask merging_here(integer state, integer depth)
