@@ -29,12 +29,9 @@ inline Spectrum merge_photons(Scene scene, mask active, Vertex v, Scattering sca
                               integer pass MERGE_ARGS)
 {
     global const Settings *settings = scene.settings;
-    integer group = 0;
+    integer group = merging_group_of(scene, scatter.sampler);
     real radius = merging_radius(scene, pass), area = merging_area(scene, pass);
     real unit = settings->rival_area, number = settings->light_paths;
-#if SPECTRUM_SIZE == 4
-    group = merging_group(scene, sampler_pair(scatter.sampler, (natural)(DIMENSION_WAVELENGTH)).x);
-#endif
     Spectrum sum = spectrum_of(0.0f);
     Cell first = cell_at(scene, sub3(v.s.p, v3(radius, radius, radius)), 2.0f * radius);
     /* Each lane goes through the photons of its own eight cells. */

@@ -27,26 +27,26 @@ STAGE(gather)(SLAB_ARGS, SCENE_ARGS GATHER_ARGS STAGE_AT_ARG)
     integer state = load_path_state(path, at);
     mask alive = (state & PATH_ALIVE) != 0, met = alive & (load_hit_prim(hit, at) >= 0);
     mask merges = alive & merging_here(state, state & PATH_DEPTH);
-    if (!any(merges)) return;
-    integer medium = flight_medium(scene, path, hit, at, alive, met), word = merging_phase(scene, medium);
-    merges = merges & (MATERIAL_KIND(word) == (integer)(BSDF_KIND));
+    integer medium = 0, word = -1;
+    if (any(merges)) {
+        medium = flight_medium(scene, path, hit, at, alive, met);
+        word = merging_phase(scene, medium);
+        merges = merges & (MATERIAL_KIND(word) == (integer)(BSDF_KIND));
+    }
     if (any(merges)) {
         Wavelengths lambdas = load_path_lambdas(path, at);
-        integer sample = load_path_sample(path, at), group = 0;
+        integer sample = load_path_sample(path, at);
         Sampler sampler = pixel_sampler(settings, load_path_pixel_key(path, at), sample);
         natural vertex = as_natural((state & PATH_DEPTH) + load_path_nulls(path, at));
         real lead = sel(merges, load_path_lead(path, at), (real)(0.0f));
         vec3 d = load_path_d(path, at);
-#if SPECTRUM_SIZE == 4
-        group = merging_group(scene, sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH)).x);
-#endif
         MergingRay ray;
         ray.o = madd3(d, -lead, load_path_o(path, at));
         ray.d = d;
         ray.end = sel(met, load_hit_t(hit, at) + lead, (real)(FAR));
         ray.medium = sel_i(merges, medium, (integer)(0));
         ray.depth = state & PATH_DEPTH;
-        ray.group = group | MERGING_IN_MEDIUM;
+        ray.group = merging_group_of(scene, sampler) | MERGING_IN_MEDIUM;
         ray.m = medium_load(scene, ray.medium, lambdas);
         ray.ratio = load_path_ratio(path, at);
         ray.arrives = load_path_rival(path, at);
