@@ -47,8 +47,8 @@
  * something sharp begins, at each vertex that is not, with pending' = e / l c' / p, and goes on as above while all that
  * follows is sharp; it counts at a joint to a sharp x_1.
  *
- * In a medium x_i is a collision, and photons are merged along the ray to it (merging/along.cl): e is the section of the
- * cylinder around the ray times the number of light paths. What passes up to x_i is left out of that, as above.
+ * In a medium x_i is a collision, and photons are merged along the ray to it (merging/along.cl): e is the section of
+ * the cylinder around the ray times the number of light paths. What passes up to x_i is left out of it, as above.
  *
  * Densities over areas, which importance, emission and 1 / e are, grow and fall with the square of the scene's size. So
  * areas are in units of `settings->rival_area`, which follows the size of very large and very small scenes and is 1 m^2
