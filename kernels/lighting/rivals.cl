@@ -47,14 +47,16 @@
  * something sharp begins, at each vertex that is not, with pending' = e / l c' / p, and goes on as above while all that
  * follows is sharp; it counts at a joint to a sharp x_1.
  *
+ * In a medium x_i is a collision, and photons are merged along the ray to it (merging/along.cl): e is the section of
+ * the cylinder around the ray times the number of light paths. What passes up to x_i is left out of it, as above.
+ *
  * Densities over areas, which importance, emission and 1 / e are, grow and fall with the square of the scene's size. So
  * areas are in units of `settings->rival_area`, which follows the size of very large and very small scenes and is 1 m^2
  * in others: rivals stay inside a float, and far from the limits below.
  *
  * What is sharp depends on the densities of both ways alone, and so is the same for both sides: a delta lobe, or a
- * density above SHARP_PDF. */
+ * density above SHARP_PDF (merging/weight.cl). */
 #define RIVAL_MOST 1e18f /* so that its square is finite */
-#define SHARP_PDF 8.0f /* [1/sr]; an even hemisphere has 0.16 */
 
 inline real rival_limited(real rival) { return min_r(rival, (real)(RIVAL_MOST)); }
 
@@ -63,8 +65,6 @@ inline mask rival_ends(Scene scene, Vertex v)
 {
     return BSDF_ENDS_LIGHT_PATHS ? mask_of(1) : shading_frame_turns(scene, v.row);
 }
-
-inline mask rival_sharp(mask delta, real p, real p_back) { return delta | (max_r(p, p_back) > SHARP_PDF); }
 
 /* What a vertex knows of the rival of its path. */
 typedef struct {

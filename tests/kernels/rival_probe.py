@@ -169,6 +169,7 @@ class VertexProbe:
                     *either(joined, "lighting/rivals_camera.cl"),
                     "lighting/rival_pdf_none.cl",
                 ),
+                "generated/rival_area.cl": ("lighting/rival_area.cl",),
                 "world.cl": WORLD,
             },
             defines={name: int(holds) for name, holds in flags.items()},
