@@ -146,8 +146,6 @@ LIGHT = f"""{VERTEX}
 class VertexProbe:
     """A vertex of paths, from the camera or from the light; others: features of the scene.
 
-    dull: most light paths end whose first surface is dull.
-
     Called with every name of GIVEN, each (n,). Returns those of FROM_CAMERA or FROM_LIGHT, each
     (n,): `rival`, `pending` and `sharp` are carried on; `met`, `chosen`, `joined`, `merged` are
     weights, 0 where the program leaves that way out; `photon`: the rival of the photon that the

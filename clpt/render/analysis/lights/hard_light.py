@@ -128,8 +128,7 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
     fewest = FEWEST - index.free_panes  # a pane on the way costs no depth
     if 0 <= integrator.max_depth < fewest:
         return without, "the longest path is too short for a caustic"
-    in_fog = _in_fog(lit)
-    if in_fog is not None:
+    if (in_fog := _in_fog(lit)) is not None:
         return in_fog
     sharp = _first_with((one for one in index.shapes if not _hides(one)), is_sharp)
     if sharp is None:
