@@ -36,6 +36,9 @@
  * those of next-event estimation do, and so they do what equiangular sampling changes: any weights that sum to one
  * serve, and both sides know these.
  *
+ * Where some light paths aim at what is sharp, few of the others go on from x_{k-1} if that is dull: the third density
+ * is less there (lighting/rival_dull.cl).
+ *
  * Where photons are merged (merging/gather.cl) the same path may also be found at x_i, the first vertex from the camera
  * that is not sharp, if some vertex beyond it is: the camera's path and a light path that end there nearly meet. Where
  * light paths are joined to the camera, what it sees by itself they find, sharper: x_i is not x_1 then. With
@@ -76,6 +79,7 @@ typedef struct {
     real merges;  /* what merging here has over the path's density: 0 where there is none */
 } Rival;
 
+#include "generated/rival_dull.cl"
 #include "generated/rival_steps.cl"
 
 /* Of a camera's path. sampler: of its sample. */
@@ -114,7 +118,7 @@ inline real rival_of_light_sample(Scene scene, Rival r, Surface s, LightSample l
     real chosen = sel(ls.pdf < 0.0f, ls.chance, ls.pdf);
     real emission = begins / max_r(chosen, (real)(1e-30f));
     real arrives = rival_arrives(r, mask_of(0), p, p_back) * VERTEX_COSINE(s.n, ls.wi) * emission;
-    real third = rival_limited(arrives * p_back);
+    real third = rival_of_dull(rival_limited(arrives * p_back), p);
     real joined = 0.0f;
     if (BSDF_IS_PHASE) joined = sel(rival_light_met(scene, ls.row), (real)(0.0f), rival_limited(arrives));
     return sel(r.first, joined, third);

@@ -103,6 +103,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/infinite_weight.cl": lambda f, _: either(
         f.transport.balanced, "lighting/infinite_weight.cl"
     ),
+    "generated/rival_dull.cl": lambda f, _: either(f.dull_paths_end, "lighting/rival_dull.cl"),
     "generated/emit_steps.cl": lambda f, _: (
         *either(f.transport.aimed, "lighting/aimed_rival.cl"),
         *either(f.transport.balanced, "lighting/light_kept.cl"),
@@ -269,6 +270,7 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
     "generated/light_path_steps.cl": lambda f, cls: (
         *either(f.transport.joined and not cls.delta, "steps/join_camera.cl"),
         *either(flags.asks_chance(f, cls), "lighting/rival_chosen.cl"),
+        *either(f.dull_paths_end and not cls.delta, "steps/dull_goes_on.cl"),
         "steps/adjoint_weight.cl",
         *either(not flags.is_null(f, cls), "steps/light_path_roulette.cl"),
     ),
