@@ -129,7 +129,7 @@ class Vcm(Integrator):
     it leaves a photon, and paths from the camera gather the photons of their pass around them. So
     caustics converge that are seen in mirrors and through glass, also those of points and suns.
     What is gathered is blurred by the radius, which shrinks from pass to pass. A `max_depth` of -1
-    counts as 64.
+    or beyond 64 counts as 64.
     """
 
     max_depth: int = host(8, "longest path, as of `path`; -1: 64")
