@@ -11,10 +11,9 @@
  * then ends; a shadow ray that meets more is blocked. */
 #define MOST_NULL_SURFACES 1024
 
-/* Dimensions of a sample, in pairs, of which an even one and the next are well spread together: film and the point on
- * the first vertex's light; then DIMENSIONS_A_VERTEX per surface that is met, null ones among them, a direction beside
- * the next vertex's point on a light; beyond all these lens, wavelength and time, and DIMENSION_TEXEL, DIMENSION_FLIGHT
- * and DIMENSION_AIM, one pair per surface each. */
+/* Dimensions of a sample, in pairs: even ones and the next are well spread together. Film and first point on a light,
+ * then DIMENSIONS_A_VERTEX per surface that is met, null ones among them, a direction beside the next point on a light;
+ * beyond these lens, wavelength and time, and DIMENSION_TEXEL, _FLIGHT and _AIM, one pair per surface each. */
 #define DIMENSION_FILM 0
 #define DIMENSION_VERTEX 1
 #define DIMENSIONS_A_VERTEX 4
