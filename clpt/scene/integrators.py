@@ -235,7 +235,7 @@ class Sampler(Kind):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sobol(Sampler):
-    """Owen-scrambled Sobol points, two dimensions at a time (Burley 2020)."""
+    """Owen-scrambled points, four dimensions at a time, in pairs as Sobol's (Ahmed 2025)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

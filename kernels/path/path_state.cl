@@ -11,18 +11,18 @@
  * then ends; a shadow ray that meets more is blocked. */
 #define MOST_NULL_SURFACES 1024
 
-/* Dimensions of a sample, in pairs: film, lens, wavelength and time, then DIMENSIONS_A_VERTEX per surface that is met,
- * null ones among them; beyond all these DIMENSION_TEXEL, DIMENSION_FLIGHT and DIMENSION_AIM, one pair per surface
- * each. */
+/* Dimensions of a sample, in pairs: even ones and the next are well spread together. Film and first point on a light,
+ * then DIMENSIONS_A_VERTEX per surface that is met, null ones among them, a direction beside the next point on a light;
+ * beyond these lens, wavelength and time, and DIMENSION_TEXEL, _FLIGHT and _AIM, one pair per surface each. */
 #define DIMENSION_FILM 0
-#define DIMENSION_LENS 1
-#define DIMENSION_WAVELENGTH 2
-#define DIMENSION_VERTEX 3
+#define DIMENSION_VERTEX 1
 #define DIMENSIONS_A_VERTEX 4
 #define DIMENSION_LIGHT 0    /* a point on a light */
-#define DIMENSION_BSDF 1     /* a direction */
-#define DIMENSION_CHOICE 2   /* which light, which lobe */
-#define DIMENSION_ROULETTE 3 /* whether to go on; which part of a mixture */
+#define DIMENSION_CHOICE 1   /* which light, which lobe */
+#define DIMENSION_ROULETTE 2 /* whether to go on; which part of a mixture */
+#define DIMENSION_BSDF 3     /* a direction */
+#define DIMENSION_LENS 0x50000
+#define DIMENSION_WAVELENGTH 0x50001
 #define DIMENSION_LIGHT_TIME (DIMENSION_VERTEX + DIMENSION_BSDF) /* of a light path, whose first vertex has no BSDF */
 #define DIMENSION_TEXEL 0x10000 /* which texel stands for those around */
 #define DIMENSION_FLIGHT 0x20000 /* how far a ray flies through a medium */

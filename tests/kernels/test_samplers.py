@@ -6,6 +6,7 @@ sampler; the seeds are fixed, so a run is either always or never unlucky.
 
 from __future__ import annotations
 
+import itertools
 from functools import cache
 
 import numpy as np
@@ -59,6 +60,22 @@ def test_sobol_pairs_are_nets(seed):
             for smaller in range(k + 1):
                 assert _is_net(points[: 1 << smaller], smaller)
             assert _is_net(points[256:512], 8)
+
+
+@pytest.mark.parametrize("seed", [0, 0xDEADBEEF])
+def test_sobol_groups_of_four_are_nets(seed):
+    """(0, k, 4)-nets in base 4: a point in every box of volume 4^-k, sides powers of 1/4."""
+    k = 4
+    for pixel in (0, 1_000_003):
+        for dimension in (0, 4, 50, 0x50000):
+            both = [pairs("sobol", pixel, np.arange(4**k), dimension + i, seed) for i in range(2)]
+            points = np.concatenate(both, axis=1)
+            for smaller in range(1, k + 1):
+                for sides in itertools.product(range(smaller + 1), repeat=4):
+                    if sum(sides) == smaller:
+                        scale = 4.0 ** np.array(sides)
+                        boxes = (points[: 4**smaller] * scale).astype(int)
+                        assert len(np.unique(boxes, axis=0)) == 4**smaller
 
 
 def test_sobol_scrambles_deeply():
