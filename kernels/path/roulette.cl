@@ -2,7 +2,7 @@
  * chance (1 after surfaces that absorb nothing), a little less than 1 brings them to an end; a path that still has a
  * third of its light is worth its time. Both numbers were measured, see bench/NOTES.md. */
 #define ROULETTE_FREE 3.0f
-#define ROULETTE_MOST 0.98f
+#define ROULETTE_MOST (BSDF_IS_PHASE ? 1.0f : 0.98f)
 
 inline real roulette_chance(real strength) { return min_r(ROULETTE_FREE * strength, (real)(ROULETTE_MOST)); }
 
