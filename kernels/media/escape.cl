@@ -10,8 +10,9 @@
 #include "core/rows.cl"
 
 #define ESCAPE_WORDS 5           /* of a ball: centre, radius and one that is not used */
-#define ESCAPE_SPREAD 0.12f      /* sine by which cones are wider than lamps */
+#define ESCAPE_SPREAD 0.03f      /* sine by which cones are wider than lamps */
 #define ESCAPE_WIDEST 0.8f       /* sine of the widest one */
+#define ESCAPE_SHARE 0.5f        /* of the optical depth, by which the chance of a ray falls */
 #define ESCAPE_DEEPEST 6.0f      /* optical depth below which none is sent */
 #define ESCAPE_FAR (4.0f * FAR)  /* length of such a ray, by which it is known */
 

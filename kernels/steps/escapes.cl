@@ -12,7 +12,7 @@ inline integer path_escapes(Scene scene, Slab path, Slab shadow, uint at, mask n
     mask sent = mask_of(0);
     real own = 0.0f;
     if (any(near)) {
-        real chance = exp_r(-max_r(depth, (real)(0.0f)));
+        real chance = exp_r(-ESCAPE_SHARE * max_r(depth, (real)(0.0f)));
         own = escape_density(e, chance, onward) / max_r(bs.pdf, (real)(1e-30f));
         own = sel(near, own, (real)(0.0f));
         sent = near & (sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_CHOICE).x < chance);

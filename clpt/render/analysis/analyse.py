@@ -58,8 +58,8 @@ class Analysis:
     index: with the integrator that renders it; reason: why that one, "" where there was no choice;
     sphere: centre and radius of one around the scene [m]; sources: what its lights send; sealed:
     media that rays to lights cannot leave; light_media: media around lights; around: the media, or
-    the matter of bodies, at the camera; aims (k, 5): spheres at which paths aim, see `aims` and `escape_lamps`;
-    warnings: of media.
+    the matter of bodies, at the camera; aims (k, 5): spheres at which paths aim, see `aims` and
+    `escape_lamps`; warnings: of media.
     """
 
     index: SceneIndex

@@ -58,7 +58,7 @@ def _is_bent_alike(shapes: list[Shape], sealed: frozenset[Medium]) -> bool:
     """
     for shape in shapes:
         whole = isinstance(shape.material, mt.Dielectric)
-        if any_of(shape.material, (mt.NormalMap, mt.BumpMap)):
+        if any_of(shape.material, mt.NormalMapped):
             return False
         if any_of(shape.material, mt.Dielectric) and not whole:
             return False
