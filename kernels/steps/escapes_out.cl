@@ -3,8 +3,9 @@
 #include "media/escape.cl"
 
 inline integer path_escapes(Scene scene, Slab path, Slab shadow, uint at, mask next, Vertex v, Scattering scatter,
-                            BsdfSample bs, vec3 onward)
+                            BsdfSample bs)
 {
+    vec3 onward = load_path_d(path, at);
     mask outward = dot3(v.s.n, onward) > 0.0f, bent = (bs.lobe & LOBE_TRANSMIT) != 0;
     mask out = !v.front & bent & outward & (v.depth > 0);
     store_path_escape(path, at, next, sel(out, load_path_escape(path, at), (real)(0.0f)));

@@ -9,8 +9,8 @@
 
 #define escape_waits(t) ((t) > 2.0f * FAR) /* a ray in the shadow slab is of this kind */
 
-/* `passes`, or of the rays that are of this kind, what comes to o from lamps along d. The first surface must be a smooth
- * boundary from within, which bends the ray; what is then met shines or does not. */
+/* `passes`, or of the rays that are of this kind, what comes to o from lamps along d. The first surface must be a
+ * smooth boundary from within, which bends the ray; what is then met shines or does not. */
 inline Spectrum escape_light(TRACE_ARGS, Scene scene, Slab path, uint at, vec3 o, vec3 d, real t, mask active,
                              Spectrum passes)
 {
