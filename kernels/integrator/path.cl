@@ -52,8 +52,8 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     store_path_cone(path, at, next, cone_scattered(v.cone, bs.pdf, (bs.lobe & LOBE_DELTA) != 0));
     path_scatters(scene, path, at, next, null, &v, scatter, rival, bs, onward);
     store_path_eta(path, at, next, eta);
+    vertex_end(path, at, met, next, null, v.state + path_escapes(scene, path, shadow, at, next, v, scatter, bs));
     store_path_ratio(path, at, next, ratio);
-    vertex_end(path, at, met, next, null, v.state);
 }
 
 #if !SHADES_BOTH

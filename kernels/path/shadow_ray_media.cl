@@ -2,6 +2,7 @@
 #include "interface/shape.cl"
 #include "generated/trace.cl"
 #include "generated/transmittance.cl"
+#include "generated/escape_light.cl"
 #define ShadowPassage Spectrum
 #define shadow_most(passes) spectrum_max(passes)
 #define shadow_dims(light, passes) spectrum_mul(light, passes)
@@ -15,5 +16,8 @@ inline Spectrum shadow_ray_transmittance(TRACE_ARGS, Scene scene, Slab path, Sla
     integer medium = sel_i(active, load_shadow_through(shadow, at), (integer)(0));
     natural key = grid_way_key(scene, path, at);
     integer into = sel_i(active, load_shadow_into(shadow, at), (integer)(0));
-    return trace_transmittance(TRACE_PASSED, scene, o, d, t, medium, load_path_lambdas(path, at), active, key, into);
+    Wavelengths lambdas = load_path_lambdas(path, at);
+    mask straight = active & !escape_waits(t);
+    Spectrum passes = trace_transmittance(TRACE_PASSED, scene, o, d, t, medium, lambdas, straight, key, into);
+    return escape_light(TRACE_PASSED, scene, path, at, o, d, t, active, passes);
 }

@@ -16,6 +16,7 @@ from clpt.render.analysis.checks import check_at_rest
 from clpt.render.analysis.geometry import Geometry, assembled
 from clpt.render.analysis.index import SceneIndex
 from clpt.render.analysis.lights.aims import aims
+from clpt.render.analysis.lights.escapes import escape_lamps
 from clpt.render.analysis.lights.hard_light import Lit, decided
 from clpt.render.analysis.lights.light_media import NOWHERE, LightMedia, light_media
 from clpt.render.analysis.lights.look import Look
@@ -57,8 +58,8 @@ class Analysis:
     index: with the integrator that renders it; reason: why that one, "" where there was no choice;
     sphere: centre and radius of one around the scene [m]; sources: what its lights send; sealed:
     media that rays to lights cannot leave; light_media: media around lights; around: the media, or
-    the matter of bodies, at the camera; aims (k, 5): spheres at which light paths aim, see `aims`;
-    warnings: of media.
+    the matter of bodies, at the camera; aims (k, 5): spheres at which paths aim, see `aims` and
+    `escape_lamps`; warnings: of media.
     """
 
     index: SceneIndex
@@ -91,16 +92,18 @@ def analyse(scene: Scene, cache: LoweringCache, before: Before | None = None) ->
     lights = Lit(index, geometry, look, sources, sphere, lit.extinction)
     index, reason = decided(lights, former)
     around, warnings = _at_the_camera(index, cache)
+    sealed = sealed_media(index, cache) if index.media else frozenset()
+    aimed = aims(index, geometry, sphere[1])
     return Analysis(
         index=index,
         reason=reason,
         geometry=geometry,
         sphere=sphere,
         sources=sources,
-        sealed=sealed_media(index, cache) if index.media else frozenset(),
+        sealed=sealed,
         light_media=lit,
         around=around,
-        aims=aims(index, geometry, sphere[1]),
+        aims=aimed if len(aimed) else escape_lamps(index, sealed, cache),
         warnings=(*warnings, *open_boundaries.warnings_of(index, cache)),
     )
 

@@ -7,10 +7,11 @@ from collections.abc import Callable, Iterable, Sequence
 from clpt.records import HIT, SHADOW, SLABS
 from clpt.render.contract.features import Features
 
+ESCAPE = ("escape", "escape_axis", "escape_width", "escape_plane", "escape_depth")
 CHANGED = (
     "o", "d", "beta", "radiance", "lambdas", "pdf", "sampled_hemisphere", "sampled_wo",
     "sampled_gloss", "null_distance", "nulls", "ratio", "eta", "medium", "bodies", "lead", "rival",
-    "pending", "expected", "state", "cone",
+    "pending", "expected", *ESCAPE, "state", "cone",
 )  # fmt: skip
 READ = ("weight", "light", "time", "pixel_index", "pixel_key", "sample")  # and not changed
 # members that not every scene has, each with the features that ask for it
@@ -30,6 +31,7 @@ NEEDED: dict[str, Callable[[Features], bool]] = {
     "rival": lambda f: f.transport.balanced,
     "pending": lambda f: f.transport.merged,
     "expected": lambda f: f.transport.guided,
+    **dict.fromkeys(ESCAPE, lambda f: f.media.escapes),
     "cone": lambda f: f.textures.mips,
     "weight": lambda f: f.transport.light_paths or _has_layers(f),
     "light": lambda f: f.transport.balanced,

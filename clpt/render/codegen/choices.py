@@ -7,6 +7,7 @@ from collections.abc import Callable
 from clpt import bvh
 from clpt.render.codegen import flags
 from clpt.render.contract.features import Features
+from clpt.scene.materials import Dielectric
 from clpt.scene.scatterer import Scatterer
 
 
@@ -77,7 +78,11 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         *when(f.film.layers.lights, "generated/light_layer_args.cl", "generated/sampler.cl"),
         *either(f.film.layers.lights, "film/light_layers.cl"),
     ),
-    "generated/met_weight.cl": lambda f, _: either(f.transport.balanced, "steps/met_weight.cl"),
+    "generated/met_weight.cl": lambda f, _: (
+        when(f.media.escapes, "steps/met_weight_escapes.cl")
+        or either(f.transport.balanced, "steps/met_weight.cl")
+    ),
+    "generated/escape_light.cl": lambda f, _: either(f.media.escapes, "tracing/escape_light.cl"),
     "generated/medium.cl": lambda f, _: (
         ("generated/medium_coefficients.cl", "media/medium.cl") * (f.media.absorbing)
         + ("media/medium_grid.cl",) * f.media.grids.present
@@ -161,7 +166,11 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         else ("path/shading_frame.cl",)
     ),
     "generated/transmittance.cl": lambda f, _: (f"tracing/transmittance{_passing(f)}.cl",),
-    "generated/shadow_ray.cl": lambda f, _: (f"path/shadow_ray{'_media' * f.shadow_media}.cl",),
+    "generated/shadow_ray.cl": lambda f, _: (
+        when(f.shadow_media, "path/shadow_ray_media.cl")
+        or when(f.media.escapes, "path/shadow_ray_escapes.cl")
+        or ("path/shadow_ray.cl",)
+    ),
     "generated/trace.cl": lambda _, layout: (
         f"tracing/trace_{'lanes' if layout == 'brute' else 'one'}.cl",
     ),
@@ -228,6 +237,13 @@ def _merges(features: Features, cls: type[Scatterer]) -> bool:
     return features.transport.merged and flags.gathers_photons(features, cls)
 
 
+def _escapes(features: Features, cls: type[Scatterer]) -> str:
+    """Return the end of the name of the file about rays that leave sealed media."""
+    if not features.media.escapes:
+        return "_none"
+    return "" if cls.is_phase else "_out" if cls is Dielectric else "_end"
+
+
 # likewise, for a scene's features and the kind of material that a program shades
 MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...]]] = {
     "generated/rivals.cl": lambda f, cls: (
@@ -266,6 +282,7 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
         *either(f.lights.kinds and not cls.delta, "steps/next_event.cl"),
         *either(not flags.is_null(f, cls), "steps/roulette.cl"),
         *either(not flags.is_null(f, cls), "steps/scatters.cl"),
+        f"steps/escapes{_escapes(f, cls)}.cl",
     ),
     "generated/light_path_steps.cl": lambda f, cls: (
         *either(f.transport.joined and not cls.delta, "steps/join_camera.cl"),

@@ -304,6 +304,7 @@ def _generated(features: Features, layout: str) -> Files:
         "generated/emission.cl": emission.dispatch_text(features),
         **_textures(features, "own"),
         "generated/lights.cl": stages.lights_text(features),
+        "generated/smooth_boundary.cl": stages.smooth_boundary_text(features),
         "generated/null_transmittance.cl": stages.null_transmittance_text(features),
         "generated/shapes.cl": shapes.points_text(features),
         "generated/shape_tree.cl": shapes.hit_text(features),

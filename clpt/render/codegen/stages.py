@@ -16,6 +16,7 @@ from clpt.render.contract.features import (
     MaterialFeatures,
 )
 from clpt.render.contract.parameter_words import MIXTURE, row_words, words
+from clpt.scene.materials import Dielectric
 from clpt.scene.params import device_params, interior_params
 from clpt.scene.roles import Role
 from clpt.scene.scatterer import Scatterer
@@ -189,6 +190,18 @@ def _pane_text(features: Features, cls: type[Scatterer]) -> list[str]:
         parameters.struct_text(cls, sources),
         parameters.load_text(cls, sources, "materials"),
     ]
+
+
+def smooth_boundary_text(features: Features) -> str:
+    """Return the kind of smooth boundaries, for rays that leave sealed media."""
+    if not features.media.escapes:
+        return ""
+    number, sources = features.materials.leaves.index(Dielectric), features.materials.sources_of
+    return (
+        f"#define SMOOTH_BOUNDARY {number}\n"
+        + functions_text(Dielectric, features.spectra.mode, features)
+        + parameters.load_text(Dielectric, sources(Dielectric.kind), "materials")
+    )
 
 
 def functions_text(cls: type[Scatterer], mode: str, features: Features | None = None) -> str:

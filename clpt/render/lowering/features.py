@@ -25,6 +25,7 @@ from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.lights.lights import LightRows
 from clpt.render.lowering.materials.material_words import MaterialWords
 from clpt.scene.cameras import Lens
+from clpt.scene.media import Medium
 
 FEW_LIGHTS = 256  # up to which one random number chooses a light and a point on it
 FEW_INSTANCES = 2  # up to which rays go to each, where some deform
@@ -88,12 +89,17 @@ def of_lights(lights: LightRows, gloss: int = 0) -> LightFeatures:
 
 
 def of_media(
-    index: SceneIndex, materials: MaterialWords, aims: int, *, sealed: bool
+    index: SceneIndex,
+    materials: MaterialWords,
+    aims: int,
+    sealed: frozenset[Medium],
+    *,
+    escapes: bool,
 ) -> MediaFeatures:
     """Return the features of a scene's media.
 
-    aims: places of lamps that flights through media aim at; sealed: whether there are media that
-    rays to lights cannot leave.
+    aims: places of lamps that flights through media aim at; sealed: media that rays to lights
+    cannot leave; escapes: whether rays of their own leave them.
     """
     return MediaFeatures(
         absorption=materials.absorption,
@@ -101,7 +107,8 @@ def of_media(
         chromatic=any(medium.is_chromatic for medium in index.media),
         emissive=bool(index.emitting),
         dyed=index.dyed,
-        sealed=sealed and not (index.balanced or index.guided),
+        sealed=bool(sealed) and not (index.balanced or index.guided),
+        escapes=escapes and not index.balanced,
         bodies=index.nested,
         aims=aims,
         grids=index.grids,

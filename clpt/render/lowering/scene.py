@@ -256,13 +256,14 @@ def _features(
 ) -> Features:  # fmt: skip
     """Return what the scene uses; motion: as of `_lower_motion`; layers: of the film."""
     index = found.index
+    aims = len(found.aims) > 0
     own = index.mode, encoder.spectra.samples, encoder.spectra.step, rows.tabulated
     return Features(
         camera=needs.of_camera(index),
         film=needs.of_film(index, layers),
-        transport=needs.of_transport(index, rows.profile, aimed=len(found.aims) > 0),
+        transport=needs.of_transport(index, rows.profile, aimed=bool(index.balanced) and aims),
         lights=needs.of_lights(surfaces.lights, surfaces.materials.gloss_before),
-        media=needs.of_media(index, surfaces.materials, surfaces.near, sealed=bool(found.sealed)),
+        media=needs.of_media(index, surfaces.materials, surfaces.near, found.sealed, escapes=aims),
         motion=needs.of_motion(index, surfaces.geometry, motion),
         geometry=_geometry_features(index, encoder, surfaces),
         textures=needs.of_textures(encoder),

@@ -14,9 +14,10 @@ from clpt.render.lowering.scene import lower
 from clpt.scene import Film, Scene, lights, media
 from clpt.scene import materials as m
 from clpt.scene.cameras import Perspective
-from clpt.scene.integrators import Box
+from clpt.scene.integrators import Box, Direct
 from clpt.scene.integrators import Path as PathIntegrator
 from clpt.scene.shapes import Rectangle, Shape, Sphere
+from tests.pictures.support import assert_agree, blocks, exposures
 
 MILK = media.Homogeneous(sigma_s=20.0)
 ABOVE = Rectangle(
@@ -67,7 +68,7 @@ def test_not_beside_light_paths() -> None:
 @pytest.mark.slow
 def test_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
     """A ray to a light brings nothing where it is stopped; neither do blocks of walking paths."""
-    scene = glass()
+    scene = glass(material=m.RoughDielectric())
     sealed = clpt.render(scene, 4)
     stages = clpt.Renderer(scene, looped=False)
     stages.run(4)
@@ -97,3 +98,42 @@ def test_a_lamp_that_moves_in_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     met = means(scene, 100)
     error = np.hypot(plain.std(ddof=1), met.std(ddof=1)) / np.sqrt(32.0)
     assert abs(plain.mean() - met.mean()) < 4.0 * error
+
+
+BLEND = m.Blend(first=m.Dielectric(), second=m.Diffuse())
+LEFT = {
+    "smooth": (glass(), True),
+    "rough": (glass(material=m.RoughDielectric()), False),
+    "lamp inside": (glass(SMALL), False),
+    "dispersive": (glass(material=m.Dielectric(int_ior="BK7")), False),
+    "a mixture beside": (glass(Sphere(center=(4, 0, 0), material=BLEND)), False),
+    "another index beside": (glass(Sphere(center=(4, 0, 0), material=m.Dielectric())), True),
+    "direct light": (dataclasses.replace(glass(), integrator=Direct()), False),
+}
+
+
+@pytest.mark.parametrize("name", LEFT)
+def test_where_rays_leave_them(name: str) -> None:
+    """They go through smooth boundaries that bend all light alike, to lamps outside."""
+    scene, leaves = LEFT[name]
+    found = lower(scene)
+    assert found.features.media.escapes == leaves
+    assert bool(found.settings["aim_count"]) == leaves
+    assert not found.features.transport.aimed
+
+
+@pytest.mark.slow
+def test_rays_that_leave_change_no_mean(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Blocks of pictures with and without them agree, and the former have less noise.
+
+    One colour of the lamp's, in a body that scatters a few times; significance as in
+    tests/pictures/support.py.
+    """
+    lamp = dataclasses.replace(SMALL, center=(1.2, 1.2, 0.3))
+    scene = dataclasses.replace(glass(lamp), lights=[], spp=64)
+    with_rays = blocks(exposures(scene, 24, 64))
+    monkeypatch.setattr(analyse, "escape_lamps", lambda *_: np.zeros((0, 5), np.float32))
+    assert not lower(scene).features.media.escapes
+    without = blocks(exposures(scene, 24, 64, first_seed=1001))
+    assert_agree(with_rays, without)
+    assert with_rays.var(axis=0).mean() < 0.8 * without.var(axis=0).mean()

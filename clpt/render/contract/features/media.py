@@ -32,6 +32,7 @@ class MediaFeatures:
     emissive: bool = False  # some give out light
     dyed: bool = False  # some have a dye that gives out light
     sealed: bool = flag("SEALED_MEDIA")  # no ray to a light can leave some
+    escapes: bool = False  # rays of their own leave them toward lamps
     bodies: bool = False  # they may overlap, of different priorities
     aims: int = number("MEDIUM_AIMS")  # rows about lamps near which flights through media end
     grids: GridFeatures = GridFeatures()

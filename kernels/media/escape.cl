@@ -1,0 +1,63 @@
+/* Escapes: ways out of a sealed medium toward lamps. No ray to a light leaves such a body, as its smooth boundary bends
+ * light, so that a path meets a lamp by chance alone. So at a collision near the boundary a ray of its own is sent
+ * where light of a lamp should come from: into a cone around where the boundary bends the light of the lamp's middle.
+ * Lamp and cone are those of the point where the path has last met the boundary, mostly not far away. The ray is bent
+ * where it meets the boundary, wherever that is (tracing/escape_light.cl), and counts if it comes to a lamp. This ray
+ * and the path's own are two ways to choose a direction at the collision, each weighed by its density (balance
+ * heuristic), so the guess needs not be right.
+ *
+ * Balls around lamps stand in `distributions`, see clpt/render/analysis/lights/escapes.py. */
+#include "core/rows.cl"
+
+#define ESCAPE_WORDS 5           /* of a ball: centre, radius and one that is not used */
+#define ESCAPE_SPREAD 0.03f      /* sine by which cones are wider than lamps */
+#define ESCAPE_WIDEST 0.8f       /* sine of the widest one */
+#define ESCAPE_SHARE 0.5f        /* of the optical depth, by which the chance of a ray falls */
+#define ESCAPE_DEEPEST 6.0f      /* optical depth below which none is sent */
+#define ESCAPE_FAR (4.0f * FAR)  /* length of such a ray, by which it is known */
+
+/* The cone of a lamp, as seen from a boundary. */
+typedef struct {
+    vec3 axis;          /* into which light would come out: away from the lamp it comes in */
+    real one_minus_cos; /* of its half angle; 0: no lamp is there */
+    real up;            /* cosine of axis and normal */
+} EscapeCone;
+
+/* Chooses a lamp by u, by how large it seems, for the point p of a boundary whose outward normal is n; eta: index of
+ * the outside over that of the inside. */
+inline EscapeCone escape_cone(Scene scene, vec3 p, vec3 n, real eta, real u)
+{
+    EscapeCone e;
+    e.axis = n;
+    e.one_minus_cos = 0.0f;
+    e.up = 1.0f;
+    real sum = 0.0f, c = 0.0f, size = 0.0f;
+    vec3 toward = n;
+    for (int i = 0; i < scene.settings->aim_count; i++) {
+        global const float *ball = scene.distributions + scene.settings->aims + ESCAPE_WORDS * i;
+        vec3 to = sub3(v3((real)(ball[0]), (real)(ball[1]), (real)(ball[2])), p);
+        real inverse = 1.0f / max_r(sqrt_r(dot3(to, to)), (real)(1e-20f)), cosine = dot3(to, n) * inverse;
+        real own = min_r(ball[3] * inverse, (real)(1.0f));
+        real seems = sel(cosine > -own, sqr(own) * max_r(cosine, 0.1f * own), (real)(0.0f));
+        sum += seems;
+        mask taken = u * sum < seems;
+        u = sel(taken, u * sum / max_r(seems, (real)(1e-30f)), (u * sum - seems) / max_r(sum - seems, (real)(1e-30f)));
+        u = clamp_r(u, (real)(0.0f), (real)(0.99999994f));
+        toward = sel3(taken, scale3(to, inverse), toward);
+        c = sel(taken, cosine, c);
+        size = sel(taken, own, size);
+    }
+    vec3 level = scale3(sub3(toward, scale3(n, c)), eta);
+    e.up = sqrt_r(max_r(1.0f - dot3(level, level), (real)(0.04f)));
+    e.axis = normalize3(add3(level, scale3(n, e.up)));
+    real sine = min_r(eta * size + ESCAPE_SPREAD, (real)(ESCAPE_WIDEST));
+    e.one_minus_cos = sel(sum > 0.0f, 1.0f - sqrt_r(1.0f - sine * sine), (real)(0.0f));
+    return e;
+}
+
+/* Density of a direction by the ray that may be sent [1/sr]; chance: that it is. */
+inline real escape_density(EscapeCone e, real chance, vec3 d)
+{
+    mask within = 1.0f - dot3(e.axis, d) < e.one_minus_cos;
+    return sel(within, chance / max_r(2.0f * PI * e.one_minus_cos, (real)(1e-30f)), (real)(0.0f));
+}

@@ -1,0 +1,35 @@
+/* At a collision in a sealed medium: a ray that may leave it toward a lamp, see media/escape.cl. Returns what
+ * Path.state gains. The path has its new direction, and the ratio of that before. */
+#include "media/escape.cl"
+
+inline integer path_escapes(Scene scene, Slab path, Slab shadow, uint at, mask next, Vertex v, Scattering scatter,
+                            BsdfSample bs)
+{
+    vec3 onward = load_path_d(path, at);
+    EscapeCone e = {load_path_escape_axis(path, at), load_path_escape_width(path, at), (real)(1.0f)};
+    real depth = load_path_escape_depth(path, at) - dot3(load_path_escape_plane(path, at), v.s.p);
+    mask near = next & (e.one_minus_cos > 0.0f) & (depth < ESCAPE_DEEPEST);
+    near = near & (v.depth + 2 < scene.settings->max_depth);
+    mask sent = mask_of(0);
+    real own = 0.0f;
+    if (any(near)) {
+        real chance = exp_r(-ESCAPE_SHARE * max_r(depth, (real)(0.0f)));
+        own = escape_density(e, chance, onward) / max_r(bs.pdf, (real)(1e-30f));
+        own = sel(near, own, (real)(0.0f));
+        sent = near & (sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_CHOICE).x < chance);
+        if (any(sent)) {
+            vec2 pair = sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_LIGHT);
+            vec3 d = to_world(frame_of(e.axis), uniform_cone(pair, e.one_minus_cos));
+            vec3 wi = to_frame(scatter.shading.frame, d);
+            real pdf = hero_pdf(scatter.bsdf, scatter.wo, wi, load_path_ratio(path, at));
+            pdf += chance / max_r(2.0f * PI * e.one_minus_cos, (real)(1e-30f));
+            Spectrum f = spectrum_scale(bsdf_eval(scatter.bsdf, scatter.wo, wi), 1.0f / pdf);
+            store_shadow_o(shadow, at, sent, v.s.p);
+            store_shadow_d(shadow, at, sent, d);
+            store_shadow_t(shadow, at, sent, (real)(ESCAPE_FAR));
+            store_shadow_value(shadow, at, sent, spectrum_mul(v.beta, f));
+        }
+    }
+    store_path_escape(path, at, next, own);
+    return sel_i(sent, (integer)(PATH_SHADOW), (integer)(0));
+}
