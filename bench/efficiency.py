@@ -13,7 +13,7 @@ does where nothing is asked for, `auto` by that integrator, `guiding`, whose lea
 Mitsuba has the file's sampler and its best one (multijitter); clpt reads either as Sobol. Both have
 a box filter; with `--as-file` the filter is the file's own. In spectral mode a metal's `eta` and
 `k` by RGB are taken as values at 610, 550 and 460 nm: Mitsuba would cut them at 1, as if they were
-reflectances.
+reflectances. Images of numbers are `raw` there, because Mitsuba takes no others for numbers.
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ from bench import machine
 from bench.renders import SCENES
 from bench.starting import WATCH
 from bench.workers import find_llvm
+from clpt import device
 
 MITSUBA = """
 import os, sys
@@ -57,6 +58,10 @@ while done < spp:
     total, done = total + numpy.array(image)[..., :3] * some, done + some
 numpy.save(out, total / spp)
 """
+NUMBERS = (  # parameters that are no spectra, of which a file may give an image
+    "alpha", "alpha_u", "alpha_v", "anisotropic", "clearcoat", "clearcoat_gloss", "flatness",
+    "metallic", "opacity", "roughness", "sheen", "sheen_tint", "spec_tint", "spec_trans", "weight",
+)  # fmt: skip
 METAL = (610, 550, 460)  # wavelengths for the red, green and blue of a metal's index [nm]
 TRIM = 0.001
 APART = 0.03  # of the means of what the two render: beyond, there is no common reference
@@ -192,12 +197,7 @@ def with_film(
         for element in root.iter("sampler"):
             element.set("type", sampler)
     if mode == "spectral":
-        for element in root.iter("rgb"):
-            if element.get("name") in ("eta", "k"):
-                values = element.get("value", "").replace(",", " ").split()
-                pairs = sorted(zip(METAL, values, strict=True))
-                element.tag = "spectrum"
-                element.set("value", ", ".join(f"{nm}:{value}" for nm, value in pairs))
+        for_spectra(root)
     for integrator in root.iter("integrator"):
         name = integrator.get("type", "")
         if name.startswith("$") and name[1:] not in given:
@@ -208,6 +208,21 @@ def with_film(
     copy = folder / f"film-{scene.name}"
     tree.write(copy)
     return copy, (width, height)
+
+
+def for_spectra(root: ET.Element) -> None:
+    """Say in a scene what Mitsuba's spectral mode needs, see above."""
+    for element in root.iter("rgb"):
+        if element.get("name") in ("eta", "k"):
+            values = element.get("value", "").replace(",", " ").split()
+            pairs = sorted(zip(METAL, values, strict=True))
+            element.tag = "spectrum"
+            element.set("value", ", ".join(f"{nm}:{value}" for nm, value in pairs))
+    for texture in root.iter("texture"):
+        if texture.get("name") in NUMBERS:
+            for old in texture.findall("boolean[@name='raw']"):
+                texture.remove(old)
+            ET.SubElement(texture, "boolean", name="raw", value="true")
 
 
 def compare(scene: Path, settings: Settings) -> list[Row]:
@@ -234,6 +249,7 @@ def in_mode(scene: Path, mode: str, settings: Settings) -> list[Row]:
         long, means = long_renders(contenders(len(every)), settings)
         about = {
             "scene": machine.scene_name(scene),
+            "runtime": device.choose().info.platform,
             "mode": mode,
             "as_file": settings.as_file,
             "size": [*size],

@@ -9,9 +9,11 @@ from pathlib import Path
 import numpy as np
 
 RESULTS = Path(__file__).parent / "results"
+POCL = "Portable Computing Language"  # its platform's name
 WHICH = (
     "scene", "mode", "renderer", "sampler", "threads", "layout", "rays", "query", "effect",
     "figure", "triangles", "builder", "bent", "as_file", "size", "benchmark_version", "way",
+    "runtime",
 )  # fmt: skip
 
 HEAD = """# What was measured
@@ -142,6 +144,7 @@ def efficiency(rows: Sequence[Row]) -> str:
         pairs = ("msamples", "relmse", "busy", "first_warm", "peak_mib")
         return [
             *(str(row[name]) for name in ("scene", "mode", "threads")),
+            runtime_of(row),
             "the file's" if row["as_file"] else "box",
             "the file's" if sampler_of(row) == "file" else "multijitter",
             row.get("way", "file"),
@@ -150,7 +153,8 @@ def efficiency(rows: Sequence[Row]) -> str:
             *(" / ".join(f"{v:g}" for v in row.get(name, ())) for name in pairs),
         ]
 
-    headings = ["scene", "mode", "threads", "filter", "Mitsuba's sampler", "clpt's best way"]
+    headings = ["scene", "mode", "threads", "runtime", "filter", "Mitsuba's sampler"]
+    headings += ["clpt's best way"]
     headings += ["efficiency : Mitsuba", "rate : Mitsuba", "efficiency of other ways"]
     headings += ["Msamples/s", "relMSE", "cores busy", "first sample with caches", "peak [MiB]"]
     return table(headings, map(cells, best)) + "\n" + geometric_means([row for row, *_ in best])
@@ -161,13 +165,18 @@ def sampler_of(row: Row) -> str:
     return str(row.get("sampler", "file" if row["as_file"] else "best"))
 
 
+def runtime_of(row: Row) -> str:
+    """OpenCL's platform; PoCL in rows that do not say so."""
+    return str(row.get("runtime", POCL))
+
+
 def best_ways(rows: Sequence[Row]) -> list[list[Row]]:
     """The newest rows of the newest film of each comparison, the most efficient way first."""
     groups: dict[tuple[object, ...], dict[str, Row]] = {}
     for row in sorted(rows, key=lambda row: str(row["date"])):
         about = (row[name] for name in ("mode", "as_file", "threads", "scene"))
         film = str(row["size"]), "way" in row
-        group = groups.setdefault((*about, sampler_of(row)), {})
+        group = groups.setdefault((*about, runtime_of(row), sampler_of(row)), {})
         if any((str(old["size"]), "way" in old) != film for old in group.values()):
             group.clear()
         group[str(row.get("way"))] = row
@@ -215,17 +224,17 @@ def media(rows: Sequence[Row]) -> str:
 
 
 def geometric_means(rows: Sequence[Row]) -> str:
-    """Efficiency over all scenes, by mode, threads, filter and Mitsuba's sampler."""
+    """Efficiency over all scenes, by mode, threads, runtime, filter and Mitsuba's sampler."""
     groups: dict[tuple[object, ...], list[float]] = {}
     for row in rows:
-        which = (row["mode"], row["threads"], row["as_file"], sampler_of(row))
+        which = (row["mode"], row["threads"], runtime_of(row), row["as_file"], sampler_of(row))
         groups.setdefault(which, []).append(float(row["efficiency_ratio"]))
     lines = [
-        f"- {mode}, {threads} thread(s), {'the file' if as_file else 'box'}'s filter, Mitsuba's "
-        f"{'best sampler' if sampler == 'best' else 'sampler by the file'}: "
+        f"- {mode}, {threads} thread(s), {runtime}, {'the file' if as_file else 'box'}'s filter, "
+        f"Mitsuba's {'best sampler' if sampler == 'best' else 'sampler by the file'}: "
         f"geometric mean {np.exp(np.mean(np.log(found))):.2f}, least {min(found):.2f}, "
         f"of {len(found)} scenes"
-        for (mode, threads, as_file, sampler), found in groups.items()
+        for (mode, threads, runtime, as_file, sampler), found in groups.items()
     ]
     return "\n".join(["Efficiency over Mitsuba's:", "", *lines, ""])
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from bench.report import RESULTS, best_ways, sampler_of, table
+from bench.report import POCL, RESULTS, best_ways, runtime_of, sampler_of, table
 
 from .pictures import gallery as pictures
 
@@ -68,9 +68,10 @@ def efficiency() -> str:
     """Return clpt's efficiency over Mitsuba's: three scenes, and the mean of all."""
 
     def ratios(processor: str, mode: str) -> dict[str, float]:
-        """Of each scene, by the way of clpt that is the best one, beside Mitsuba's best sampler."""
+        """Of each scene, by PoCL and clpt's best way, beside Mitsuba's best sampler."""
         about = {"bench": "efficiency", "processor": processor, "mode": mode, "threads": 1}
         own = [r for r in records() if {**about, "as_file": False}.items() <= r.items()]
+        own = [r for r in own if runtime_of(r) == POCL]
         best = (found[0] for found in best_ways(own) if sampler_of(found[0]) == "best")
         return {row["scene"]: row["efficiency_ratio"] for row in best}
 

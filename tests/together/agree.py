@@ -2,6 +2,7 @@
 
     python -m tests.together.agree --scenes 200 --seed 1
     python -m tests.together.agree --fixed --scenes 8 --both --way "light paths" --way vcm
+    python -m tests.together.agree --scenes 0 --file scenes/bulb --file room.xml --samples 512
 
 A scene is rendered EXPOSURES times with seeds of their own, by `path` and in another way; a block
 of pixels has as many independent values of each. Welch's t-test gives a probability for each block.
@@ -26,13 +27,17 @@ import random
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+import clpt
 from clpt.errors import ClptError
+from clpt.render.analysis.analyse import analyse
+from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.scene import Film, Scene, lights
 from clpt.scene import materials as m
 from clpt.scene.integrators import Independent, ParticleTracer, Path, Sobol, Vcm
@@ -47,7 +52,8 @@ EXPOSURES = 12
 SAMPLES = 32  # of an exposure
 CONFIRM = 8  # times as many samples
 SIDE = 4  # of a block [pixels]
-RADIUS = 2e-3  # of photons [m]
+WIDTH = 16  # of the film of a file [pixels]
+RADIUS = 4e-4  # of photons, over the radius of a sphere around the scene
 BIAS = 2e-3  # relative: what gathering within that radius, and offsets of rays, may change
 
 
@@ -122,6 +128,12 @@ def guided(scene: Scene) -> Scene | None:
     return _by(lambda given: Path(guiding=True, **given))(scene)
 
 
+def merged(scene: Scene) -> Scene | None:
+    """With photons, of a radius as small as the scene allows: what they blur is a bias."""
+    _, around = analyse(plain(scene), LoweringCache()).sphere
+    return _by(lambda given: Vcm(radius=RADIUS * around, **given))(scene)
+
+
 def traced(scene: Scene) -> Scene | None:
     """From lights alone: what is sharp would be black to the camera."""
     if _kinds(scene) & {*SHARP} or scene.film.bands:
@@ -148,7 +160,7 @@ def many_lamps(scene: Scene) -> Scene | None:
 
 WAYS: dict[str, Callable[[Scene], Scene | None]] = {
     "light paths": _by(lambda given: Path(light_paths=1, **given)),
-    "vcm": _by(lambda given: Vcm(radius=RADIUS, **given)),
+    "vcm": merged,
     "guiding": guided,
     "particle tracer": traced,
     "the other sampler": other_sampler,
@@ -250,6 +262,14 @@ def drawn(seed: int) -> Scene:
     return dataclasses.replace(scene, film=film, noise=None)
 
 
+def read(path: FilePath) -> Scene:
+    """A scene of a file, with a small and plain film of its shape."""
+    scene = clpt.load(path)
+    high = scene.film.height / scene.film.width
+    film = Film(width=WIDTH, height=max(SIDE, round(WIDTH * high)), mode=scene.film.mode)
+    return dataclasses.replace(scene, film=film, noise=None)
+
+
 def chosen(scene: Scene, seed: int, most: int) -> list[str]:
     """Return some ways that a scene can be rendered in, drawn; at most so many."""
     ways = [way for way in WAYS if WAYS[way](scene) is not None]
@@ -280,6 +300,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--scenes", type=int, default=200, help="that are drawn")
     parser.add_argument("--fixed", action="store_true", help="those of the tests before these")
+    parser.add_argument("--file", action="append", default=[], type=FilePath, help="a scene more")
     parser.add_argument("--both", action="store_true", help="each in RGB and in spectral mode")
     parser.add_argument("--seed", type=int, default=1, help="of the first scene")
     parser.add_argument("--way", action="append", choices=list(WAYS), help="in place of drawn ones")
@@ -287,6 +308,7 @@ def main() -> int:
     parser.add_argument("--samples", type=int, default=SAMPLES, help="of each exposure")
     given = parser.parse_args()
     scenes = dict(SCENES) if given.fixed else {}
+    scenes |= {str(path): functools.partial(read, path) for path in given.file}
     seeds = range(given.seed, given.seed + given.scenes)
     scenes |= {f"seed {seed}": functools.partial(drawn, seed) for seed in seeds}
     found: list[Comparison] = []
@@ -304,7 +326,11 @@ def main() -> int:
         if one.called:
             print(json.dumps(one.row()), flush=True)
     blocks_ = sum(one.p.size for one in found)
-    total = {"comparisons": len(found), "blocks": blocks_, "called": sum(o.called for o in found)}
+    least = min((float(one.p.min()) for one in found if one.p.size), default=1.0)
+    total: dict[str, Any] = {
+        "comparisons": len(found), "blocks": blocks_, "called": sum(o.called for o in found),
+        "least_p": least, "bonferroni": min(1.0, least * blocks_),
+    }  # fmt: skip
     print(json.dumps({**total, "different": len(different), "failed": failed}))
     return int(bool(different) or failed > 0)
 

@@ -36,6 +36,7 @@ Parameters = dict[str, Any]
 SMOOTHEST = 1e-4  # Mitsuba's own floor of a roughness
 # metals of Mitsuba without free data
 WITHOUT_DATA = ("Cu2O", "CuO", "HgTe", "Se", "Se-e", "SnTe", "Ta")
+AIR = 1e-3  # how far its index may be from 1
 GREY_METAL = 0.3  # what they reflect head-on
 
 
@@ -92,6 +93,7 @@ def _rough_dielectric(props: Properties) -> Parameters:
 
 
 def _metal(props: Properties) -> Parameters:
+    _in_air(props)
     named = "material" in props.named
     if named and ("eta" in props.named or "k" in props.named):
         raise props.element.error("give either 'material' or 'eta' and 'k', not both")
@@ -102,6 +104,15 @@ def _metal(props: Properties) -> Parameters:
     else:
         eta, k = index(props, "eta", 0.0), index(props, "k", 1.0)
     return {"eta": eta, "k": k}
+
+
+def _in_air(props: Properties) -> None:
+    """Take Mitsuba 0.6's index of what is around a metal. Raises SceneError unless it is air's."""
+    around = ior(props, "ext_eta", "air")
+    index_there = around.value if isinstance(around, Constant) else around
+    if not isinstance(index_there, float) or abs(index_there - 1.0) > AIR:
+        message = "metals are in air: divide eta and k by 'ext_eta', and leave it out"
+        raise props.element.error(message)
 
 
 def _named_metal(child: Element, context: Context) -> tuple[Spectrum, Spectrum]:

@@ -363,11 +363,27 @@ def _bitmap(props: Properties) -> Bitmap:
     props.ignore("format", "accel")
     return Bitmap(
         image=props.image(),
-        raw=props.flag("raw", False),
-        filter=props.text("filter_type", "bilinear", ("bilinear", "nearest")),
+        raw=props.flag("raw", _linear(props)),
+        filter=_filter(props),
         wrap=wraps[props.text("wrap_mode", "repeat", tuple(wraps))],
         to_uv=TOP_DOWN @ _to_uv(props),
     )
+
+
+def _linear(props: Properties) -> bool:
+    """Take Mitsuba 0.6's exponent of the texels: 1 says that they are no sRGB."""
+    gamma = props.number("gamma", -1.0)
+    if gamma not in (-1.0, 1.0):
+        message = f"texels are sRGB, not powers of {gamma:g}"
+        props.context.warn(props.named["gamma"], message)
+    return gamma == 1.0
+
+
+def _filter(props: Properties) -> str:
+    """Take a filter; those of Mitsuba 0.6 that average over a pixel have the same limit."""
+    smooth = ("bilinear", "trilinear", "ewa")
+    name = props.text("filter_type", "bilinear", (*smooth, "nearest"))
+    return "bilinear" if name in smooth else name
 
 
 def _checkerboard(props: Properties) -> Checkerboard:

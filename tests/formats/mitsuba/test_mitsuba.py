@@ -294,6 +294,9 @@ BSDFS = {
     '<bsdf type="conductor"><string name="material" value="Au"/></bsdf>': materials.Conductor(
         eta=metal("Au")[0], k=metal("Au")[1]
     ),
+    '<bsdf type="conductor"><float name="extEta" value="1"/></bsdf>': (
+        materials.Conductor(eta=0.0, k=1.0)
+    ),
     '<bsdf type="roughconductor"><string name="material" value="none"/></bsdf>': (
         materials.RoughConductor(distribution="beckmann")
     ),
@@ -472,6 +475,11 @@ INDICES = {
 }  # fmt: skip
 
 
+def test_metals_are_in_air(bsdf):
+    with pytest.raises(SceneError, match="divide eta and k by 'ext_eta'"):
+        bsdf('<bsdf type="conductor"><string name="extEta" value="water"/></bsdf>')
+
+
 @pytest.mark.parametrize("xml", INDICES)
 def test_dispersive_indices(bsdf, xml):
     assert bsdf(f'<bsdf type="dielectric">{xml}</bsdf>').int_ior == INDICES[xml]
@@ -488,6 +496,12 @@ def test_textures(bsdf):
     assert (made.wrap, made.filter, made.raw) == ("clamp", "nearest", True)
     # Ours starts at the bottom row: v = 1 - 4 v'.
     assert np.allclose(made.to_uv, [[2, 0, 0], [0, -4, 1], [0, 0, 1]])
+    old = bsdf(
+        '<bsdf type="diffuse"><texture name="reflectance" type="bitmap">'
+        '<string name="filename" value="t.png"/><float name="gamma" value="1"/>'
+        '<string name="filterType" value="trilinear"/></texture></bsdf>'
+    ).reflectance
+    assert (old.filter, old.raw) == ("bilinear", True)  # as Mitsuba 0.6 writes them
     made = bsdf(
         '<bsdf type="diffuse"><texture name="reflectance" type="checkerboard">'
         '<rgb name="color0" value="0.7"/></texture></bsdf>'
