@@ -1,4 +1,4 @@
-"""What lights send to each side, as a tree over lights knows of its nodes.
+"""A node's share of light to each side, as a tree over lights knows it.
 
 A flat light sends its power in proportion to max(n . w, 0), which is half of n . w + |n . w|. Of
 many lights the mean of the first term is that of the normals, times w. The mean of the second one
