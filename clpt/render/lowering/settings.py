@@ -61,9 +61,9 @@ def settings_of(
     if index.merged:
         _set_photons(settings, index, geometry, sphere[1], found.disperses)
     if index.guided:
-        settings["photon_cells"] = guides.CELLS
-        settings["guide_paths"] = index.integrator.guide_paths or guides.PATHS
-        settings["guide_side"] = guides.SIDE * sphere[1]
+        paths = settings["guide_paths"] = index.integrator.guide_paths or guides.PATHS
+        settings["photon_cells"], side = guides.cells_for(paths)
+        settings["guide_side"] = side * sphere[1]
     settings["rival_area"] = rival_area(sphere[1])
     settings["aims"], settings["aim_count"] = found.aims
     settings["camera_bodies"], settings["camera_medium"] = found.around

@@ -27,7 +27,7 @@ log = logging.getLogger(__name__)
 
 SEED = 0x2545F491
 QUIET = 0.4  # variance of such pictures up to which no guide is tried: that takes a compilation
-LESSON = 8  # of the light paths from which a guide learns at last, for each in a trial
+LESSON = 8  # of the light paths from which a guide learns at last, for each in a trial, at most
 FEWEST_LESSONS = 1 << 18
 
 
@@ -121,8 +121,7 @@ def tried(
     samples: of the whole film; like: the scene as another way has it, None for the first one.
     """
     settings = cost.settings(lowered.settings, cost.pixels_for(samples))
-    learned_from = int(settings["guide_paths"])
-    settings["guide_paths"] = min(max(learned_from // LESSON, FEWEST_LESSONS), learned_from)
+    settings["guide_paths"] = lessons(int(settings["guide_paths"]), samples)
     small = replace(lowered, settings=settings)
     wavefront = Wavefront.create(
         ground.device, small, ground.tuning, looped=ground.looped, trees=like or "fast"
@@ -137,6 +136,15 @@ def tried(
         pictures.append(wavefront.film.picture.get()[..., :3].astype(np.float64))
         rays += wavefront.counts.rays
     return Trial(np.array(pictures), rays, _ray(lowered)), wavefront.scene
+
+
+def lessons(paths: int, samples: int) -> int:
+    """Return from how many light paths a guide learns in a trial, for a film of so many samples.
+
+    paths: from which it would learn for the film. A coarser guide has more noise than it, so a
+    trial comes as near to it as what other ways take allows.
+    """
+    return min(max(paths // LESSON, samples // worth.SHARE, FEWEST_LESSONS), paths)
 
 
 def _ray(lowered: Lowered) -> float:

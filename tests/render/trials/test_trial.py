@@ -82,17 +82,40 @@ def test_an_edit_has_no_trial() -> None:
 
 def test_a_guide_learns_the_longer_the_more_samples_there_are() -> None:
     """Unless somebody says from how many light paths."""
-    learned = {1 << 20: 20, worth.SAMPLES: 20, worth.GUIDE_RAYS: 22, 1 << 40: 22}
+    learned = {1 << 20: 20, worth.SAMPLES: 20, worth.GUIDE_RAYS: 22}
+    learned |= {1 << 28: 22, 1 << 29: 23, 1 << 30: 24, 1 << 40: 24}
     for samples, power in learned.items():
         assert guides.paths_for(samples) == 1 << power
     assert guides.paths_for(3 << 23) == 1 << 21
     scene = long(caustic())
     *_, guided = lower(scene).candidates
     former = dataclasses.replace(lower(scene), integrator=guided)
-    assert lower(scene, former=former).settings["guide_paths"] == guides.LONG_PATHS
-    for said, taken in ((0, guides.PATHS), (1000, 1000)):
+    assert lower(scene, former=former).settings["guide_paths"] == 1 << 24
+    for said, taken, cells in ((0, guides.PATHS, 1 << 15), (1000, 1000, 1 << 15)):
         asked = Path(light_paths=0, guiding=True, guide_paths=said)
-        assert lower(long(caustic(), asked)).settings["guide_paths"] == taken
+        found = lower(long(caustic(), asked)).settings
+        assert (found["guide_paths"], found["photon_cells"]) == (taken, cells)
+
+
+def test_a_guide_that_learns_much_has_smaller_cells() -> None:
+    """Of which as many more are told apart; that of the trial is like that of the film."""
+    made = [
+        lower(guided_by(paths)).settings
+        for paths in (1 << 20, guides.FINE_PATHS - 1, guides.FINE_PATHS)
+    ]
+    assert [int(each["photon_cells"]) for each in made] == [1 << 15, 1 << 15, 1 << 16]
+    sides = [float(each["guide_side"] / each["scene_radius"]) for each in made]
+    assert sides == pytest.approx([0.14, 0.14, 0.1])
+    small = cost.settings(made[-1])
+    assert small["guide_side"] == made[-1]["guide_side"]
+    assert small["photon_cells"] == made[-1]["photon_cells"]
+
+
+def guided_by(paths: int) -> Scene:
+    """A scene whose guide learns from so many light paths."""
+    return dataclasses.replace(
+        caustic(), integrator=Path(light_paths=0, guiding=True, guide_paths=paths)
+    )
 
 
 @pytest.mark.parametrize("wrong", [-1, 1.5, True, 1 << 25])
@@ -109,6 +132,16 @@ def test_a_trial_takes_a_share_of_the_film() -> None:
         assert share <= 1.0 / worth.SHARE
     assert cost.pixels_for(1) == cost.FEWEST
     assert cost.pixels_for(1 << 40) == cost.PIXELS
+
+
+@pytest.mark.parametrize(
+    ("power", "paths", "learned"),
+    [(23, 20, 18), (25, 22, 19), (27, 22, 20), (29, 22, 22), (40, 22, 22), (40, 10, 10)],
+)
+def test_a_trials_guide_comes_near_that_of_a_long_film(
+    power: int, paths: int, learned: int
+) -> None:
+    assert trial.lessons(1 << paths, 1 << power) == 1 << learned
 
 
 def made_up(
@@ -240,8 +273,10 @@ def test_a_film_is_gone_on_with_in_its_way(
 def test_a_guide_stays_as_it_is_if_more_samples_are_wanted(
     monkeypatch: pytest.MonkeyPatch, tmp_path: files.Path
 ) -> None:
-    """A longer film learns from more light paths, but not one that has begun with fewer."""
+    """A longer film learns from more light paths, in smaller cells, but not one that has begun with
+    fewer."""
     monkeypatch.setattr(trial, "GUIDED_RAY", 0.0)
+    monkeypatch.setattr(guides, "FINE_PATHS", 1 << 13)
     monkeypatch.setattr(guides, "LONG_PATHS", 1 << 13)
     monkeypatch.setattr(guides, "LESSON", 1)
     file, made = tmp_path / "a.film", []
