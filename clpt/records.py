@@ -232,12 +232,12 @@ LIGHT = Record(
 
 PHOTON = Record(
     "Photon",
-    "A light path where it has met a surface by something sharp.",
+    "A light path where it has met a surface, or collided in a medium, by something sharp.",
     p=("vec3", "where [m]"),
     power=("spectrum", "light that it stands for [W nm^-1]"),
     ratio=("spectrum", "density of the path at each wavelength, over the mean of the four"),
     to_light=("natural", "direction to where it came from, see kernels/core/octahedral.cl"),
-    normal=("natural", "geometric normal, likewise"),
+    normal=("natural", "geometric normal, likewise; in a medium its name"),
     rival=("real", "of its light path, over the cosine there, see kernels/lighting/rivals.cl"),
     depth=("integer", "surfaces that the light path has met; its group from bit 16 up"),
 )

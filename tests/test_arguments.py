@@ -11,7 +11,7 @@ import clpt
 from clpt.errors import SceneError, UnknownKindError
 from clpt.render.lowering.scene import lower
 from clpt.render.options import RenderOptions
-from clpt.scene import Film, Scene, cameras, integrators, lights, materials
+from clpt.scene import Film, Scene, cameras, integrators, lights, materials, shapes
 from clpt.spectra import illuminant
 
 SCENE = Scene(camera=cameras.Perspective(), film=Film(width=4, height=4, mode="rgb"))
@@ -140,3 +140,14 @@ def test_the_longest_path_is_limited_with_a_word(depth: int, told: bool) -> None
     assert lowered.settings["max_depth"] == 4000
     expected = "integrator.max_depth: 4001 counts as 4000, the longest path"
     assert (expected in lowered.warnings) == told
+
+
+def test_the_longest_path_with_photons_is_limited_with_a_word() -> None:
+    """Scattering in dense media goes on beyond it, so the picture is darker than by `path`."""
+    lamp = shapes.Rectangle(emission=lights.Area(radiance=1.0))
+    scene = Scene(
+        camera=cameras.Perspective(), shapes=[lamp], integrator=integrators.Vcm(max_depth=65)
+    )
+    lowered = lower(scene)
+    assert lowered.settings["max_depth"] == 64
+    assert "integrator.max_depth: 65 counts as 64, the longest path" in lowered.warnings

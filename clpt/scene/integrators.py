@@ -127,9 +127,10 @@ class Vcm(Integrator):
 
     Each pass is a sample of every pixel. Where a light path meets a surface behind something sharp
     it leaves a photon, and paths from the camera gather the photons of their pass around them. So
-    caustics converge that are seen in mirrors and through glass, also those of points and suns.
+    caustics converge that are seen in mirrors and through glass, also those of points and suns. In
+    homogeneous media photons are gathered along rays (Krivanek 2014).
     What is gathered is blurred by the radius, which shrinks from pass to pass. A `max_depth` of -1
-    counts as 64.
+    or beyond 64 counts as 64.
     """
 
     max_depth: int = host(8, "longest path, as of `path`; -1: 64")

@@ -39,6 +39,7 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
     next = light_path_roulette(scene, path, at, next, null, v, scatter, &beta);
 
     if (!BSDF_IS_PHASE) rival = rival_chosen(scene, path, at, v, rival, vertex_receiver(scene, v, scatter, onward));
+    next = dull_goes_on(next, null, scatter, bs, &rival, &beta);
     next = rival_goes_to_camera(scene, path, at, next, null, rival, &v, onward, bs);
     if (BSDF_IS_PANE) path_scattered(path, at, next & !null);
     vertex_leave(path, at, next, null, v, onward, beta);

@@ -36,6 +36,9 @@
  * those of next-event estimation do, and so they do what equiangular sampling changes: any weights that sum to one
  * serve, and both sides know these.
  *
+ * Where some light paths aim at what is sharp, few of the others go on from x_{k-1} if that is dull: the third density
+ * is less there (lighting/rival_dull.cl).
+ *
  * Where photons are merged (merging/gather.cl) the same path may also be found at x_i, the first vertex from the camera
  * that is not sharp, if some vertex beyond it is: the camera's path and a light path that end there nearly meet. Where
  * light paths are joined to the camera, what it sees by itself they find, sharper: x_i is not x_1 then. With
@@ -47,14 +50,16 @@
  * something sharp begins, at each vertex that is not, with pending' = e / l c' / p, and goes on as above while all that
  * follows is sharp; it counts at a joint to a sharp x_1.
  *
+ * In a medium x_i is a collision, and photons are merged along the ray to it (merging/along.cl): e is the section of
+ * the cylinder around the ray times the number of light paths. What passes up to x_i is left out of it, as above.
+ *
  * Densities over areas, which importance, emission and 1 / e are, grow and fall with the square of the scene's size. So
  * areas are in units of `settings->rival_area`, which follows the size of very large and very small scenes and is 1 m^2
  * in others: rivals stay inside a float, and far from the limits below.
  *
  * What is sharp depends on the densities of both ways alone, and so is the same for both sides: a delta lobe, or a
- * density above SHARP_PDF. */
+ * density above SHARP_PDF (merging/weight.cl). */
 #define RIVAL_MOST 1e18f /* so that its square is finite */
-#define SHARP_PDF 8.0f /* [1/sr]; an even hemisphere has 0.16 */
 
 inline real rival_limited(real rival) { return min_r(rival, (real)(RIVAL_MOST)); }
 
@@ -63,8 +68,6 @@ inline mask rival_ends(Scene scene, Vertex v)
 {
     return BSDF_ENDS_LIGHT_PATHS ? mask_of(1) : shading_frame_turns(scene, v.row);
 }
-
-inline mask rival_sharp(mask delta, real p, real p_back) { return delta | (max_r(p, p_back) > SHARP_PDF); }
 
 /* What a vertex knows of the rival of its path. */
 typedef struct {
@@ -76,6 +79,7 @@ typedef struct {
     real merges;  /* what merging here has over the path's density: 0 where there is none */
 } Rival;
 
+#include "generated/rival_dull.cl"
 #include "generated/rival_steps.cl"
 
 /* Of a camera's path. sampler: of its sample. */
@@ -114,7 +118,7 @@ inline real rival_of_light_sample(Scene scene, Rival r, Surface s, LightSample l
     real chosen = sel(ls.pdf < 0.0f, ls.chance, ls.pdf);
     real emission = begins / max_r(chosen, (real)(1e-30f));
     real arrives = rival_arrives(r, mask_of(0), p, p_back) * VERTEX_COSINE(s.n, ls.wi) * emission;
-    real third = rival_limited(arrives * p_back);
+    real third = rival_of_dull(rival_limited(arrives * p_back), p);
     real joined = 0.0f;
     if (BSDF_IS_PHASE) joined = sel(rival_light_met(scene, ls.row), (real)(0.0f), rival_limited(arrives));
     return sel(r.first, joined, third);

@@ -1,10 +1,7 @@
 /* What merging adds to lighting/rivals.cl: a number that is `pending` until something sharp follows. */
 
-/* `merging_area` in the unit of rivals. */
-inline real rival_merging_area(Scene scene, integer pass)
-{
-    return merging_area(scene, pass) / scene.settings->rival_area;
-}
+#include "merging/weight.cl"
+#include "generated/rival_area.cl"
 
 /* The rival of a camera's path that arrives, if the vertex scatters with these densities. */
 inline real rival_arrives(Rival r, mask delta, real p, real p_back)
@@ -17,7 +14,7 @@ inline real rival_arrives(Rival r, mask delta, real p, real p_back)
 inline real rival_merges_here(Scene scene, Slab path, uint at, Vertex v)
 {
     if (!BSDF_MERGES) return 0.0f;
-    real area = rival_merging_area(scene, load_path_sample(path, at));
+    real area = rival_merging_area(scene, load_path_sample(path, at), v);
     return sel(merging_here(v.state, v.depth), area, (real)(0.0f));
 }
 
@@ -25,7 +22,7 @@ inline real rival_merges_here(Scene scene, Slab path, uint at, Vertex v)
 inline real rival_left_here(Scene scene, Slab path, uint at, Vertex v)
 {
     if (!BSDF_MERGES) return 0.0f;
-    real area = rival_merging_area(scene, merging_pass(scene, load_path_sample(path, at)));
+    real area = rival_merging_area(scene, merging_pass(scene, load_path_sample(path, at)), v);
     return sel((v.state & PATH_SHARP) != 0, area / scene.settings->light_paths, (real)(0.0f));
 }
 

@@ -39,6 +39,14 @@ inline integer merging_group(Scene scene, real u)
     return min_i(to_integer(u * (float)groups), (integer)(groups - 1));
 }
 
+/* That of a path by its sampler. */
+#if SPECTRUM_SIZE == 4
+#define merging_group_of(scene, sampler) \
+    merging_group(scene, sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH)).x)
+#else
+#define merging_group_of(scene, sampler) ((integer)(0))
+#endif
+
 /* What stands for `own`, a random number, where the time is drawn: all paths of a pass and a group are at one time, so
  * that photons are met where and as they were left. From pass to pass it goes in steps of the golden ratio. */
 inline real merging_moment(Scene scene, real u, real own, integer pass)

@@ -6,7 +6,7 @@
  * away, or off the disk's plane, are left out. */
 #include "core/octahedral.cl"
 #include "merging/cells.cl"
-#include "merging/weight.cl"
+#include "merging/photon_light.cl"
 
 #define MERGING_FLAT 0.5f    /* how far off the plane photons may lie, over the radius */
 #define MERGING_TURN 0.866f  /* least cosine between the normals */
@@ -20,12 +20,7 @@ inline Spectrum merge_photon(Photon photon, mask near, Vertex v, Scattering scat
     real w = photon_weight(photon.rival, rival.arrives, number, area / unit, pair.p, pair.p_back);
     real share = shading_frame_share(scatter.shading, to);
     real scale = w * share / (area * max_r(fabs(dot3(v.s.n, to)), (real)(1e-3f)));
-#if USES_DISPERSION /* the pdfs of both parts for each wavelength as the hero, over their mean */
-    scale /= max_r(spectrum_mean(spectrum_mul(ratio, photon.ratio)), (real)(1e-20f));
-#endif
-    Spectrum light = spectrum_scale(spectrum_mul(pair.f, photon.power), scale);
-    near = near & !rival_sharp(mask_of(0), pair.p, pair.p_back);
-    return spectrum_sel(near & (spectrum_max(pair.f) > 0.0f), light, spectrum_of(0.0f));
+    return photon_light(photon, near, pair, ratio, scale);
 }
 
 /* The light of all photons around a vertex, by the share of it that merging takes, without what the path carries.
@@ -34,12 +29,9 @@ inline Spectrum merge_photons(Scene scene, mask active, Vertex v, Scattering sca
                               integer pass MERGE_ARGS)
 {
     global const Settings *settings = scene.settings;
-    integer group = 0;
+    integer group = merging_group_of(scene, scatter.sampler);
     real radius = merging_radius(scene, pass), area = merging_area(scene, pass);
     real unit = settings->rival_area, number = settings->light_paths;
-#if SPECTRUM_SIZE == 4
-    group = merging_group(scene, sampler_pair(scatter.sampler, (natural)(DIMENSION_WAVELENGTH)).x);
-#endif
     Spectrum sum = spectrum_of(0.0f);
     Cell first = cell_at(scene, sub3(v.s.p, v3(radius, radius, radius)), 2.0f * radius);
     /* Each lane goes through the photons of its own eight cells. */

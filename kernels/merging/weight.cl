@@ -1,5 +1,8 @@
 /* How photons are weighed against all other ways to find their paths: the numbers of lighting/rivals.cl where a path
  * from the camera and a light path nearly meet. */
+#define SHARP_PDF 8.0f /* [1/sr]; an even hemisphere has 0.16 */
+
+inline mask rival_sharp(mask delta, real p, real p_back) { return delta | (max_r(p, p_back) > SHARP_PDF); }
 
 /* The rival of a light path that leaves a photon, without the density of the material there. rival: what arrives;
  * cosine: to where the light comes from. */

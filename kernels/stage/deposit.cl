@@ -1,5 +1,6 @@
-/* Keeps as photons the light paths that meet a surface after something sharp, before a material is chosen there. Each
- * vertex of each light path of a pass has a place of its own, so that nothing is dropped and no order counts. */
+/* Keeps as photons the light paths that meet a surface, or collide in a medium, after something sharp, before a
+ * material is chosen there. Each vertex of each light path of a pass has a place of its own, so that nothing is dropped
+ * and no order counts. */
 #include "core/base.cl"
 #include "core/octahedral.cl"
 #include "interface/stage.cl"
@@ -15,6 +16,7 @@
 #include "generated/photon_numbers.cl"
 #include "merging/weight.cl"
 #include "generated/photon.cl"
+#include "generated/collisions.cl"
 
 STAGE(deposit)(SLAB_ARGS, SCENE_ARGS DEPOSIT_ARGS STAGE_AT_ARG)
 {
@@ -25,6 +27,7 @@ STAGE(deposit)(SLAB_ARGS, SCENE_ARGS DEPOSIT_ARGS STAGE_AT_ARG)
     integer pixel_index = load_path_pixel_index(path, at), kind = MATERIAL_KIND(load_hit_material(hit, at));
     mask active = ((state & PATH_ALIVE) != 0) & ((state & PATH_SHARP) != 0) & (load_hit_prim(hit, at) >= 0);
     active = active & (depth < settings->max_depth) & (pixel_index < settings->photon_pixels) & photon_met(kind);
+    Collision collision = collision_met(scene, path, hit, at, &active);
     if (any(active)) {
         scene.time = load_path_time(path, at);
         integer sample = load_path_sample(path, at), pass = merging_pass(scene, sample), group = 0;
@@ -49,14 +52,12 @@ STAGE(deposit)(SLAB_ARGS, SCENE_ARGS DEPOSIT_ARGS STAGE_AT_ARG)
         medium = MEDIUM_LEFT(medium);
         photon.power = spectrum_mul(photon.power, medium_transmittance(scene, medium, through, lambdas));
 #endif
-#if SPECTRUM_SIZE == 4
-        Sampler sampler = light_path_sampler(settings, pixel_index, sample);
-        group = merging_group(scene, sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH)).x);
-#endif
+        group = merging_group_of(scene, light_path_sampler(settings, pixel_index, sample));
+        collision_photon(path, hit, at, collision, &photon, &group);
         photon.depth = depth | group << 16;
         int number = (int)settings->light_paths, places = settings->photon_places;
         integer place = (pixel_index * number + sample - pass * number) * places + depth - 2;
-        Cell cell = cell_at(scene, s.p, 2.0f * merging_radius(scene, pass));
+        Cell cell = cell_at(scene, photon.p, 2.0f * merging_radius(scene, pass));
         place = sel_i(active, place, (integer)(0));
         photon_keep(photons, place * PHOTON_WORDS, active, photon);
         integer cell_of = cell_number(scene, cell, group);

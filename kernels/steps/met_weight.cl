@@ -1,6 +1,8 @@
 /* What light that a path meets counts, against its choice by next-event estimation and against light paths. */
+#include "generated/rival_dull.cl"
+
 inline real met_weight(Scene scene, Slab path, uint at, Vertex v, integer light, real pdf, real other)
 {
     real emission = light_path_pdf(scene, light, v.o, v.d, v.t, v.s.n);
-    return mis_weight_of_three(pdf, other, path_rival(path, at, v.depth) * emission);
+    return mis_weight_of_three(pdf, other, rival_of_dull(path_rival(path, at, v.depth) * emission, pdf));
 }

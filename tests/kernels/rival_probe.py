@@ -106,8 +106,9 @@ CAMERA = f"""{VERTEX}
     real chosen = mis_weight_of_three(ls.pdf, p, third);
 
     rival = rival_to_light(here, s, onward, is_delta, p, p_back);
-    third = sel(depth > 0.5f, rival, (real)(0.0f)) * emission;
-    real met = mis_weight_of_three(sel(is_delta, (real)(-1.0f), p), found, third);
+    real kept = sel(is_delta, (real)(-1.0f), p);
+    third = rival_of_dull(sel(depth > 0.5f, rival, (real)(0.0f)) * emission, kept);
+    real met = mis_weight_of_three(kept, found, third);
     met = sel(hit, met, (real)(0.0f));
 
     real merged = 0.0f;
@@ -135,12 +136,15 @@ LIGHT = f"""{VERTEX}
     pending = rival_merged(here, s, onward, is_delta, p, p_back);
     sharp = sel(rival_sharp(is_delta, p, p_back), (real)(1.0f), sharp);
 #endif
+#ifdef DULL_SHARE
+    here.arrives /= sel(here.first & !is_delta & is_dull(p_back), (real)(DULL_SHARE), (real)(1.0f));
+#endif
     rival = rival_to_camera(here, s, onward, is_delta, p, p_back);
 """
 
 
 class VertexProbe:
-    """A vertex of paths, from the camera or from the light; joined, merged: features of the scene.
+    """A vertex of paths, from the camera or from the light; others: features of the scene.
 
     Called with every name of GIVEN, each (n,). Returns those of FROM_CAMERA or FROM_LIGHT, each
     (n,): `rival`, `pending` and `sharp` are carried on; `met`, `chosen`, `joined`, `merged` are
@@ -148,7 +152,7 @@ class VertexProbe:
     light path leaves here, -1 without one.
     """
 
-    def __init__(self, from_light: bool, joined: bool, merged: bool):
+    def __init__(self, from_light: bool, joined: bool, merged: bool, dull: bool):
         self.results = FROM_LIGHT if from_light else FROM_CAMERA
         names = ["lamp_row" if name == "lamp" else name for name in GIVEN]
         reads = "".join(f"    real {name} = x[{i}];\n" for i, name in enumerate(names))
@@ -164,11 +168,13 @@ class VertexProbe:
             lanes=1,
             virtual={
                 **lights.virtual_files(),
+                "generated/rival_dull.cl": either(dull, "lighting/rival_dull.cl"),
                 "generated/rival_steps.cl": (
                     *either(merged, "lighting/rivals_merging.cl"),
                     *either(joined, "lighting/rivals_camera.cl"),
                     "lighting/rival_pdf_none.cl",
                 ),
+                "generated/rival_area.cl": ("lighting/rival_area.cl",),
                 "world.cl": WORLD,
             },
             defines={name: int(holds) for name, holds in flags.items()},
@@ -181,6 +187,6 @@ class VertexProbe:
 
 
 @cache
-def vertex_probe(from_light: bool, joined: bool, merged: bool) -> VertexProbe:
+def vertex_probe(from_light: bool, joined: bool, merged: bool, dull: bool) -> VertexProbe:
     """A probe of such features, compiled once."""
-    return VertexProbe(from_light, joined, merged)
+    return VertexProbe(from_light, joined, merged, dull)

@@ -17,6 +17,7 @@ from tests.kernels.rival_probe import LAMPS, LIGHT_PATHS, vertex_probe
 
 PATHS = 1 << 15  # of each length
 SHARP = 8.0  # SHARP_PDF of lighting/rivals.cl [1/sr]
+DULL, DULL_SHARE = 1.0, 0.125  # of lighting/rival_dull.cl, DULL_PDF and DULL_SHARE
 SHARED = (
     50  # paths that every way that there is must share with others, so that the test can see it
 )
@@ -96,7 +97,7 @@ def ways(k: int) -> list[str]:
     return ["met", "chosen", "joined", *(f"merged {i}" for i in range(1, k - 1))]
 
 
-def exact_weights(paths: Paths, joined: bool, merged: bool) -> Array:
+def exact_weights(paths: Paths, joined: bool, merged: bool, dull: bool) -> Array:
     """Weights of `ways` (k + 1, n) by products in float64; 0 where no way is possible."""
     a, k = paths, paths.k
     n = len(a.cosine)
@@ -114,6 +115,9 @@ def exact_weights(paths: Paths, joined: bool, merged: bool) -> Array:
     light = [a.emission.astype(float) * a.gain * a.cosine * to_light[-1] / a.square[-1]]
     for i in range(k - 2, 0, -1):
         light.insert(0, light[0] * p_back[i] * to_light[i - 1] / a.square[i - 1])
+    if dull:
+        few = np.where(~a.delta[-1] & (a.p[-1] <= DULL), DULL_SHARE, 1)
+        light[:-1] = [one * few for one in light[:-1]]
 
     density = np.zeros((k + 1, n))
     density[0] = np.where(a.lamp < 2, camera[k - 1], 0)
@@ -128,7 +132,7 @@ def exact_weights(paths: Paths, joined: bool, merged: bool) -> Array:
     return square / np.maximum(square.sum(axis=0), 1e-300)
 
 
-def kernel_weights(paths: Paths, joined: bool, merged: bool) -> Array:
+def kernel_weights(paths: Paths, joined: bool, merged: bool, dull: bool) -> Array:
     """The same by the kernels' recursions, from each end."""
     a, k = paths, paths.k
     n = len(a.cosine)
@@ -146,7 +150,7 @@ def kernel_weights(paths: Paths, joined: bool, merged: bool) -> Array:
 
     photons = np.full((k - 1, n), -1.0)
     state, alive = start(1 / (LIGHT_PATHS * a.gain), 0.0), np.ones(n, bool)
-    step = vertex_probe(True, joined, merged)
+    step = vertex_probe(True, joined, merged, dull)
     for i in range(k - 2, -1, -1):
         made = step(
             **common, **state, **vertex(i),
@@ -160,7 +164,7 @@ def kernel_weights(paths: Paths, joined: bool, merged: bool) -> Array:
     weights[2] = np.where(alive & ~a.delta[0], made["joined"], 0)
 
     state = start(LIGHT_PATHS, 1.0)
-    step = vertex_probe(False, joined, merged)
+    step = vertex_probe(False, joined, merged, dull)
     for i in range(k - 1):
         made = step(
             **common, **state, **vertex(i),
@@ -175,14 +179,14 @@ def kernel_weights(paths: Paths, joined: bool, merged: bool) -> Array:
 
 
 @pytest.mark.parametrize(
-    ("joined", "merged"),
-    [(True, False), (False, True), (True, True)],
-    ids=["joined", "merged", "both"],
+    ("joined", "merged", "dull"),
+    [(True, False, False), (False, True, False), (True, True, False), (True, True, True)],
+    ids=["joined", "merged", "both", "dull"],
 )
-def test_weights_sum_to_one(joined: bool, merged: bool) -> None:
+def test_weights_sum_to_one(joined: bool, merged: bool, dull: bool) -> None:
     for k in range(2, 7):
         paths = paths_of(k)
-        exact, found = (of(paths, joined, merged) for of in (exact_weights, kernel_weights))
+        exact, found = (of(paths, joined, merged, dull) for of in (exact_weights, kernel_weights))
         whole = exact.sum(axis=0)
         there = {"met", "chosen", *["joined"] * (joined and k > 2)}
         there |= {f"merged {i}" for i in range(1 + joined, k - 1)} if merged else set()

@@ -36,6 +36,7 @@ from scipy import stats
 
 import clpt
 from clpt.errors import ClptError
+from clpt.render.analysis import photons
 from clpt.render.analysis.analyse import analyse
 from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.scene import Film, Scene, lights
@@ -110,11 +111,15 @@ def _kinds(scene: Scene) -> set[type]:
 
 
 def _depth(scene: Scene) -> dict[str, Any]:
-    return {
+    """Return how long paths are, at most as long as photons let them be, and what they see."""
+    given = {
         name: getattr(scene.integrator, name)
         for name in ("max_depth", "hide_lights")
         if hasattr(scene.integrator, name)
     }
+    if not 0 <= given.get("max_depth", 0) <= photons.DEEPEST:
+        given["max_depth"] = photons.DEEPEST
+    return given
 
 
 def _by(integrator: Callable[[dict[str, Any]], Any]) -> Callable[[Scene], Scene | None]:

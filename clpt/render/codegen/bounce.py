@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from clpt.render.codegen import signatures, vertices
+from clpt.render.codegen import flags, signatures, vertices
 from clpt.render.codegen.dispatch import function
 from clpt.render.contract.features import Features
+from clpt.scene.scatterer import Scatterer
 
 # what a bounce does, in its order
 VERBS = ("begin", "show", "intersect", "flight", "deposit", "train", "mix", "shade", "join")
@@ -38,6 +39,8 @@ def _order(features: Features, layout: str, lanes: int, interleaved: bool) -> It
     if features.shows_lights:
         yield Stage("show", join, join, joining)
     yield Stage("intersect", "intersect", "intersect", lanes if interleaved else tracing)
+    for cls in gathered(features):
+        yield Stage("flight", f"gather_{cls.kind}", "gather", lanes)
     if features.media.present:
         yield Stage("flight", flight(features), "flight", lanes)
     if deposits(features):
@@ -70,6 +73,13 @@ def joins(features: Features) -> bool:
 def deposits(features: Features) -> bool:
     """Whether paths leave photons."""
     return features.transport.light_paths and features.transport.merged
+
+
+def gathered(features: Features) -> list[type[Scatterer]]:
+    """Return the phase functions in whose media rays from the camera gather photons."""
+    if not features.transport.merged or features.transport.light_paths:
+        return []
+    return [cls for cls in features.materials.leaves if flags.gathers_along(features, cls)]
 
 
 def trains(features: Features) -> bool:
@@ -171,6 +181,7 @@ def _call(features: Features, own: Features, layout: str, stage: Stage) -> _Call
         begin: signatures.begin_args(own),
         "intersect": signatures.trace_args(own, layout),
         "flight": signatures.flight_args(own),
+        "gather": signatures.gather_args(own),
         "deposit": signatures.deposit_args(own),
         "train": signatures.deposit_args(own),
         join: signatures.join_args(own, layout),
@@ -195,12 +206,12 @@ def _shade_call(features: Features, stage: Stage, args: list[tuple[str, str]]) -
 
 
 def _verb(verb: str, passes: list[list[_Call]]) -> str:
-    """The macro of a verb, for each kind of paths at most one call.
+    """The macro of a verb, for each kind of paths its calls.
 
     It stands there once where it is the same for all: compilers put into the loop what is called in
     one place alone, which saves some hundredths of the time.
     """
-    each = [calls[0].through if calls else "" for calls in passes]
+    each = [" ".join(call.through for call in calls) for calls in passes]
     if len(set(each)) == 1:
         rows = [each[0]]
     else:

@@ -44,6 +44,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/integrator.cl": lambda f, _: (f"integrator/{f.transport.integrator}.cl",),
     "generated/walk.cl": lambda f, _: either(flags.walks(f), "path/walk.cl"),
     "generated/merging.cl": lambda f, _: either(f.transport.merged, "merging/area.cl"),
+    "generated/collisions.cl": lambda f, _: either(f.media.present, "merging/collisions.cl"),
     "generated/cone.cl": lambda f, _: either(f.textures.mips, "path/cone.cl"),
     "generated/vertex_media.cl": lambda f, _: (
         when(f.media.bodies, "path/vertex_bodies.cl")
@@ -102,6 +103,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/infinite_weight.cl": lambda f, _: either(
         f.transport.balanced, "lighting/infinite_weight.cl"
     ),
+    "generated/rival_dull.cl": lambda f, _: either(f.dull_paths_end, "lighting/rival_dull.cl"),
     "generated/emit_steps.cl": lambda f, _: (
         *either(f.transport.aimed, "lighting/aimed_rival.cl"),
         *either(f.transport.balanced, "lighting/light_kept.cl"),
@@ -129,6 +131,9 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/body_weight.cl": lambda f, _: either(f.lights.bodies, "media/body_weight.cl"),
     "generated/aim_cone.cl": lambda f, _: either(f.media.aim_cones, "media/aim_cone.cl"),
     "generated/grid_origin.cl": lambda f, _: either(f.media.grids.emissive, "media/grid_origin.cl"),
+    "generated/flight_medium.cl": lambda f, _: (
+        f"media/flight_medium{'_bodies' * f.media.bodies}.cl",
+    ),
     "generated/flight_steps.cl": lambda f, _: (
         f"media/flight_medium{'_bodies' * f.media.bodies}.cl",
         *either(f.media.grids.present, "media/near_grids.cl"),
@@ -233,6 +238,7 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
         *either(f.transport.merged, "lighting/rivals_merging.cl"),
         *either(f.transport.joined and not cls.delta, "lighting/rivals_camera.cl"),
     ),
+    "generated/rival_area.cl": lambda f, cls: (f"lighting/rival_area{'_along' * cls.is_phase}.cl",),
     "generated/hero_steps.cl": lambda f, cls: (
         *either(
             f.ratios and flags.is_chromatic(f, cls) and f.spectra.spectral, "path/hero_weighs.cl"
@@ -264,6 +270,7 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
     "generated/light_path_steps.cl": lambda f, cls: (
         *either(f.transport.joined and not cls.delta, "steps/join_camera.cl"),
         *either(flags.asks_chance(f, cls), "lighting/rival_chosen.cl"),
+        *either(f.dull_paths_end and not cls.delta, "steps/dull_goes_on.cl"),
         "steps/adjoint_weight.cl",
         *either(not flags.is_null(f, cls), "steps/light_path_roulette.cl"),
     ),

@@ -35,8 +35,13 @@ def ends_light_paths(features: Features, cls: type[Scatterer]) -> bool:
 
 
 def gathers_photons(features: Features, cls: type[Scatterer]) -> bool:
-    """Whether paths from the camera are merged with photons at a material."""
+    """Whether paths from the camera are merged with photons on a material."""
     return not (cls.delta or cls.is_null or cls.is_phase or ends_light_paths(features, cls))
+
+
+def gathers_along(features: Features, cls: type[Scatterer]) -> bool:
+    """Whether rays from the camera are merged with photons in media of a phase function."""
+    return cls.is_phase and not ends_light_paths(features, cls)
 
 
 def filters_at_random(features: Features, cls: type[Scatterer]) -> bool:
@@ -101,7 +106,9 @@ MATERIAL: dict[str, Callable[[Features, type[Scatterer]], int]] = {
     "BSDF_CHROMATIC": is_chromatic,
     "BSDF_FLUORESCES": fluoresces,
     "BSDF_ENDS_LIGHT_PATHS": lambda f, cls: f.transport.balanced and ends_light_paths(f, cls),
-    "BSDF_MERGES": lambda f, cls: f.transport.merged and gathers_photons(f, cls),
+    "BSDF_MERGES": lambda f, cls: (
+        f.transport.merged and (gathers_photons(f, cls) or gathers_along(f, cls))
+    ),
     "BSDF_GUIDED": is_guided,
     "BSDF_IS_PHASE": lambda f, cls: cls.is_phase,
     "BSDF_IS_NULL": is_null,

@@ -97,6 +97,9 @@ def _stages(
         texts["deposit"] = make("deposit", files, defines, lanes)
     if bounce.trains(features):
         texts["train"] = make("train", files, defines, lanes)
+    for cls in bounce.gathered(features):
+        own, given = _of_kind(features, cls, files), {**defines, **flags.of_material(features, cls)}
+        texts[f"gather_{cls.kind}"] = make(f"gather_{cls.kind}", own, given, lanes, "gather")
     if features.media.present:
         flight = bounce.flight(features)
         texts[flight] = make(flight, files, defines, lanes, "flight")
@@ -113,7 +116,7 @@ def _shading(
     texts: dict[str, device.Source] = {}
     for vertex in vertices.vertices(features, lanes if part is not None else 1):
         cls = vertices.leader(features, vertex)
-        own = {**files, **choices.material_files(features, cls), **_material(features, cls)}
+        own = _of_kind(features, cls, files)
         if vertex.shared:
             own |= vertices.virtual_files(features, vertex)
             texts |= _materials(features, vertex, files, lanes, part)
@@ -130,6 +133,11 @@ def _shading(
     return texts
 
 
+def _of_kind(features: Features, cls: type[Scatterer], files: Files) -> Files:
+    """The files of a scene with those of a kind."""
+    return {**files, **choices.material_files(features, cls), **_material(features, cls)}
+
+
 def _material(features: Features, cls: type[Scatterer]) -> Files:
     """The files of a kind's own functions."""
     own: Files = {"generated/bsdf.cl": stages.bsdf_text(features, cls)}
@@ -144,7 +152,7 @@ def _materials(
     """The parts of the kinds of a shared vertex, by program name."""
     texts = {}
     for cls in (features.materials.leaves[kind] for kind in vertex.kinds):
-        own = {**files, **choices.material_files(features, cls), **_material(features, cls)}
+        own = _of_kind(features, cls, files)
         own["generated/material_part.cl"] = vertices.part_text(features, cls)
         given = {**_defines(features, lanes), **flags.of_material(features, cls)}
         name = f"material_{cls.kind}"

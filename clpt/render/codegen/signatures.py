@@ -47,6 +47,7 @@ def virtual_files(features: Features, layout: str) -> dict[str, str]:
         "layer": (layer_args(features), False),
         "light_layer": (light_layer_args(features), True),
         "flight": (flight_args(features), True),
+        "gather": (gather_args(features), True),
     }
     files = {"generated/scene.cl": scene_text(blocks.unused(features), features)}
     for name, (args, behind) in groups.items():
@@ -141,6 +142,11 @@ def merge_args(features: Features) -> dict[str, str]:
     if not features.transport.merged or features.transport.light_paths:
         return {}
     return dict.fromkeys(("photons", "photon_order", "photon_cells"), "global const uint *")
+
+
+def gather_args(features: Features) -> dict[str, str]:
+    """Return what the stage takes that gathers photons along rays, beside slabs and scene."""
+    return {**merge_args(features), **light_layer_args(features)}
 
 
 def layer_args(features: Features) -> dict[str, str]:

@@ -96,15 +96,22 @@ def screen_text(features: Features) -> str:
 def photon_text(features: Features) -> str:
     """Return the struct of a photon, and `photon_met(kind)`: whether one is kept at a material.
 
-    At a mixture one is kept while no part is chosen yet.
+    At a mixture one is kept while no part is chosen yet. `photon_along(kind)`: likewise in a medium
+    of a phase function; `photon_collides(kind)`: whether it is a phase function.
     """
-    kinds = [
-        i for i, cls in enumerate(features.materials.leaves) if flags.gathers_photons(features, cls)
-    ]
-    met = " | ".join(f"((kind) == {kind})" for kind in [*kinds, MIXTURE])
-    return f"""{PHOTON.row_text(many=True)}{PHOTON.keep_text()}#define PHOTON_WORDS {PHOTON.words}
-#define photon_met(kind) ({met})
-"""
+    leaves = [*enumerate(features.materials.leaves)]
+    kinds = [i for i, cls in leaves if flags.gathers_photons(features, cls)]
+    along = [i for i, cls in leaves if flags.gathers_along(features, cls)]
+    asked = {
+        "met": [*kinds, *along, MIXTURE],
+        "along": along,
+        "collides": [i for i, cls in leaves if cls.is_phase],
+    }
+    rows = [f"{PHOTON.row_text(many=True)}{PHOTON.keep_text()}#define PHOTON_WORDS {PHOTON.words}"]
+    for name, of in asked.items():
+        any_ = " | ".join(f"((kind) == {kind})" for kind in of) or "mask_of(0)"
+        rows.append(f"#define photon_{name}(kind) ({any_})")
+    return "\n".join([*rows, ""])
 
 
 def grid_words_text(grids: GridFeatures) -> str:

@@ -429,9 +429,9 @@ def _warnings(index: SceneIndex) -> list[str]:
         warnings += _of_motion(index)
     if integrator.light_paths:
         warnings += _left_to_the_camera(index)
-    depth = integrator.max_depth
-    if depth > DEEPEST:
-        warnings.append(f"integrator.max_depth: {depth} counts as {DEEPEST}, the longest path")
+    depth, most = integrator.max_depth, photons.DEEPEST if index.merged else DEEPEST
+    if depth > most:
+        warnings.append(f"integrator.max_depth: {depth} counts as {most}, the longest path")
     if index.spectral and not film.bands and not _sees(film):
         warnings.append(
             f"film.sensor sees nothing from {film.lambda_min:g} to {film.lambda_max:g} nm, so the"

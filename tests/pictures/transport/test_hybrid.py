@@ -110,7 +110,7 @@ def leave_aims_out(monkeypatch: pytest.MonkeyPatch) -> None:
 def smooth(mode: str) -> Sphere:
     """A small ball of glass that light paths aim at, not so smooth that `path` finds no lamp."""
     index: Any = {"rgb": 1.5, "spectral": "sf11"}[mode]
-    glass = m.RoughDielectric(int_ior=index, alpha_u=0.15, alpha_v=0.15)
+    glass = m.RoughDielectric(int_ior=index, alpha_u=0.19, alpha_v=0.19)
     return Sphere(center=(0.2, 0.35, 0.2), radius=0.2, material=glass)
 
 

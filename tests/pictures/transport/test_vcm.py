@@ -82,11 +82,13 @@ def transmitted(angle: np.ndarray, index: float = WATER) -> np.ndarray:
     return 1.0 - (s**2 + p**2) / 2.0
 
 
-def flat_pool_irradiance(x: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Of the floor of `flat_pool` at (x, -DEEP, z): light refracted by Snell.
+def flat_pool_irradiance(
+    x: np.ndarray, z: np.ndarray, deep: float = DEEP
+) -> tuple[np.ndarray, np.ndarray]:
+    """Of a floor at (x, -deep, z) in `flat_pool`, light refracted by Snell; and its cosine there.
 
     Light that leaves the point at t1 to the vertical goes on at t2, sin t1 = WATER sin t2, and
-    meets the floor at rho = ABOVE tan t1 + DEEP tan t2 from the point's foot. A ring of it keeps
+    meets the floor at rho = ABOVE tan t1 + deep tan t2 from the point's foot. A ring of it keeps
     its power: E = I T sin t1 / (rho drho/dt1).
     """
     rho = np.hypot(x - 0.6, z)
@@ -94,11 +96,11 @@ def flat_pool_irradiance(x: np.ndarray, z: np.ndarray) -> np.ndarray:
     for _ in range(60):  # the angle at which light comes there
         t1 = (low + high) / 2.0
         t2 = np.arcsin(np.sin(t1) / WATER)
-        short = ABOVE * np.tan(t1) + DEEP * np.tan(t2) < rho
+        short = ABOVE * np.tan(t1) + deep * np.tan(t2) < rho
         low, high = np.where(short, t1, low), np.where(short, high, t1)
     t2 = np.arcsin(np.sin(t1) / WATER)
-    spread = ABOVE / np.cos(t1) ** 2 + DEEP * np.cos(t1) / (WATER * np.cos(t2) ** 3)
-    return INTENSITY * transmitted(t1) * np.sin(t1) / (rho * spread)
+    spread = ABOVE / np.cos(t1) ** 2 + deep * np.cos(t1) / (WATER * np.cos(t2) ** 3)
+    return INTENSITY * transmitted(t1) * np.sin(t1) / (rho * spread), np.cos(t2)
 
 
 def flat_pool_radiance(samples: int = 8) -> np.ndarray:
@@ -110,7 +112,7 @@ def flat_pool_radiance(samples: int = 8) -> np.ndarray:
     out = np.arctan(slope)
     inside = np.arcsin(np.sin(out) / WATER)
     far = HEIGHT * np.tan(out) + DEEP * np.tan(inside)
-    irradiance = flat_pool_irradiance(far * np.cos(across), far * np.sin(across))
+    irradiance, _ = flat_pool_irradiance(far * np.cos(across), far * np.sin(across))
     seen = ALBEDO / np.pi * irradiance * transmitted(out) / WATER**2
     return seen.reshape(8, samples, 8, samples).mean(axis=(1, 3))
 

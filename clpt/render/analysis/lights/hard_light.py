@@ -37,7 +37,7 @@ MOSTLY = 0.5  # of the power of all lights: where small ones have less, few path
 FEW = 0.125  # a sample
 SOME = 0.25  # where they have more; `vcm` has one, as its photons are these
 FOGGY = 0.25, 0.5  # the same two where lights are in media that scatter
-MANY = 4  # where they are in bulbs: the camera's paths find next to nothing there
+MANY = 8  # where they are in bulbs: the camera's paths find next to nothing there
 DIRECTIONS = 128  # in which a light looks for what is sharp
 SLACK = 1e-6  # of the cosine of a cone around what may be met, for roundings
 BULB = 0.75  # of them: where what is sharp fills more, the light is in a bulb
@@ -128,8 +128,7 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
     fewest = FEWEST - index.free_panes  # a pane on the way costs no depth
     if 0 <= integrator.max_depth < fewest:
         return without, "the longest path is too short for a caustic"
-    in_fog = _in_fog(lit)
-    if in_fog is not None:
+    if (in_fog := _in_fog(lit)) is not None:
         return in_fog
     sharp = _first_with((one for one in index.shapes if not _hides(one)), is_sharp)
     if sharp is None:

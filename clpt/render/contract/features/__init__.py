@@ -107,6 +107,11 @@ class Features:
         return self.spectra.spectral and any(cls.fluoresces for cls in self.materials.leaves)
 
     @property
+    def dull_paths_end(self) -> bool:
+        """Whether most light paths end whose first surface is dull: others aim at what is sharp."""
+        return self.transport.aimed and self.transport.balanced and not self.media.present
+
+    @property
     def hemispheres(self) -> bool:
         """Whether paths keep the side of a surface from which their direction was chosen."""
         weighed_there = self.transport.balanced and self.transport.light_paths

@@ -13,7 +13,7 @@ import pytest
 
 from clpt import transforms as tf
 from clpt.render.analysis.lights import image_lights
-from clpt.render.analysis.lights.hard_light import FEW, SOME
+from clpt.render.analysis.lights.hard_light import FEW, MANY, SOME
 from clpt.render.lowering.scene import Lowered, lower
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
@@ -162,10 +162,10 @@ GLASS_BALL = Sphere(radius=1.0, material=m.Dielectric())
 @pytest.mark.parametrize(
     ("bulb", "number"),
     [
-        (Sphere(center=LAMP.position, radius=0.1, material=m.Dielectric()), 4),
+        (Sphere(center=LAMP.position, radius=0.1, material=m.Dielectric()), MANY),
         (Sphere(center=LAMP.position, radius=0.1, material=m.Diffuse()), 0),
-        (Cube(to_world=AT_LAMP, material=m.Dielectric()), 4),
-        (Instance(group=Group(shapes=[GLASS_BALL]), to_world=AT_LAMP), 4),
+        (Cube(to_world=AT_LAMP, material=m.Dielectric()), MANY),
+        (Instance(group=Group(shapes=[GLASS_BALL]), to_world=AT_LAMP), MANY),
         (Rectangle(to_world=PANE, material=m.Dielectric()), SOME),
         (Sphere(center=(0.0, 0.5, 0.0), radius=0.2, material=m.Dielectric()), SOME),
     ],
@@ -173,11 +173,11 @@ GLASS_BALL = Sphere(radius=1.0, material=m.Dielectric())
 )
 def test_a_light_in_a_bulb_has_many_light_paths(bulb: Shape, number: float) -> None:
     found, reason = chosen(scene_of(ROOM, bulb))
-    assert found == number and ("in a bulb" in reason) == (number == 4)
+    assert found == number and ("in a bulb" in reason) == (number == MANY)
     lamp = dataclasses.replace(LAMP, position=(0.0, 0.0, 0.0), intensity=3.0)  # has most power
     assert chosen(scene_of(ROOM, bulb, lights=[LAMP, lamp]))[0] in (0, SOME)
     made = lower(scene_of(ROOM, bulb, camera=looking(*LAMP.position), integrator=Auto()))
-    assert made.settings["light_paths"] == {4: 4, SOME: 1, 0: 0}[number]
+    assert made.settings["light_paths"] == {MANY: MANY, SOME: 1, 0: 0}[number]
 
 
 def test_what_instances_show_counts() -> None:

@@ -1,0 +1,61 @@
+/* Gathers photons along rays from the camera through media, for those whose phase function is of one kind: before
+ * stage/flight.cl chooses where they collide. */
+#include "core/base.cl"
+#include "interface/stage.cl"
+#include "generated/merge_args.cl"
+#include "generated/gather_args.cl"
+#include "generated/sampler.cl"
+#include "path/path_state.cl"
+#include "path/surface_flags.cl"
+#include "generated/textures.cl"
+#include "interface/bsdf.cl"
+#include "generated/bsdf.cl"
+#include "generated/medium.cl"
+#include "generated/hero_steps.cl"
+#include "path/pair.cl"
+#include "generated/light_layers.cl"
+#include "generated/flight_medium.cl"
+#include "merging/area.cl"
+#include "generated/photon.cl"
+#include "merging/along.cl"
+
+STAGE(gather)(SLAB_ARGS, SCENE_ARGS GATHER_ARGS STAGE_AT_ARG)
+{
+    SLABS
+    SCENE
+    STAGE_AT
+    integer state = load_path_state(path, at);
+    mask alive = (state & PATH_ALIVE) != 0, met = alive & (load_hit_prim(hit, at) >= 0);
+    mask merges = alive & merging_here(state, state & PATH_DEPTH);
+    integer medium = 0, word = -1;
+    if (any(merges)) {
+        medium = flight_medium(scene, path, hit, at, alive, met);
+        word = merging_phase(scene, medium);
+        merges = merges & (MATERIAL_KIND(word) == (integer)(BSDF_KIND));
+    }
+    if (any(merges)) {
+        Wavelengths lambdas = load_path_lambdas(path, at);
+        integer sample = load_path_sample(path, at);
+        Sampler sampler = pixel_sampler(settings, load_path_pixel_key(path, at), sample);
+        natural vertex = as_natural((state & PATH_DEPTH) + load_path_nulls(path, at));
+        real lead = sel(merges, load_path_lead(path, at), (real)(0.0f));
+        vec3 d = load_path_d(path, at);
+        MergingRay ray;
+        ray.o = madd3(d, -lead, load_path_o(path, at));
+        ray.d = d;
+        ray.end = sel(met, load_hit_t(hit, at) + lead, (real)(FAR));
+        ray.medium = sel_i(merges, medium, (integer)(0));
+        ray.depth = state & PATH_DEPTH;
+        ray.group = merging_group_of(scene, sampler) | MERGING_IN_MEDIUM;
+        ray.m = medium_load(scene, ray.medium, lambdas);
+        ray.ratio = load_path_ratio(path, at);
+        ray.arrives = load_path_rival(path, at);
+        integer row = sel_i(merges, MATERIAL_ROW(word), (integer)(0));
+        Bsdf bsdf = bsdf_load(scene, row, texture_point_nowhere(), lambdas);
+        real u = sampler_pair(sampler, DIMENSION_FLIGHT + vertex).x;
+        Spectrum light = merge_along(scene, merges, ray, bsdf, sample, u MERGE_PASSED);
+        light = spectrum_mul(load_path_beta(path, at), light);
+        light_layers_add(scene, path, at, merges, (integer)(2), (integer)(0), light, light_layers);
+        store_path_radiance(path, at, merges, spectrum_add(load_path_radiance(path, at), light));
+    }
+}
