@@ -1,41 +1,48 @@
 /* Choosing a light in proportion to what it may send to a point, by a tree over all lights (Conty Estevez
- * and Kulla 2018; its nodes' importance after pbrt-v4, 12.6.3). Behind the rows in `lights` lie a word for every row,
- * two bits of which say at each level which node of a group leads to it, and then the groups: see
- * clpt/render/lowering/lights/light_tree.py. */
+ * and Kulla 2018). Behind the rows in `lights` lie a word for every row, two bits of which say at each level which node
+ * of a group leads to it, and then the groups: see clpt/render/lowering/lights/light_tree.py. */
 #define LIGHT_TREE_SLACK 1e-3f /* of a cosine, so that rounding hides no light */
+#define LIGHT_TREE_DARK 1e-5f  /* of a cosine: rounding, behind what is flat */
+/* For lights of a node are not where its centre is: the share of the square of its radius that adds to that of the
+ * distance; by how much of the square of its sine as seen from p that of the cosine at the lights grows; and the share
+ * of the cosine at p of what rises above its horizon. All were measured, see bench/NOTES.md. */
+#define LIGHT_TREE_NEAR 0.33f
+#define LIGHT_TREE_AROUND 0.1f
+#define LIGHT_TREE_RISING 0.25f
 /* The least importance of lights at places over that of those that shine on the whole scene, and the other way round,
  * where both may send light: what is in the way is not known. */
 #define LIGHT_TREE_LEAST 0.05f
 
-/* cos and sin of max(a - b, 0) for angles in [0, pi]. */
-inline void light_tree_minus(real cos_a, real sin_a, real cos_b, real sin_b, real *c, real *s)
+/* In which lanes lights of a node, to which p is so far `from` its centre, may shine on p by their cones. */
+inline mask light_tree_in_cone(LightNode n, vec3 from)
 {
-    mask below = cos_a > cos_b;
-    *c = sel(below, (real)(1.0f), cos_a * cos_b + sin_a * sin_b);
-    *s = sel(below, (real)(0.0f), sin_a * cos_b - cos_a * sin_b);
+    real d2 = dot3(from, from), inverse = 1.0f / sqrt(max_r(d2, (real)(1e-20f)));
+    real sine = min_r(n.radius * inverse, (real)(1.0f));
+    real turned = n.cos_e * sqrt_r(1.0f - sqr(sine)) - sqrt_r(1.0f - sqr(n.cos_e)) * sine;
+    return dot3(n.mean, from) * inverse > (turned - LIGHT_TREE_SLACK) * sqrt(dot3(n.mean, n.mean));
 }
 
-/* What the lights below a node may send to p, all surfaces there shading them: their power, times the cosine at the
- * light, over the squared distance; and times what p reflects, which of a dull surface is the cosine there if light
- * from one hemisphere only matters. The cosine at the light is the largest that any of these may have, the other that
- * of the sphere's highest point, over the distance of its centre; lift: 1 where light from both sides matters, else 0.
- * Lights that shine on the whole scene count as much everywhere. */
+/* What the lights below a node may send to p, all surfaces there shading them: their power, times the mean of their
+ * cosines (light_lobes.py), over the squared distance; and times what p reflects, which of a dull surface is the cosine
+ * there if light from one hemisphere only matters. No light is lost: 0 means that there is none. lift: 1 where light
+ * from both sides matters, else 0. Lights that shine on the whole scene count as much everywhere. */
 inline real light_tree_importance(LightNode n, vec3 p, Receiver receiver, real lift)
 {
     vec3 from = sub3(p, n.center);
-    real d2 = dot3(from, from), r2 = sqr(n.radius);
-    real inverse = 1.0f / sqrt(max_r(max_r(d2, r2), (real)(1e-20f))); /* of the distance, within of the radius */
-    real cos_w = dot3(n.axis, from) * inverse, sin_o = fabs(n.sin_o);
-    cos_w = sel(n.sin_o < 0.0f, fabs(cos_w), cos_w);
-    real sin_b = n.radius * inverse, cos_b = sqrt_r(1.0f - sin_b * sin_b), cos_x, sin_x, cos_p, sin_p;
-    light_tree_minus(cos_w, sqrt_r(1.0f - cos_w * cos_w), n.cos_o, sin_o, &cos_x, &sin_x);
-    light_tree_minus(cos_x, sin_x, cos_b, sin_b, &cos_p, &sin_p);
-    cos_p = sel(d2 > r2, cos_p, (real)(1.0f));
-    real cos_r = min_r(lift + sin_b - dot3(receiver_hemisphere(receiver), from) * inverse, (real)(1.0f));
-    real arrives = max_r(cos_p, (real)(LIGHT_TREE_SLACK));
-    arrives *= receiver_reflects(receiver, scale3(from, -inverse), sin_b, max_r(cos_r, (real)(LIGHT_TREE_SLACK)));
-    mask faces = (cos_p > n.cos_e - LIGHT_TREE_SLACK) & (cos_r > -LIGHT_TREE_SLACK);
-    real importance = sel(faces, n.power * arrives * sqr(inverse), (real)(0.0f));
+    real d2 = dot3(from, from) + LIGHT_TREE_NEAR * sqr(n.radius), inverse = 1.0f / sqrt(max_r(d2, (real)(1e-20f)));
+    vec3 w = scale3(from, inverse), across = v3(w.y * w.z, w.z * w.x, w.x * w.y);
+    real sine = min_r(n.radius * inverse, (real)(1.0f));
+    real square = dot3(n.squares, v3(w.x * w.x, w.y * w.y, w.z * w.z)) + 2.0f * dot3(n.products, across);
+    real along = dot3(n.mean, w), shines = 0.5f * (along + sqrt_r(square + LIGHT_TREE_AROUND * sqr(sine)));
+    mask flat = (n.child < 0) & (dot3(n.mean, n.mean) > 1.0f - LIGHT_TREE_SLACK);
+    mask faces = !flat | (along > LIGHT_TREE_DARK);
+    mask narrow = n.cos_e > -1.0f;
+    if (any(narrow)) faces = faces & (!narrow | light_tree_in_cone(n, from));
+    real straight = lift - dot3(receiver_hemisphere(receiver), w), highest = straight + sine;
+    real cosine = max_r(max_r(straight, LIGHT_TREE_RISING * highest), (real)(LIGHT_TREE_SLACK));
+    real reflected = receiver_reflects(receiver, neg3(w), sine, min_r(cosine, (real)(1.0f)));
+    real importance = n.power * shines * reflected * sqr(inverse);
+    importance = sel(faces & (highest > -LIGHT_TREE_SLACK), importance, (real)(0.0f));
     return sel(n.radius < 0.0f, n.power, importance);
 }
 

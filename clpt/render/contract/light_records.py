@@ -202,13 +202,13 @@ KINDS = (*(kind for kind in RECORDS if kind not in VOLUMES), *shape_records.RECO
 NODE = Record(
     "LightNode",
     "A node of the tree over lights; children of a node are a group, neighbours in the table.",
-    center=("vec3", "of the sphere around its lights [m]"),
-    radius=("real", "[m]; below 0: it shines on the whole scene, power is all that counts"),
-    axis=("vec3", "of the cone around its lights' normals, unit length"),
+    center=("vec3", "of its lights, weighed by power [m]"),
+    radius=("real", "around all of them [m]; below 0: it shines everywhere, power alone counts"),
+    mean=("vec3", "of the lights' normals, weighed by power"),
     power=("real", "of all its lights"),
-    cos_o=("real", "of the angle by which normals lean from the axis"),
-    sin_o=("real", "below 0: light leaves against the normals too"),
-    cos_e=("real", "of the angle by which light leans from a normal"),
+    squares=("vec3", "mean of the squares of the normals' x, y and z, see light_lobes.py"),
+    cos_e=("real", "of the angle from `mean` up to which there is light; -1: on all sides"),
+    products=("vec3", "mean of the normals' y z, z x and x y"),
     child=("integer", "the group of its children; below 0: -1 - the row in `lights`"),
 )
 WIDTH = 4  # nodes of a group

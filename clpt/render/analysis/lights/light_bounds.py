@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,13 +22,15 @@ NARROW = 0.02  # [rad] around a cone of directions that is known to hold all lig
 class Bounds:
     """Bounds of n lights: boxes, and cones as Conty Estevez and Kulla 2018 (4.1) have them.
 
-    low, high (n, 3) [m]; axis (n, 3) unit length; theta_o (n,): how far normals lean from it [rad];
-    theta_e (n,): how far light leans from a normal [rad], up to pi / 2; both (n,) bool: light
-    leaves against the normals too; placed (n,) bool: False for what shines on the whole scene.
+    low, high (n, 3) [m]; center (n, 3): in the plane of what is flat [m]; axis (n, 3) unit length;
+    theta_o (n,): how far normals lean from it [rad]; theta_e (n,): how far light leans from a
+    normal [rad], up to pi / 2; both (n,) bool: light leaves against the normals too; placed (n,)
+    bool: False for what shines on the whole scene.
     """
 
     low: Floats
     high: Floats
+    center: Floats
     axis: Floats
     theta_o: Floats
     theta_e: Floats
@@ -41,7 +43,13 @@ class Bounds:
     @property
     def arrays(self) -> tuple[Any, ...]:
         """The arrays, in the order of the fields."""
-        return self.low, self.high, self.axis, self.theta_o, self.theta_e, self.both, self.placed
+        cones = self.axis, self.theta_o, self.theta_e, self.both
+        return self.low, self.high, self.center, *cones, self.placed
+
+    def within(self, low: Floats, high: Floats) -> Bounds:
+        """Return the bounds of lights that move or turn in larger boxes (n, 3)."""
+        theta_o = np.full(len(low), np.pi)
+        return replace(self, low=low, high=high, center=0.5 * (low + high), theta_o=theta_o)
 
     def __getitem__(self, rows: ArrayLike) -> Bounds:
         return Bounds(*(array[rows] for array in self.arrays))
@@ -89,6 +97,7 @@ def of_triangles(vertices: Points, faces: Faces, two_sided: bool) -> Bounds:
     return Bounds(
         corners.min(axis=1),
         corners.max(axis=1),
+        corners.mean(axis=1),
         normals / np.where(lengths > 0.0, lengths, 1.0),
         np.where(lengths[:, 0] > 0.0, 0.0, np.pi),
         np.full(count, np.pi / 2.0),
@@ -102,7 +111,7 @@ def of_balls(balls: NDArray[np.float32]) -> Bounds:
     center, radius = balls[:, :3].astype(np.float64), balls[:, 3:].astype(np.float64)
     count = len(balls)
     return Bounds(
-        center - radius, center + radius, np.tile([0.0, 0.0, 1.0], (count, 1)),
+        center - radius, center + radius, center, np.tile([0.0, 0.0, 1.0], (count, 1)),
         np.full(count, np.pi), np.full(count, np.pi / 2.0), np.full(count, False),
         np.full(count, True),
     )  # fmt: skip
@@ -122,6 +131,6 @@ def _one(
     high = low if high is None else high
     angles = (np.array([theta_o]), np.array([theta_e]))
     return Bounds(
-        low[None], high[None], np.array([axis], np.float64), *angles, np.array([both]),
-        np.array([placed]),
+        low[None], high[None], 0.5 * (low + high)[None], np.array([axis], np.float64), *angles,
+        np.array([both]), np.array([placed]),
     )  # fmt: skip

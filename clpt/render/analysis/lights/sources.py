@@ -170,7 +170,7 @@ def _all_around(low: NDArray[np.float64], high: NDArray[np.float64]) -> Bounds:
     """Boxes (n, 3) of what shines in all directions."""
     count = len(low)
     return Bounds(
-        low, high,
+        low, high, 0.5 * (low + high),
         np.tile([0.0, 0.0, 1.0], (count, 1)),
         np.full(count, np.pi), np.full(count, np.pi / 2.0), np.full(count, False),
         np.full(count, True),
@@ -227,12 +227,8 @@ def _triangle_bounds(vertices: Points, faces: Faces, keys: int, two_sided: bool)
     )
     if not others:
         return first
-    return replace(
-        first,
-        low=np.minimum.reduce([first.low, *(one.low for one in others)]),
-        high=np.maximum.reduce([first.high, *(one.high for one in others)]),
-        theta_o=np.full(len(faces), np.pi),
-    )
+    low = np.minimum.reduce([first.low, *(one.low for one in others)])
+    return first.within(low, np.maximum.reduce([first.high, *(one.high for one in others)]))
 
 
 def _around(index: SceneIndex, geometry: Geometry) -> Around:
@@ -248,6 +244,6 @@ def _around(index: SceneIndex, geometry: Geometry) -> Around:
             return bounds
         points = corners(np.stack([bounds.low, bounds.high], axis=1))
         low, high = swept(keys, points, motions.shutter).astype(np.float64).transpose(1, 0, 2)
-        return replace(bounds, low=low, high=high, theta_o=np.full(len(low), np.pi))
+        return bounds.within(low, high)
 
     return around

@@ -57,7 +57,7 @@ def around(cones: Cones, starts: NDArray[np.int64]) -> Cones:
     lost = length[:, 0] < 1e-6
     axis = np.where(lost[:, None], [0.0, 0.0, 1.0], total / np.where(length > 0.0, length, 1.0))
     counts = np.diff(np.append(starts, len(cones.theta_o)))
-    leans = _angle(np.repeat(axis, counts, axis=0), cones.axis) + cones.theta_o
+    leans = angle(np.repeat(axis, counts, axis=0), cones.axis) + cones.theta_o
     theta_o = np.where(lost, np.pi, np.minimum(np.maximum.reduceat(leans, starts), np.pi))
     return Cones(
         axis,
@@ -71,7 +71,7 @@ def merged(a: Cones, b: Cones) -> Cones:
     """Return the smallest cones around pairs of cones, either of which may be empty."""
     swap = b.theta_o > a.theta_o
     wide, thin = _where(swap, b, a), _where(swap, a, b)
-    between = _angle(wide.axis, thin.axis)
+    between = angle(wide.axis, thin.axis)
     inside = (thin.theta_o < 0.0) | (np.minimum(between + thin.theta_o, np.pi) <= wide.theta_o)
     theta_o = 0.5 * (wide.theta_o + between + thin.theta_o)
     whole = (theta_o >= np.pi) | (between > np.pi - 1e-6)
@@ -107,6 +107,6 @@ def _where(mask: NDArray[np.bool_], a: Cones, b: Cones) -> Cones:
     )
 
 
-def _angle(a: Floats, b: Floats) -> Floats:
-    """Between unit vectors (n, 3), exact for small ones too (Kahan)."""
+def angle(a: Floats, b: Floats) -> Floats:
+    """Return the angles (n,) between unit vectors (n, 3), exact for small ones too (Kahan)."""
     return 2.0 * np.arctan2(np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1))

@@ -1,9 +1,10 @@
 """A tree over lights, to choose one in proportion to what it sends to a point.
 
-Conty Estevez and Kulla 2018: a node bounds where its lights are (a box) and where they shine
-(cones), and sums their power. It is built from the top by their surface area orientation
-heuristic, over bins as in pbrt-v4 (12.6.3), all nodes of a level at once. Every second level is
-then left out: a point looks at up to WIDTH nodes at once, which are neighbours.
+Conty Estevez and Kulla 2018: a node bounds where its lights are, and sums their power. What they
+send to each side it knows in the mean (light_lobes.py), where theirs knows a bound of it. It is
+built from the top by their surface area orientation heuristic, over bins as in pbrt-v4 (12.6.3),
+all nodes of a level at once. Every second level is then left out: a point looks at up to WIDTH
+nodes at once, which are neighbours.
 """
 
 from __future__ import annotations
@@ -17,10 +18,10 @@ from clpt.arrays import Floats
 from clpt.render.analysis.lights.light_bounds import Bounds
 from clpt.render.contract.light_records import LINE, NODE, WIDTH
 from clpt.render.lowering.lights.light_cones import Cones, around, measure, merged
+from clpt.render.lowering.lights.light_lobes import Lobes, reach
 
 BINS = 12  # places along an axis where a node may be split
 DEEPEST = 31  # levels below the root, half of which are left: two bits each of a trail
-SLACK = 2e-4  # [rad] by which cones are widened, for what is rounded
 
 
 @dataclass(frozen=True)
@@ -99,7 +100,7 @@ class _Level:
     low: Floats
     high: Floats
     cones: Cones
-    power: Floats
+    lobes: Lobes
 
 
 def _counts(starts: NDArray[np.int64], n: int) -> NDArray[np.int64]:
@@ -110,7 +111,7 @@ class _Builder:
     """The nodes of a tree of two children a node, so far."""
 
     def __init__(self, bounds: Bounds, power: Floats):
-        self.bounds, self.power = bounds, power
+        self.bounds, self.power, self.lobes = bounds, power, Lobes.of(bounds, power)
         self.nodes = np.zeros(2 * len(bounds) + 1, NODE.dtype)
         self.count = 1
 
@@ -121,19 +122,20 @@ class _Builder:
             np.minimum.reduceat(own.low, starts),
             np.maximum.reduceat(own.high, starts),
             around(Cones.of(own), starts),
-            np.add.reduceat(self.power[order], starts),
+            self.lobes.summed(order, starts),
         )
 
     def node(self, at: NDArray[np.int64], level: _Level, child: NDArray[np.int64]) -> None:
         """Fill in nodes; those that are not placed get their radius afterwards."""
         nodes = np.zeros(len(at), NODE.dtype)
-        nodes["center"] = 0.5 * (level.low + level.high)
-        nodes["radius"] = 0.5 * np.linalg.norm(level.high - level.low, axis=1) * (1.0 + 1e-5)
-        cones = level.cones
-        theta_o, theta_e = (np.minimum(a + SLACK, np.pi) for a in (cones.theta_o, cones.theta_e))
-        nodes["axis"], nodes["cos_o"], nodes["cos_e"] = cones.axis, np.cos(theta_o), np.cos(theta_e)
-        nodes["sin_o"] = np.where(cones.both, -1.0, 1.0) * np.maximum(np.sin(theta_o), 1e-30)
-        nodes["power"], nodes["child"] = level.power, child
+        mean, second, center = level.lobes.means()
+        far = np.maximum(center - level.low, level.high - center)
+        nodes["center"] = center
+        nodes["radius"] = np.linalg.norm(np.maximum(far, 0.0), axis=1) * (1.0 + 1e-5)
+        nodes["mean"], nodes["cos_e"] = mean, reach(mean, level.cones)
+        nodes["squares"] = second[:, [0, 1, 2], [0, 1, 2]]
+        nodes["products"] = second[:, [1, 2, 0], [2, 0, 1]]
+        nodes["power"], nodes["child"] = level.lobes.power, child
         self.nodes[at] = nodes
         self.count = max(self.count, int(at.max()) + 1)
 
