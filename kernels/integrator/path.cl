@@ -53,7 +53,8 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     store_path_cone(path, at, next, cone_scattered(v.cone, bs.pdf, (bs.lobe & LOBE_DELTA) != 0));
     path_scatters(scene, path, at, next, null, &v, scatter, rival, bs, onward);
     store_path_eta(path, at, next, eta);
-    vertex_end(path, at, met, next, null, v.state + path_escapes(scene, path, shadow, at, onto, v, scatter, bs, onward));
+    v.state += path_escapes(scene, path, shadow, at, onto, v, scatter, bs, onward);
+    vertex_end(path, at, met, next, null, v.state);
     store_path_ratio(path, at, next, ratio);
 }
 
