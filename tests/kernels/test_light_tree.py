@@ -439,6 +439,27 @@ def test_a_node_knows_what_its_lights_send_to_each_side(kind):
             assert found == pytest.approx(turned.mean(), abs=1e-9)
 
 
+def spot_that(turns: bool, cutoff: float) -> light_bounds.Bounds:
+    """A spot along z; or one that turns, of which the bounds know no axis."""
+    place = np.zeros((1, 3))
+    bounds = light_bounds.of_lamp(Spot(to_world=np.eye(4), intensity=1.0, cutoff=cutoff))
+    return bounds.within(place, place) if turns else bounds
+
+
+@pytest.mark.parametrize("cutoff", [20.0, 60.0, 90.0, 130.0, 179.0, 180.0])
+@pytest.mark.parametrize("turns", [False, True])
+def test_a_spot_is_no_dark_light_within_its_cone(cutoff, turns):
+    """A node knows .4 to 1.2 of its intensity, at most as much as a surface's, in all the cone."""
+    bounds = spot_that(turns, cutoff)
+    mean, second, _ = Lobes.of(bounds, np.ones(1)).means()
+    end = np.radians(180.0 if turns else cutoff)
+    sent = min(0.5 / (1.0 - np.cos(end)), 1.0)
+    for angle in np.linspace(0.0, end, 50):
+        w = np.array([np.sin(angle), 0.0, np.cos(angle)])
+        found = 0.5 * (mean[0] @ w + np.sqrt(w @ second[0] @ w))
+        assert 0.4 * sent < found < 1.2 * sent
+
+
 def test_a_lamp_of_many_triangles_is_chosen_by_what_it_sends():
     """Below tubes of triangles the variance of one choice is below .1 of the square of its mean.
 
