@@ -93,7 +93,7 @@ def ior(props: Properties, name: str, default: str) -> Any:
     return number(child)
 
 
-def over(value: Any, divisor: float) -> Any:
+def over(value: float | Spectrum | Texture, divisor: float) -> float | Spectrum | Texture:
     """Return what `index` gives, divided by a number."""
     if divisor == 1.0:
         return value
