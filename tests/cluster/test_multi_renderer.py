@@ -27,7 +27,7 @@ from tests.pictures.support import with_film
 
 SPP = 12
 SIZE = {"width": 26, "height": 18}
-NOISE = 0.2
+NOISE = 0.12
 
 Fault = Callable[[], None]
 
