@@ -171,7 +171,7 @@ def importance(
     seen = np.arcsin(np.clip(radius / np.sqrt(d2), 0.0, 1.0))
     turned = np.cos(np.arccos(nodes["cos_e"].astype(float)) + seen)
     edge = (turned - SLACK) * np.linalg.norm(mean, axis=1)
-    aside = (mean * away).sum(axis=1) / np.sqrt(d2) <= edge
+    aside = ((mean * away).sum(axis=1) / np.sqrt(d2) <= edge) & (radius < np.sqrt(d2))
     faces &= ~((nodes["cos_e"] > -1.0) & aside)
     straight = 1.0 - w @ side if not side.any() else -w @ side
     cosine = np.clip(np.maximum(straight, RISING * (straight + sine)), SLACK, 1.0)
@@ -324,6 +324,22 @@ def test_a_light_that_shines_on_a_point_may_be_chosen():
     above = (np.einsum("kn,mckn->mcn", side, toward) > 1e-9).any(axis=1)
     assert (sided[(height > 1e-9) & above] > 0.0).all()
     assert (sided[~above] == 0.0).mean() > 0.5
+
+
+def test_spots_above_each_other_are_seen_from_among_them():
+    """All shine downward: each on points below it, though most of the others are below these."""
+    down = T.rotate([1, 0, 0], 180)
+    height = np.linspace(-2.0, 2.0, 24)
+    spots = [
+        Spot(to_world=T.translate([0, 0, z]) @ down, intensity=(1.0, 1.0, 1.0), cutoff=20.0)
+        for z in height
+    ]
+    p = np.zeros((3, 60))
+    p[2] = np.linspace(-2.5, 1.9, 60)
+    chances = pmfs(lit(spots, [], tree=True), p)
+    above = height[:, None] > p[2] + 1e-3
+    assert (chances[above] > 0.0).all()
+    assert (chances[height[:, None] < p[2] - 1e-3] == 0.0).all()
 
 
 def test_the_estimate_is_that_of_choosing_by_power():
