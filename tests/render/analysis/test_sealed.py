@@ -17,7 +17,7 @@ from clpt.scene import materials as m
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Box, Direct
 from clpt.scene.integrators import Path as PathIntegrator
-from clpt.scene.shapes import Rectangle, Shape, Sphere
+from clpt.scene.shapes import Group, Instance, Rectangle, Shape, Sphere
 from tests.pictures.support import assert_agree, blocks, exposures
 
 MILK = media.Homogeneous(sigma_s=20.0)
@@ -99,6 +99,11 @@ def test_a_lamp_that_moves_in_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     met = means(scene, 100)
     error = np.hypot(plain.std(ddof=1), met.std(ddof=1)) / np.sqrt(32.0)
     assert abs(plain.mean() - met.mean()) < 4.0 * error
+
+
+def test_rays_leave_toward_lamps_in_instances_too() -> None:
+    beside = Instance(group=Group(shapes=[SMALL]), to_world=tf.translate([2.0, 0.0, 0.0]))
+    assert [lower(scene).settings["aim_count"] for scene in (glass(), glass(beside))] == [1, 2]
 
 
 BLEND = m.Blend(first=m.Dielectric(), second=m.Diffuse())
