@@ -112,7 +112,7 @@ def _candidates(index: SceneIndex, chosen: Integrator) -> tuple[Integrator, ...]
     if samples < worth.SAMPLES or index.adaptive or index.lit_ghosts or chosen.guiding:
         return ()
     path = Path(light_paths=0, **shared(chosen, Path()))
-    finds = isinstance(chosen, Path) or chosen.light_paths < MANY and _may_be_met(index)
+    finds = isinstance(chosen, Path) or (chosen.light_paths < MANY and _may_be_met(index))
     plain = [path] if finds and chosen.light_paths else []
     several = chosen.max_depth < 0 or chosen.max_depth > 2
     can_guide = several and not index.has_media
@@ -161,11 +161,11 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
         return Path(light_paths=number), reason
     if not _sees_clear(index, geometry):
         number = number if number == MANY else FEW
-        return Path(light_paths=number), f"{reason}, though the camera sees little through glass or in mirrors"
+        return Path(light_paths=number), f"{reason}; the camera sees little glass and few mirrors"
     if index.motions:
         return Path(light_paths=number), f"{reason}; photons of a pass are all at one time"
     whole = max(1, int(number))
-    return Vcm(light_paths=whole), f"{reason}; the camera sees through glass or in mirrors"
+    return Vcm(light_paths=whole), f"{reason}; the camera sees glass or mirrors"
 
 
 def _in_fog(lit: Lit) -> tuple[Integrator, str] | None:
