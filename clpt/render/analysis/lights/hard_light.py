@@ -112,7 +112,7 @@ def _candidates(index: SceneIndex, chosen: Integrator) -> tuple[Integrator, ...]
     if samples < worth.SAMPLES or index.adaptive or index.lit_ghosts or chosen.guiding:
         return ()
     path = Path(light_paths=0, **shared(chosen, Path()))
-    finds = isinstance(chosen, Path) or (chosen.light_paths < MANY and _may_be_met(index))
+    finds = isinstance(chosen, Path) or (chosen.light_paths != MANY and _may_be_met(index))
     plain = [path] if finds and chosen.light_paths else []
     several = chosen.max_depth < 0 or chosen.max_depth > 2
     can_guide = several and not index.has_media
