@@ -167,7 +167,7 @@ class Auto(Integrator):
     """The integrator that suits the scene: `path`, `path` with light paths, or `vcm`.
 
     Light paths where something is sharp and a light is small; photons too where the camera sees
-    what is sharp, and the scene asks for no limit of noise.
+    mirrors or clear glass, and the scene asks for no limit of noise.
     """
 
     max_depth: int = host(8, "longest path, as of `path`; -1: no limit")
