@@ -17,7 +17,9 @@ from clpt.render.lowering.scene import Lowered, lower
 from clpt.render.trials import cost, trial
 from clpt.scene import Scene
 from clpt.scene.integrators import Auto, Integrator, Path
+from clpt.scene.materials import Null
 from clpt.scene.media import Homogeneous
+from clpt.scene.shapes import Rectangle
 from tests.pictures.support import assert_agree, blocks, with_film
 from tests.pictures.transport.test_guiding import slit
 from tests.pictures.transport.test_hybrid import caustic, lamp, narrow
@@ -67,12 +69,13 @@ def test_nothing_is_tried(changes: dict[str, Any]) -> None:
     assert ways(long(caustic(), **changes)) == []
 
 
-def test_no_guide_is_tried_among_media() -> None:
-    fog = Homogeneous(sigma_s=0.01, sigma_a=0.0)
-    scene = caustic()
-    camera = dataclasses.replace(scene.camera, medium=fog)
-    foggy = long(dataclasses.replace(scene, camera=camera))
-    assert not any(guiding for _, guiding in ways(foggy))
+def test_a_guide_is_tried_among_media() -> None:
+    """Where light paths know the medium in which they start: not beside an open boundary."""
+    fog = Homogeneous(sigma_s=0.5, sigma_a=0.0)
+    assert (0, True) in ways(long(slit(fog)))
+    scene = slit(fog)
+    scene.shapes = [*scene.shapes, Rectangle(material=Null(), interior=fog)]
+    assert not any(guiding for _, guiding in ways(long(scene)))
 
 
 def test_an_edit_has_no_trial() -> None:

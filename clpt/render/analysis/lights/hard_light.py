@@ -111,7 +111,7 @@ def _candidates(index: SceneIndex, chosen: Integrator) -> tuple[Integrator, ...]
     path = Path(light_paths=0, **shared(chosen, Path()))
     plain = [path] if isinstance(chosen, Path) and chosen.light_paths else []
     several = chosen.max_depth < 0 or chosen.max_depth > 2
-    can_guide = several and not index.has_media
+    can_guide = several and index.lights_reach
     guide = replace(path, guiding=True, guide_paths=guides.paths_for(samples))
     guided = [guide] if can_guide else []
     return (chosen, *plain, *guided) if plain or guided else ()
