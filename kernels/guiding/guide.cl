@@ -1,10 +1,10 @@
 /* Path guiding: where scattered light comes from, learned from light paths before the first sample (Jensen 1995,
  * "Importance Driven Path Tracing using the Photon Map").
  *
- * Space is a grid of cells, and a cell has a row for each of six directions that a surface may mostly face; a hash
- * numbers the rows. A row has the equal parts of the sphere of guiding/bins.cl. stage/train.cl adds what light paths
- * carry to the part from which they come, but for those straight from a light, which next-event estimation finds: of
- * these it counts what a row has got, behind all rows.
+ * Space is a grid of cells. A cell has a row for each of six directions that a surface may mostly face, and one for
+ * collisions in media; a hash numbers the rows. A row has the equal parts of the sphere of guiding/bins.cl.
+ * stage/train.cl adds what light paths carry to the part from which they come, but for those straight from a light,
+ * which next-event estimation finds: of these it counts what a row has got, behind all rows.
  * guiding/sum.cl turns that to sums: guide[row + k] is light from part k and those before it. Then it stays as it is,
  * so that no pixel depends on the order of samples.
  *
@@ -19,7 +19,6 @@
 
 #define GUIDE_EVEN 2.0f /* light from everywhere that is expected beside what is known, over that */
 #define GUIDE_STRAIGHT 4.0f /* the same of what comes straight from lights, which may be from anywhere above */
-#define GUIDE_COSINE 0.1f /* the least by which flux is divided for radiance */
 #define GUIDE_LEAST 0.5f /* chance that a path goes on */
 #define GUIDE_FACES 0x01000193 /* sets the faces of a cell apart, in its hash */
 
@@ -65,7 +64,7 @@ inline Guided guide_at(Scene scene, global const uint *guide, Surface s, vec3 d)
     g.row = 0;
     g.light = 0.0f;
     g.even = 0.0f;
-    g.row = guide_row(scene, s.p, sel3(dot3(s.n, d) < 0.0f, s.n, neg3(s.n)));
+    g.row = guide_row_at(scene, s, d);
     g.light = gather((global const float *)guide, g.row + GUIDE_BINS - 1);
     real straight = gather((global const float *)guide, guide_straight(scene, g.row));
     g.even = GUIDE_EVEN + GUIDE_STRAIGHT * straight / max_r(g.light, (real)(1e-30f));
@@ -138,12 +137,11 @@ typedef struct {
     real weight;           /* of what it brings by the mean of the wavelengths: the chance that it is taken, unscaled */
 } Candidate;
 
-/* The guide leads to the side of wo alone. */
 inline Candidate guide_candidate(vec3 wo, vec3 wi, real guided, real material)
 {
     Candidate c;
     c.wi = wi;
-    c.guided = sel(wi.z * wo.z > 0.0f, guided, (real)(0.0f));
+    c.guided = sel(guide_leads(wo, wi), guided, (real)(0.0f));
     c.material = material;
     return c;
 }
@@ -151,7 +149,7 @@ inline Candidate guide_candidate(vec3 wo, vec3 wi, real guided, real material)
 /* The radiance that is expected from a direction, over all that the guide knows. */
 inline real guide_expects(Guided g, Candidate c)
 {
-    return c.guided / max_r(fabs(c.wi.z), (real)(GUIDE_COSINE)) + g.even * (0.25f / PI);
+    return c.guided / guide_cosine(c.wi) + g.even * (0.25f / PI);
 }
 
 /* The next direction: one of the material and one of the guide are drawn, and one of both is taken, by what it brings
@@ -186,7 +184,7 @@ inline BsdfSample guide_sample(global const uint *guide, Guided g, Bsdf m, Frame
     s.pdf = sel(stays & !delta & (s.pdf > 0.0f), own.material + own.guided, s.pdf);
     s.pdf = sel(known & !delta, 0.5f * s.pdf, s.pdf);
     s.wi = sel3(follows, wi, s.wi);
-    s.lobe = sel_i(follows, (integer)(LOBE_REFLECT), s.lobe);
+    s.lobe = sel_i(follows, (integer)(GUIDE_LOBE), s.lobe);
     s.eta = sel(follows, (real)(1.0f), s.eta);
     return s;
 }

@@ -6,14 +6,7 @@ typedef struct {
     integer medium;
 } Collision;
 
-/* A part of a mixture that is none itself: all parts of a phase function are phase functions. */
-inline integer merging_part(Scene scene, mask active, integer word)
-{
-    mask mixed = active & (MATERIAL_KIND(word) == MATERIAL_MIXTURE);
-    for (; any(mixed); mixed = active & (MATERIAL_KIND(word) == MATERIAL_MIXTURE))
-        word = sel_i(mixed, gather_i(scene.mixtures, sel_i(mixed, MATERIAL_ROW(word), (integer)(0)) + 2), word);
-    return word;
-}
+#include "merging/part.cl"
 
 /* Whether light paths collide, and where a medium has no photons they are `active` no more. */
 inline Collision collision_met(Scene scene, Slab path, Slab hit, uint at, mask *active)

@@ -1,4 +1,4 @@
-/* Adds what light paths carry to the guide where they meet a surface. In whole
+/* Adds what light paths carry to the guide where they meet a surface, or collide. In whole
  * numbers, whose sums do not depend on the order. */
 #include "core/base.cl"
 #include "interface/stage.cl"
@@ -7,6 +7,7 @@
 #include "generated/shapes.cl"
 #include "surface/surface.cl"
 #include "guiding/guide.cl"
+#include "generated/train_steps.cl"
 
 #define TRAIN_UNIT 256.0f /* of what a light path begins with */
 
@@ -23,10 +24,12 @@ STAGE(train)(SLAB_ARGS, SCENE_ARGS DEPOSIT_ARGS STAGE_AT_ARG)
         vec3 d = load_path_d(path, at);
         Surface s = surface_load(scene, hit, at, active, load_path_o(path, at), d, &front);
         vec3 n = sel3(dot3(s.n, d) < 0.0f, s.n, neg3(s.n));
-        integer row = guide_row(scene, s.p, n), straight = guide_straight(scene, row);
+        real shared = 1.0f;
+        integer row = collision_row(scene, path, hit, at, active, guide_row(scene, s.p, n), &shared);
+        integer straight = guide_straight(scene, row);
         integer entry = sel_i((state & PATH_DEPTH) > 1, row + guide_bin(neg3(d)), straight);
         entry = sel_i(active, entry, (integer)(0));
-        real carried = spectrum_mean(load_path_beta(path, at)) * load_path_weight(path, at);
+        real carried = spectrum_mean(load_path_beta(path, at)) * load_path_weight(path, at) / shared;
         integer value = sel_i(active, to_integer(clamp_r(carried, (real)(0.0f), (real)(16.0f)) * TRAIN_UNIT),
                               (integer)(0));
 #define ADD(i) if (LANE(value, i)) atomic_add((volatile global uint *)(guide + LANE(entry, i)), (uint)LANE(value, i));

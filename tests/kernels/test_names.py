@@ -39,6 +39,7 @@ ALTERNATIVES = (  # files, of each row of which a program has one at most
     ("path/vertex_bodies_ways.cl", "path/vertex_media_ways*.cl"),
     ("path/vertex_dims.cl", "path/vertex_media_ways_none.cl"),
     ("guiding/guided_vertex.cl", "guiding/guide_none.cl"),
+    ("guiding/at_*.cl",),
     ("path/pair*.cl",),
     ("path/pixel_sampler*.cl",),
     ("path/shadow_ray*.cl",),

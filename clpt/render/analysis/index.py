@@ -172,7 +172,7 @@ class SceneIndex:
     def may_have_light_paths(self) -> bool:
         """Whether paths start at lights, if they can."""
         given = self.scene.integrator
-        wanted = bool(given.light_paths)
+        wanted = bool(given.light_paths) or given.guiding
         return isinstance(given, Auto | ParticleTracer) or wanted
 
     @property
@@ -194,7 +194,7 @@ class SceneIndex:
     @property
     def guided(self) -> bool:
         """Whether directions of the camera's paths are learned from light paths."""
-        return self.scene.integrator.guiding and not self.weighed and not self.has_media
+        return self.scene.integrator.guiding and not self.weighed and self.lights_reach
 
     @property
     def shifts(self) -> bool:

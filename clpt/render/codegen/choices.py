@@ -46,6 +46,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/walk.cl": lambda f, _: either(flags.walks(f), "path/walk.cl"),
     "generated/merging.cl": lambda f, _: either(f.transport.merged, "merging/area.cl"),
     "generated/collisions.cl": lambda f, _: either(f.media.present, "merging/collisions.cl"),
+    "generated/train_steps.cl": lambda f, _: either(f.media.present, "guiding/collisions.cl"),
     "generated/cone.cl": lambda f, _: either(f.textures.mips, "path/cone.cl"),
     "generated/vertex_media.cl": lambda f, _: (
         when(f.media.bodies, "path/vertex_bodies.cl")
@@ -271,7 +272,7 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
     ),
     "generated/pair.cl": lambda f, cls: ("path/pair.cl",),
     "generated/guide.cl": lambda f, cls: (
-        ("guiding/guided_vertex.cl",)
+        (f"guiding/at_{'collision' if cls.is_phase else 'surface'}.cl", "guiding/guided_vertex.cl")
         if flags.is_guided(f, cls) and not f.transport.light_paths
         else ("guiding/guide_none.cl",)
     ),

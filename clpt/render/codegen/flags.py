@@ -78,7 +78,7 @@ def is_null(features: Features, cls: type[Scatterer]) -> bool:
 
 def is_guided(features: Features, cls: type[Scatterer]) -> bool:
     """Whether a guide helps to choose directions at a material."""
-    unsuited = cls.delta or cls.is_null or cls.is_phase or cls.no_back or fluoresces(features, cls)
+    unsuited = cls.delta or cls.is_null or cls.no_back or fluoresces(features, cls)
     alone = cls.refracts and features.told_dispersion  # a direction may be of one wavelength
     return features.transport.guided and not (unsuited or alone)
 

@@ -301,6 +301,7 @@ def _generated(features: Features, layout: str) -> Files:
         "generated/grid_words.cl": stages.grid_words_text(features.media.grids),
         "generated/screen.cl": stages.screen_text(features),
         "generated/photon.cl": stages.photon_text(features) if features.transport.merged else "",
+        "generated/phases.cl": stages.phases_text(features),
         "generated/emission.cl": emission.dispatch_text(features),
         **_textures(features, "own"),
         "generated/lights.cl": stages.lights_text(features),

@@ -5,6 +5,8 @@ The physics is always in a file.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from clpt.records import PHOTON
 from clpt.render.codegen import emission, flags, lights, parameters, thin_films
 from clpt.render.codegen.dispatch import Case, Function, active, function
@@ -106,13 +108,26 @@ def photon_text(features: Features) -> str:
     asked = {
         "met": [*kinds, *along, MIXTURE],
         "along": along,
-        "collides": [i for i, cls in leaves if cls.is_phase],
+        "collides": _phases(features),
     }
     rows = [f"{PHOTON.row_text(many=True)}{PHOTON.keep_text()}#define PHOTON_WORDS {PHOTON.words}"]
-    for name, of in asked.items():
-        any_ = " | ".join(f"((kind) == {kind})" for kind in of) or "mask_of(0)"
-        rows.append(f"#define photon_{name}(kind) ({any_})")
+    rows += [f"#define photon_{name}(kind) ({_among(of)})" for name, of in asked.items()]
     return "\n".join([*rows, ""])
+
+
+def phases_text(features: Features) -> str:
+    """Return `is_phase(kind)`: whether a material is a phase function."""
+    return f"#define is_phase(kind) ({_among(_phases(features))})\n"
+
+
+def _phases(features: Features) -> list[int]:
+    """Return the numbers of the phase functions of a scene."""
+    return [i for i, cls in enumerate(features.materials.leaves) if cls.is_phase]
+
+
+def _among(kinds: Sequence[int]) -> str:
+    """The condition that a kind is one of these, in each lane."""
+    return " | ".join(f"((kind) == {kind})" for kind in kinds) or "mask_of(0)"
 
 
 def grid_words_text(grids: GridFeatures) -> str:

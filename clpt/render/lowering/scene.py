@@ -368,7 +368,7 @@ def _lower_bodies(
         sides = bodies.rows(bounding, encoder, materials, media)
     else:
         sides = media.of_shapes(bounding)
-    if index.has_media and (index.balanced or index.light_paths):
+    if index.has_media and (index.balanced or index.light_paths or index.guided):
         words = light_media_words(found.light_media, media, bodies)
         encoder.store.append("media", words)
     encoder.store.append("media", sides)
@@ -430,6 +430,8 @@ def _warnings(index: SceneIndex) -> list[str]:
         warnings += _of_motion(index)
     if integrator.light_paths:
         warnings += _left_to_the_camera(index)
+    if integrator.guiding and not index.lights_reach:
+        warnings.append(f"{integrator.kind}.guiding: left aside, as {index.lit_media}")
     depth, most = integrator.max_depth, photons.DEEPEST if index.merged else DEEPEST
     if depth > most:
         warnings.append(f"integrator.max_depth: {depth} counts as {most}, the longest path")

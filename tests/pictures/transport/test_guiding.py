@@ -16,12 +16,13 @@ from clpt import transforms as tf
 from clpt.errors import SceneError
 from clpt.render.analysis import guides
 from clpt.render.lowering.scene import lower
-from clpt.scene import Film, Scene
+from clpt.scene import Film, Scene, media, phases
 from clpt.scene import materials as m
 from clpt.scene.cameras import Orthographic, Perspective
 from clpt.scene.integrators import Gaussian, Path
 from clpt.scene.lights import Constant, Point
 from clpt.scene.shapes import Cube, Rectangle, Shape, Sphere
+from tests.pictures.media.test_fog_light import CHROMATIC, FOGS, GLASS, LAMP, SPOT, room
 from tests.pictures.support import assert_agree, assert_mean, blocks, exposures, with_film
 from tests.pictures.transport.test_hybrid import caustic, corner, lamp, narrow
 from tests.pictures.transport.test_light_tracing import LIGHTS, UP
@@ -80,6 +81,40 @@ def test_every_material(material: m.Material, mode: str) -> None:
     both(scene, 512, material.kind, max_depth=-1, rr_depth=2)
 
 
+@pytest.mark.parametrize("mode", ["rgb", pytest.param("spectral", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "fog", [pytest.param(fog, marks=() if fog == "chromatic" else pytest.mark.slow) for fog in FOGS]
+)
+def test_every_medium(fog: str, mode: str) -> None:
+    """Directions at collisions are guided too, along with those of the floor."""
+    both(room(FOGS[fog], SPOT, mode=mode), 64, fog, max_depth=6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+@pytest.mark.parametrize(
+    "phase", [phases.Rayleigh(), phases.Draine(g=0.3, alpha=2.0), phases.Blend(weight=0.3)]
+)
+def test_phase_functions(phase: phases.Phase, mode: str) -> None:
+    fog = media.Homogeneous(sigma_s=CHROMATIC, phase=phase)
+    both(room(fog, LAMP, inside=True, mode=mode), 128, phase.kind, max_depth=-1, rr_depth=2)
+
+
+@pytest.mark.slow
+def test_a_ball_of_glass_in_fog() -> None:
+    fog = FOGS["chromatic"]
+    ball = Sphere(radius=0.3, material=GLASS, exterior=fog)
+    both(room(fog, LAMP, ball), 256, "glass in fog", max_depth=-1, rr_depth=2)
+
+
+def test_where_no_light_path_can_start() -> None:
+    """It is left aside, and that is told."""
+    wall = Rectangle(material=m.Null(), interior=FOGS["grey"], name="wall")
+    made = lower(guided(room(FOGS["grey"], SPOT, wall)))
+    assert not made.features.transport.guided
+    assert any("guiding: left aside, as " in one for one in made.warnings)
+
+
 @pytest.mark.slow
 def test_a_camera_that_cannot_be_joined() -> None:
     both(dataclasses.replace(corner({}, lamp()), camera=Orthographic()), 128, "orthographic")
@@ -101,7 +136,7 @@ def test_furnace() -> None:
     assert_mean(made, (1.0, 1.0, 1.0), 2e-3, 1e-3)
 
 
-def slit() -> Scene:
+def slit(fog: media.Medium | None = None) -> Scene:
     """A room that is lit from the next one, through a slit of a sixteenth of the wall."""
     room = Cube(flip_normals=True, material=m.Diffuse(reflectance=0.7))
     turn = tf.rotate([0, 1, 0], 90) @ tf.scale([15.0 / 16.0, 1.0, 1.0])
@@ -109,23 +144,27 @@ def slit() -> Scene:
         to_world=tf.translate([0.0, 0.0, 1.0 / 16.0]) @ turn,
         material=m.TwoSided(front=m.Diffuse(reflectance=0.7)),
     )
+    haze = [Cube(to_world=tf.scale(1.01), material=m.Null(), interior=fog)] if fog else []
     eye = tf.look_at([-0.9, 0.0, 0.9], [-0.4, -0.2, -0.9], UP)
     return Scene(
-        camera=Perspective(to_world=eye, fov=60),
-        shapes=[room, wall],
+        camera=Perspective(to_world=eye, fov=60, medium=fog),
+        shapes=[room, wall, *haze],
         lights=[Point(position=(0.8, 0.5, 0.8))],
         film=Film(width=16, height=16, mode="rgb"),
     )
 
 
 @pytest.mark.slow
-def test_noise_falls_where_light_comes_through_a_slit(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("fog", [None, media.Homogeneous(sigma_s=0.5)], ids=["clear", "fog"])
+def test_noise_falls_where_light_comes_through_a_slit(
+    monkeypatch: pytest.MonkeyPatch, fog: media.Medium | None
+) -> None:
     """Seventeen exposures of each: that their variances differ by chance as much has a probability
     below 1e-6, by the F distribution of a few hundred pixels' means."""
     monkeypatch.setattr(guides, "PATHS", 1 << 18)
     noise = []
     for integrator in (Path(light_paths=0), Path(light_paths=0, guiding=True)):
-        scene = dataclasses.replace(slit(), integrator=integrator)
+        scene = dataclasses.replace(slit(fog), integrator=integrator)
         made = exposures(scene, 17, 64, device=narrow())
         noise.append(np.median(made.var(axis=0, ddof=1) / made.mean(axis=0) ** 2))
     assert noise[1] < 0.5 * noise[0], noise
@@ -158,6 +197,13 @@ def test_same_bits_however_samples_are_split() -> None:
         part.run(samples)
     parts[0].merge(parts[1].film_state())
     assert np.array_equal(parts[0].image(), whole)
+
+
+def test_same_bits_in_fog() -> None:
+    scene = guided(room(FOGS["chromatic"], SPOT), max_depth=6)
+    whole = picture(scene, 7)
+    assert np.array_equal(picture(scene, 3, 4), whole)
+    assert np.array_equal(picture(scene, 7, slots=128), whole)
 
 
 @pytest.mark.slow

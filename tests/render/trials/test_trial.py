@@ -18,7 +18,9 @@ from clpt.render.trials import cost, trial
 from clpt.scene import Scene
 from clpt.scene.integrators import Auto, Integrator, Path
 from clpt.scene.lights import Point
+from clpt.scene.materials import Null
 from clpt.scene.media import Homogeneous
+from clpt.scene.shapes import Rectangle
 from tests.pictures.support import assert_agree, blocks, with_film
 from tests.pictures.transport.test_guiding import slit
 from tests.pictures.transport.test_hybrid import caustic, lamp, narrow
@@ -77,12 +79,13 @@ def test_path_is_not_tried_beside_photons_where_it_never_finds_the_light() -> No
     assert ways(long(dark, Auto())) == [(1, False), (0, True)]
 
 
-def test_no_guide_is_tried_among_media() -> None:
-    fog = Homogeneous(sigma_s=0.01, sigma_a=0.0)
-    scene = caustic()
-    camera = dataclasses.replace(scene.camera, medium=fog)
-    foggy = long(dataclasses.replace(scene, camera=camera))
-    assert not any(guiding for _, guiding in ways(foggy))
+def test_a_guide_is_tried_among_media() -> None:
+    """Where light paths know the medium in which they start: not beside an open boundary."""
+    fog = Homogeneous(sigma_s=0.5, sigma_a=0.0)
+    assert (0, True) in ways(long(slit(fog)))
+    scene = slit(fog)
+    scene.shapes = [*scene.shapes, Rectangle(material=Null(), interior=fog)]
+    assert not any(guiding for _, guiding in ways(long(scene)))
 
 
 def test_an_edit_has_no_trial() -> None:

@@ -115,7 +115,7 @@ def _candidates(index: SceneIndex, chosen: Integrator) -> tuple[Integrator, ...]
     finds = isinstance(chosen, Path) or (chosen.light_paths != MANY and _may_be_met(index))
     plain = [path] if finds and chosen.light_paths else []
     several = chosen.max_depth < 0 or chosen.max_depth > 2
-    can_guide = several and not index.has_media
+    can_guide = several and index.lights_reach
     guide = replace(path, guiding=True, guide_paths=guides.paths_for(samples))
     guided = [guide] if can_guide else []
     return (chosen, *plain, *guided) if plain or guided else ()

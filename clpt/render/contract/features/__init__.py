@@ -133,7 +133,8 @@ class Features:
     def light_media(self) -> bool:
         """Whether media are known around lights, as paths start there."""
         own = self.transport
-        return self.media.present and (own.light_paths or own.weighed) and not own.lit_ghosts
+        start = own.light_paths or own.weighed or own.guided
+        return self.media.present and start and not own.lit_ghosts
 
     @property
     def screen_motion(self) -> bool:
