@@ -283,7 +283,8 @@ def figures(
     contenders: dict[str, Contender], spp: int, long: Sequence[NDArray[np.float32]]
 ) -> dict[str, Row]:
     """Return what each took; the first sample of each pixel is not counted: its time is the
-    start's. The start of guiding is that of `path`, because it learns before its first sample."""
+    start's. The start of guiding is that of `path`, because it learns before its first sample.
+    busy: cores in the render that had most of them, with its start."""
     for one in contenders.values():  # compiles
         one.render(1, 1)
     machine.settle(next(iter(contenders.values())).caches)
@@ -295,15 +296,13 @@ def figures(
     own = relative_mse(long[0], reference)  # which is that of the reference
     pixels, found = reference.shape[0] * reference.shape[1], {}
     for name in contenders:
-        begun = [run["path" if name == "guiding" else name] for run in warm]
-        start, clock = min(run.cpu for run in begun), min(run.seconds for run in begun)
+        start = min(run["path" if name == "guiding" else name].cpu for run in warm)
         cpu = min(run[name].cpu for run in full) - start
-        seconds = min(run[name].seconds for run in full) - clock
         errors = [relative_mse(run[name].image, reference) for run in full]
         found[name] = {
             "msamples": round(pixels * (spp - 1) / cpu / 1e6, 4),
             "relmse": round(float(np.mean(errors)) - own, 6),
-            "busy": round(cpu / max(seconds, 1e-3), 2),
+            "busy": round(max(run[name].cpu / run[name].seconds for run in full), 2),
             "first_warm": round(min(run[name].cpu for run in warm), 2),
             "peak_mib": round(max(run[name].peak for run in full) / 2**20),
         }

@@ -50,7 +50,7 @@ PATH = Record(
     ),
     pending=("real", "what joins it if the next surface is sharp, see kernels/lighting/rivals.cl"),
     expected=("real", "light that a guide knows where the path met it first, times throughput"),
-    escape=("real", "density of rays out of a sealed medium, over that of d, where d was chosen"),
+    escape=("real", "density of rays out of a sealed medium, over that of d; below 0: it is left"),
     escape_axis=("vec3", "of the cone into which they are sent, see kernels/media/escape.cl"),
     escape_width=("real", "1 less the cosine of its half angle; 0: none are sent"),
     escape_plane=("vec3", "normal of the boundary, times optical depth of a metre along the axis"),

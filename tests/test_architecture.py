@@ -316,6 +316,15 @@ def test_kernel_files_keep_to_the_language() -> None:
     keep(rule, kernels(broken))
 
 
+def test_stages_are_named_as_no_function() -> None:
+    """A GPU's stage is a kernel of its name in a program of all functions that it includes."""
+    texts = "\n".join(without_comments(path.read_text("utf-8")) for path in kernel_files())
+    functions = set(re.findall(r"^inline [\w ]*?\b(\w+)\(", texts, re.MULTILINE))
+    assert "gather" in functions
+    stages = set(re.findall(r"^STAGE\((\w+)\)", texts, re.MULTILINE))
+    keep("a stage has another name than all functions", sorted(stages & functions))
+
+
 def test_comments_of_kernels_name_what_exists() -> None:
     """Kernel files as `folder/file.cl`, others by their path, modules by their full name."""
 

@@ -142,12 +142,14 @@ def test_the_longest_path_is_limited_with_a_word(depth: int, told: bool) -> None
     assert (expected in lowered.warnings) == told
 
 
-def test_the_longest_path_with_photons_is_limited_with_a_word() -> None:
+@pytest.mark.parametrize(("depth", "told"), [(66, True), (65, False), (-1, False)])
+def test_the_longest_path_with_photons_is_limited_with_a_word(depth: int, told: bool) -> None:
     """Scattering in dense media goes on beyond it, so the picture is darker than by `path`."""
     lamp = shapes.Rectangle(emission=lights.Area(radiance=1.0))
     scene = Scene(
-        camera=cameras.Perspective(), shapes=[lamp], integrator=integrators.Vcm(max_depth=65)
+        camera=cameras.Perspective(), shapes=[lamp], integrator=integrators.Vcm(max_depth=depth)
     )
     lowered = lower(scene)
-    assert lowered.settings["max_depth"] == 64
-    assert "integrator.max_depth: 65 counts as 64, the longest path" in lowered.warnings
+    assert lowered.settings["max_depth"] == 65
+    expected = "integrator.max_depth: 66 counts as 65, the longest path"
+    assert (expected in lowered.warnings) == told

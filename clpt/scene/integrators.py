@@ -130,10 +130,10 @@ class Vcm(Integrator):
     caustics converge that are seen in mirrors and through glass, also those of points and suns. In
     homogeneous media photons are gathered along rays (Krivanek 2014).
     What is gathered is blurred by the radius, which shrinks from pass to pass. A `max_depth` of -1
-    or beyond 64 counts as 64.
+    or beyond 65 counts as 65.
     """
 
-    max_depth: int = host(8, "longest path, as of `path`; -1: 64")
+    max_depth: int = host(8, "longest path, as of `path`; -1: 65")
     rr_depth: int = host(3, "depth from which Russian roulette may end a path")
     hide_lights: bool = flag(False, "the camera sees through lights, also those on shapes")
     light_paths: int = host(1, "paths from lights for each sample of the camera")
@@ -167,7 +167,7 @@ class Auto(Integrator):
     """The integrator that suits the scene: `path`, `path` with light paths, or `vcm`.
 
     Light paths where something is sharp and a light is small; photons too where the camera sees
-    what is sharp, and the scene asks for no limit of noise.
+    mirrors or clear glass, and the scene asks for no limit of noise.
     """
 
     max_depth: int = host(8, "longest path, as of `path`; -1: no limit")

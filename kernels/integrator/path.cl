@@ -46,14 +46,14 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     vec3 onward = normalize3(to_world(scatter.shading.frame, bs.wi));
     beta = spectrum_scale(spectrum_mul(beta, bs.weight), shading_frame_share(scatter.shading, onward));
     real eta = load_path_eta(path, at) * bs.eta;
-    next = path_roulette(scene, path, at, next, null, v, scatter, guided, eta, &beta);
+    mask on = path_roulette(scene, path, at, next, null, v, scatter, guided, eta, &beta);
 
-    vertex_leave(path, at, next, null, v, onward, beta);
-    store_path_cone(path, at, next, cone_scattered(v.cone, bs.pdf, (bs.lobe & LOBE_DELTA) != 0));
-    path_scatters(scene, path, at, next, null, &v, scatter, rival, bs, onward);
-    store_path_eta(path, at, next, eta);
-    vertex_end(path, at, met, next, null, v.state + path_escapes(scene, path, shadow, at, next, v, scatter, bs));
-    store_path_ratio(path, at, next, ratio);
+    vertex_leave(path, at, on, null, v, onward, beta);
+    store_path_cone(path, at, on, cone_scattered(v.cone, bs.pdf, (bs.lobe & LOBE_DELTA) != 0));
+    path_scatters(scene, path, at, on, null, &v, scatter, rival, bs, onward);
+    store_path_eta(path, at, on, eta);
+    vertex_end(path, at, met, on, null, v.state + path_escapes(scene, path, shadow, at, next, v, scatter, bs, onward));
+    store_path_ratio(path, at, on, ratio);
 }
 
 #if !SHADES_BOTH

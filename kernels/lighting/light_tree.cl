@@ -13,13 +13,14 @@
  * where both may send light: what is in the way is not known. */
 #define LIGHT_TREE_LEAST 0.05f
 
-/* In which lanes lights of a node, to which p is so far `from` its centre, may shine on p by their cones. */
+/* In which lanes lights of a node may shine on p by their cones, `from` their centre; among them all may. */
 inline mask light_tree_in_cone(LightNode n, vec3 from)
 {
     real d2 = dot3(from, from), inverse = 1.0f / sqrt(max_r(d2, (real)(1e-20f)));
     real sine = min_r(n.radius * inverse, (real)(1.0f));
     real turned = n.cos_e * sqrt_r(1.0f - sqr(sine)) - sqrt_r(1.0f - sqr(n.cos_e)) * sine;
-    return dot3(n.mean, from) * inverse > (turned - LIGHT_TREE_SLACK) * sqrt(dot3(n.mean, n.mean));
+    mask within = dot3(n.mean, from) * inverse > (turned - LIGHT_TREE_SLACK) * sqrt(dot3(n.mean, n.mean));
+    return within | (n.radius * inverse >= 1.0f);
 }
 
 /* What the lights below a node may send to p, all surfaces there shading them: their power, times the mean of their

@@ -12,6 +12,7 @@
 
 #define MERGING_STEPS 64.0f  /* of a window at most */
 #define MERGING_DEPTH 1.0f   /* its optical depth at most */
+#define MERGING_CLEAR 1e-4f  /* share of the mean extinction: what is less has no photons worth a window */
 
 /* A camera's ray in a medium. */
 typedef struct {
@@ -39,11 +40,11 @@ inline real merging_before(MergingWindow w, MergingRay ray, real t)
 inline MergingWindow merging_window(MergingRay ray, real step, real u)
 {
     MergingWindow w;
-    real least = ray.m.sigma_t.x;
-#define C(c) least = min_r(least, ray.m.sigma_t.c);
+    real mean = spectrum_mean(ray.m.sigma_t), least = mean;
+#define C(c) least = sel(ray.m.sigma_t.c > MERGING_CLEAR * mean, min_r(least, ray.m.sigma_t.c), least);
     SPECTRUM_EACH(C)
 #undef C
-    real length = min_r(MERGING_STEPS * step, MERGING_DEPTH / max_r(spectrum_mean(ray.m.sigma_t), (real)(1e-30f)));
+    real length = min_r(MERGING_STEPS * step, MERGING_DEPTH / max_r(mean, (real)(1e-30f)));
     w.sigma = max_r(least, 1e-3f / ray.end);
     w.all = 1.0f - exp_r(-w.sigma * ray.end);
     mask whole = length >= ray.end;

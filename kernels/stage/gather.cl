@@ -19,7 +19,7 @@
 #include "generated/photon.cl"
 #include "merging/along.cl"
 
-STAGE(gather)(SLAB_ARGS, SCENE_ARGS GATHER_ARGS STAGE_AT_ARG)
+STAGE(gather_along)(SLAB_ARGS, SCENE_ARGS GATHER_ARGS STAGE_AT_ARG)
 {
     SLABS
     SCENE

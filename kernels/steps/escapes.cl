@@ -1,11 +1,10 @@
 /* At a collision in a sealed medium: a ray that may leave it toward a lamp, see media/escape.cl. Returns what
- * Path.state gains. The path has its new direction, and the ratio of that before. */
+ * Path.state gains. next: those that go on along `onward`, before roulette; the path has the ratio of before that. */
 #include "media/escape.cl"
 
 inline integer path_escapes(Scene scene, Slab path, Slab shadow, uint at, mask next, Vertex v, Scattering scatter,
-                            BsdfSample bs)
+                            BsdfSample bs, vec3 onward)
 {
-    vec3 onward = load_path_d(path, at);
     EscapeCone e = {load_path_escape_axis(path, at), load_path_escape_width(path, at), (real)(1.0f)};
     real depth = load_path_escape_depth(path, at) - dot3(load_path_escape_plane(path, at), v.s.p);
     mask near = next & (e.one_minus_cos > 0.0f) & (depth < ESCAPE_DEEPEST);

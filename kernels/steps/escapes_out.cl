@@ -3,12 +3,12 @@
 #include "media/escape.cl"
 
 inline integer path_escapes(Scene scene, Slab path, Slab shadow, uint at, mask next, Vertex v, Scattering scatter,
-                            BsdfSample bs)
+                            BsdfSample bs, vec3 onward)
 {
-    vec3 onward = load_path_d(path, at);
     mask outward = dot3(v.s.n, onward) > 0.0f, bent = (bs.lobe & LOBE_TRANSMIT) != 0;
     mask out = !v.front & bent & outward & (v.depth > 0);
-    store_path_escape(path, at, next, sel(out, load_path_escape(path, at), (real)(0.0f)));
+    real sent = load_path_escape(path, at); /* below 0 behind the boundary, so that only one is passed */
+    store_path_escape(path, at, next, sel(out, -max_r(sent, (real)(0.0f)), (real)(0.0f)));
     integer name = sel_i(next & !outward, v.media.inside, (integer)(0));
     mask sealed = (name & MEDIUM_SEALED) != 0;
     real width = 0.0f;

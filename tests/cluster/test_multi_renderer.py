@@ -27,7 +27,7 @@ from tests.pictures.support import with_film
 
 SPP = 12
 SIZE = {"width": 26, "height": 18}
-NOISE = 0.2
+NOISE = 0.12
 
 Fault = Callable[[], None]
 
@@ -282,7 +282,7 @@ def test_a_device_fails_after_a_film_was_loaded(scenes, tmp_path, pair, faults, 
     with clpt.MultiRenderer(scene, pair) as several:
         several.load_state(path)
         several.run(5, noise=noise)
-        faults[pair[0].queue] = FailsAfter(4)
+        faults[pair[0].queue] = FailsAfter(0)
         several.run(95, noise=noise)
         assert same(several.film_state(), state) and len(several.devices) == 1
         assert len(several._saved_film().sessions) == 2

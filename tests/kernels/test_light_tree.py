@@ -171,7 +171,7 @@ def importance(
     seen = np.arcsin(np.clip(radius / np.sqrt(d2), 0.0, 1.0))
     turned = np.cos(np.arccos(nodes["cos_e"].astype(float)) + seen)
     edge = (turned - SLACK) * np.linalg.norm(mean, axis=1)
-    aside = (mean * away).sum(axis=1) / np.sqrt(d2) <= edge
+    aside = ((mean * away).sum(axis=1) / np.sqrt(d2) <= edge) & (radius < np.sqrt(d2))
     faces &= ~((nodes["cos_e"] > -1.0) & aside)
     straight = 1.0 - w @ side if not side.any() else -w @ side
     cosine = np.clip(np.maximum(straight, RISING * (straight + sine)), SLACK, 1.0)
@@ -326,6 +326,22 @@ def test_a_light_that_shines_on_a_point_may_be_chosen():
     assert (sided[~above] == 0.0).mean() > 0.5
 
 
+def test_spots_above_each_other_are_seen_from_among_them():
+    """All shine downward: each on points below it, though most of the others are below these."""
+    down = T.rotate([1, 0, 0], 180)
+    height = np.linspace(-2.0, 2.0, 24)
+    spots = [
+        Spot(to_world=T.translate([0, 0, z]) @ down, intensity=(1.0, 1.0, 1.0), cutoff=20.0)
+        for z in height
+    ]
+    p = np.zeros((3, 60))
+    p[2] = np.linspace(-2.5, 1.9, 60)
+    chances = pmfs(lit(spots, [], tree=True), p)
+    above = height[:, None] > p[2] + 1e-3
+    assert (chances[above] > 0.0).all()
+    assert (chances[height[:, None] < p[2] - 1e-3] == 0.0).all()
+
+
 def test_the_estimate_is_that_of_choosing_by_power():
     n = 1 << 17
     normal = np.array([0.2, -0.3, 0.9]) / np.linalg.norm([0.2, -0.3, 0.9])
@@ -437,6 +453,27 @@ def test_a_node_knows_what_its_lights_send_to_each_side(kind):
         assert found == pytest.approx(turned.mean(), abs=0.035)
         if kind == "panel":
             assert found == pytest.approx(turned.mean(), abs=1e-9)
+
+
+def spot_that(turns: bool, cutoff: float) -> light_bounds.Bounds:
+    """A spot along z; or one that turns, of which the bounds know no axis."""
+    place = np.zeros((1, 3))
+    bounds = light_bounds.of_lamp(Spot(to_world=np.eye(4), intensity=1.0, cutoff=cutoff))
+    return bounds.within(place, place) if turns else bounds
+
+
+@pytest.mark.parametrize("cutoff", [20.0, 60.0, 90.0, 130.0, 179.0, 180.0])
+@pytest.mark.parametrize("turns", [False, True])
+def test_a_spot_is_no_dark_light_within_its_cone(cutoff, turns):
+    """A node knows .4 to 1.2 of its intensity, at most as much as a surface's, in all the cone."""
+    bounds = spot_that(turns, cutoff)
+    mean, second, _ = Lobes.of(bounds, np.ones(1)).means()
+    end = np.radians(180.0 if turns else cutoff)
+    sent = min(0.5 / (1.0 - np.cos(end)), 1.0)
+    for angle in np.linspace(0.0, end, 50):
+        w = np.array([np.sin(angle), 0.0, np.cos(angle)])
+        found = 0.5 * (mean[0] @ w + np.sqrt(w @ second[0] @ w))
+        assert 0.4 * sent < found < 1.2 * sent
 
 
 def test_a_lamp_of_many_triangles_is_chosen_by_what_it_sends():

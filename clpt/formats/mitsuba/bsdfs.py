@@ -21,6 +21,7 @@ from clpt.formats.mitsuba.spectra import (
     index,
     ior,
     nested_textures,
+    over,
     real,
     reflectance,
     texture,
@@ -36,7 +37,6 @@ Parameters = dict[str, Any]
 SMOOTHEST = 1e-4  # Mitsuba's own floor of a roughness
 # metals of Mitsuba without free data
 WITHOUT_DATA = ("Cu2O", "CuO", "HgTe", "Se", "Se-e", "SnTe", "Ta")
-AIR = 1e-3  # how far its index may be from 1
 GREY_METAL = 0.3  # what they reflect head-on
 
 
@@ -93,7 +93,7 @@ def _rough_dielectric(props: Properties) -> Parameters:
 
 
 def _metal(props: Properties) -> Parameters:
-    _in_air(props)
+    around = _around(props)
     named = "material" in props.named
     if named and ("eta" in props.named or "k" in props.named):
         raise props.element.error("give either 'material' or 'eta' and 'k', not both")
@@ -103,16 +103,19 @@ def _metal(props: Properties) -> Parameters:
             eta, k = _named_metal(child, props.context)
     else:
         eta, k = index(props, "eta", 0.0), index(props, "k", 1.0)
-    return {"eta": eta, "k": k}
+    return {"eta": over(eta, around), "k": over(k, around)}
 
 
-def _in_air(props: Properties) -> None:
-    """Take Mitsuba 0.6's index of what is around a metal. Raises SceneError unless it is air's."""
+def _around(props: Properties) -> float:
+    """Take Mitsuba 0.6's index of what is around a metal, over which its own index counts."""
+    child = props.named.get("ext_eta")
+    if child is None:
+        return 1.0
     around = ior(props, "ext_eta", "air")
-    index_there = around.value if isinstance(around, Constant) else around
-    if not isinstance(index_there, float) or abs(index_there - 1.0) > AIR:
-        message = "metals are in air: divide eta and k by 'ext_eta', and leave it out"
-        raise props.element.error(message)
+    around = around.value if isinstance(around, Constant) else around
+    if not isinstance(around, float) or around <= 0.0:
+        raise child.error("must be a number above 0 or the name of a glass, liquid or gas")
+    return around
 
 
 def _named_metal(child: Element, context: Context) -> tuple[Spectrum, Spectrum]:

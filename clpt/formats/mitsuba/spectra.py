@@ -39,7 +39,7 @@ from clpt.spectra import (
     Spectrum,
     Tabulated,
 )
-from clpt.spectra.spectrum import Outside
+from clpt.spectra.spectrum import WIDEST, Outside
 
 LUMINANCE = (0.212671, 0.715160, 0.072169)  # of Rec. 709, as Mitsuba has it
 VOLUMES = ("constvolume", "gridvolume")
@@ -91,6 +91,23 @@ def ior(props: Properties, name: str, default: str) -> Any:
         with child.locating():
             return spectra.glass(child.attribute("value"), dispersion=False)
     return number(child)
+
+
+def over(value: float | Spectrum | Texture, divisor: float) -> float | Spectrum | Texture:
+    """Return what `index` gives, divided by a number."""
+    if divisor == 1.0:
+        return value
+    if isinstance(value, Texture):
+        return _scaled(value, 1.0 / divisor)
+    if isinstance(value, RGBUnbounded):
+        return RGBUnbounded(*(value.to_rgb() / divisor))
+    if isinstance(value, Constant):
+        return Constant(value.value / divisor)
+    if isinstance(value, Spectrum):
+        if not isinstance(value, Tabulated):
+            value = Tabulated(WIDEST, value.sample(WIDEST), "hold")
+        return Tabulated(value.lambdas, np.array(value.values) / divisor, value.outside)
+    return value / divisor
 
 
 def real(props: Properties, name: str, default: float) -> float | Texture:

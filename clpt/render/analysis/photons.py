@@ -13,7 +13,8 @@ from clpt.render.analysis.geometry import Geometry
 from clpt.scene.cameras import Camera
 from clpt.scene.integrators import Vcm
 
-DEEPEST = 64  # of a path where photons are merged: each of its vertices has a place
+# of a path where photons are merged, each vertex of which has a place; many files ask for 65
+DEEPEST = 65
 FIRST = 2  # surfaces of a light path, before which it leaves no photon
 MIB = 1 << 20
 FEWEST_CELLS = 1 << 10

@@ -40,7 +40,7 @@ def _order(features: Features, layout: str, lanes: int, interleaved: bool) -> It
         yield Stage("show", join, join, joining)
     yield Stage("intersect", "intersect", "intersect", lanes if interleaved else tracing)
     for cls in gathered(features):
-        yield Stage("flight", f"gather_{cls.kind}", "gather", lanes)
+        yield Stage("flight", f"gather_{cls.kind}", "gather_along", lanes)
     if features.media.present:
         yield Stage("flight", flight(features), "flight", lanes)
     if deposits(features):
@@ -181,7 +181,7 @@ def _call(features: Features, own: Features, layout: str, stage: Stage) -> _Call
         begin: signatures.begin_args(own),
         "intersect": signatures.trace_args(own, layout),
         "flight": signatures.flight_args(own),
-        "gather": signatures.gather_args(own),
+        "gather_along": signatures.gather_args(own),
         "deposit": signatures.deposit_args(own),
         "train": signatures.deposit_args(own),
         join: signatures.join_args(own, layout),

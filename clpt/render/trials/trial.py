@@ -17,7 +17,7 @@ from clpt import device
 from clpt.render.analysis import worth
 from clpt.render.lowering.scene import Lowered
 from clpt.render.trials import cost
-from clpt.render.trials.cost import GUIDED_RAY, LIGHT_RAY, ROUNDS, SAMPLES, Trial
+from clpt.render.trials.cost import GUIDED_RAY, LIGHT_RAY, PHOTON_RAY, ROUNDS, SAMPLES, Trial
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.render.wavefront.strategy import Tuning
 from clpt.render.wavefront.wavefront import Wavefront
@@ -151,4 +151,6 @@ def _ray(lowered: Lowered) -> float:
     """Return the time of a way's ray over one of `path`."""
     if lowered.features.transport.guided:
         return GUIDED_RAY
+    if lowered.features.transport.merged:
+        return PHOTON_RAY
     return LIGHT_RAY if lowered.features.transport.weighed else 1.0

@@ -22,6 +22,7 @@ from clpt.spectra import (
     glass,
     metal,
 )
+from clpt.spectra.spectrum import WIDEST
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
 SENSOR = '<sensor type="perspective"/>'
@@ -475,9 +476,36 @@ INDICES = {
 }  # fmt: skip
 
 
-def test_metals_are_in_air(bsdf):
-    with pytest.raises(SceneError, match="divide eta and k by 'ext_eta'"):
-        bsdf('<bsdf type="conductor"><string name="extEta" value="water"/></bsdf>')
+AROUND = {  # Mitsuba 0.6 divides by the index of what is around a metal
+    '<float name="eta" value="3"/>': (1.5, 0.5),
+    '<rgb name="eta" value="2, 3, 4"/>': (RGBUnbounded(1.0, 1.5, 2.0), 0.5),
+    '<spectrum name="k" value="400:2, 700:3"/>': (0.0, Tabulated((400, 700), (1.0, 1.5), "hold")),
+    '<spectrum name="k" type="cauchy"><float name="a" value="3"/></spectrum>': (
+        0.0, Tabulated(WIDEST, np.full(1801, 1.5), "hold")
+    ),
+    '<string name="material" value="none"/>': (0.0, 0.5),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("xml", AROUND)
+def test_metals_in_what_is_no_air(bsdf, xml):
+    eta, k = AROUND[xml]
+    made = bsdf(f'<bsdf type="conductor"><float name="extEta" value="2"/>{xml}</bsdf>')
+    assert dataclasses.asdict(made) == dataclasses.asdict(materials.Conductor(eta=eta, k=k))
+
+
+def test_textures_of_metals_in_what_is_no_air(bsdf):
+    texture = '<texture name="eta" type="checkerboard"/>'
+    made = bsdf(f'<bsdf type="conductor"><float name="extEta" value="2"/>{texture}</bsdf>').eta
+    assert isinstance(made.first, textures.Checkerboard)
+    assert made.second == Constant(0.5)
+
+
+def test_what_is_around_a_metal_may_be_named(bsdf):
+    water = bsdf('<bsdf type="conductor"><string name="extEta" value="water"/></bsdf>')
+    assert water.k == Constant(1.0 / 1.333)
+    with pytest.raises(SceneError, match="must be a number above 0 or the name"):
+        bsdf('<bsdf type="conductor"><float name="extEta" value="0"/></bsdf>')
 
 
 @pytest.mark.parametrize("xml", INDICES)

@@ -85,6 +85,23 @@ def test_a_point_seen_in_water(mode: str) -> None:
     assert_agree(blocks(made[..., :1]), blocks(expected[None, :, :, None]), mode, allowed=0.01)
 
 
+@pytest.mark.slow
+def test_a_sea_without_end_that_keeps_no_red() -> None:
+    """Its green is that of a sea that is the same for all light: 1 %, and as little noise."""
+    scene, deep = sea(radius=0.1), 1e4
+    box = tf.translate([0.0, -deep / 2.0, 0.0]) @ tf.scale([deep, deep / 2.0, deep])
+    means = []
+    for red in (1.0, 0.0):
+        scattered, absorbed = (tuple(n * c for c in (red, 1, 1)) for n in (SCATTERED, ABSORBED))
+        water = media.Homogeneous(sigma_s=scattered, sigma_a=absorbed)
+        body = dataclasses.replace(scene.shapes[0], to_world=box, interior=water)
+        made = exposures(dataclasses.replace(scene, shapes=[body]), 8, 64, device=narrow())
+        means.append(made[..., 1].mean(axis=(1, 2)))
+    grey, green = means
+    assert green.std() < 4.0 * grey.std()
+    assert green.mean() == pytest.approx(grey.mean(), rel=0.01)
+
+
 BALL_OF = {
     "grey": FOGS["grey"],
     "chromatic": FOGS["chromatic"],

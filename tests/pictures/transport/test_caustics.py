@@ -358,7 +358,7 @@ def test_the_floor_of_a_pool(way: str) -> None:
     scene = bench(looking([0.35, 0, -1], [0, 0, -0.9], half), shapes, lamp, 16, 16)
     at = ((np.arange(32) + 0.5) / 16 - 1.0) * half
     x, y = np.meshgrid(at + 0.35, at)
-    exact = blocks(flat_pool_irradiance(x, y)[..., None], 16)[..., 0]
+    exact = blocks(flat_pool_irradiance(x, y)[0][..., None], 16)[..., 0]
     found = blocks(irradiance(scene, way, 1e6 if way == "merging" else 2e5, 3, 0.03)[..., None], 8)[
         ..., 0
     ]

@@ -17,6 +17,7 @@ from clpt.render.lowering.scene import Lowered, lower
 from clpt.render.trials import cost, trial
 from clpt.scene import Scene
 from clpt.scene.integrators import Auto, Integrator, Path
+from clpt.scene.lights import Point
 from clpt.scene.materials import Null
 from clpt.scene.media import Homogeneous
 from clpt.scene.shapes import Rectangle
@@ -49,7 +50,7 @@ def test_ways_that_are_tried() -> None:
     assert ways(long(slit())) == [(0, False), (0, True)]
     assert {one.max_depth for one in lower(long(caustic())).candidates} == {5}
     photons = long(caustic(), Auto())
-    assert ways(photons) == [(1, False), (0, True)] and lower(photons).integrator.kind == "vcm"
+    assert ways(photons) == [(1, False), *WAYS[1:]] and lower(photons).integrator.kind == "vcm"
     shallow = Path(light_paths="auto", max_depth=2)
     assert ways(long(slit(), shallow)) == []
     assert ways(long(caustic(), spp=worth.SAMPLES // (16 * 12))) == []
@@ -67,6 +68,15 @@ def test_ways_that_are_tried() -> None:
 )
 def test_nothing_is_tried(changes: dict[str, Any]) -> None:
     assert ways(long(caustic(), **changes)) == []
+
+
+def test_path_is_not_tried_beside_photons_where_it_never_finds_the_light() -> None:
+    """A ray never meets a point, so what that lights is dark where it is seen through glass."""
+    scene = caustic()
+    point = Point(position=(0.0, 1.8, 0.0))
+    dark = dataclasses.replace(scene, shapes=scene.shapes[:2], lights=[point])
+    assert lower(long(dark, Auto())).integrator.kind == "vcm"
+    assert ways(long(dark, Auto())) == [(1, False), (0, True)]
 
 
 def test_a_guide_is_tried_among_media() -> None:

@@ -54,18 +54,19 @@ def aims(index: SceneIndex, geometry: Geometry, scene_radius: float) -> NDArray[
     return np.hstack([centre, radius, share]).astype(np.float32)
 
 
-def is_sharp(material: mt.Material) -> bool:
+def is_sharp(material: mt.Material, below: float = SHARP) -> bool:
     """Whether a material, or one inside it, sends light on in about one direction.
 
-    Of a coat over something dull that does not count. Nor does what ends light paths.
+    Of a coat over something dull that does not count. Nor does what ends light paths. below: the
+    roughness alpha of what is not perfectly smooth.
     """
     if isinstance(material, mt.NormalMapped) or not material.reversible:
         return False
     if isinstance(material, mt.COMPOSITES):
-        return any(is_sharp(part) for _, part in mt.inner(material))
+        return any(is_sharp(part, below) for _, part in mt.inner(material))
     if material.delta:
         return not material.is_null
-    return _roughness(material) < SHARP
+    return _roughness(material) < below
 
 
 def _roughness(material: mt.Material) -> float:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from clpt.geometry.winding import box
 from clpt.render.analysis.index import SceneIndex, any_of
-from clpt.render.analysis.surroundings import every
+from clpt.render.analysis.surroundings import bounds_media, every
 from clpt.scene import materials as mt
 from clpt.scene.integrators import Path
 from clpt.scene.media import Lattice, Medium
@@ -32,7 +32,7 @@ def escape_lamps(
     There are none where no ray of that kind is sent. cached: `LoweringCache`, which keeps the
     triangles of lamps.
     """
-    shapes = list(every(index.listed))
+    shapes = list(every(index.listed, lambda one: one.emission is not None or bounds_media(one)))
     lamps = [shape for shape in shapes if shape.emission is not None]
     if not lamps or not _suits(index, sealed) or not _is_bent_alike(shapes, sealed):
         return np.zeros((0, 5), np.float32)

@@ -41,7 +41,9 @@ MANY = 8  # where they are in bulbs: the camera's paths find next to nothing the
 DIRECTIONS = 128  # in which a light looks for what is sharp
 SLACK = 1e-6  # of the cosine of a cone around what may be met, for roundings
 BULB = 0.75  # of them: where what is sharp fills more, the light is in a bulb
-SEEN = 0.02  # of the picture: where what is sharp fills more, caustics may be seen through it
+SEEN = 0.02  # of the picture: where what is clear fills more, caustics may be seen through it
+CLEAR = 0.05  # roughness alpha of what is clear: light paths can be joined to what is rougher
+RAYS = 256  # of the camera, that look for what is clear
 
 LEAST = 0.25  # of the power of all lights: where small ones in media have less, they do not count
 THIN, DENSE = 0.3, 5.0  # optical depths from a light to the camera, see bench/NOTES.md
@@ -103,18 +105,25 @@ def _candidates(index: SceneIndex, chosen: Integrator) -> tuple[Integrator, ...]
 
     It pays if many samples are to come. Where a limit of noise ends the picture nobody knows how
     many, and some scenes cannot have a guide. Photons blur the picture, which no variance tells: so
-    they are left where another way is cheaper all the same, and never taken.
+    they are left where another way is cheaper all the same, and never taken. `path` is no such way
+    where it never finds a light through what is clear.
     """
     samples = index.samples
     if samples < worth.SAMPLES or index.adaptive or index.lit_ghosts or chosen.guiding:
         return ()
     path = Path(light_paths=0, **shared(chosen, Path()))
-    plain = [path] if isinstance(chosen, Path) and chosen.light_paths else []
+    finds = isinstance(chosen, Path) or (chosen.light_paths != MANY and _may_be_met(index))
+    plain = [path] if finds and chosen.light_paths else []
     several = chosen.max_depth < 0 or chosen.max_depth > 2
     can_guide = several and index.lights_reach
     guide = replace(path, guiding=True, guide_paths=guides.paths_for(samples))
     guided = [guide] if can_guide else []
     return (chosen, *plain, *guided) if plain or guided else ()
+
+
+def _may_be_met(index: SceneIndex) -> bool:
+    """Whether a ray can meet every light."""
+    return all(light.reach in ("surface", "infinite") for light in index.lights)
 
 
 def _choice(lit: Lit) -> tuple[Integrator, str]:
@@ -148,12 +157,15 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
         return Path(light_paths=number), reason
     if index.adaptive:
         return Path(light_paths=number), f"{reason}; noise is not measured with photons"
-    if index.has_media or index.shifts or _share_seen(index, geometry) < SEEN:
+    if index.has_media or index.shifts:
         return Path(light_paths=number), reason
+    if not _sees_clear(index, geometry):
+        number = number if number == MANY else FEW
+        return Path(light_paths=number), f"{reason}; the camera sees little glass and few mirrors"
     if index.motions:
         return Path(light_paths=number), f"{reason}; photons of a pass are all at one time"
     whole = max(1, int(number))
-    return Vcm(light_paths=whole), f"{reason}; the camera sees what is sharp"
+    return Vcm(light_paths=whole), f"{reason}; the camera sees glass or mirrors"
 
 
 def _in_fog(lit: Lit) -> tuple[Integrator, str] | None:
@@ -193,14 +205,23 @@ def _is_enclosed(geometry: Geometry, place: NDArray[np.float64] | None) -> bool:
     """Whether a light is in a bulb: what is only sharp fills most directions from its place [m]."""
     if place is None:
         return False
-    number = np.arange(DIRECTIONS) + 0.5  # spread evenly, on a spiral
-    z, turn = 1.0 - 2.0 * number / DIRECTIONS, np.pi * (1.0 + math.sqrt(5.0)) * number
-    level = np.sqrt(1.0 - z * z)
-    directions = np.stack([level * np.cos(turn), level * np.sin(turn), z])
     covered = np.zeros(DIRECTIONS, bool)
+    directions = _cone(np.array([0.0, 0.0, 1.0]), -1.0, DIRECTIONS)
     for pieces in sharp_pieces(geometry, (), lambda one: is_sharp(one) and not _is_dull(one)):
         covered[_covered(pieces, place, directions)] = True
     return bool(covered.mean() > BULB)
+
+
+def _cone(axis: NDArray[np.float64], least: float, number: int) -> NDArray[np.float64]:
+    """Directions (3, number) spread evenly, on a spiral, in a cone: least is its lowest cosine."""
+    middle = np.arange(number) + 0.5
+    z, turn = 1.0 - (1.0 - least) * middle / number, np.pi * (1.0 + math.sqrt(5.0)) * middle
+    level = np.sqrt(1.0 - z * z)
+    least_along = np.eye(3)[np.abs(axis).argmin()]
+    right = np.cross(least_along, axis)
+    right /= np.linalg.norm(right)
+    up = np.cross(axis, right)
+    return np.stack([right, up, axis], axis=1) @ [level * np.cos(turn), level * np.sin(turn), z]
 
 
 def _covered(
@@ -221,21 +242,17 @@ def _covered(
     return way[(apart <= reach * reach) | (np.min(sides * ahead, axis=0) > 0.0)]
 
 
-def _share_seen(index: SceneIndex, geometry: Geometry) -> float:
-    """The share of the picture that sharp things fill: as if nothing hid them, with all sides."""
+def _sees_clear(index: SceneIndex, geometry: Geometry) -> bool:
+    """Whether mirrors and clear things fill enough of the picture: as if nothing hid them."""
     view = cameras.view_of(index.camera, index.film.width, index.film.height)
     assert view is not None, "a camera that can be joined has a point"
-    pieces = np.concatenate([np.zeros((0, 10)), *sharp_pieces(geometry, index.motions.shapes)])
-    a, b, c = (pieces[:, i : i + 3] - view.place for i in (0, 3, 6))
-    middle, reach = (a + b + c) / 3.0, pieces[:, 9]
-    away = np.maximum(np.linalg.norm(middle, axis=1), 1e-30)
-    size = reach + np.max([np.linalg.norm(p - middle, axis=1) for p in (a, b, c)], axis=0)
-    around = np.arcsin(np.minimum(size / away, 1.0))
-    apart = np.arccos(np.clip(middle @ view.axis / away, -1.0, 1.0))
-    facing = np.abs(np.einsum("ij,ij->i", np.cross(b - a, c - a), middle)) / (2.0 * away**3)
-    solid = np.minimum(facing + np.pi * (reach / away) ** 2, 2.0 * np.pi)
-    solid = solid[apart < view.angle + around]
-    return float(solid.sum() / (2.0 * np.pi * (1.0 - math.cos(view.angle))))
+    directions = _cone(view.axis, math.cos(view.angle), RAYS)
+    for pieces in sharp_pieces(geometry, index.motions.shapes, lambda one: is_sharp(one, CLEAR)):
+        met = _covered(pieces, view.place, directions)
+        directions = np.delete(directions, met, axis=1)
+        if directions.shape[1] <= (1.0 - SEEN) * RAYS:
+            return True
+    return False
 
 
 def _first_with(all_: Iterable[Shape], wanted: Callable[[mt.Material], object]) -> Shape | None:

@@ -35,15 +35,17 @@ class Lobes:
     def of(cls, bounds: Bounds, power: Floats) -> Lobes:
         """Return what lights send, whose normals lean evenly from their axes.
 
-        One that shines in a cone sends as much along all of it, but is taken to send at most what
-        the normal of a surface sends along it: of several the power is not in one direction.
+        One that shines in a cone, up to a hemisphere, sends as much along all of it, but is taken
+        to send at most what the normal of a surface sends along it: of several the power is not in
+        one direction. In a wider cone light is taken to lean evenly from the axis, as normals do.
         """
         cosine = np.cos(bounds.theta_o)[:, None]
         square = (1.0 + cosine + cosine**2)[..., None] / 3.0
         outer = bounds.axis[:, :, None] * bounds.axis[:, None, :]
         second = square * outer + 0.5 * (1.0 - square) * (np.eye(3) - outer)
         mean = np.where(bounds.both[:, None], 0.0, bounds.axis * (1.0 + cosine) / 2.0)
-        narrow = bounds.theta_e < np.pi / 2.0 - NEARLY
+        right = np.pi / 2.0
+        narrow = (bounds.theta_e < right - NEARLY) & (bounds.theta_o < right + NEARLY)
         height = np.minimum(0.5 / np.maximum(1.0 - cosine, 1e-6), 1.0)
         mean = np.where(narrow[:, None], height * bounds.axis, mean)
         second = np.where(narrow[:, None, None], height[..., None] ** 2 * np.eye(3), second)
