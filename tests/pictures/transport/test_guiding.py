@@ -155,9 +155,11 @@ def slit(fog: media.Medium | None = None) -> Scene:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("fog", [None, media.Homogeneous(sigma_s=0.5)], ids=["clear", "fog"])
+@pytest.mark.parametrize(
+    ("fog", "most"), [(None, 0.5), (media.Homogeneous(sigma_s=0.5), 0.8)], ids=["clear", "fog"]
+)
 def test_noise_falls_where_light_comes_through_a_slit(
-    monkeypatch: pytest.MonkeyPatch, fog: media.Medium | None
+    monkeypatch: pytest.MonkeyPatch, fog: media.Medium | None, most: float
 ) -> None:
     """Seventeen exposures of each: that their variances differ by chance as much has a probability
     below 1e-6, by the F distribution of a few hundred pixels' means."""
@@ -167,7 +169,7 @@ def test_noise_falls_where_light_comes_through_a_slit(
         scene = dataclasses.replace(slit(fog), integrator=integrator)
         made = exposures(scene, 17, 64, device=narrow())
         noise.append(np.median(made.var(axis=0, ddof=1) / made.mean(axis=0) ** 2))
-    assert noise[1] < 0.5 * noise[0], noise
+    assert noise[1] < most * noise[0], noise
 
 
 def picture(scene: Scene, *runs: int, **options: Any) -> np.ndarray:
