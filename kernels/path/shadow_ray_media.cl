@@ -1,12 +1,5 @@
 /* The ray that waits in the shadow slab of a path to a light, where it may go through several media. */
-#include "interface/shape.cl"
-#include "generated/trace.cl"
-#include "generated/transmittance.cl"
-#include "generated/escape_light.cl"
-#define ShadowPassage Spectrum
-#define shadow_most(passes) spectrum_max(passes)
-#define shadow_dims(light, passes) spectrum_mul(light, passes)
-#define shadow_adds(light, passes, sum) spectrum_add(spectrum_mul(light, passes), sum)
+#include "path/shadow_ray_passage.cl"
 
 /* How much of the light between the two points of each active ray passes. The rays wait no longer. */
 inline Spectrum shadow_ray_transmittance(TRACE_ARGS, Scene scene, Slab path, Slab shadow, uint at, real t, mask active)

@@ -101,12 +101,10 @@ def over(value: float | Spectrum | Texture, divisor: float) -> float | Spectrum 
         return _scaled(value, 1.0 / divisor)
     if isinstance(value, RGBUnbounded):
         return RGBUnbounded(*(value.to_rgb() / divisor))
-    if isinstance(value, Constant):
-        return Constant(value.value / divisor)
     if isinstance(value, Spectrum):
-        if not isinstance(value, Tabulated):
+        if not isinstance(value, (Constant, Tabulated)):
             value = Tabulated(WIDEST, value.sample(WIDEST), "hold")
-        return Tabulated(value.lambdas, np.array(value.values) / divisor, value.outside)
+        return spectra.scaled(value, 1.0 / divisor)
     return value / divisor
 
 
