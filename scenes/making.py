@@ -17,6 +17,14 @@ from clpt import images
 
 Array = NDArray[np.float64]
 JSON = dict[str, Any]
+# Radius and height [cm]: from the middle of the foot up the outside, over the rim, down inside.
+WINE_GLASS = [
+    (0.0, 0.12), (1.6, 0.10), (2.9, 0.02), (3.5, 0.06), (3.55, 0.18), (3.2, 0.34), (2.0, 0.62),
+    (0.9, 1.1), (0.46, 2.2), (0.38, 4.6), (0.42, 7.0), (0.62, 8.0), (1.5, 8.75), (2.9, 9.9),
+    (3.75, 11.6), (3.95, 13.4), (3.65, 15.6), (3.1, 17.9), (3.0, 18.35), (2.97, 18.48),
+    (2.91, 18.53), (2.85, 18.48), (2.87, 18.35), (2.97, 17.9), (3.5, 15.6), (3.79, 13.4),
+    (3.58, 11.7), (2.74, 10.15), (1.4, 9.1), (0.55, 8.78), (0.0, 8.72),
+]  # fmt: skip
 
 
 def curve(points: ArrayLike, steps: int, closed: bool = False) -> Array:
@@ -74,6 +82,20 @@ def lathe(profile: Array, around: int, flutes: int = 0, depth: ArrayLike = 0) ->
     normals = np.stack([out * x - along * z, up, out * z + along * x], -1)
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
     return surface(np.stack([radius * x, height, radius * z], -1), normals)
+
+
+def filled(
+    profile: Array, level: float, around: int
+) -> tuple[trimesh.Trimesh, trimesh.Trimesh, trimesh.Trimesh]:
+    """A glass filled up to a height: its surface to air, the wet wall, and the liquid's top."""
+    rim = int(np.argmax(profile[:, 1]))
+    under = rim + int(np.argmax(profile[rim:, 1] < level))
+    (r0, y0), (r1, y1) = profile[under - 1 : under + 1]
+    edge = [r0 + (r1 - r0) * (level - y0) / (y1 - y0), level]
+    wet = np.vstack([edge, profile[under:]])[::-1]
+    dry = np.vstack([profile[:under], edge])
+    top = np.linspace(edge, [0, level], 3)
+    return lathe(dry, around), lathe(wet, around), lathe(top, around)
 
 
 def rod(line: ArrayLike, radius: float, around: int = 12) -> trimesh.Trimesh:

@@ -14,23 +14,15 @@ import sys
 from pathlib import Path
 
 import numpy as np
-import trimesh
 from PIL import Image
 
 sys.path.append(str(Path(__file__).parents[1]))
-from making import Array, curve, daylight, lathe
+from making import WINE_GLASS, curve, daylight, filled, lathe
 
 HERE = Path(__file__).parent
 SUN = np.array([-0.62, 0.36, -0.7])  # where it stands, seen from the table
 AROUND = 64
 # From the middle of the foot up the outside, over the rim, and down to the middle inside.
-WINE = [
-    (0.0, 0.12), (1.6, 0.10), (2.9, 0.02), (3.5, 0.06), (3.55, 0.18), (3.2, 0.34), (2.0, 0.62),
-    (0.9, 1.1), (0.46, 2.2), (0.38, 4.6), (0.42, 7.0), (0.62, 8.0), (1.5, 8.75), (2.9, 9.9),
-    (3.75, 11.6), (3.95, 13.4), (3.65, 15.6), (3.1, 17.9), (3.0, 18.35), (2.97, 18.48),
-    (2.91, 18.53), (2.85, 18.48), (2.87, 18.35), (2.97, 17.9), (3.5, 15.6), (3.79, 13.4),
-    (3.58, 11.7), (2.74, 10.15), (1.4, 9.1), (0.55, 8.78), (0.0, 8.72),
-]  # fmt: skip
 TUMBLER = [
     (0.0, 0.22), (2.4, 0.18), (3.2, 0.03), (3.55, 0.12), (3.68, 0.5), (3.8, 2.0), (4.05, 5.5),
     (4.2, 7.8), (4.25, 8.5), (4.24, 8.72), (4.18, 8.86), (4.1, 8.9), (4.02, 8.86), (3.96, 8.72),
@@ -44,20 +36,6 @@ BOTTLE = [
     (0.98, 28.8), (0.98, 26.5), (1.1, 24.2), (1.6, 22.3), (2.6, 20.5), (3.2, 18.7), (3.32, 17.0),
     (3.32, 10.0), (3.32, 4.0), (3.25, 1.6), (2.6, 1.25), (1.3, 1.9), (0.0, 2.1),
 ]  # fmt: skip
-
-
-def filled(
-    profile: Array, level: float
-) -> tuple[trimesh.Trimesh, trimesh.Trimesh, trimesh.Trimesh]:
-    """A glass filled up to a height: its surface to air, the wet wall, and the liquid's top."""
-    rim = int(np.argmax(profile[:, 1]))
-    under = rim + int(np.argmax(profile[rim:, 1] < level))
-    (r0, y0), (r1, y1) = profile[under - 1 : under + 1]
-    edge = [r0 + (r1 - r0) * (level - y0) / (y1 - y0), level]
-    wet = np.vstack([edge, profile[under:]])[::-1]
-    dry = np.vstack([profile[:under], edge])
-    top = np.linspace(edge, [0, level], 3)
-    return lathe(dry, AROUND), lathe(wet, AROUND), lathe(top, AROUND)
 
 
 def cloth() -> None:
@@ -77,12 +55,12 @@ def cloth() -> None:
 def main() -> None:
     made = {"bottle": lathe(curve(BOTTLE, 3), AROUND)}
     for name, profile, level in (
-        ("red", WINE, 12.6),
-        ("white", WINE, 11.9),
+        ("red", WINE_GLASS, 12.6),
+        ("white", WINE_GLASS, 11.9),
         ("tumbler", TUMBLER, 5.2),
     ):
         made[f"{name}_glass"], made[f"{name}_wet"], made[f"{name}_top"] = filled(
-            curve(profile, 3), level
+            curve(profile, 3), level, AROUND
         )
     for name, mesh in made.items():
         mesh.export(HERE / f"{name}.ply", vertex_normal=True)
