@@ -6,7 +6,10 @@ import dataclasses
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
 
 from clpt import device as dev
 from clpt import formats
@@ -16,13 +19,14 @@ from clpt.render.film_renderer import checked_samples
 from clpt.render.options import RenderOptions, check_scene
 from clpt.render.progress import Progress
 from clpt.render.renderer import Renderer
+from clpt.scalars import is_number, is_whole, plain
 from clpt.scene import Film, Scene, viewpoint
 from clpt.scene.cameras import Camera
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-CameraLike = Camera | Sequence[float] | str | int
+CameraLike = Camera | Sequence[float] | NDArray[Any] | str | int
 SHOWN, SHOWN_SAMPLES = 400, 32  # pixels a side and samples of what a notebook shows of a scene
 ORBIT = "(azimuth, elevation), such as (45, 20), or with a distance, in those that frame the scene"
 
@@ -68,7 +72,7 @@ def render(
     size, mode = options.pop("size", None), options.pop("mode", None)
     camera, env = options.pop("camera", None), options.pop("env", None)
     if isinstance(scene, (str, os.PathLike)):
-        named = {"camera": camera} if isinstance(camera, (str, int)) else {}
+        named = {"camera": camera} if isinstance(camera, str) or is_whole(camera) else {}
         scene, camera = _loaded(Path(scene), named), None if named else camera
     check_scene(scene)
     if env is not None:
@@ -120,8 +124,9 @@ def _camera(scene: Scene, camera: CameraLike) -> Camera:
     """Return the camera that is meant. Raises SceneError."""
     if isinstance(camera, Camera):
         return camera
-    numbers = () if isinstance(camera, (str, int)) else tuple(camera)
-    if not 2 <= len(numbers) <= 3 or not all(isinstance(n, (int, float)) for n in numbers):
+    listed = isinstance(camera, (list, tuple)) or (isinstance(camera, np.ndarray) and camera.ndim)
+    numbers = tuple(map(plain, camera)) if listed else ()  # type: ignore[arg-type]
+    if not 2 <= len(numbers) <= 3 or not all(map(is_number, numbers)):
         of_file = "; a name or a number is for files with several cameras"
         message = f"must be a camera or {ORBIT}, not {camera!r}{of_file}"
         raise SceneError(message, where="camera")

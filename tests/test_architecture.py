@@ -25,7 +25,8 @@ PACKAGE, KERNELS = ROOT / "clpt", ROOT / "kernels"
 
 BASE = {
     "arrays", "budget", "child_processes", "choices", "colour", "errors", "host_memory", "images",
-    "input_files", "layout", "measured", "numpy_files", "output_files", "records", "spectra",
+    "input_files", "layout", "measured", "numpy_files", "output_files", "records", "scalars",
+    "spectra",
     "spectral_exr", "tev", "text", "transforms", "version",
 }  # fmt: skip
 RENDERS = BASE | {"scene", "device", "denoise", "render", "formats"}

@@ -12,10 +12,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from clpt import device as dev
-from clpt import images
+from clpt import images, scalars
 from clpt.arrays import Image
 from clpt.choices import MOST_SAMPLES, Exposure
 from clpt.colour.view import View
@@ -182,8 +180,8 @@ class FilmRenderer(FilmOwner, Pictures):
         noise: leave pixels as soon as the noise around them is as low, relative to the picture,
         such as 0.02; `samples` is then the most that a pixel gets, see
         clpt.render.wavefront.adaptive. A renderer with `denoise` counts what is left after that.
-        progress: called every few milliseconds to seconds; if it returns False the run stops soon,
-        as after `cancel`. Returns whether it came to its end. What progress raises, or Ctrl+C at
+        progress: called every few milliseconds to seconds; if it returns something false, but not
+        None, the run stops soon, as after `cancel`. Returns whether it came to its end. What progress raises, or Ctrl+C at
         any line, is raised when the paths in flight have ended. The film is whole after a stop too:
         its pixels have fewer samples, and the numbers of those left out are not used again.
 
@@ -310,8 +308,8 @@ class FilmRenderer(FilmOwner, Pictures):
         """
         if first_sample is not None:
             first_sample = checked_number(first_sample)
-        if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int)):
-            raise SceneError(f"must be a whole number, not {seed!r}", where="seed")
+        if seed is not None:
+            seed = scalars.whole(seed, where="seed")
         broken = isinstance(self._contents, Change)
         self._maker.after(wait_for)
         with self._healing("reset", lambda _: self._emptied(recover=True)):
@@ -512,7 +510,8 @@ class Watch:
             return not renderer._stop.is_set()
         renderer._telling = True
         try:
-            if self._progress(renderer._so_far(self._end, self.seconds)) is False:
+            answer = self._progress(renderer._so_far(self._end, self.seconds))
+            if answer is not None and not answer:
                 renderer._stop.set()
         except BaseException as error:
             self.raised = error
@@ -534,6 +533,7 @@ def next_range(first: int, samples: int) -> tuple[int, int]:
 
 def checked_number(number: int) -> int:
     """Return a sample's number. Raises SceneError for one that is too large."""
+    number = scalars.whole(number, 0, where="samples")
     if number > MOST_SAMPLES:
         raise SceneError(f"a pixel cannot have more than {MOST_SAMPLES} samples", where="samples")
     return number
@@ -541,6 +541,6 @@ def checked_number(number: int) -> int:
 
 def checked_samples(samples: int) -> int:
     """Return a number of samples. Raises SceneError for one that is none."""
-    if isinstance(samples, bool) or not isinstance(samples, (int, np.integer)) or samples < 1:
+    if not scalars.is_whole(samples) or samples < 1:
         raise SceneError(f"samples per pixel must be a whole number above zero, not {samples!r}")
     return int(samples)

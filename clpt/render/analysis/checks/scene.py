@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from clpt import scalars
 from clpt.errors import SceneError
 from clpt.geometry import shapes
 from clpt.geometry.instancing import distinct
@@ -33,8 +34,7 @@ def check(scene: Scene) -> None:
 def check_at_rest(scene: Scene, cache: LoweringCache) -> None:
     """Raise SceneError as `check` does, for a scene that is `at_rest`; cache: of its analysis."""
     check_parts(scene)
-    if isinstance(scene.seed, bool) or not isinstance(scene.seed, int):
-        raise SceneError(f"must be a whole number, not {scene.seed!r}", where="seed")
+    scalars.whole(scene.seed, where="seed")
     shapes_ = list(distinct(scene.shapes))
     check_film(scene)
     check_camera(scene.camera, scene.film)
