@@ -181,8 +181,9 @@ class FilmRenderer(FilmOwner, Pictures):
         such as 0.02; `samples` is then the most that a pixel gets, see
         clpt.render.wavefront.adaptive. A renderer with `denoise` counts what is left after that.
         progress: called every few milliseconds to seconds; if it returns something false, but not
-        None, the run stops soon, as after `cancel`. Returns whether it came to its end. What progress raises, or Ctrl+C at
-        any line, is raised when the paths in flight have ended. The film is whole after a stop too:
+        None, the run stops soon, as after `cancel`. Returns whether it came to its end. What
+        progress raises, or Ctrl+C at any line, is raised when the paths in flight have ended. The
+        film is whole after a stop too:
         its pixels have fewer samples, and the numbers of those left out are not used again.
 
         Raises SceneError for noise that makes no sense with the scene, and for more than 2^31 - 1
