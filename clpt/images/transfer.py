@@ -94,6 +94,13 @@ def straight(image: Floats32) -> Floats32:
     return np.concatenate([image[..., :3] / np.where(alpha > 0, alpha, 1), alpha], axis=2)
 
 
+def multiplied(image: Floats32) -> Floats32:
+    """Colours (h, w, 4) of what covers as those over nothing: what `straight` undoes."""
+    if image.shape[2] != 4:
+        return image
+    return np.concatenate([image[..., :3] * image[..., 3:], image[..., 3:]], axis=2)
+
+
 def to_rec709(pixels: Floats32, space: str) -> Floats32:
     """Colours (h, w, 3 or 4) of a space in linear Rec. 709, white to white; alpha stays."""
     if space == "rec709" or pixels.shape[2] == 1:

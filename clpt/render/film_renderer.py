@@ -24,7 +24,7 @@ from clpt.render.device_film import Changes
 from clpt.render.editing.scene_edit import MaterialKey, ShapeKey
 from clpt.render.film.denoised_picture import DenoisedPicture
 from clpt.render.film.developed import Developed
-from clpt.render.film.layer_channels import write_layers
+from clpt.render.film.layer_channels import write_picture
 from clpt.render.film.picture_form import PictureForm
 from clpt.render.film.pictures import Pictures
 from clpt.render.film.saved_film import (
@@ -452,19 +452,15 @@ class FilmRenderer(FilmOwner, Pictures):
     ) -> None:
         """Write the picture so far to a file, in the format of the path's suffix; wait for it.
 
-        An .exr has the film's layers. A renderer with `denoise` writes what is denoised.
+        An .exr has the film's layers and bands. A renderer with `denoise` writes what is denoised.
+        A film with alpha: see `clpt.write_image`.
         exposure [stops], tone, view: of files for screens, see `clpt.write_image`.
 
         Raises SceneError for an unknown suffix, and for a file that cannot be written.
         """
-        path, film = Path(path), self.scene.film
-        if film.layers and path.suffix.lower() == ".exr" and self.denoise is None:
-            write_layers(path, self)
-            return
-        plain = self.image() if film.bands == 0 else self.colours()
-        picture = plain if self.denoise is None else self.denoised()
-        space = film.output_space
-        images.write(path, picture, exposure=exposure, space=space, tone=tone, view=view)
+        path = images.check_output(path)
+        source = self if self.denoise is None else DenoisedPicture(self)
+        write_picture(path, source, exposure=exposure, tone=tone, view=view)
 
     # ---- the end
 

@@ -48,7 +48,7 @@ def remarks(renderer: DevicePictures, grading: Grading, targets: tuple[Path, ...
 
 def _pixels(renderer: DevicePictures) -> Floats32:
     """The picture so far in linear Rec. 709, (h, w, c)."""
-    colours = renderer.colours() if renderer._form.bands else renderer.image()
+    colours = renderer.picture()
     return images.to_rec709(images.straight(colours), renderer.scene.film.output_space)
 
 

@@ -155,7 +155,7 @@ def _header(path: Path, text: object) -> dict[str, Any]:
 def _picture(saved: SavedFilm) -> Any:
     """The picture so far, with the header: what viewers show."""
     form, made = saved.form, saved._developed()
-    pixels = made.colours() if form.bands else made.image()
+    pixels = made.picture()
     letters = "RGBA"[: pixels.shape[2]]
     stored = np.clip(np.nan_to_num(pixels), -HALF_MAX, HALF_MAX).astype(np.float16)
     channels = {n: np.ascontiguousarray(stored[..., i]) for i, n in enumerate(letters)}
