@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mmap
 import sys
 from typing import Any
 
@@ -27,6 +28,30 @@ def on_host(values: object) -> Any:
     """Return values in host memory; of an array on a device a copy, for which it waits."""
     module = sys.modules.get("pyopencl.array")  # whoever has such an array has imported it
     return values.get() if module and isinstance(values, module.Array) else values
+
+
+def in_memory(value: Any) -> Any:
+    """Return an argument of a scene's part with copies of the arrays that are maps of files.
+
+    A file that changes would change the scene, and one that is cut would end the process. Looks
+    into mappings and sequences; whatever else holds arrays asks by itself.
+    """
+    if isinstance(value, np.ndarray):
+        return np.array(value, order="K", subok=False) if _is_map(value) else value
+    if type(value) is dict:
+        kept: Any = {name: in_memory(one) for name, one in value.items()}
+        return kept if any(kept[name] is not one for name, one in value.items()) else value
+    if type(value) in (list, tuple) and any(isinstance(one, np.ndarray) for one in value):
+        return type(value)(in_memory(one) for one in value)
+    return value
+
+
+def _is_map(array: Array) -> bool:
+    """Whether an array's numbers lie in a map of a file."""
+    held: Any = array
+    while held is not None and not isinstance(held, (np.memmap, mmap.mmap)):
+        held = held.obj if isinstance(held, memoryview) else getattr(held, "base", None)
+    return held is not None
 
 
 def on_device(values: object) -> bool:
