@@ -30,7 +30,7 @@ def on_host(values: object) -> Any:
     return values.get() if module and isinstance(values, module.Array) else values
 
 
-def in_memory(value: Any) -> Any:
+def in_memory(value: object) -> Any:
     """Return an argument of a scene's part with copies of the arrays that are maps of files.
 
     A file that changes would change the scene, and one that is cut would end the process. Looks
@@ -38,20 +38,21 @@ def in_memory(value: Any) -> Any:
     """
     if isinstance(value, np.ndarray):
         return np.array(value, order="K", subok=False) if _is_map(value) else value
-    if type(value) is dict:
-        kept: Any = {name: in_memory(one) for name, one in value.items()}
+    if isinstance(value, dict):
+        kept = {name: in_memory(one) for name, one in value.items()}
         return kept if any(kept[name] is not one for name, one in value.items()) else value
-    if type(value) in (list, tuple) and any(isinstance(one, np.ndarray) for one in value):
-        return type(value)(in_memory(one) for one in value)
+    if isinstance(value, (list, tuple)) and any(isinstance(one, np.ndarray) for one in value):
+        parts = [in_memory(one) for one in value]
+        return tuple(parts) if isinstance(value, tuple) else parts
     return value
 
 
 def _is_map(array: Array) -> bool:
     """Whether an array's numbers lie in a map of a file."""
-    held: Any = array
-    while held is not None and not isinstance(held, (np.memmap, mmap.mmap)):
-        held = held.obj if isinstance(held, memoryview) else getattr(held, "base", None)
-    return held is not None
+    held: object = array
+    while isinstance(held, (np.ndarray, memoryview)) and not isinstance(held, np.memmap):
+        held = held.obj if isinstance(held, memoryview) else held.base
+    return isinstance(held, (np.memmap, mmap.mmap))
 
 
 def on_device(values: object) -> bool:

@@ -164,14 +164,11 @@ class _Walk:
         return found
 
 
-def named_files(scene: Scene) -> set[str]:
-    """Return the paths of the files that a scene's images are read from."""
+def named_files(whole: object) -> set[str]:
+    """Return the paths of the files that the images of a scene, or of a part, are read from."""
     found: set[str] = set()
-    seen: dict[int, Any] = {}
-    waiting: list[tuple[Any, str]] = [
-        (getattr(scene, part.name), "") for part in dataclasses.fields(scene)
-        if part.name not in WITHOUT_SAMPLES
-    ]  # fmt: skip
+    seen: dict[int, object] = {}
+    waiting = [(whole, "")]
     while waiting:
         thing, form = waiting.pop()
         if isinstance(thing, (str, os.PathLike)):
@@ -179,9 +176,8 @@ def named_files(scene: Scene) -> set[str]:
                 found.add(os.fspath(thing))
         elif id(thing) not in seen:
             if dataclasses.is_dataclass(thing):
-                cls: Any = type(thing)
-                given = fields_of(cast("Any", thing))
-                waiting += ((given[name], one) for name, one in _plan(cls))
+                held = fields_of(cast("Kind", thing))
+                waiting += ((held[name], one) for name, one in _plan(cast("Kind", type(thing))))
             elif isinstance(thing, Mapping):
                 waiting += ((one, form) for one in thing.values())
             elif isinstance(thing, (list, tuple)) and form not in ARRAYS:

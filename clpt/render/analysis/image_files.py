@@ -5,19 +5,18 @@ Such a file may change while a scene is rendered: samples are of what was read.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from clpt.errors import SceneError
 from clpt.render.analysis.lowering_cache import version
-from clpt.scene import Scene
-from clpt.scene.fingerprint import file_digest, named_files
+from clpt.scene.fingerprint import file_digest
 
 
 @dataclass(frozen=True)
 class ImageFiles:
-    """What stands for the files of a scene by path: their versions and the digests of their bytes.
+    """The versions of a scene's files, and the digests of their bytes, by path.
 
     They are noted before a scene is lowered; `check` says afterwards whether they are still so.
     """
@@ -26,14 +25,14 @@ class ImageFiles:
     digests: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, scene: Scene, former: ImageFiles) -> ImageFiles:
-        """Note the files of a scene; former: of the scene before, whose files are not read again.
+    def of(cls, paths: Iterable[str], former: ImageFiles) -> ImageFiles:
+        """Note files; former: those of the scene before, which are not read again.
 
         Files that cannot be read are left out: whoever lowers the scene tells what is wrong.
         """
         versions: dict[str, str] = {}
         digests: dict[str, str] = {}
-        for path in sorted(named_files(scene)):
+        for path in sorted(paths):
             versions[path] = version(path)
             if former.versions.get(path) == versions[path]:
                 digests[path] = former.digests[path]

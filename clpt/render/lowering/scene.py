@@ -53,6 +53,7 @@ from clpt.render.lowering.settings import Found, settings_of
 from clpt.render.lowering.textures.attributes import lower_attributes
 from clpt.scene import Scene
 from clpt.scene import materials as mt
+from clpt.scene.fingerprint import named_files
 from clpt.scene.integrators import DEEPEST, Film, Integrator
 from clpt.scene.lights import Point
 from clpt.scene.media import Lattice
@@ -141,7 +142,7 @@ def lower(
     before = None
     if former is not None and not anew:
         before = Before(former.integrator, former.features.transport.lit_ghosts)
-    files = ImageFiles.of(scene, former.files if former else ImageFiles())
+    files = ImageFiles.of(named_files(scene), former.files if former else ImageFiles())
     made = encode(analyse(scene, cache, before), cache, texture_budget)
     files.check()
     return replace(made, files=files)

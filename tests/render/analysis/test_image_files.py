@@ -65,7 +65,7 @@ def test_a_fingerprint_is_of_the_files_that_were_read(tmp_path: Path, part: str)
 def test_a_file_that_changes_while_it_is_read_is_told(tmp_path: Path) -> None:
     path = tmp_path / "a.npy"
     clpt.write_image(path, np.ones((4, 4, 3), np.float32))
-    files = ImageFiles.of(surface(path), ImageFiles())
+    files = ImageFiles.of([str(path)], ImageFiles())
     files.check()
     os.utime(path, ns=(1, 1))
     with pytest.raises(SceneError, match=r"a\.npy: changed while the scene was read"):
