@@ -45,6 +45,7 @@ def _restored(cls: type[ClptError], args: tuple[Any, ...]) -> ClptError:
 
 
 LONGEST, LONGEST_PLACE = 300, 120  # characters of an error about a file, and of where it is
+LONGEST_WARNING = 1000  # characters of a warning
 LONGEST_KEPT = 1 << 14  # characters of a message that an error keeps
 
 

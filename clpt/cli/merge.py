@@ -14,6 +14,7 @@ from .files.targets import checked
 from .options.grading import GradingOptions, grading_options, names_option
 from .options.records import with_records
 from .options.scene_options import denoise_option
+from .process import terminal
 
 if TYPE_CHECKING:
     from ..render.film.saved_film import SavedFilm
@@ -53,7 +54,7 @@ def merge(
 
     def note(text: str) -> None:
         if not quiet:
-            click.echo(text, err=True)
+            terminal.say(text)
 
     if text := how.unused(targets):
         note(f"clpt: warning: {text}")
