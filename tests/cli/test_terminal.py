@@ -181,8 +181,8 @@ def test_what_a_display_shows(monkeypatch: pytest.MonkeyPatch) -> None:
     shown.note(f"[bold]{HOSTILE}[/bold]")
     with shown.loading(HOSTILE) as tell:
         tell(0.5, HOSTILE)
-    with shown.phase(HOSTILE), shown.compiling(HOSTILE) as begins:
-        begins()
+    with shown.phase(HOSTILE), shown.compiling(HOSTILE) as programs:
+        programs.begin("a")
     with shown.rendering():
         pass
     text = stream.getvalue()
