@@ -224,8 +224,8 @@ class Bar(Lines):
 
         def changed() -> None:
             bar.update(
-                task, description=terminal.cleaned(text), total=programs.begun, completed=programs.ended,
-                told=programs.told,
+                task, description=terminal.cleaned(text), total=programs.begun,
+                completed=programs.ended, told=programs.told,
             )  # fmt: skip
 
         programs = Programs(changed)
