@@ -25,16 +25,23 @@ ADVICE = "docs/lighting.md has a list: Why is it black?"
 
 def exposure_found(renderer: DevicePictures) -> float:
     """Return the stops of `--exposure auto`."""
-    return images.auto_exposure(_pixels(renderer))
+    return images.auto_exposure(_pixels(renderer)) - renderer.scene.film.display_exposure
+
+
+def display_exposure(renderer: DevicePictures) -> str:
+    """Return what to say of the exposure that the scene's film has for screens, "" for none."""
+    stops = renderer.scene.film.display_exposure
+    return f"exposure {stops:+.1f} stops, of the scene: film.display_exposure" if stops else ""
 
 
 def remarks(renderer: DevicePictures, grading: Grading, targets: tuple[Path, ...]) -> Iterator[str]:
     """Yield sentences of a picture in which little is seen, with what mends it."""
     scene, pixels = renderer.scene, _pixels(renderer)
-    exposure = images.stops(grading.exposure, pixels)
+    display = scene.film.display_exposure
+    exposure = images.stops(images.raised(grading.exposure, display), pixels)
     found = images.levels(pixels, exposure, grading.tone, grading.view)
     mended = images.auto_exposure(pixels)
-    advice = f"--exposure auto, {mended:+.1f} stops, shows it"
+    advice = f"--exposure auto, {mended - display:+.1f} stops, shows it"
     if not found.lit:
         yield f"the picture is black: no path has found a light; {ADVICE}"
         return

@@ -51,9 +51,9 @@ def load(path: Path, missing: Missing = "error", /, **variables: Any) -> Scene:
     without it nodes have their own transforms, and materials, lights
     and cameras their own numbers. `camera` and `scene` choose by number or name.
     `shutter` [s] is how long light comes to the film from `time` on, while nodes move.
-    `variant` chooses among material variants. `lumens`: of a watt, by which punctual lights are
-    divided; of files of Blender 683 by itself. `multiple_scattering`: 1 keeps what facets reflect
-    to each other.
+    `variant` chooses among material variants. `lumens`: of a watt, by which the exporter multiplied
+    its lights' watts; of files of Blender 683 by itself, of others lights are in candela and lux.
+    `multiple_scattering`: 1 keeps what facets reflect to each other.
     missing: see clpt.load. Raises SceneError with the JSON path of what is wrong.
     """
     if "shutter" in variables:
@@ -65,6 +65,10 @@ def load(path: Path, missing: Missing = "error", /, **variables: Any) -> Scene:
             return motion.between(lambda t: load(path, missing, **variables, time=t), time, length)
         variables["time"] = time
     document, graph = _open(path, variables, missing)
+    lumens = lights.lumens_of(document)
+    if "lumens" in variables:
+        lumens = _number(path, variables, "lumens", 1.0, 1e-6, 1e6)
+    document.scale = lights.scale_of(graph, lumens)
     chosen = cameras.chosen(graph, _text(variables.get("camera")))
     shapes = meshes.shapes(graph)
     if not shapes:
@@ -82,6 +86,8 @@ def load(path: Path, missing: Missing = "error", /, **variables: Any) -> Scene:
     if chosen:
         width, height = chosen[1]
         scene.film = dataclasses.replace(scene.film, width=width, height=height)
+    stops = lights.display_exposure(document.scale)
+    scene.film = dataclasses.replace(scene.film, display_exposure=stops)
     return scene
 
 
@@ -115,7 +121,6 @@ def _open(
     if unknown:
         advice = nearest(unknown[0], VARIABLES)
         raise SceneError(f"glTF has no variable {unknown[0]!r}{advice}", file=path)
-    document.lumens = _number(path, variables, "lumens", lights.lumens_of(document), 1e-6, 1e6)
     document.multiple_scattering = _number(path, variables, "multiple_scattering", 0.0, 0.0, 1.0)
     document.variant = variants.chosen(document, _text(variables.get("variant")))
     _check_extensions(document)

@@ -47,7 +47,7 @@ def material(element: Element | None, *, colours: bool = False) -> tuple[Materia
         shown = surface.base_color(element)
         if colours:
             shown = Product(first=shown, second=MeshAttribute(), rgb=True)
-        emission: Area | None = Area(radiance=shown, two_sided=both)
+        emission: Area | None = Area(radiance=_scaled(shown, element), two_sided=both)
     else:
         inner = surface.surface(element, colours)
         emission = _emission(element, both)
@@ -90,7 +90,17 @@ def _emission(element: Element, both: bool) -> Area | None:
         else:
             tinted = max(radiance) > min(radiance)
             radiance = Product(first=image, second=surface.unbounded(radiance), rgb=tinted)
-    return Area(radiance=radiance, two_sided=both)
+    return Area(radiance=_scaled(radiance, element), two_sided=both)
+
+
+def _scaled(shown: Any, element: Element) -> Any:
+    """An emission that the file counts in its own unit, as radiance."""
+    scale = element.document.scale.emission
+    if scale == 1.0:
+        return shown
+    if isinstance(shown, tuple):
+        return tuple(scale * value for value in shown)
+    return Product(first=shown, second=scale)
 
 
 def _opacity(element: Element, colours: bool) -> Any:

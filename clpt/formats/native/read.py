@@ -23,9 +23,15 @@ from clpt.scene.volumes import Volume
 
 ON_SHAPES = tuple(cls.kind for cls in lights.ON_SHAPES)
 KEYS = (
-    "$schema", "name", "camera", "film", "integrator", "sampler", "materials", "media", "groups",
-    "shapes",    "lights", "spp", "noise", "seed",
+    "$schema", "version", "name", "camera", "film", "integrator", "sampler", "materials", "media", "groups",
+    "shapes", "lights", "spp", "noise", "seed",
 )  # fmt: skip
+VERSION = 2  # since it, lamps' files give candela: version 1 took them for W sr^-1 nm^-1
+CANDELA = (
+    "lamps' files give candela since version 2 of scene files, on one scale with lumens and watts: "
+    "the same lamp was 72,983 times as bright before; 'version': 2 in the file says that this is "
+    "meant, 'version': 1 keeps the former brightness"
+)
 FILM_KEYS = frozenset(params(integrators.Film))
 
 
@@ -61,6 +67,7 @@ class _Reader:
         self.volumes: dict[str, Volume] = {}
         self.measurements: dict[str, Any] = {}
         self.groups: dict[str, shapes.Group | None] = {}
+        self.version: int | None = None
         self.warnings: list[str] = []
 
     def scene(self) -> Scene:
@@ -72,6 +79,7 @@ class _Reader:
         root.check_keys("a scene", KEYS)
         if "camera" not in root.value:
             raise root.error("needs a 'camera'")
+        self.version = _version(root.at("version")) if "version" in root.value else None
         readers: dict[str, Callable[[Cursor], Any]] = {
             "camera": lambda c: self.kind(c, "camera"),
             "film": lambda c: self.object_of(c, integrators.Film),
@@ -171,9 +179,14 @@ class _Reader:
         if cls in shape_files.FILES and "file" in cursor.value:
             shape_files.check_only_in_file(cursor, cls)
             made, file = self.object_of(cursor, cls, ("type", "file")), cursor.at("file")
-            path, reader = find_file(file), shape_files.FILES[cls].read
+            path, known = find_file(file), shape_files.FILES[cls]
             with file.locating():
-                return dataclasses.replace(made, **reader(path)) if reader else made
+                values = known.read(path) if known.read else {}
+                if self.version == 1:
+                    return dataclasses.replace(made, **{**values, "candela": None})
+                if self.version is None and CANDELA not in self.warnings:
+                    self.warnings.append(CANDELA)
+                return known.join(made, values)
         return self.kind(cursor, "light")
 
     def area_light(self, cursor: Cursor) -> Any:
@@ -299,6 +312,13 @@ def _merged(
         tangents=part.tangents,
         attributes=part.attributes,
     )
+
+
+def _version(cursor: Cursor) -> int:
+    version = cursor.integer()
+    if not 1 <= version <= VERSION:
+        raise cursor.error(f"this clpt reads the versions 1 to {VERSION}, not {version}")
+    return version
 
 
 def _noise(cursor: Cursor) -> float:
