@@ -7,16 +7,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from clpt.formats import eulumdat, ies
 from clpt.scene.lights import STRENGTHS, Goniometric
+from clpt.scene.params import fields_of
 from clpt.spectra import RGBIlluminant
 
 EULUMDAT = ".ldt"
 
 
 def parameters(path: Path) -> dict[str, Any]:
-    """Return `image` and `candela` of a Goniometric from an .ies or .ldt file. Raises SceneError."""
+    """Return `image` and `candela` of a Goniometric from an .ies or .ldt file.
+
+    Raises SceneError with the line of what is broken.
+    """
     read = eulumdat.read if path.suffix.lower() == EULUMDAT else ies.read
     return ies.table(read(path))
 
@@ -30,7 +35,8 @@ def joined(lamp: Goniometric, file: dict[str, Any]) -> Goniometric:
     intensity, image = lamp.intensity, file["image"]
     candela = file["candela"] if lamp.candela is None else lamp.candela
     alike = isinstance(intensity, RGBIlluminant) and intensity.r == intensity.g == intensity.b
-    if any(getattr(lamp, name, None) is not None for name in STRENGTHS if name != "candela"):
+    values = fields_of(lamp)
+    if any(values.get(name) is not None for name in STRENGTHS if name != "candela"):
         shares = np.asarray(image.image, np.float32) / np.float32(mean(image.image))
         return dataclasses.replace(lamp, image=dataclasses.replace(image, image=shares))
     if isinstance(intensity, RGBIlluminant) and alike:
@@ -40,7 +46,7 @@ def joined(lamp: Goniometric, file: dict[str, Any]) -> Goniometric:
     return dataclasses.replace(lamp, image=image, candela=candela, intensity=intensity)
 
 
-def mean(image: Any) -> float:
+def mean(image: ArrayLike) -> float:
     """Return the mean over all directions of a table (h, w, 1) in latitude and longitude."""
     values = np.asarray(image, np.float64)
     edges = np.cos(np.linspace(0.0, np.pi, len(values) + 1))

@@ -41,7 +41,8 @@ def png(pixels: NDArray[np.uint8]) -> bytes:
 class Display:
     """Settings by which a page shows the picture; the render does not know of them.
 
-    exposure [stops] over that of the film; tone: a curve of clpt.colour.tones, or that of `view`, of OpenColorIO.
+    exposure [stops] over that of the film; tone: a curve of clpt.colour.tones, or that of `view`,
+    of OpenColorIO.
     """
 
     exposure: float = 0.0

@@ -24,7 +24,7 @@ from clpt.formats.gltf import (
     pointers,
     variants,
 )  # fmt: skip
-from clpt.formats.gltf.document import Document
+from clpt.formats.gltf.document import Document, Scale
 from clpt.formats.meshes import framing
 from clpt.formats.meshes.mesh import MeshFile
 from clpt.scene import Scene
@@ -65,10 +65,6 @@ def load(path: Path, missing: Missing = "error", /, **variables: Any) -> Scene:
             return motion.between(lambda t: load(path, missing, **variables, time=t), time, length)
         variables["time"] = time
     document, graph = _open(path, variables, missing)
-    lumens = lights.lumens_of(document)
-    if "lumens" in variables:
-        lumens = _number(path, variables, "lumens", 1.0, 1e-6, 1e6)
-    document.scale = lights.scale_of(graph, lumens)
     chosen = cameras.chosen(graph, _text(variables.get("camera")))
     shapes = meshes.shapes(graph)
     if not shapes:
@@ -83,11 +79,11 @@ def load(path: Path, missing: Missing = "error", /, **variables: Any) -> Scene:
     scene.extra["cameras"] = cameras.descriptions(graph)
     scene.extra["animations"] = animation.descriptions(document)
     scene.extra |= _provenance(document)
+    film = dataclasses.replace(scene.film, display_exposure=lights.display_exposure(document.scale))
     if chosen:
         width, height = chosen[1]
-        scene.film = dataclasses.replace(scene.film, width=width, height=height)
-    stops = lights.display_exposure(document.scale)
-    scene.film = dataclasses.replace(scene.film, display_exposure=stops)
+        film = dataclasses.replace(film, width=width, height=height)
+    scene.film = film
     return scene
 
 
@@ -107,6 +103,7 @@ def _provenance(document: Document) -> dict[str, Any]:
 def read_mesh(path: Path) -> MeshFile:
     """Return the meshes of a file as its scene shows them. Raises SceneError if there are none."""
     document, graph = _open(path, {})
+    document.scale = Scale()  # the scene that shows the meshes has lights of its own
     shapes = meshes.shapes(graph, instances=False)
     if not shapes:
         raise SceneError("holds no triangles", file=path)
@@ -129,7 +126,12 @@ def _open(
     if "time" in variables or "animation" in variables:
         chosen = _text(variables.get("animation"))
         pose = animation.pose(document, chosen, _seconds(path, variables.get("time", 0.0)))
-    return document, nodes.graph(document, _text(variables.get("scene")), pose)
+    graph = nodes.graph(document, _text(variables.get("scene")), pose)
+    lumens = lights.lumens_of(document)
+    if "lumens" in variables:
+        lumens = _number(path, variables, "lumens", 1.0, 1e-6, 1e6)
+    document.scale = lights.scale_of(graph, lumens)
+    return document, graph
 
 
 def _check_extensions(document: Document) -> None:

@@ -192,7 +192,7 @@ class Element:
 
 @dataclass(frozen=True)
 class Scale:
-    """How bright a file's numbers are.
+    """The brightness of a file's numbers.
 
     emission: radiance of an emission of 1 [W m^-2 sr^-1 nm^-1 of D65]; lights: intensity of a
     punctual light of 1, in the same unit [m^2].

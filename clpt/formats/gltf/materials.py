@@ -22,6 +22,7 @@ from clpt.scene.materials import (
 )
 from clpt.scene.params import Texture
 from clpt.scene.textures import Bitmap, MeshAttribute, Product
+from clpt.scene.values import Textured
 
 UNLIT, EMISSIVE = "KHR_materials_unlit", "KHR_materials_emissive_strength"
 EXTENSIONS: tuple[str, ...] = (
@@ -93,7 +94,7 @@ def _emission(element: Element, both: bool) -> Area | None:
     return Area(radiance=_scaled(radiance, element), two_sided=both)
 
 
-def _scaled(shown: Any, element: Element) -> Any:
+def _scaled(shown: Textured, element: Element) -> Textured:
     """An emission that the file counts in its own unit, as radiance."""
     scale = element.document.scale.emission
     if scale == 1.0:

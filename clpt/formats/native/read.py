@@ -23,14 +23,13 @@ from clpt.scene.volumes import Volume
 
 ON_SHAPES = tuple(cls.kind for cls in lights.ON_SHAPES)
 KEYS = (
-    "$schema", "version", "name", "camera", "film", "integrator", "sampler", "materials", "media", "groups",
-    "shapes", "lights", "spp", "noise", "seed",
+    "$schema", "version", "name", "camera", "film", "integrator", "sampler", "materials", "media",
+    "groups", "shapes", "lights", "spp", "noise", "seed",
 )  # fmt: skip
 VERSION = 2  # since it, lamps' files give candela: version 1 took them for W sr^-1 nm^-1
 CANDELA = (
-    "lamps' files give candela since version 2 of scene files, on one scale with lumens and watts: "
-    "the same lamp was 72,983 times as bright before; 'version': 2 in the file says that this is "
-    "meant, 'version': 1 keeps the former brightness"
+    "lamps' files are in candela, as in version 2 of scene files, on one scale with lumens: before, "
+    'such a lamp was 72,983 times as bright; write "version": 2 to confirm, 1 for the former light'
 )
 FILM_KEYS = frozenset(params(integrators.Film))
 
@@ -67,7 +66,7 @@ class _Reader:
         self.volumes: dict[str, Volume] = {}
         self.measurements: dict[str, Any] = {}
         self.groups: dict[str, shapes.Group | None] = {}
-        self.version: int | None = None
+        self.version = _version(root)
         self.warnings: list[str] = []
 
     def scene(self) -> Scene:
@@ -79,7 +78,6 @@ class _Reader:
         root.check_keys("a scene", KEYS)
         if "camera" not in root.value:
             raise root.error("needs a 'camera'")
-        self.version = _version(root.at("version")) if "version" in root.value else None
         readers: dict[str, Callable[[Cursor], Any]] = {
             "camera": lambda c: self.kind(c, "camera"),
             "film": lambda c: self.object_of(c, integrators.Film),
@@ -314,7 +312,11 @@ def _merged(
     )
 
 
-def _version(cursor: Cursor) -> int:
+def _version(root: Cursor) -> int | None:
+    """Return the version that a scene says it has, None without. Raises SceneError."""
+    if not isinstance(root.value, dict) or "version" not in root.value:
+        return None
+    cursor = root.at("version")
     version = cursor.integer()
     if not 1 <= version <= VERSION:
         raise cursor.error(f"this clpt reads the versions 1 to {VERSION}, not {version}")

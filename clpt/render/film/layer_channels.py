@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
+
 from clpt import images, spectral_exr
 from clpt.arrays import Image
 from clpt.render.film import cryptomatte
