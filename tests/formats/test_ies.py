@@ -64,8 +64,9 @@ def test_a_floor_below_a_lamp(written, tmp_path):
     path = written(lamp((0, 90, 180, 270, 360)))
     (tmp_path / "a.json").write_text(
         """{"version": 2, "camera": {"type": "orthographic",
-        "to_world": [{"look_at": {"origin": [0, 0, 1], "target": [0, 0, 0], "up": [0, 1, 0]}}, {"scale": 2}]}, "film": {"width": 16, "height": 16,
-        "mode": "rgb"}, "integrator": {"type": "direct"}, "shapes": [{"type": "rectangle",
+        "to_world": [{"look_at": {"origin": [0, 0, 1], "target": [0, 0, 0], "up": [0, 1, 0]}},
+        {"scale": 2}]}, "film": {"width": 16, "height": 16, "mode": "rgb"},
+        "integrator": {"type": "direct"}, "shapes": [{"type": "rectangle",
         "to_world": [{"scale": 3}], "material": {"type": "diffuse", "reflectance": 0.5}}],
         "lights": [{"type": "goniometric", "file": "lamp.ies", "intensity": [1, 1, 1],
         "to_world": [{"rotate": {"axis": [1, 0, 0], "angle": 90}}, {"translate": [0, 0, 2]}]}]}"""

@@ -126,8 +126,8 @@ def _read(path: Path) -> ImageContents:
     more: dict[str, str] = {}
     stops = 0.0
     if path.suffix.lower() == ".exr":
-        stops = _stops(images.attributes(path))
         channels = images.read_channels(path)
+        stops = _stops(images.attributes(path))
         if len({channel.shape for channel in channels.values()}) != 1:
             raise SceneError("its channels are of different sizes", file=path)
         more = {"layers": "\n".join(_layers(channels))}

@@ -28,8 +28,8 @@ KEYS = (
 )  # fmt: skip
 VERSION = 2  # since it, lamps' files give candela: version 1 took them for W sr^-1 nm^-1
 CANDELA = (
-    "lamps' files are in candela, as in version 2 of scene files, on one scale with lumens: before, "
-    'such a lamp was 72,983 times as bright; write "version": 2 to confirm, 1 for the former light'
+    "lamps' files are in candela, as in version 2 of scene files, on a scale with lumens; before, "
+    'such a lamp was 72,983 times as bright: write "version": 2 to confirm, 1 for the former light'
 )
 FILM_KEYS = frozenset(params(integrators.Film))
 
