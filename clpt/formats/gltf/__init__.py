@@ -79,7 +79,7 @@ def load(path: Path, missing: Missing = "error", /, **variables: Any) -> Scene:
     scene.extra["cameras"] = cameras.descriptions(graph)
     scene.extra["animations"] = animation.descriptions(document)
     scene.extra |= _provenance(document)
-    film = dataclasses.replace(scene.film, display_exposure=lights.display_exposure(document.scale))
+    film = dataclasses.replace(scene.film, display_exposure=document.scale.stops)
     if chosen:
         width, height = chosen[1]
         film = dataclasses.replace(film, width=width, height=height)

@@ -201,6 +201,11 @@ class Scale:
     emission: float = 1.0
     lights: float = 1.0
 
+    @property
+    def stops(self) -> float:
+        """The stops that show an emission of 1 as 1."""
+        return math.log2(1.0 / self.emission)
+
 
 class Document:
     """A parsed file: `root` is its JSON; `warnings` say what was left out."""

@@ -57,11 +57,6 @@ def scale_of(graph: Graph, lumens: float | None) -> Scale:
     return Scale(watt, watt / lumens)
 
 
-def display_exposure(scale: Scale) -> float:
-    """Return the stops that show a file's emission of 1 as 1."""
-    return math.log2(1.0 / scale.emission)
-
-
 def lights_of(graph: Graph) -> list[Light]:
     """Return the lights of the scene."""
     extension = graph.document.root.extension(NAME)
