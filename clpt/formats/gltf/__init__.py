@@ -48,12 +48,11 @@ def load(path: Path, missing: Missing = "error", /, **variables: Any) -> Scene:
     """Read a glTF file; a camera or light that it lacks is added, as for a bare mesh.
 
     variables: `time` [s] of an animation (the first, or the `animation` of that number or name);
-    without it nodes have their own transforms, and materials, lights
-    and cameras their own numbers. `camera` and `scene` choose by number or name.
+    without it nodes have their own transforms, and materials, lights and cameras their own numbers.
+    `camera` and `scene` choose by number or name.
     `shutter` [s] is how long light comes to the film from `time` on, while nodes move.
-    `variant` chooses among material variants. `lumens`: of a watt, by which the exporter multiplied
-    its lights' watts; of files of Blender 683 by itself, of others lights are in candela and lux.
-    `multiple_scattering`: 1 keeps what facets reflect to each other.
+    `variant` chooses among material variants. `lumens`: of a watt, as clpt.formats.gltf.lights has
+    it. `multiple_scattering`: 1 keeps what facets reflect to each other.
     missing: see clpt.load. Raises SceneError with the JSON path of what is wrong.
     """
     if "shutter" in variables:
