@@ -10,6 +10,7 @@ from click.shell_completion import get_completion_class
 
 from .. import output_files
 from ..errors import ClptError
+from .process import terminal
 
 SHELLS = ("bash", "zsh", "fish")
 VARIABLE = "_CLPT_COMPLETE"  # by which a shell asks clpt
@@ -28,7 +29,7 @@ def completion(ctx: click.Context, shell: str, printed: bool) -> None:
     assert made is not None
     script = made(ctx.find_root().command, {}, "clpt", VARIABLE).source()
     if printed:
-        click.echo(script)
+        terminal.write(script)
         return
     path = file_of(shell)
     try:
@@ -36,7 +37,7 @@ def completion(ctx: click.Context, shell: str, printed: bool) -> None:
         output_files.write_text(path, script)
     except OSError as error:
         raise ClptError(f"{path}: cannot be written: {error}") from error
-    click.echo(f"{path}  {advice(shell, path)}")
+    terminal.say(f"{path}  {advice(shell, path)}", err=False)
 
 
 def file_of(shell: str) -> Path:

@@ -14,6 +14,7 @@ from ..errors import SceneError
 from ..formats import load, locate
 from .options.loading_options import loading_options
 from .options.records import with_records
+from .process import terminal
 
 if TYPE_CHECKING:
     from ..scene import Scene
@@ -100,7 +101,7 @@ def _write_texts(plan: Scene, folder: Path, texts: Texts) -> None:
         raise SceneError(f"cannot be written: {error}", file=folder) from error
     for name, source in made.items():
         rows, files = source.text.count("\n"), len(source.files)
-        click.echo(f"{folder / name}.cl  {rows:,} lines from {files} files")
+        terminal.say(f"{folder / name}.cl  {rows:,} lines from {files} files", err=False)
 
 
 def _opened(scene: Path, mode: str | None, variables: dict[str, Any]) -> Scene:
@@ -131,5 +132,5 @@ def _reproduce(plan: Scene, scene: Path, folder: Path, stage: str, which: str | 
         raise SceneError(f"no stage is wrong beside {witness.name}", file=scene)
     told = one.told or "right"
     repro.write(folder, one.launch, str(scene), on.info, witness.name, told)
-    click.echo(f"{one.launch.stage} on {on.info.label}: {told}, beside {witness.name}")
-    click.echo(f"{folder / 'README.txt'} says how to run it without clpt")
+    terminal.say(f"{one.launch.stage} on {on.info.label}: {told}, beside {witness.name}", err=False)
+    terminal.say(f"{folder / 'README.txt'} says how to run it without clpt", err=False)

@@ -12,6 +12,7 @@ from .. import output_files
 from ..choices import DROP_SIZES
 from ..errors import SceneError
 from .options.records import with_records
+from .process import terminal
 from .process.extras import extra
 
 if TYPE_CHECKING:
@@ -107,14 +108,14 @@ def mie(drops: Drops, indices: Indices, output: Path | None, plot: Path | None) 
             output_files.write_text(output, write_medium(medium, DIGITS) + "\n")
         except OSError as error:
             raise SceneError(f"cannot be written: {error.strerror}", file=output) from None
-        click.echo(str(output), err=True)
+        terminal.say(str(output))
     if plot is not None:
         with extra("plot", "a plot"):
             from .plots import mie as mie_plot  # here: matplotlib is an extra, and slow to import
 
         title = f"{drops.law}, {drops.radius:g} um, {indices.index} in {indices.host}"
         mie_plot.write(plot, medium, title)
-        click.echo(str(plot), err=True)
+        terminal.say(str(plot))
     if output is None and plot is None:
         print_medium(medium, at)
 

@@ -40,6 +40,7 @@ from typing import Any, ClassVar, Literal, cast
 
 import numpy as np
 
+from clpt.arrays import in_memory
 from clpt.errors import SceneError, UnusedParameterError
 from clpt.scene import roles
 from clpt.scene.roles import HostForm, Param
@@ -228,7 +229,8 @@ class KindType(type):
             message = f"{cls.__name__} takes its parameters by name: {cls.__name__}({example}=...)"
             raise TypeError(message)
         try:
-            return super().__call__(**_spelled_out(kind, given))
+            plain = _spelled_out(kind, given)
+            return super().__call__(**{name: in_memory(one) for name, one in plain.items()})
         except SceneError as error:
             name, where = given.get("name"), error.where or kind.kind
             if name and isinstance(name, str) and where.startswith(kind.kind):

@@ -11,7 +11,7 @@ import numpy as np
 from ... import images, output_files
 from ...choices import FOR_SCREENS
 from ...colour.false_colours import false_colours
-from ...errors import SceneError
+from ...errors import SceneError, one_line
 from ...images import screen_files
 from ...images.differences import Differences, differences, size_of
 from .conversions import contents
@@ -53,7 +53,7 @@ class Pair:
     def place(self) -> str:
         """Where the largest difference is."""
         x, y, channel = self.found.where
-        return f"{x},{y} {self.labels[channel]}"
+        return one_line(f"{x},{y} {self.labels[channel]}")
 
 
 def _same_wavelengths(a: np.ndarray | None, b: np.ndarray | None) -> bool:
