@@ -372,6 +372,9 @@ class Film(Kind):
     )
     output_space: str = choice("rec709", "colour space of the picture", spaces.SPACES)
     exposure: float = real(1.0, "factor on the picture, of bands too", low=0.0)
+    display_exposure: float = real(
+        0.0, "brightens pictures for screens; other files keep the light", "stops", -64.0, 64.0
+    )
     alpha: bool = host(
         False, "transparent: the camera sees no sky, and a fourth channel tells what is covered"
     )
