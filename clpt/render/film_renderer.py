@@ -18,7 +18,7 @@ from clpt.arrays import Image
 from clpt.choices import MOST_SAMPLES, Exposure
 from clpt.colour.view import View
 from clpt.denoise import needs
-from clpt.errors import ClptError, DeviceError, SceneError
+from clpt.errors import LONGEST_WARNING, ClptError, DeviceError, SceneError, one_line
 from clpt.render.contents import Change, Contents, FilmOwner
 from clpt.render.device_film import Changes
 from clpt.render.editing.scene_edit import MaterialKey, ShapeKey
@@ -80,7 +80,7 @@ class FilmRenderer(FilmOwner, Pictures):
     @property
     def warnings(self) -> list[str]:
         """Warnings of the scene, and of those who take its samples, for people."""
-        return [*self._maker.warnings, *self._told]
+        return [one_line(text, LONGEST_WARNING) for text in (*self._maker.warnings, *self._told)]
 
     @property
     def device(self) -> dev.Device:
@@ -454,7 +454,8 @@ class FilmRenderer(FilmOwner, Pictures):
 
         An .exr has the film's layers and bands. A renderer with `denoise` writes what is denoised.
         A film with alpha: see `clpt.write_image`.
-        exposure [stops], tone, view: of files for screens, see `clpt.write_image`.
+        exposure [stops] over the film's `display_exposure`, tone, view: of files for screens, see
+        `clpt.write_image`.
 
         Raises SceneError for an unknown suffix, and for a file that cannot be written.
         """

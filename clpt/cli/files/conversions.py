@@ -32,13 +32,18 @@ def write_converted(
     pixels = _picture(image) if layer is None else _layer(image, layer)
     if source.suffix.lower() in images.STRAIGHT:
         pixels = images.multiplied(pixels)
-    metadata = {"software": f"clpt {VERSION}", "source": source.name}
+    metadata: dict[str, str | int | float] = {
+        "software": f"clpt {VERSION}", "source": source.name
+    }  # fmt: skip
+    stops = image.stops if layer is None else 0.0
+    if stops and target.suffix.lower() == ".exr":
+        metadata[images.STOPS] = stops
     images.write(
-        target, pixels, metadata=metadata, exposure=grading.exposure, tone=grading.tone,
-        view=grading.view,
+        target, pixels, metadata=metadata, exposure=images.raised(grading.exposure, stops),
+        tone=grading.tone, view=grading.view,
     )  # fmt: skip
     if grading.exposure == "auto" and for_screens((target,)):
-        tell(f"exposure {images.auto_exposure(images.straight(pixels)):+.1f} stops")
+        tell(f"exposure {images.auto_exposure(images.straight(pixels)) - stops:+.1f} stops")
     tell(str(target))
 
 
