@@ -352,6 +352,7 @@ LAYER_SIZES = Constants(
     "LAYER_",
     "Sizes of layers of the first samples of a pixel.",
     most_words=(64, "of all layers together"),
+    long_words=(4, "of a number of any size"),
     matte_slots=(12, "names that a matte keeps"),
 )
 MOTION_SIZES = Constants("MOTION_", "Sizes of tables of motion.", step=(29, "floats of one"))

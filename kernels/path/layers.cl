@@ -12,12 +12,13 @@ inline vec3 layer_albedo(Scene scene, Scattering scatter, Wavelengths lambdas, S
     return scale3(film_value(scene, albedo, lambdas), weight);
 }
 
-/* How far a point is from the camera along its axis, the third column of `to_world` [m]. */
+/* How far a point is from the camera along its axis, the third column of `to_world` at the path's time [m]. */
 inline real layer_z(Scene scene, vec3 p)
 {
     global const float *m = (global const float *)scene.camera;
-    float length = sqrt(m[2] * m[2] + m[6] * m[6] + m[10] * m[10]);
-    return ((p.x - m[3]) * m[2] + (p.y - m[7]) * m[6] + (p.z - m[11]) * m[10]) / length;
+    vec3 axis = v3(m[2], m[6], m[10]), from = v3(m[3], m[7], m[11]);
+    camera_axis_moved(scene, &from, &axis);
+    return dot3(sub3(p, from), axis) / sqrt(dot3(axis, axis));
 }
 
 /* The shading normal; points of media have none. */
@@ -30,8 +31,8 @@ inline vec3 layer_normal(Scattering scatter)
 inline void layer_put_long3(integer *words, mask m, vec3 v, real weight)
 {
     layer_put_long(words, m, v.x * weight);
-    layer_put_long(words + 3, m, v.y * weight);
-    layer_put_long(words + 6, m, v.z * weight);
+    layer_put_long(words + LAYER_LONG_WORDS, m, v.y * weight);
+    layer_put_long(words + 2 * LAYER_LONG_WORDS, m, v.z * weight);
 }
 
 /* Puts what the camera sees `first`; Settings.layer_<name> is 0 where there is no such layer. */
@@ -54,7 +55,7 @@ inline void layers_put_first(Scene scene, Slab path, uint at, integer *words, ma
     if (settings->layer_position) layer_put_long3(words + settings->layer_position, first, v.s.p, weight);
     if (settings->layer_uv) {
         layer_put_long(words + settings->layer_uv, first, v.s.uv.x * weight);
-        layer_put_long(words + settings->layer_uv + 3, first, v.s.uv.y * weight);
+        layer_put_long(words + settings->layer_uv + LAYER_LONG_WORDS, first, v.s.uv.y * weight);
     }
     if (settings->layer_motion) screen_motion_record(scene, words + settings->layer_motion, first, v, weight);
     mask zeroth = first & (load_path_sample(path, at) == 0);

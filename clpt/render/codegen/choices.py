@@ -70,6 +70,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
             "generated/layer_args.cl",
             *_screen_motion(f),
             *either(f.screen_motion, "path/screen_motion_record.cl"),
+            *either(f.motion.camera, "path/camera_axis.cl"),
             "path/layers.cl",
         )
         or ("path/layers_none.cl",)
