@@ -45,6 +45,7 @@ class LayerFeatures:
     names: tuple[str, ...] = ()
     present: bool = False  # for any kind of paths of the scene
     material_numbers: int = 0  # where they stand in `distributions`
+    primitive_rows: int = 0  # where those stand of shapes whose primitives have other rows
     light_groups: int = 0  # of lights, where there is a layer for each
     light_group_row: int | None = None  # where in `distributions` they are
 
