@@ -9,9 +9,11 @@
 #include "generated/rivals.cl"
 #include "generated/guide.cl"
 #include "generated/path_steps.cl"
+#include "generated/scout.cl"
 
 inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask active, Vertex v SHADE_ARGS)
 {
+    active = scout_vertex(scene, path, at, LAYER_PASSED, active, v);
     Spectrum beta = v.beta, ratio = load_path_ratio(path, at);
     mask met = active & !met_emission(scene, path, at, active, v SHADE_PASSED);
     mask next = BSDF_IS_PANE ? met : met & vertex_continues(scene, v, vertex_is_null((integer)(0)));

@@ -64,7 +64,19 @@ inline void layers_put_first(Scene scene, Slab path, uint at, integer *words, ma
     if (settings->layer_material_id) layer_put_id(words + settings->layer_material_id, zeroth, v.material);
 }
 
-/* Adds what the `met` paths see here. Returns the paths' state, which says whether denoisers have got theirs. */
+/* Adds what the `first` paths see first. */
+inline void layers_see(Scene scene, Slab path, uint at, LAYER_ARGS, mask first, Vertex v, Scattering scatter)
+{
+    first = layers_want(path, at, first);
+    integer words[LAYER_MOST_WORDS], pixel_index = load_path_pixel_index(path, at);
+    int before = scene.settings->layer_denoising; /* theirs come last */
+    layers_put_first(scene, path, at, words, first, v, scatter, layer_weight(path, at));
+    layers_add(scene, layers, first, pixel_index, words, before ? before : scene.settings->layer_words);
+    mattes_record(scene, mattes, first, pixel_index, v);
+}
+
+/* Adds what the `met` paths see here, but what they see first where other paths scout for that. Returns the paths'
+ * state, which says whether denoisers have got theirs. */
 inline integer layers_record(Scene scene, Slab path, uint at, LAYER_ARGS, mask met, Vertex v, Scattering scatter,
                              integer state)
 {
@@ -75,19 +87,16 @@ inline integer layers_record(Scene scene, Slab path, uint at, LAYER_ARGS, mask m
         state |= sel_i(met, (integer)(PATH_SEEN), (integer)(0));
     }
     if (!any(adds)) return state;
-    real weight = layer_weight(path, at);
+#if !LAYERS_SCOUT
+    if (any(first)) layers_see(scene, path, at, LAYER_PASSED, first, v, scatter);
+#endif
+    if (!DENOISERS_SEE) return state;
     integer words[LAYER_MOST_WORDS];
-    layers_put_first(scene, path, at, words, first, v, scatter, weight);
-    if (DENOISERS_SEE && settings->layer_denoising_albedo) {
-        vec3 albedo = layer_albedo(scene, scatter, v.lambdas, v.beta, weight);
-        layer_put(words + settings->layer_denoising_albedo, adds, albedo);
-    }
-    if (DENOISERS_SEE && settings->layer_denoising_normal)
-        layer_put(words + settings->layer_denoising_normal, adds, scale3(layer_normal(scatter), weight));
-    int count = settings->layer_words, before = settings->layer_denoising; /* theirs come last */
-    if (before && BSDF_DELTA) count = before;
-    integer pixel_index = load_path_pixel_index(path, at);
-    layers_add(scene, layers, adds, pixel_index, words, count);
-    mattes_record(scene, mattes, first, pixel_index, v);
+    int before = settings->layer_denoising, albedo = settings->layer_denoising_albedo - before;
+    int normal = settings->layer_denoising_normal - before;
+    real weight = layer_weight(path, at);
+    if (albedo >= 0) layer_put(words + albedo, adds, layer_albedo(scene, scatter, v.lambdas, v.beta, weight));
+    if (normal >= 0) layer_put(words + normal, adds, scale3(layer_normal(scatter), weight));
+    layers_add(scene, layers + before, adds, load_path_pixel_index(path, at), words, settings->layer_words - before);
     return state;
 }

@@ -22,6 +22,8 @@
 #include "generated/first_ray.cl"
 #include "path/first_cone.cl"
 #include "generated/layer_sums.cl"
+#include "path/path_state.cl"
+#include "generated/scouts_begin.cl"
 
 /* Adds the finished paths to the sums of their pixels. What is not finite counts as black, at its own wavelength. */
 inline void add_sample(Scene scene, Slab path, uint at, BEGIN_ARGS, PathEnd end, integer part, integer pixel_index,
@@ -97,10 +99,13 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
         integer slot = LANE_INDEX + (int)at;
         integer pixel_index = load_path_pixel_index(path, at), sample = load_path_sample(path, at);
         integer part = film_part(settings, sample);
-        add_sample(scene, path, at, BEGIN_PASSED, end, part, pixel_index, sample);
-        mask unseen = end.ended & end.begun & (end.depth == 0);
+        mask scouted = scouts_ended(end), unseen = LAYERS_END(end, scouted) & (end.depth == 0);
         layers_count(scene, path, at, layers, unseen);
         layers_of_sky(scene, path, at, layers, unseen);
+        mask begins = end.ended;
+        end.ended = end.ended & !scouted;
+        end.missed = end.missed & !scouted;
+        add_sample(scene, path, at, BEGIN_PASSED, end, part, pixel_index, sample);
         NextSample next = next_sample(settings, work_list, samples, slot, end.ended, end.begun, pixel_index, sample);
         mask turns = end.ended & !next.leaves & (film_part(settings, next.sample) != part);
         if (any(next.leaves | turns)) {
@@ -112,8 +117,10 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
         count(counters, COUNTER_DONE, next.done, (integer)(1));
         mask go = end.ended & !next.done;
         store_path_sample(path, at, go, next.sample);
-        begin_path(scene, path, at, go, next.pixel_index, next.sample);
+        next.sample = sel_i(scouted, sample, next.sample);
+        begin_path(scene, path, at, go | scouted, next.pixel_index, next.sample);
         integer begun = PATH_BEGUN | ghost_bit(scene, next.pixel_index, next.sample);
-        store_path_state(path, at, end.ended, sel_i(next.done, (integer)(PATH_DONE), begun));
+        begun |= scouts_begin(scouted, next.sample);
+        store_path_state(path, at, begins, sel_i(next.done, (integer)(PATH_DONE), begun));
     }
 }

@@ -75,6 +75,8 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         )
         or ("path/layers_none.cl",)
     ),
+    "generated/scouts_begin.cl": lambda f, _: either(f.scouts, "path/scouts_begin.cl"),
+    "generated/scout_choice.cl": lambda f, _: either(f.scouts, "path/scout_choice.cl"),
     "generated/mattes.cl": lambda f, _: either(f.film.layers.mattes, "path/mattes.cl"),
     "generated/light_layers.cl": lambda f, _: (
         *when(f.film.layers.lights, "generated/light_layer_args.cl", "generated/sampler.cl"),
@@ -293,6 +295,7 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
         "steps/adjoint_weight.cl",
         *either(not flags.is_null(f, cls), "steps/light_path_roulette.cl"),
     ),
+    "generated/scout.cl": lambda f, cls: either(f.scouts and not cls.is_phase, "path/scout.cl"),
     "generated/vertex_steps.cl": lambda f, cls: (
         *either(f.names_surfaces, "path/vertex_names.cl"),
         *(

@@ -68,6 +68,12 @@ class LayerFeatures:
         return 1 + sum(LAYERS[name].words for name in self.names)
 
     @property
+    def of_surfaces(self) -> bool:
+        """Whether some layer is of the first surface that is seen."""
+        first = (name for name in self.places if not LAYERS[name].denoising)
+        return any(first) or bool(self.mattes)
+
+    @property
     @macro("USES_LAYERS")
     def first_samples(self) -> bool:
         """Whether the first samples of a pixel add to some layer."""
