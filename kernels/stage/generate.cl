@@ -19,11 +19,41 @@
 #include "generated/seen_wavelengths.cl"
 #include "generated/ghosts.cl"
 #include "generated/sky.cl"
+#include "generated/path_covers.cl"
 #include "generated/first_ray.cl"
 #include "path/first_cone.cl"
 #include "generated/layer_sums.cl"
 #include "path/path_state.cl"
 #include "generated/scouts_begin.cl"
+
+/* What a sample begins with. */
+typedef struct {
+    CameraRay ray;
+    Spectrum beta;
+    Wavelengths lambdas;
+    real time;
+    vec2 position, lens;
+} SampleBegin;
+
+/* Draws it; `go`: the paths that take it. */
+inline SampleBegin sample_begin(Scene scene, Slab path, uint at, mask go, integer pixel_index, integer sample)
+{
+    global const Settings *settings = scene.settings;
+    vec2 pixel = pixel_of_index(settings, pixel_index);
+    Sampler sampler = pixel_sampler(settings, pixel_key(settings, pixel_index), sample);
+    vec2 offset = exposure_begin(scene, path, at, go, sampler);
+    vec2 u = sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH));
+    SampleBegin b;
+    b.position = film_position(settings, pixel, offset);
+    b.time = motion_time(scene, merging_moment(scene, u.x, u.y, sample));
+    b.lambdas = wavelengths_sample(scene, merging_wavelength(scene, u.x, sample));
+    b.lens = sampler_pair(sampler, (natural)(DIMENSION_LENS));
+    scene.time = b.time;
+    b.ray = first_ray(scene, b.position, b.lens, b.lambdas, &b.beta);
+    return b;
+}
+
+#include "generated/path_start.cl"
 
 /* Adds the finished paths to the sums of their pixels. What is not finite counts as black, at its own wavelength. */
 inline void add_sample(Scene scene, Slab path, uint at, BEGIN_ARGS, PathEnd end, integer part, integer pixel_index,
@@ -48,7 +78,9 @@ inline void add_sample(Scene scene, Slab path, uint at, BEGIN_ARGS, PathEnd end,
         rejected = finished & !film_accepts(value);
         value = sel3(rejected, v3(0.0f, 0.0f, 0.0f), value);
     }
-    Light light = {value, small, !(end.missed & (end.depth == 0)), radiance, lambdas, scale};
+    Spectrum start = path_start(scene, path, at, pixel_index, sample);
+    real covers = path_covers(scene, path, at, end, lambdas, start);
+    Light light = {value, small, covers, radiance, lambdas, scale};
     exposure_add(scene, path, at, BEGIN_PASSED, finished, part, pixel_index, sample, light);
     path_end_count(counters, end, end.depth + load_path_nulls(path, at));
 }
@@ -57,25 +89,16 @@ inline void add_sample(Scene scene, Slab path, uint at, BEGIN_ARGS, PathEnd end,
 inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_index, integer sample)
 {
     global const Settings *settings = scene.settings;
-    vec2 pixel = pixel_of_index(settings, pixel_index);
-    natural key = pixel_key(settings, pixel_index);
-    Sampler sampler = pixel_sampler(settings, key, sample);
-    vec2 offset = exposure_begin(scene, path, at, go, sampler);
-    vec2 position = film_position(settings, pixel, offset);
-    vec2 u = sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH));
-    scene.time = motion_time(scene, merging_moment(scene, u.x, u.y, sample));
-    Wavelengths lambdas = wavelengths_sample(scene, merging_wavelength(scene, u.x, sample));
-    vec2 lens = sampler_pair(sampler, (natural)(DIMENSION_LENS));
-    Spectrum beta;
-    CameraRay ray = first_ray(scene, position, lens, lambdas, &beta);
-    store_path_time(path, at, go, scene.time);
-    store_path_cone(path, at, go, first_cone(scene, ray, position, lens, lambdas));
-    store_path_o(path, at, go, ray.o);
-    store_path_d(path, at, go, ray.d);
-    store_path_lambdas(path, at, go, lambdas);
-    store_path_beta(path, at, go, beta);
+    SampleBegin b = sample_begin(scene, path, at, go, pixel_index, sample);
+    scene.time = b.time;
+    store_path_time(path, at, go, b.time);
+    store_path_cone(path, at, go, first_cone(scene, b.ray, b.position, b.lens, b.lambdas));
+    store_path_o(path, at, go, b.ray.o);
+    store_path_d(path, at, go, b.ray.d);
+    store_path_lambdas(path, at, go, b.lambdas);
+    store_path_beta(path, at, go, b.beta);
     store_path_radiance(path, at, go, spectrum_of((real)(0.0f)));
-    store_path_pdf(path, at, go, -ray.far);
+    store_path_pdf(path, at, go, -b.ray.far);
     store_path_eta(path, at, go, (real)(1.0f));
     store_path_rival(path, at, go, (real)(settings->light_paths));
     store_path_expected(path, at, go, (real)(0.0f));

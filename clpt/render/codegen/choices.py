@@ -75,6 +75,10 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         )
         or ("path/layers_none.cl",)
     ),
+    "generated/path_covers.cl": lambda f, _: either(f.film.alpha, "path/covers.cl"),
+    "generated/path_start.cl": lambda f, _: either(
+        f.film.alpha and f.camera.weighs, "path/start.cl"
+    ),
     "generated/scouts_begin.cl": lambda f, _: either(f.scouts, "path/scouts_begin.cl"),
     "generated/scout_choice.cl": lambda f, _: either(f.scouts, "path/scout_choice.cl"),
     "generated/mattes.cl": lambda f, _: either(f.film.layers.mattes, "path/mattes.cl"),
