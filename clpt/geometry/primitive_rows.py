@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from clpt.geometry import strands, triangles, tubes
 from clpt.geometry.shapes import where
-from clpt.scene.shapes import Shape
-
-Rows = NDArray[np.int64]
+from clpt.scene.shapes import Curves, Mesh, Shape
 
 
-def primitive_rows(shape: Shape, times: Sequence[float] = ()) -> Rows | None:
+def primitive_rows(shape: Shape, times: Sequence[float] = ()) -> NDArray[np.int64] | None:
     """Return the caller's row for each primitive of a shape, (n,); None: kernels know it.
 
     times: at which a shape that deforms has vertices [s]. It is the row in `faces` of a mesh, also
@@ -29,16 +26,16 @@ def primitive_rows(shape: Shape, times: Sequence[float] = ()) -> Rows | None:
     return None if same else rows
 
 
-def _of_triangles(shape: Any, times: Sequence[float]) -> Rows:
+def _of_triangles(shape: Shape, times: Sequence[float]) -> NDArray[np.int64]:
     return np.flatnonzero(triangles.kept(shape, times))
 
 
-def _of_mesh(shape: Any, times: Sequence[float]) -> Rows:
+def _of_mesh(shape: Mesh, times: Sequence[float]) -> NDArray[np.int64]:
     kept = triangles.kept(shape, times)
     return np.asarray(triangles.sources(shape, len(kept))[kept])
 
 
-def _of_tubes(shape: Any, times: Sequence[float]) -> Rows:
+def _of_tubes(shape: Curves, times: Sequence[float]) -> NDArray[np.int64]:
     keyed = times if shape.deformation is not None else ()
     alike = [triangles.at_time(shape, time) for time in keyed]
     vertices, faces, _, _ = triangles.local(alike[0] if alike else shape, alike)
@@ -46,19 +43,19 @@ def _of_tubes(shape: Any, times: Sequence[float]) -> Rows:
     return np.asarray(strand[faces[:, 0]][triangles.kept(shape, times)])
 
 
-def _of_curves(shape: Any, times: Sequence[float]) -> Rows:
+def _of_curves(shape: Curves, times: Sequence[float]) -> NDArray[np.int64]:
     return strands.strands(shape)
 
 
-def _of_one(shape: Any, times: Sequence[float]) -> Rows:
+def _of_one(shape: Shape, times: Sequence[float]) -> NDArray[np.int64]:
     return np.zeros(int(triangles.kept(shape, times).sum()), np.int64)
 
 
-def _as_they_lie(shape: Any, times: Sequence[float]) -> None:
+def _as_they_lie(shape: Shape, times: Sequence[float]) -> None:
     """Each is one by itself."""
 
 
-_ROWS: dict[str, Callable[[Any, Sequence[float]], Rows | None]] = {
+_ROWS: dict[str, Callable[..., NDArray[np.int64] | None]] = {
     "mesh": _of_mesh,
     "tubes": _of_tubes,
     "curves": _of_curves,

@@ -24,5 +24,5 @@ inline real rounding_step(vec3 p, real size) { return SURFACE_ROUNDING * (size3(
  * (core/twofold.cl): what a point is off them hardly grows with their size, but with its own coordinates. */
 #define EXACT_SIZE 0x1p-20f
 
-/* How far beside a primitive of this size a point at p may seem to be that lies on it [m]. Rays leave from farther off. */
+/* How far beside a primitive of this size a point at p may seem to be that lies on it [m]. Rays begin farther off. */
 inline real beside_step(vec3 p, real size) { return 0.25f * rounding_step(p, size); }

@@ -13,7 +13,6 @@
 
 inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask active, Vertex v SHADE_ARGS)
 {
-    active = scout_vertex(scene, path, at, LAYER_PASSED, active, v);
     Spectrum beta = v.beta, ratio = load_path_ratio(path, at);
     mask met = active & !met_emission(scene, path, at, active, v SHADE_PASSED);
     mask next = BSDF_IS_PANE ? met : met & vertex_continues(scene, v, vertex_is_null((integer)(0)));
@@ -62,6 +61,6 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
 inline void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active SHADE_ARGS)
 {
     Vertex v = vertex_load(scene, path, hit, at, active);
-    path_vertex(scene, path, shadow, at, active, v SHADE_PASSED);
+    path_vertex(scene, path, shadow, at, scout_vertex(scene, path, at, LAYER_PASSED, active, v), v SHADE_PASSED);
 }
 #endif

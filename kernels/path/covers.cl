@@ -1,5 +1,5 @@
-/* How much a sample covers of what is behind the picture: 1, less the share of light that comes through from there to the
- * camera, as a mean over the wavelengths; 0 for that is not kept, as in black smoke. */
+/* How much a sample covers of what is behind the picture: 1, less the share of light that comes through from there, as
+ * a mean over the wavelengths. Black smoke covers too. */
 #include "path/sky_dimmed.cl"
 
 /* start: the throughput with which the path began, which a lens weighs. */

@@ -1,6 +1,7 @@
 /* Layers beside the picture: what the camera sees at a path's first surface and, for denoisers, at the first one that
  * is not a mirror or smooth glass, as dark and as coloured as what is before lets it through. */
 #include "film/layers.cl"
+#include "generated/scouts.cl"
 
 #include "generated/mattes.cl"
 #define DENOISERS_SEE (settings->layer_denoising && !BSDF_DELTA) /* past mirrors and smooth glass */
@@ -87,9 +88,7 @@ inline integer layers_record(Scene scene, Slab path, uint at, LAYER_ARGS, mask m
         state |= sel_i(met, (integer)(PATH_SEEN), (integer)(0));
     }
     if (!any(adds)) return state;
-#if !LAYERS_SCOUT
-    if (any(first)) layers_see(scene, path, at, LAYER_PASSED, first, v, scatter);
-#endif
+    if (!LAYERS_SCOUT && any(first)) layers_see(scene, path, at, LAYER_PASSED, first, v, scatter);
     if (!DENOISERS_SEE) return state;
     integer words[LAYER_MOST_WORDS];
     int before = settings->layer_denoising, albedo = settings->layer_denoising_albedo - before;

@@ -6,15 +6,6 @@
 #define PATH_SEEN 0x10000000 /* layers for denoisers have the path, see path/layers.cl */
 #define PATH_GHOST 0x20000000 /* of a lens's samples, of light that two of its surfaces have reflected */
 
-/* Where fog, thin glass or masks decide by chance what a path meets first, a path goes ahead of each of a pixel's first
- * samples, to the first surface, for layers alone (path/scout.cl). */
-#define PATH_SCOUTS 0x40000000
-#if LAYERS_SCOUT
-#define path_scouts(state) (((state) & PATH_SCOUTS) != 0)
-#else
-#define path_scouts(state) mask_of(0)
-#endif
-
 /* A null surface (a hole of a mask, a boundary that neither bends nor scatters, with FREE_PANES thin glass where light
  * goes straight through it) is no step of a path: it adds nothing to the depth. A path crosses this many of them, and
  * then ends; a shadow ray that meets more is blocked. */

@@ -1,5 +1,5 @@
-/* A path that scouts goes through fog, holes and hidden lights to the first surface, which layers then have, and ends. */
-#include "path/hide_light.cl"
+/* A path that scouts goes through fog, holes and hidden lights to the first surface, which layers have, and ends. */
+#include "generated/scouts.cl"
 
 /* Takes those of the `active` paths a surface further that scout; returns the others. */
 inline mask scout_vertex(Scene scene, Slab path, uint at, LAYER_ARGS, mask active, Vertex v)

@@ -1,4 +1,6 @@
 /* Which paths that ended only scouted: their samples begin anew. */
+#include "generated/scouts.cl"
+
 inline mask scouts_ended(PathEnd end) { return end.ended & end.begun & path_scouts(end.state); }
 
 /* The bits of Path.state by which the paths begin that go ahead of their samples. */

@@ -7,6 +7,7 @@
 #include "interface/stage.cl"
 #include "generated/sampler.cl"
 #include "path/path_state.cl"
+#include "generated/scouts.cl"
 #include "generated/textures.cl"
 #include "generated/medium.cl"
 #include "generated/grid_flight.cl"

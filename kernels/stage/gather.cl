@@ -6,6 +6,7 @@
 #include "generated/gather_args.cl"
 #include "generated/sampler.cl"
 #include "path/path_state.cl"
+#include "generated/scouts.cl"
 #include "path/surface_flags.cl"
 #include "generated/textures.cl"
 #include "interface/bsdf.cl"

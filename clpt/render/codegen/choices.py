@@ -79,6 +79,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/path_start.cl": lambda f, _: either(
         f.film.alpha and f.camera.weighs, "path/start.cl"
     ),
+    "generated/scouts.cl": lambda f, _: either(f.scouts, "path/scouts.cl"),
     "generated/scouts_begin.cl": lambda f, _: either(f.scouts, "path/scouts_begin.cl"),
     "generated/scout_choice.cl": lambda f, _: either(f.scouts, "path/scout_choice.cl"),
     "generated/mattes.cl": lambda f, _: either(f.film.layers.mattes, "path/mattes.cl"),
@@ -299,7 +300,9 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
         "steps/adjoint_weight.cl",
         *either(not flags.is_null(f, cls), "steps/light_path_roulette.cl"),
     ),
-    "generated/scout.cl": lambda f, cls: either(f.scouts and not cls.is_phase, "path/scout.cl"),
+    "generated/scout.cl": lambda f, cls: when(
+        f.film.layers.words > 0, *either(f.scouts and not cls.is_phase, "path/scout.cl")
+    ),
     "generated/vertex_steps.cl": lambda f, cls: (
         *either(f.names_surfaces, "path/vertex_names.cl"),
         *(

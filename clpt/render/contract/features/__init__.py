@@ -148,7 +148,6 @@ class Features:
         return self.screen_motion or not forms.isdisjoint(("id", "matte"))
 
     @property
-    @macro("LAYERS_SCOUT")
     def scouts(self) -> bool:
         """Whether paths go ahead to the first surface, as chance decides what others meet."""
         chance = self.media.present or self.materials.mixtures or self.materials.free_panes
