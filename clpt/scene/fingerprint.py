@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from clpt import input_files
-from clpt.arrays import on_host
+from clpt.arrays import on_device, on_host
 from clpt.errors import SceneError
 from clpt.scene import Scene
 from clpt.scene.materials import Material
@@ -125,7 +125,7 @@ class _Walk:
                 raise SceneError(
                     "is a buffer on a device; an Array of PyOpenCL is read", where=where
                 )
-            return {"": _array(np.asarray(on_host(thing)), form)}
+            return {"": _array(np.asarray(on_host(thing) if on_device(thing) else thing.get()), form)}
         if isinstance(thing, Sequence):
             numbers = _numbers(thing)
             if numbers is not None:
