@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import spectra, transforms
+from clpt import budget, spectra, transforms
 from clpt.geometry import shape_records, shapes
 from clpt.geometry.instancing import Instances
 from clpt.geometry.refining import is_refined
@@ -131,13 +131,15 @@ def lower(
     common with this one: it saves time, and what is "auto" stays as chosen, unless it is chosen
     anew. Arrays, lights and images that are the same objects as then are taken to hold the same.
 
-    Raises SceneError where the scene makes no sense: it names the shape, light or material.
+    Raises SceneError where the scene makes no sense: it names the shape, light or material; and
+    where it takes more than the budget of its load has left.
     """
     cache = LoweringCache(former.cache if former else None)
     before = None
     if former is not None and not anew:
         before = Before(former.integrator, former.features.transport.lit_ghosts)
-    return encode(analyse(scene, cache, before), cache, texture_budget)
+    with budget.resumed(scene.account):
+        return encode(analyse(scene, cache, before), cache, texture_budget)
 
 
 def encode(found: Analysis, cache: LoweringCache, texture_budget: int | None = None) -> Lowered:
