@@ -7,7 +7,7 @@ import json
 import pickle
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from clpt.formats.native.shape_files import FILES
 from clpt.geometry import polygons
 from clpt.images import pillow
 from clpt.render.lowering.scene import lower
+from clpt.scene import materials
 from clpt.scene.shapes import Mesh
 
 QUAD = """v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1
@@ -203,3 +204,19 @@ def test_an_unknown_suffix_of_a_mesh(tmp_path: Path) -> None:
                 clpt.load(path)
             if kind is Mesh:
                 assert ".obj, .ply, .stl, .off" in str(raised.value)
+
+
+HOLDERS = [
+    (kind.kind, field.name)
+    for kind in materials.KINDS
+    for field in fields(kind)
+    if field.type == "Material"
+]
+
+
+@pytest.mark.parametrize(("kind", "name"), HOLDERS)
+def test_a_material_that_another_needs(tmp_path: Path, kind: str, name: str) -> None:
+    assert len(HOLDERS) >= 6
+    path = scene(tmp_path, material={"type": kind, name: None})
+    with pytest.raises(SceneError, match=f"{kind} needs a material as its '{name}'"):
+        clpt.Renderer(clpt.load(path))
