@@ -12,7 +12,7 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -171,6 +171,15 @@ def take(size: int, what: str, file: Path | None = None) -> None:
         _check(account, size, what, file)
         account.held += size
     check_time(file)
+
+
+def take_made(arrays: Iterable[Any], what: str) -> None:
+    """Ask for memory of arrays that are made of a scene, None left out. Raises as `take` does.
+
+    The scene of no file, which has no account, has no limit either.
+    """
+    if _account.get() is not None:
+        take(sum(array.nbytes for array in arrays if array is not None), what)
 
 
 def take_image(size: int, what: str, file: Path | None = None) -> None:

@@ -75,6 +75,33 @@ def test_its_time_is_that_of_the_load(tmp_path: Path, which: str) -> None:
             lower(other)
 
 
+def stretched(kind: str, count: int) -> dict[str, Any]:
+    """Spheres or cylinders that an instance stretches, so that they become triangles."""
+    group = [{"type": kind, "to_world": {"translate": [3 * i, 0, 0]}} for i in range(count)]
+    instance = {"type": "instance", "group": "g", "to_world": {"scale": [1, 2, 3]}}
+    return {"groups": {"g": group}, "shapes": [instance]}
+
+
+CURVES = [[np.cos(i), np.sin(i), 0.01 * i, 1e-5] for i in range(3000)]
+MANY: dict[str, dict[str, Any]] = {  # many shapes of few words, that become many triangles
+    "spheres": stretched("sphere", 60),
+    "cylinders": stretched("cylinder", 700),
+    "curves": {
+        "shapes": [{"type": "curves", "basis": "bspline", "points": CURVES, "lengths": [3000]}]
+    },
+}
+
+
+@pytest.mark.parametrize("which", MANY)
+def test_shapes_of_few_words_draw_from_it(tmp_path: Path, which: str) -> None:
+    path = tmp_path / "s.json"
+    path.write_text(json.dumps({"camera": {"type": "perspective"}, **MANY[which]}))
+    loaded = clpt.load(path, budget=clpt.Budget(memory=6 * MEBI))
+    with pytest.raises(SceneError, match=r"the limit is 6\.0 MiB.*raise --load-memory"):
+        lower(loaded)
+    lower(clpt.load(path))
+
+
 def test_each_time_draws_from_what_the_load_has_left(tmp_path: Path) -> None:
     """A page makes a scene ready hundreds of times: that adds nothing up."""
     loaded = clpt.load(scene(tmp_path, **LARGE["both"]), budget=clpt.Budget(memory=16 * MEBI))
