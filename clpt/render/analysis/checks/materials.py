@@ -31,8 +31,9 @@ def check_material(material: Material, film: Film) -> None:
 
 def _check_held(material: Material) -> None:
     """Raise SceneError for a material in which another is missing that it cannot do without."""
+    own = fields_of(material)
     for field in dataclasses.fields(material):
-        if field.type == "Material" and getattr(material, field.name) is None:
+        if field.type == "Material" and own[field.name] is None:
             raise SceneError(f"{material.kind} needs a material as its {field.name!r}, not none")
 
 
