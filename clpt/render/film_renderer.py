@@ -21,6 +21,7 @@ from clpt.choices import MOST_SAMPLES, Exposure
 from clpt.colour.view import View
 from clpt.denoise import needs
 from clpt.errors import LONGEST_WARNING, ClptError, DeviceError, SceneError, one_line
+from clpt.images import exr_files
 from clpt.render.contents import Change, Contents, FilmOwner
 from clpt.render.device_film import Changes
 from clpt.render.editing.scene_edit import MaterialKey, ShapeKey
@@ -453,7 +454,8 @@ class FilmRenderer(FilmOwner, Pictures):
     ) -> None:
         """Write the picture so far to a file, in the format of the path's suffix; wait for it.
 
-        An .exr has the film's layers. A renderer with `denoise` writes what is denoised.
+        An .exr has the film's layers, and as its data window the place of a crop. A renderer with
+        `denoise` writes what is denoised.
         exposure [stops] over the film's `display_exposure`, tone, view: of files for screens, see
         `clpt.write_image`.
 
@@ -467,7 +469,11 @@ class FilmRenderer(FilmOwner, Pictures):
         picture = plain if self.denoise is None else self.denoised()
         space = film.output_space
         stops = images.raised(exposure, film.display_exposure)
-        images.write(path, picture, exposure=stops, space=space, tone=tone, view=view)
+        place = self._form.place if path.suffix.lower() == ".exr" else None
+        images.write(
+            path, picture, exposure=stops, space=space, tone=tone, view=view,
+            metadata=exr_files.windows(picture.shape, place),
+        )  # fmt: skip
 
     # ---- the end
 
