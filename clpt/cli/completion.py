@@ -10,6 +10,7 @@ from click.shell_completion import get_completion_class
 
 from .. import output_files
 from ..errors import ClptError
+from .options.values import Choice
 from .process import terminal
 
 SHELLS = ("bash", "zsh", "fish")
@@ -17,7 +18,7 @@ VARIABLE = "_CLPT_COMPLETE"  # by which a shell asks clpt
 
 
 @click.command()
-@click.argument("shell", type=click.Choice(SHELLS))
+@click.argument("shell", type=Choice(SHELLS))
 @click.option("--print", "printed", is_flag=True, help="Print the script, and install nothing.")
 @click.pass_context
 def completion(ctx: click.Context, shell: str, printed: bool) -> None:

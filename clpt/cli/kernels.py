@@ -14,6 +14,7 @@ from ..errors import SceneError
 from ..formats import load, locate
 from .options.loading_options import loading_options
 from .options.records import with_records
+from .options.values import Choice
 from .process import terminal
 
 if TYPE_CHECKING:
@@ -45,14 +46,14 @@ class Reproduction:
     help="Folder for the files; created if missing.",
 )  # fmt: skip
 @click.option(
-    "--lanes", type=click.Choice(["1", "8", "16"]), default="8", show_default=True,
+    "--lanes", type=Choice(["1", "8", "16"]), default="8", show_default=True,
     help="Paths per work-item: 1 as on a GPU, 8 or 16 as on a CPU.",
 )  # fmt: skip
 @click.option(
-    "--layout", type=click.Choice(LAYOUTS), default="wide8", show_default=True,
+    "--layout", type=Choice(LAYOUTS), default="wide8", show_default=True,
     help="Acceleration structure of the triangles.",
 )  # fmt: skip
-@click.option("--mode", type=click.Choice(MODES), help="What light is made of.")
+@click.option("--mode", type=Choice(MODES), help="What light is made of.")
 @click.option(
     "--repro", metavar="STAGE",
     help="Write a program of its own, in C and in Python, that shows whether a device runs this "

@@ -12,6 +12,7 @@ from .. import output_files
 from ..choices import DROP_SIZES
 from ..errors import SceneError
 from .options.records import with_records
+from .options.values import Choice
 from .process import terminal
 from .process.extras import extra
 
@@ -45,7 +46,7 @@ class Indices:
 @click.command()
 @click.argument("radius", type=float)
 @click.option(
-    "--law", default="log_normal", show_default=True, type=click.Choice(DROP_SIZES),
+    "--law", default="log_normal", show_default=True, type=Choice(DROP_SIZES),
     help="How many drops have which radius: RADIUS is that of all, the median, or the effective"
     " radius (Hansen and Travis 1974).",
 )  # fmt: skip

@@ -444,6 +444,7 @@ class DeviceFilm:
             lambda_max=film.lambda_max,
             output_space=film.output_space,
             exposure=film.exposure,
+            display_exposure=film.display_exposure,
             layers=features.film.layers.names,
             paper=tuple(map(tuple, white_paper(film, features.spectra.mode).tolist())),
             names=first.scene.lowered.layer_names,

@@ -453,7 +453,8 @@ class FilmRenderer(FilmOwner, Pictures):
         """Write the picture so far to a file, in the format of the path's suffix; wait for it.
 
         An .exr has the film's layers. A renderer with `denoise` writes what is denoised.
-        exposure [stops], tone, view: of files for screens, see `clpt.write_image`.
+        exposure [stops] over the film's `display_exposure`, tone, view: of files for screens, see
+        `clpt.write_image`.
 
         Raises SceneError for an unknown suffix, and for a file that cannot be written.
         """
@@ -464,7 +465,8 @@ class FilmRenderer(FilmOwner, Pictures):
         plain = self.image() if film.bands == 0 else self.colours()
         picture = plain if self.denoise is None else self.denoised()
         space = film.output_space
-        images.write(path, picture, exposure=exposure, space=space, tone=tone, view=view)
+        stops = images.raised(exposure, film.display_exposure)
+        images.write(path, picture, exposure=stops, space=space, tone=tone, view=view)
 
     # ---- the end
 

@@ -238,10 +238,18 @@ class KindType(type):
             raise
 
 
+OF_FILES = {  # keys of objects in a scene file, and what Python has instead
+    "file": "clpt.load reads a scene.json that has it, a mesh also by itself",
+    "type": "in Python the class says it",
+}
+
+
 def _spelled_out(kind: type[Kind], given: dict[str, object]) -> dict[str, object]:
     """Return arguments of a kind without shorthands. Raises SceneError, UnusedParameterError."""
     known, short = _field_names(kind), shorthands(kind)
     for name in given:
+        if name in OF_FILES:
+            raise SceneError(f"{name!r} is for scene files: {OF_FILES[name]}", where=kind.kind)
         if name not in known and name not in short:
             raise UnusedParameterError(kind.kind, name, (*known, *short))
     plain = {name: value for name, value in given.items() if name not in short}

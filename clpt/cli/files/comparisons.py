@@ -37,7 +37,8 @@ class Pair:
         first, second = contents(a), contents(b)
         sizes = size_text(first.values), size_text(second.values)
         if sizes[0] != sizes[1]:
-            raise SceneError(f"is {sizes[1]} pixels, and {a} is {sizes[0]}", file=b)
+            advice = "; render both with the same --size"
+            raise SceneError(f"is {sizes[1]} pixels, and {a} is {sizes[0]}{advice}", file=b)
         if _same_wavelengths(first.lambdas, second.lambdas):
             values, labels = (first.values, second.values), first.labels
         elif first.colours is not None and second.colours is not None:
