@@ -10,8 +10,8 @@
  * first word on, and its highest density. A medium with MEDIUM_BYTES in its name has 8 bits for each number. */
 #include "generated/brick_cells.cl"
 #define GRID_ROULETTE 0.05f /* what passes below this is at stake */
-/* Collisions of one way through a grid. A density of 1 beside empty cells, under a large coefficient, makes as many null
- * collisions as a file likes. A way with more of them makes its sample infinite, which the film rejects and counts. */
+/* Collisions of one way through a grid. A density of 1 beside empty cells, under a large coefficient, makes as many
+ * null collisions as a file likes. A way with more makes its sample infinite, which the film rejects and counts. */
 #define MOST_NULL_COLLISIONS 262144u
 
 /* A ray in the lattice, and the brick where it is. */
