@@ -39,7 +39,7 @@ from clpt.render.stats import RenderStats, collect
 from clpt.render.wavefront import adaptive
 from clpt.render.wavefront.film_state import join_ranges
 from clpt.render.wavefront.wavefront import Counts, Wavefront
-from clpt.scene import Scene
+from clpt.scene import Scene, checked_seed
 from clpt.scene.cameras import Camera
 from clpt.scene.materials import Material
 
@@ -300,17 +300,16 @@ class FilmRenderer(FilmOwner, Pictures):
     ) -> cl.Event:
         """Enqueue that the film is emptied; the next sample is the first one again.
 
-        wait_for: events of the caller that come first. first_sample: its number from now on, by
-        default as before. seed: of the samples from now
-        on, which `self.scene` then has; by default as before. Raises SceneError for a seed that is
-        no whole number, and for a number that is too large.
+        wait_for: events of the caller that come first. first_sample: its number from now on, from
+        0 to 2^31 - 1, by default as before. seed: of the samples from now on, from 0 to 2^32 - 1,
+        which `self.scene` then has; by default as before. Raises SceneError for other numbers.
 
         A renderer that says it is broken is whole again then, unless it says otherwise.
         """
         if first_sample is not None:
             first_sample = checked_number(first_sample)
         if seed is not None:
-            seed = scalars.whole(seed, where="seed")
+            seed = checked_seed(seed)
         broken = isinstance(self._contents, Change)
         self._maker.after(wait_for)
         with self._healing("reset", lambda _: self._emptied(recover=True)):
@@ -452,8 +451,8 @@ class FilmRenderer(FilmOwner, Pictures):
     ) -> None:
         """Write the picture so far to a file, in the format of the path's suffix; wait for it.
 
-        An .exr has the film's layers and bands. A renderer with `denoise` writes what is denoised.
-        A film with alpha: see `clpt.write_image`.
+        An .exr has the film's layers and bands, and as its data window the place of a crop. A
+        renderer with `denoise` writes what is denoised. A film with alpha: see `clpt.write_image`.
         exposure [stops] over the film's `display_exposure`, tone, view: of files for screens, see
         `clpt.write_image`.
 
@@ -530,8 +529,8 @@ def next_range(first: int, samples: int) -> tuple[int, int]:
 
 
 def checked_number(number: int) -> int:
-    """Return a sample's number. Raises SceneError for one that is too large."""
-    number = scalars.whole(number, 0, where="samples")
+    """Return a sample's number. Raises SceneError for one below 0, and for one too large."""
+    number = scalars.whole(number, 0, where="first_sample")
     if number > MOST_SAMPLES:
         raise SceneError(f"a pixel cannot have more than {MOST_SAMPLES} samples", where="samples")
     return number

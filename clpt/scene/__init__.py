@@ -12,6 +12,7 @@ import numpy as np
 
 from clpt import scalars
 from clpt.budget import Account
+from clpt.choices import MOST_SEED
 from clpt.errors import SceneError
 from clpt.scene import (
     cameras,
@@ -215,9 +216,14 @@ class Scene:
         self.shapes, self.lights = _listed(self.shapes, "shapes"), _listed(self.lights, "lights")
         check_parts(self)
         self.spp = scalars.whole(self.spp, 1, where="spp")
-        self.seed = scalars.whole(self.seed, where="seed")
+        self.seed = checked_seed(self.seed)
         if self.noise is not None:
             self.noise = checked_noise(self.noise)
+
+
+def checked_seed(seed: object) -> int:
+    """Return a seed. Raises SceneError for no whole number of 32 bits: kernels know no others."""
+    return scalars.whole(seed, 0, MOST_SEED, where="seed")
 
 
 def check_parts(scene: Scene) -> None:
