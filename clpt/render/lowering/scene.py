@@ -165,7 +165,7 @@ def encode(found: Analysis, cache: LoweringCache, texture_budget: int | None = N
         *encoder.textures.finish(),
     )  # fmt: skip
     motion_row = _lower_motion(found, lights, encoder)
-    names, layers = lower_names(index, geometry, lights, encoder.store)
+    names, layers = lower_names(index, geometry, lights, encoder.store, cache)
     features = _features(found, encoder, surfaces, rows, motion_row, layers)
     aims, around, disperses = (rows.aims, len(found.aims)), surfaces.around, features.dispersion
     own = Found(rows.density, rows.ambient, aims, around, disperses, layers)
