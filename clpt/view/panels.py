@@ -166,8 +166,7 @@ def _of_metal(material: Material, metal: object) -> Material:
         raise CommandError("a metal is given by its name")
     known = fields_of(material)
     plain = {name: value for name, value in known.items() if name not in ("eta", "k")}
-    cls: Any = type(material)
-    return cls(**plain, metal=metal)
+    return type(material)(**plain, **{METAL: metal})
 
 
 def _of_kind(material: Material, kind: object) -> Material:
