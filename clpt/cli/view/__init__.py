@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from ...choices import MOST_SEED
 from ...formats import locate
 from ..options.grading import grading_options
 from ..options.headings import grouped
@@ -44,7 +45,7 @@ EXAMPLES = (
 @worker_options("Render on workers, as of `clpt render`.")
 @click.option("--spp", type=Count(), help="Samples per pixel: 256, 1k, 1M.")
 @click.option("--noise", type=Noise(), help="As of `clpt render`.")
-@click.option("--seed", type=click.IntRange(0, 2**31 - 1), help="Seed of the random numbers.")
+@click.option("--seed", type=click.IntRange(0, MOST_SEED), help="Seed of the random numbers.")
 @scene_options
 @grading_options
 @verbose_option("Log more, twice for everything.")
