@@ -40,6 +40,9 @@ help:
 
 demo: $(VENV)/.run
 	$(BIN)/clpt render scenes/three_spheres -o demo.exr -o demo.png
+	@echo "make: demo.png is there. Go on by typing:"
+	@echo "          . $(VENV)/bin/activate"
+	@echo "          clpt scenes"
 
 test: $(VENV)/.dev
 	$(BIN)/python -m pytest -q $(SHARED)
