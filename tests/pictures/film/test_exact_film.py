@@ -185,9 +185,9 @@ def test_numbers_of_a_stopped_run_are_not_used_again():
 
 
 def test_what_stops_a_run():
-    """Only False, and `cancel`, also before the run."""
+    """Only what is false, and `cancel`, also before the run."""
     with clpt.Renderer(sky()) as renderer:
-        assert renderer.run(3, lambda progress: None) and renderer.run(3, lambda progress: 0)
+        assert renderer.run(3, lambda progress: None) and renderer.run(3, lambda progress: 1)
         renderer.cancel()
         assert not renderer.run(3) and renderer.samples == 6
         assert renderer.run(3) and renderer.samples == 9
