@@ -154,6 +154,11 @@ SETTINGS = Record(
     aim_count=("integer", "number of these spheres, see kernels/lighting/aiming.cl"),
     camera_medium=("integer", "medium around the camera, see kernels/media/medium.cl"),
     camera_bodies=("integer", "bodies around it, see kernels/media/bodies.cl"),
+    second_u=(
+        "integer",
+        "number of the attribute vertex_u1 among those of meshes; -1: no map asks",
+    ),
+    second_v=("integer", "number of vertex_v1"),
     light_count=("integer", "rows in `lights`"),
     ambient=(
         "integer",

@@ -520,6 +520,10 @@ class GltfSurface(Material):
         return self.transmission != 0.0 or self.diffuse_transmission != 0.0
 
     @property
+    def directing(self) -> tuple[object, object]:
+        return self.clearcoat_normal_x, self.anisotropy_rotation
+
+    @property
     def uses_tangents(self) -> bool:
         return self.anisotropy != 0.0 or self.clearcoat_apart != 0.0
 

@@ -35,6 +35,11 @@ class Scatterer(Kind):
         return False
 
     @property
+    def directing(self) -> tuple[object, object]:
+        """What tells the normals of a coat, and what tells directions along the surface."""
+        return 0.0, 0.0
+
+    @property
     def uses_tangents(self) -> bool:
         """Whether what it does differs between the tangent and across."""
         given = fields_of(self)

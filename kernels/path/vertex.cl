@@ -87,7 +87,8 @@ inline Scattering vertex_scattering(Scene scene, Slab path, uint at, mask active
     store_path_lambdas(path, at, active, scatter.lambdas);
 #endif
     scatter.shading = shading_frame_load(scene, v.row, v.s, v.d, scatter.lambdas);
-    scatter.bsdf = coat_normal_turned(scatter.bsdf, v.s, scatter.shading.frame);
+    scatter.bsdf = coat_normal_turned(scene, v.row, scatter.bsdf, v.s, scatter.shading.frame);
+    scatter.bsdf = anisotropy_turned(scene, v.row, scatter.bsdf, v.s, scatter.shading.frame);
     scatter.wo = to_frame(scatter.shading.frame, neg3(v.d));
     return scatter;
 }

@@ -32,7 +32,8 @@ class Found:
     density_row: where the table of the density of wavelengths begins in `distributions`;
     ambient_row: where the ambient light is in `light_params`; aims: the first of the spheres at
     which light paths aim, and their number; around: words of the bodies and of the medium at the
-    camera; disperses: whether directions depend on wavelengths; layers: beside the picture.
+    camera; disperses: whether directions depend on wavelengths; layers: beside the picture;
+    second_uv: numbers of the attributes that a mesh's second set of uv are, -1 for none.
     """
 
     density_row: int
@@ -41,6 +42,7 @@ class Found:
     around: tuple[int, int]
     disperses: bool
     layers: LayerFeatures
+    second_uv: tuple[int, int]
 
 
 def settings_of(
@@ -67,6 +69,7 @@ def settings_of(
     settings["rival_area"] = rival_area(sphere[1])
     settings["aims"], settings["aim_count"] = found.aims
     settings["camera_bodies"], settings["camera_medium"] = found.around
+    settings["second_u"], settings["second_v"] = found.second_uv
     settings["light_count"] = len(lights.rows)
     settings["infinite_count"] = lights.infinite
     settings["ambient"] = found.ambient_row
