@@ -52,15 +52,16 @@ def build(device: Device, source: Source, options: Sequence[str] = ()) -> Progra
         return program
     if on_disk:
         device.builds.on_new()
-    device.builds.on_compile()
+    entry = _entry(device, source, flags)
+    device.builds.on_compile(entry)
     start = time.perf_counter()
     with compile_limits.watched(source):
         program = _from_source(device, source, flags)
         if on_disk:  # a binary is compiled to the end, a program of the driver may not be
-            entry = _entry(device, source, flags)
             binary = native_programs.binary(program.cl_program)
             disk_cache.store(entry, encode(program.signatures), binary)
             program = _from_cache(device, source, flags, entry) or program
+    device.builds.on_compiled(entry)
     return _built(device, source, flags, program, time.perf_counter() - start)
 
 
@@ -129,9 +130,10 @@ def compile_ahead(device: Device, sources: Mapping[str, Source], main: str) -> N
             text, options = next(declarations.forms(device, source.text, flags))
             seconds = compile_limits.seconds_for(source)
             told = source.name, seconds, device.info.platform, device.info.name
-            device.builds.on_compile()
+            device.builds.on_compile(part)
             job = Job(*told, " ".join(options), text)
-            device.compilers.submit(part, job, first=device.hurries)
+            compiled = partial(device.builds.on_compiled, part)
+            device.compilers.submit(part, job, first=device.hurries, done=compiled)
     device.builds.on_new()
 
 
@@ -180,15 +182,16 @@ def _part(device: Device, source: Source, flags: list[str]) -> cl.Program:
 
 def _compiled(device: Device, source: Source, flags: list[str]) -> cl.Program:
     """Return a part of a program that this process compiles. Raises KernelBuildError."""
-    device.builds.on_compile()
+    entry = _entry(device, source, [*flags, _PART])
+    device.builds.on_compile(entry)
     try:
         make = partial(native_programs.compile_part, device.context, device.info.cl_device)
         part = declarations.built(device, source.text, flags, make)
     except cl.Error as error:
         raise _build_error(source, str(error)) from error
     if _has_binaries(device):
-        entry = _entry(device, source, [*flags, _PART])
         disk_cache.store(entry, _PART, native_programs.binary(part))
+    device.builds.on_compiled(entry)
     return part
 
 

@@ -135,15 +135,17 @@ class Builds:
     """The programs that have been built so far, and the seconds that took (summed over threads).
 
     cached: how many of them came from clpt's own cache; drivers do not tell about theirs.
-    on_compile: called when a program, or a part of one, is about to be given to a compiler. on_new:
-    called when that is in none of clpt's caches, after other processes have got their share.
-    Threads call both, and wait for them.
+    on_compile: called with a key when a program, or a part of one, is about to be given to a
+    compiler, and on_compiled with the same key when it has been. on_new: called when a program is
+    in none of clpt's caches, after other processes have got their share. Threads call all three,
+    and wait for them.
     """
 
     programs: int = 0
     cached: int = 0
     seconds: float = 0.0
-    on_compile: Callable[[], None] = lambda: None
+    on_compile: Callable[[str], None] = lambda key: None
+    on_compiled: Callable[[str], None] = lambda key: None
     on_new: Callable[[], None] = lambda: None
     _lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
 

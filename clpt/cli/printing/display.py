@@ -35,6 +35,44 @@ def display(quiet: bool, limit: float | None, name: str = "") -> Display:
     return Bar(limit, name) if sys.stderr.isatty() else Lines(limit, name)
 
 
+class Programs:
+    """Counts programs that are compiled; changed: called after each change, one at a time."""
+
+    def __init__(self, changed: Callable[[], None] = lambda: None):
+        self._begun: set[str] = set()
+        self._ended: set[str] = set()
+        self._changed, self._lock = changed, threading.Lock()
+
+    def begin(self, key: str) -> None:
+        """Note that a program is about to be compiled."""
+        self._note(key, self._begun)
+
+    def end(self, key: str) -> None:
+        """Note that a program has been compiled."""
+        self._note(key, self._ended)
+
+    def _note(self, key: str, keys: set[str]) -> None:
+        with self._lock:
+            if key not in keys:
+                keys.add(key)
+                self._changed()
+
+    @property
+    def begun(self) -> int:
+        """The number of programs that a compiler has, or has had."""
+        return len(self._begun)
+
+    @property
+    def ended(self) -> int:
+        """The number of programs that are ready."""
+        return len(self._ended)
+
+    @property
+    def told(self) -> str:
+        """The count of ready programs, for people."""
+        return f"{self.ended} of {self.begun}, once for this kind of scene"
+
+
 class Display:
     """Shows nothing; the base of those that do."""
 
@@ -49,9 +87,9 @@ class Display:
         yield
 
     @contextmanager
-    def compiling(self, text: str) -> Iterator[Callable[[], None]]:
-        """Yield a function that any thread calls when a compiler begins; show it if it lasts."""
-        yield lambda: None
+    def compiling(self, text: str) -> Iterator[Programs]:
+        """Yield programs, of which any thread tells what is compiled; show them if it lasts."""
+        yield Programs()
 
     def begin(self, text: str) -> None:
         """Show a text at once, until something else is shown."""
@@ -105,25 +143,19 @@ class Lines(Display):
         yield
 
     @contextmanager
-    def compiling(self, text: str) -> Iterator[Callable[[], None]]:
-        timer = threading.Timer(PATIENCE, self._compiles, [text])
+    def compiling(self, text: str) -> Iterator[Programs]:
+        timer = threading.Timer(PATIENCE, lambda: self.note(f"{text}: {programs.told} ..."))
         timer.daemon = True
-        lock, begun = threading.Lock(), False
 
-        def begin() -> None:
-            nonlocal begun
-            with lock:
-                if not begun:
-                    timer.start()
-                begun = True
+        def begun() -> None:
+            if programs.begun == 1 and not programs.ended:
+                timer.start()
 
+        programs = Programs(begun)
         try:
-            yield begin
+            yield programs
         finally:
             timer.cancel()
-
-    def _compiles(self, text: str) -> None:
-        self.note(f"{text} ...")
 
     @contextmanager
     def loading(self, name: str) -> Iterator[Callable[[float, str], None]]:
@@ -168,13 +200,32 @@ class Bar(Lines):
 
     @contextmanager
     def phase(self, text: str) -> Iterator[None]:
-        with self.console.status(text):
+        with self.console.status(f"{text} ..."):
             yield
 
     @contextmanager
-    def compiling(self, text: str) -> Iterator[Callable[[], None]]:
-        with self.console.status(self.name) as status:
-            yield lambda: status.update(text)
+    def compiling(self, text: str) -> Iterator[Programs]:
+        from rich.progress import BarColumn, SpinnerColumn, TextColumn
+        from rich.progress import Progress as RichProgress
+
+        columns = (
+            SpinnerColumn(),
+            TextColumn("{task.description}", markup=False),
+            BarColumn(NARROW),
+            TextColumn("{task.fields[told]}", markup=False),
+        )
+        bar = RichProgress(*columns, console=self.console, transient=True)
+        task = bar.add_task(self.name[:LONGEST_NAME], total=None, told="")
+
+        def changed() -> None:
+            bar.update(
+                task, description=text, total=programs.begun, completed=programs.ended,
+                told=programs.told,
+            )  # fmt: skip
+
+        programs = Programs(changed)
+        with bar:
+            yield programs
 
     @contextmanager
     def loading(self, name: str) -> Iterator[Callable[[float, str], None]]:

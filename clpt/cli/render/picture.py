@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -215,8 +215,11 @@ class _Picture:
 
     def _write(self) -> float:
         """Write the files of the picture; return the samples of a pixel in the mean."""
-        job, stats = self._job, self._stats()
-        outputs.write_all(job.targets, self._renderer, stats, job.graded.grading, self._shown.note)
+        job, stats, denoiser = self._job, self._stats(), self._renderer.denoise
+        with self._shown.phase(f"denoising ({denoiser})") if denoiser else nullcontext():
+            outputs.write_all(
+                job.targets, self._renderer, stats, job.graded.grading, self._shown.note
+            )
         return float(stats["spp"])
 
     @contextmanager
