@@ -42,6 +42,7 @@ PATH = Record(
     eta=("real", "product of the relative indices so far, for Russian roulette"),
     weight=("real", "sample's weight by the pixel filter; from a light, 1 over its first beta"),
     medium=("integer", "medium of the ray, see kernels/media/medium.cl; 0: none"),
+    around=("integer", "medium from which the ray went into a body that absorbs; 0: none"),
     bodies=("integer", "bodies around the ray, see kernels/media/bodies.cl"),
     lead=("real", "how far before o the ray's medium begins: o lies off the surface [m]"),
     rival=(

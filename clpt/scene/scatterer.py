@@ -36,7 +36,7 @@ class Scatterer(Kind):
 
     @property
     def directing(self) -> tuple[object, object]:
-        """What tells the normals of a coat, and what tells directions along the surface."""
+        """The values or textures that tell a coat's normals, and directions along the surface."""
         return 0.0, 0.0
 
     @property

@@ -13,8 +13,8 @@
 #define PERTURB_UNSHADED 8   /* the edge is not softened */
 #define PERTURB_NORMAL 16    /* there is a normal map */
 #define PERTURB_HEIGHT 32    /* there is a bump map */
-#define PERTURB_SECOND 64    /* the normal map lies on a mesh's second set of uv; twice that: a coat's; four times that: */
-#define PERTURB_TURNS 11     /* directions of anisotropy. First of the words `to_uv` */
+#define PERTURB_SECOND 64    /* the normal map is on a mesh's second uv; twice and four times that: the other two */
+#define PERTURB_TURNS 11     /* first of the words `to_uv` */
 #define PERTURB_STEP 1e-4f   /* of uv, over which heights are compared */
 
 typedef struct {

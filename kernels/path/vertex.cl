@@ -134,6 +134,7 @@ inline void vertex_leave(Slab path, uint at, mask next, mask null, Vertex v, vec
     store_path_d(path, at, next, d);
     store_path_beta(path, at, next, beta);
     store_path_medium(path, at, next, vertex_medium(v, d));
+    store_path_around(path, at, next, vertex_around(v, d));
     store_path_lead(path, at, next, surface_lead(v.s, d));
     store_path_bodies(path, at, next, vertex_through(v, d));
 }

@@ -1,5 +1,5 @@
-/* What the x and y of a map are along, beside the frame in which its surface is shaded: they lie in the plane of both, and
- * are told by a unit vector and a side. */
+/* What the x and y of a map are along, beside the frame in which its surface is shaded: they lie in the plane of both,
+ * and are told by a unit vector and a side. */
 typedef struct {
     real c, s; /* x of the map in that frame */
     real side; /* 1 where y is at x's left there, -1 where uv are mirrored */

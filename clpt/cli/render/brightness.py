@@ -10,6 +10,7 @@ import numpy as np
 from ... import images
 from ...arrays import Floats32
 from ...render.analysis.lights import light_power
+from ...render.analysis.lights.look import Look
 from ...render.analysis.lights.sources import emissions_of
 from ...render.pictures import DevicePictures
 from ...scene import Scene
@@ -54,8 +55,9 @@ def _pixels(renderer: DevicePictures) -> Floats32:
 
 def _outshone(scene: Scene) -> Iterator[str]:
     """Yield a sentence where one lamp with a place is far stronger than any other."""
+    look = Look.of(scene.film)
     powers = [
-        (light_power.power(lamp, _strength(lamp), 1.0), f"lights[{i}] ({lamp.kind})")
+        (light_power.power(lamp, _strength(lamp, look), 1.0, look), f"lights[{i}] ({lamp.kind})")
         for i, lamp in enumerate(scene.lights)
         if lamp.reach == "placed"
     ]
@@ -67,7 +69,7 @@ def _outshone(scene: Scene) -> Iterator[str]:
         yield f"{name} is {times} any other lamp: little is seen of what the others light"
 
 
-def _strength(lamp: Light) -> float:
+def _strength(lamp: Light, look: Look) -> float:
     """The mean of the emissions of a lamp."""
-    values = [light_power.brightness(value) for value in emissions_of(lamp).values()]
+    values = [light_power.brightness(value, look) for value in emissions_of(lamp).values()]
     return float(np.mean(values)) if values else 0.0

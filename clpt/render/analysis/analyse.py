@@ -85,7 +85,7 @@ def analyse(scene: Scene, cache: LoweringCache, before: Before | None = None) ->
     index = replace(SceneIndex.of(scene), lit_before=before.lit_ghosts if before else None)
     geometry = assembled(index, cache)
     sphere = geometry.bounding_sphere()
-    look = Look(index.spectral, scene.film.lambda_min, scene.film.lambda_max, cache)
+    look = Look.of(scene.film, cache)
     sources = sources_of(index, geometry, sphere[1], look)
     index, lit = _media_at_lights(index, geometry, sources, sphere, cache)
     former = before.integrator if before else None
