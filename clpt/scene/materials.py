@@ -128,6 +128,12 @@ class Material(Scatterer):
 
     # of a kind without such parameters
     absorption = cast(SpectrumLike, CLEAR)
+
+    @property
+    def inside_index(self) -> IndexLike:
+        """The index of refraction of what is behind the boundary."""
+        return Constant(1.0)
+
     layers = cast("tuple[Layer, ...]", ())
 
 
@@ -177,6 +183,10 @@ class Dielectric(Material):
     layers: tuple[Layer, ...] = layers(FILMS)
 
     @property
+    def inside_index(self) -> IndexLike:
+        return self.int_ior
+
+    @property
     def transmits(self) -> bool:
         return True
 
@@ -224,6 +234,10 @@ class RoughDielectric(Material):
     specular_transmittance: Textured = _factor("transmission", linear=True)
     absorption: SpectrumLike = coefficient(0.0, "of the inside: exp(-absorption distance) passes")
     layers: tuple[Layer, ...] = layers(FILMS)
+
+    @property
+    def inside_index(self) -> IndexLike:
+        return self.int_ior
 
     @property
     def transmits(self) -> bool:
@@ -519,6 +533,10 @@ class GltfSurface(Material):
     iridescence_thickness: TexturedNumber = real(
         400.0, "its thickness", "nm", 0.0, 1e5, textured=True
     )
+
+    @property
+    def inside_index(self) -> IndexLike:
+        return Constant(1.0) if self.thin else self.ior
 
     @property
     def transmits(self) -> bool:

@@ -10,8 +10,8 @@ import numpy as np
 from ... import images
 from ...arrays import Floats32
 from ...render.analysis.lights import light_power
-from ...render.analysis.lights.look import Look
 from ...render.analysis.lights.sources import emissions_of
+from ...render.analysis.look import Look
 from ...render.pictures import DevicePictures
 from ...scene import Scene
 from ...scene.lights import Light

@@ -19,8 +19,8 @@ from clpt.render.analysis.lights.aims import aims
 from clpt.render.analysis.lights.escapes import escape_lamps
 from clpt.render.analysis.lights.hard_light import Lit, decided
 from clpt.render.analysis.lights.light_media import NOWHERE, LightMedia, light_media
-from clpt.render.analysis.lights.look import Look
 from clpt.render.analysis.lights.sources import Sources, sources_of
+from clpt.render.analysis.look import Look
 from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.render.analysis.sealed import sealed_media
 from clpt.render.analysis.surroundings import (

@@ -15,7 +15,7 @@ from clpt.geometry.tessellate import keeps_its_kind
 from clpt.geometry.winding import box
 from clpt.render.analysis.bricks import Glow, black_bodies, glow
 from clpt.render.analysis.index import SceneIndex, leaves_of
-from clpt.render.analysis.lights.look import Look
+from clpt.render.analysis.look import Look
 from clpt.render.analysis.open_boundaries import HOLE, hole_around
 from clpt.render.analysis.surroundings import every
 from clpt.scene.media import Grid, Lattice, Medium

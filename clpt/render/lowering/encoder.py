@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from clpt.arrays import Words
-from clpt.render.analysis.lights.look import Look
+from clpt.render.analysis.look import Look
 from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.render.analysis.wavelengths import Density
 from clpt.render.contract.features.materials import Sources

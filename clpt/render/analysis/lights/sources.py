@@ -20,8 +20,8 @@ from clpt.render.analysis.glow import GlowingBody, glows
 from clpt.render.analysis.index import SceneIndex
 from clpt.render.analysis.lights import image_lights, light_bounds, light_power, sky_light
 from clpt.render.analysis.lights.light_bounds import Bounds
-from clpt.render.analysis.lights.look import Look
 from clpt.render.analysis.lights.triangle_means import triangle_means
+from clpt.render.analysis.look import Look
 from clpt.render.contract.light_records import INFINITE
 from clpt.scene import lights
 from clpt.scene.lights import Area, DirectionalArea, Light

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Floats
 from clpt.render.analysis.lights.light_power import brightness
-from clpt.render.analysis.lights.look import Look
+from clpt.render.analysis.look import Look
 from clpt.scene.textures import Bitmap, Checkerboard, MeshAttribute, Mix, Product, Texture
 
 LOOKS = 1 << 18  # at a texture, all triangles together

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from clpt.render.analysis.index import SceneIndex
 from clpt.render.analysis.lights.light_bounds import concatenated
 from clpt.render.analysis.lights.light_power import brightness
-from clpt.render.analysis.lights.look import Look
+from clpt.render.analysis.look import Look
 from clpt.render.lowering.lights.lights import LightRows
 
 
