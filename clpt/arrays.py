@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mmap
 import sys
 from typing import Any
 
@@ -27,6 +28,31 @@ def on_host(values: object) -> Any:
     """Return values in host memory; of an array on a device a copy, for which it waits."""
     module = sys.modules.get("pyopencl.array")  # whoever has such an array has imported it
     return values.get() if module and isinstance(values, module.Array) else values
+
+
+def in_memory(value: object) -> Any:
+    """Return an argument of a scene's part with copies of the arrays that are maps of files.
+
+    A file that changes would change the scene, and one that is cut would end the process. Looks
+    into mappings and sequences; whatever else holds arrays asks by itself.
+    """
+    if isinstance(value, np.ndarray):
+        return np.array(value, order="K", subok=False) if _is_map(value) else value
+    if isinstance(value, dict):
+        kept = {name: in_memory(one) for name, one in value.items()}
+        return kept if any(kept[name] is not one for name, one in value.items()) else value
+    if isinstance(value, (list, tuple)) and any(isinstance(one, np.ndarray) for one in value):
+        parts = [in_memory(one) for one in value]
+        return tuple(parts) if isinstance(value, tuple) else parts
+    return value
+
+
+def _is_map(array: Array) -> bool:
+    """Whether an array's numbers lie in a map of a file."""
+    held: object = array
+    while isinstance(held, (np.ndarray, memoryview)) and not isinstance(held, np.memmap):
+        held = held.obj if isinstance(held, memoryview) else held.base
+    return isinstance(held, (np.memmap, mmap.mmap))
 
 
 def on_device(values: object) -> bool:

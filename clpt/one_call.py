@@ -13,7 +13,7 @@ from clpt import formats
 from clpt.arrays import Image
 from clpt.errors import SceneError
 from clpt.render.film_renderer import checked_samples
-from clpt.render.options import RenderOptions, check_scene
+from clpt.render.options import RenderOptions, check_names, check_scene
 from clpt.render.progress import Progress
 from clpt.render.renderer import Renderer
 from clpt.scene import Film, Scene, viewpoint
@@ -45,6 +45,10 @@ class PictureOptions(RenderOptions, total=False):
     env: str | os.PathLike[str] | None
 
 
+# `spp` and others are arguments of `render` itself; they stand here for messages.
+OPTIONS = (*PictureOptions.__annotations__, "spp", "noise", "device", "progress")
+
+
 def render(
     scene: Scene | str | os.PathLike[str],
     spp: int | None = None,
@@ -65,12 +69,12 @@ def render(
 
     Raises as `clpt.load` and `Renderer` do.
     """
+    if isinstance(scene, (str, os.PathLike)):
+        scene = _loaded(Path(scene), options)
+    check_scene(scene)
+    check_names(scene, options, OPTIONS)
     size, mode = options.pop("size", None), options.pop("mode", None)
     camera, env = options.pop("camera", None), options.pop("env", None)
-    if isinstance(scene, (str, os.PathLike)):
-        named = {"camera": camera} if isinstance(camera, (str, int)) else {}
-        scene, camera = _loaded(Path(scene), named), None if named else camera
-    check_scene(scene)
     if env is not None:
         scene = viewpoint.surrounded(scene, os.fspath(formats.brought(env)))
     spp = checked_samples(scene.spp if spp is None else spp)
@@ -86,8 +90,13 @@ def render(
     return renderer.image() if renderer.denoise is None else renderer.denoised()
 
 
-def _loaded(file: Path, variables: dict[str, str | int]) -> Scene:
-    return formats.load(file, **variables)  # type: ignore[arg-type]
+def _loaded(file: Path, options: PictureOptions) -> Scene:
+    """Return the scene of a file, with the camera whose name or number is taken from options."""
+    camera = options.get("camera")
+    if not isinstance(camera, (str, int)):
+        return formats.load(file)
+    del options["camera"]
+    return formats.load(file, camera=camera)
 
 
 def small_picture(scene: Scene) -> bytes:

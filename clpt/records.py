@@ -192,6 +192,11 @@ SETTINGS = Record(
     matte_material=("integer", "1 more than where that of materials stands; 0: there is none"),
     mattes=("integer", "lists of names of a pixel"),
     material_numbers=("integer", "where in `distributions` materials have numbers; 0: nowhere"),
+    primitive_rows=(
+        "integer",
+        "where in `distributions` rows of `shapes` have the place of their list of the caller's "
+        "rows of primitives, 0: they have none; 0: no row has one",
+    ),
     layer_direct=("integer", "1 more than where that of direct light stands; 0: there is none"),
     layer_indirect=("integer", "1 more than where that of indirect light stands; 0: there is none"),
     layer_groups=("integer", "1 more than where those of groups of lights begin; 0: there is none"),
@@ -199,7 +204,7 @@ SETTINGS = Record(
 )
 
 # the last of them, which only layers need
-LAYER_SETTINGS = tuple(m.name for m in SETTINGS.members)[-len(LAYER_PLACES) - 10 :]
+LAYER_SETTINGS = tuple(m.name for m in SETTINGS.members)[-len(LAYER_PLACES) - 11 :]
 
 SHAPE = Record(
     "ShapeRow",
@@ -358,6 +363,7 @@ LAYER_SIZES = Constants(
     "LAYER_",
     "Sizes of layers of the first samples of a pixel.",
     most_words=(64, "of all layers together"),
+    long_words=(4, "of a number of any size"),
     matte_slots=(12, "names that a matte keeps"),
 )
 MOTION_SIZES = Constants("MOTION_", "Sizes of tables of motion.", step=(29, "floats of one"))

@@ -12,6 +12,7 @@ import click
 
 from ..errors import nearest
 from .options.verbosity import Handler, verbose_option
+from .process import terminal
 
 COMMANDS = {  # with the first words of their help, for which nothing is imported
     "render": "Render each SCENE: a scene file, a mesh or a folder.",
@@ -70,7 +71,7 @@ def _tell_version(ctx: click.Context, _: click.Parameter, asked: bool) -> None:
     if asked:
         from clpt import version
 
-        click.echo(f"clpt {version.described()}")
+        terminal.write(f"clpt {version.described()}")
         ctx.exit()
 
 
@@ -85,4 +86,4 @@ def cli(ctx: click.Context, verbose: int) -> None:
     """clpt, a spectral path tracer in OpenCL."""
     logging.basicConfig(handlers=[Handler()], format="%(message)s")
     if ctx.invoked_subcommand is None:
-        click.echo(ctx.get_help())
+        terminal.write(ctx.get_help())

@@ -10,6 +10,7 @@ import click
 
 from ..formats import locate
 from .options.loading_options import loading_options
+from .process import terminal
 
 
 @click.command()
@@ -43,7 +44,7 @@ def info(scene: Path, variables: dict[str, Any], as_json: bool) -> None:
         contents = summary(loaded)
         contents = contents if as_json else tidy(contents)
     if as_json:
-        click.echo(json.dumps(contents, indent=2))
+        terminal.write(json.dumps(contents, indent=2))
         return
     from rich.table import Table
 

@@ -15,6 +15,7 @@ from .files.targets import checked
 from .options.grading import GradingOptions, grading_options, names_option
 from .options.records import with_records
 from .options.scene_options import denoise_option
+from .process import terminal
 
 if TYPE_CHECKING:
     from ..render.film.saved_film import SavedFilm
@@ -55,7 +56,7 @@ def merge(
 
     def note(text: str) -> None:
         if not quiet:
-            click.echo(text, err=True)
+            terminal.say(text)
 
     if text := how.unused(targets):
         note(f"clpt: warning: {text}")

@@ -13,6 +13,7 @@ from .options.headings import Grouped
 from .options.records import with_records
 from .options.scene_options import SceneOptions, denoise_option, scene_options
 from .options.verbosity import verbose_option
+from .process import terminal
 
 
 @click.command(cls=Grouped)
@@ -43,8 +44,9 @@ def warm(scenes: tuple[Path, ...], options: SceneOptions, verbose: int, quiet: b
                 renderer.prepare()
         builds, seconds = [on.builds for on in renderer.devices], time.perf_counter() - began
         programs, found = sum(b.programs for b in builds), sum(b.cached for b in builds)
-        click.echo(
+        terminal.say(
             f"{scene}: {programs} programs, {found} of them found, in {seconds:.1f}"
-            f" s; the scene took {opened.loading:.1f} s of it"
+            f" s; the scene took {opened.loading:.1f} s of it",
+            err=False,
         )
         renderer.close()

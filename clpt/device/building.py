@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
 import pyopencl as cl
-from pyopencl.characterize import has_src_build_cache
+from pyopencl.characterize import nv_compute_capability
 
 from clpt.device import (
     compile_limits,
@@ -46,7 +46,7 @@ def build(device: Device, source: Source, options: Sequence[str] = ()) -> Progra
     Raises KernelBuildError with our file and line, the log, and the path of the text.
     """
     flags = _flags(device, options)
-    on_disk = not has_src_build_cache(device.info.cl_device)
+    on_disk = not has_own_cache(device.info.cl_device)
     program = _known(device, source, flags, on_disk)
     if program is not None:
         return program
@@ -63,6 +63,15 @@ def build(device: Device, source: Source, options: Sequence[str] = ()) -> Progra
             program = _from_cache(device, source, flags, entry) or program
     device.builds.on_compiled(entry)
     return _built(device, source, flags, program, time.perf_counter() - start)
+
+
+def has_own_cache(cl_device: cl.Device) -> bool:
+    """Return whether the driver keeps programs by their text: PoCL and NVIDIA do.
+
+    PyOpenCL's own `has_src_build_cache` is not in its older versions.
+    """
+    pocl = cl_device.platform.name == "Portable Computing Language"
+    return pocl or nv_compute_capability(cl_device) is not None
 
 
 def link(

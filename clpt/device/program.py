@@ -30,6 +30,8 @@ _SCALARS = {
     "float": np.float32,
     "double": np.float64,
 }
+# A null pointer as bytes: None is taken by PyOpenCL from 2026.1.3 on alone.
+_NULL = np.uintp(0)
 _VECTOR = re.compile(r"([a-z]+?)(2|3|4|8|16)$")
 
 
@@ -166,7 +168,8 @@ class BoundKernel:
             self._numbers.pop(name, None)  # first: an interrupt may come between any two lines
             try:
                 value = argument.value(new)
-                self._cl_kernel.set_arg(index, value)
+                null = value is None and argument.space in ("global", "constant")
+                self._cl_kernel.set_arg(index, _NULL if null else value)
             except (TypeError, ValueError, OverflowError, cl.Error) as error:
                 raise TypeError(
                     f"kernel {self.kernel.name!r}: {name} is {argument.type}, "

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, get_args
 from clpt import budget as budgets
 from clpt.budget import Budget
 from clpt.choices import Missing
-from clpt.errors import SceneError, nearest
+from clpt.errors import LONGEST_WARNING, SceneError, nearest, one_line
 
 if TYPE_CHECKING:  # a name of a file is looked up without the kinds of scenes
     from clpt.scene import Scene
@@ -69,7 +69,9 @@ def load(
     path = locate(path)
     try:
         with budgets.opened(budget):
-            return _load(path, kinds, progress, missing_textures, variables)
+            scene = _load(path, kinds, progress, missing_textures, variables)
+        scene.warnings[:] = [one_line(text, LONGEST_WARNING) for text in scene.warnings]
+        return scene
     except RecursionError:
         raise SceneError("what it holds is nested too deeply", file=path) from None
     except MemoryError:

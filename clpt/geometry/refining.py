@@ -79,6 +79,20 @@ def _welded(points: Floats, faces: Integers) -> tuple[Floats, Integers, Integers
     return places, inverse[faces], inverse
 
 
+def sources(mesh: Mesh, parts: Parts, count: int) -> Integers:
+    """Return from which face of a mesh each of the `count` faces of `refined` comes, (count,)."""
+    vertices, faces = parts[0].astype(np.float64), parts[1].astype(np.int64)
+    kept = np.arange(len(faces))
+    if mesh.subdivision:
+        kept = kept[_whole(_welded(vertices, faces)[1])]
+    return np.repeat(kept, count // max(len(kept), 1))
+
+
+def _whole(welded: Integers) -> NDArray[np.bool_]:
+    """Which faces have three places."""
+    return np.asarray((np.roll(welded, 1, axis=1) != welded).all(axis=1))
+
+
 def _halved(faces: Integers, count: int) -> tuple[Integers, Integers]:
     """The edges (e, 2) of faces, and the four faces of each; a new vertex stands behind `count`."""
     halves = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
@@ -100,7 +114,7 @@ def _subdivided(
 ) -> tuple[Floats, Integers, Floats, Floats | None]:
     """Points and normals of the limit surface; uvs are linear on each triangle."""
     places, welded, _ = _welded(points, faces)
-    whole = (np.roll(welded, 1, axis=1) != welded).all(axis=1)
+    whole = _whole(welded)
     welded, faces = welded[whole], faces[whole]
     try:
         limit, finer, normals = subdivision.loop(places, welded, levels)

@@ -116,6 +116,13 @@ def keyed(
     )
 
 
+def kept(shape: Shape, times: Sequence[float] = ()) -> NDArray[np.bool_]:
+    """Return which of a shape's triangles `triangulate`, or at `times` [s] `keyed`, keeps, (m,)."""
+    alike = [shape] if shape.deformation is None else [at_time(shape, time) for time in times]
+    at_all = [_in_world(one, alike if times else ()) for one in alike]
+    return np.asarray(np.any([_solid(one[0], one[1]) for one in at_all], axis=0))
+
+
 def at_time(shape: Any, time: float) -> Any:
     """Return a shape with a deformation as it is at a time [s], which does not deform."""
     points, normals = shape.deformation.at(time)
@@ -319,6 +326,17 @@ def _mesh(shape: shapes.Mesh) -> tuple[Points, Faces, Points | None, Points | No
     uvs = None if shape.uvs is None else _array(shape, "uvs", 2, len(vertices))
     parts = vertices, faces.astype(np.uint32, copy=False), normals, uvs
     return refining.refined(shape, parts, where(shape)) if refining.is_refined(shape) else parts
+
+
+def sources(shape: shapes.Mesh, count: int) -> NDArray[np.int64]:
+    """Return the row in a mesh's `faces` of each of its `count` triangles before any is left out.
+
+    It differs from their own where a mesh is subdivided or displaced.
+    """
+    if not refining.is_refined(shape):
+        return np.arange(count)
+    parts = _array(shape, "vertices", 3), np.asarray(on_host(shape.faces)), None, None
+    return refining.sources(shape, parts, count)
 
 
 def _normals(shape: shapes.Mesh, vertices: Points, faces: NDArray[Any]) -> Points | None:

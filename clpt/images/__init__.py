@@ -6,8 +6,8 @@ its bytes stand in another file. What a file says of its numbers is heeded: colo
 """
 
 from clpt.choices import FOR_SCREENS, WRITABLE
-from clpt.images.brightness import auto_exposure, levels, stops
-from clpt.images.exr import matrix_of
+from clpt.images.brightness import auto_exposure, levels, raised, stops
+from clpt.images.exr import STOPS, matrix_of
 from clpt.images.exr_files import attributes, part_names, write_channels
 from clpt.images.layers import read_channels, read_layers
 from clpt.images.npy import write as write_npy
@@ -30,6 +30,7 @@ from clpt.images.writing import check_output, write, write_stored
 __all__ = [
     "FOR_SCREENS",
     "READERS",
+    "STOPS",
     "WRITABLE",
     "Stored",
     "attributes",
@@ -44,6 +45,7 @@ __all__ = [
     "part_names",
     "png",
     "png_text",
+    "raised",
     "read",
     "read_channels",
     "read_layers",

@@ -20,7 +20,7 @@ from clpt.arrays import Image
 from clpt.choices import MOST_SAMPLES, Exposure
 from clpt.colour.view import View
 from clpt.denoise import needs
-from clpt.errors import ClptError, DeviceError, SceneError
+from clpt.errors import LONGEST_WARNING, ClptError, DeviceError, SceneError, one_line
 from clpt.render.contents import Change, Contents, FilmOwner
 from clpt.render.device_film import Changes
 from clpt.render.editing.scene_edit import MaterialKey, ShapeKey
@@ -82,7 +82,7 @@ class FilmRenderer(FilmOwner, Pictures):
     @property
     def warnings(self) -> list[str]:
         """Warnings of the scene, and of those who take its samples, for people."""
-        return [*self._maker.warnings, *self._told]
+        return [one_line(text, LONGEST_WARNING) for text in (*self._maker.warnings, *self._told)]
 
     @property
     def device(self) -> dev.Device:
@@ -454,7 +454,8 @@ class FilmRenderer(FilmOwner, Pictures):
         """Write the picture so far to a file, in the format of the path's suffix; wait for it.
 
         An .exr has the film's layers. A renderer with `denoise` writes what is denoised.
-        exposure [stops], tone, view: of files for screens, see `clpt.write_image`.
+        exposure [stops] over the film's `display_exposure`, tone, view: of files for screens, see
+        `clpt.write_image`.
 
         Raises SceneError for an unknown suffix, and for a file that cannot be written.
         """
@@ -465,7 +466,8 @@ class FilmRenderer(FilmOwner, Pictures):
         plain = self.image() if film.bands == 0 else self.colours()
         picture = plain if self.denoise is None else self.denoised()
         space = film.output_space
-        images.write(path, picture, exposure=exposure, space=space, tone=tone, view=view)
+        stops = images.raised(exposure, film.display_exposure)
+        images.write(path, picture, exposure=stops, space=space, tone=tone, view=view)
 
     # ---- the end
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+import difflib
+from collections.abc import Iterable, Mapping
 from typing import Any, TypedDict, get_args
 
 import pyopencl as cl
@@ -11,9 +12,9 @@ import pyopencl as cl
 from clpt import bvh
 from clpt.denoise import needs, oidn
 from clpt.errors import SceneError, UnknownKindError, nearest
-from clpt.scene import Film, Scene
+from clpt.scene import Scene
 from clpt.scene.cameras import Camera
-from clpt.scene.params import params
+from clpt.scene.params import Kind, params
 
 
 class RenderOptions(TypedDict, total=False):
@@ -69,12 +70,10 @@ def check_scene(scene: object) -> None:
 def check_options(scene: Scene, options: Mapping[str, Any]) -> None:
     """Check the names and values of options.
 
-    Raises TypeError for a name that is no option, and says where such a value belongs; TypeError
-    for a queue that is none; SceneError, UnknownKindError for other values.
+    Raises TypeError as `check_names` does, and for a queue that is none; SceneError,
+    UnknownKindError for other values.
     """
-    for name in options:
-        if name not in RenderOptions.__annotations__:
-            raise TypeError(f"there is no option {name!r}{_cure(scene, name)}")
+    check_names(scene, options, RenderOptions.__annotations__)
     queue, layout = options.get("queue"), options.get("layout")
     if queue is not None and not isinstance(queue, cl.CommandQueue):
         found = f"queue must be a pyopencl.CommandQueue, not {type(queue).__name__}"
@@ -111,16 +110,37 @@ def check_changes(camera: object, **by_key: object) -> None:
             raise SceneError(message, where=name)
 
 
-def _cure(scene: Scene, name: str) -> str:
-    """Return what to write for an option that is not there."""
-    if name == "size":
-        return (
-            "; it is the film's: scene.film = dataclasses.replace(scene.film, width=.., height=..)"
-        )
-    if name in {field.name for field in dataclasses.fields(Scene)}:
-        return f"; it is the scene's: scene.{name} = .."
-    for owner, cls in (("film", Film), ("integrator", type(scene.integrator))):
-        if name in params(cls):
-            replaced = f"dataclasses.replace(scene.{owner}, {name}=..)"
-            return f"; it is the {owner}'s: scene.{owner} = {replaced}"
-    return nearest(name, RenderOptions.__annotations__)
+def check_names(scene: Scene, names: Iterable[str], known: Iterable[str]) -> None:
+    """Raise TypeError for a name that is no option, and say where such a value belongs.
+
+    known: the options that there are.
+    """
+    known = tuple(known)
+    for name in names:
+        if name not in known:
+            places = {
+                other: at
+                for other, at in _places(film=scene.film, integrator=scene.integrator).items()
+                if other not in known
+            }
+            near = difflib.get_close_matches(name, (*known, *places), n=1)
+            cure = places.get(name) or nearest(name, known)
+            if name not in places and near and near[0] in places:
+                cure = f"; did you mean {near[0]!r}{places[near[0]]}"
+            raise TypeError(f"there is no option {name!r}{cure}")
+
+
+def _places(**parts: Kind) -> dict[str, str]:
+    """Return the end of a message for each name that belongs to a scene, or to a part of it."""
+    places = {
+        name: f"; it is the {owner}'s: scene.{owner} = "
+        f"dataclasses.replace(scene.{owner}, {name}=..)"
+        for owner, part in parts.items()
+        for name in params(type(part))
+    }
+    size = "; it is the film's: scene.film = dataclasses.replace(scene.film, width=.., height=..)"
+    of_scene = {
+        field.name: f"; it is the scene's: scene.{field.name} = .."
+        for field in dataclasses.fields(Scene)
+    }
+    return {**places, "size": size, **of_scene}

@@ -51,6 +51,10 @@ class Integrator(Kind):
         """Whether the scene decides if paths start at lights."""
         return self.light_paths == AUTO
 
+    def for_denoiser(self) -> Integrator:
+        """Return the integrator that takes the place of this one if the picture is denoised."""
+        return self
+
     @property
     def ambient(self) -> SpectrumLike | None:
         """The radiance that reaches every surface; None: there is none."""
@@ -168,7 +172,7 @@ class Auto(Integrator):
     """The integrator that suits the scene: `path`, `path` with light paths, or `vcm`.
 
     Light paths where something is sharp and a light is small; photons too where the camera sees
-    mirrors or clear glass, and the scene asks for no limit of noise.
+    mirrors or clear glass, and the scene asks for no limit of noise and no denoiser.
     """
 
     max_depth: int = host(8, "longest path, as of `path`; -1: no limit")
@@ -180,6 +184,10 @@ class Auto(Integrator):
     def leaves_choice(self) -> bool:
         """It always does."""
         return True
+
+    def for_denoiser(self) -> Integrator:
+        """Return `path`, which has light paths as `auto` has: noise of photons is blotchy."""
+        return Path(**shared(self, Path()))
 
 
 def shared(integrator: Integrator, other: Integrator) -> dict[str, Any]:
@@ -366,6 +374,9 @@ class Film(Kind):
     )
     output_space: str = choice("rec709", "colour space of the picture", spaces.SPACES)
     exposure: float = real(1.0, "factor on the picture, of bands too", low=0.0)
+    display_exposure: float = real(
+        0.0, "brightens pictures for screens; other files keep the light", "stops", -64.0, 64.0
+    )
     alpha: bool = host(
         False, "transparent: the camera sees no sky, and a fourth channel tells what is covered"
     )

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt import transforms
+from clpt.arrays import in_memory
 from clpt.errors import SceneError
 
 SHAPES = {"box": (1.0, 1.0), "triangle": (0.0, 1.0, 0.0)}  # of shutters, by name
@@ -34,7 +35,7 @@ class Keys:
     def __post_init__(self) -> None:
         try:
             times = np.asarray(self.times, np.float64).reshape(-1)
-            matrices = np.asarray(self.transforms, np.float64)
+            matrices = np.asarray(in_memory(self.transforms), np.float64)
         except (TypeError, ValueError) as error:
             raise SceneError(f"its keys are not numbers: {error}", where="motion") from error
         if not len(times):
@@ -147,7 +148,7 @@ def _keyed(values: Any, where: str, count: int, widths: tuple[int, ...]) -> NDAr
     try:
         rows = [np.shape(one) for one in values]
         odd = next((i for i, shape in enumerate(rows) if shape != rows[0]), None)
-        found = np.asarray(values if odd is None else (), np.float32)
+        found = np.asarray(in_memory(values) if odd is None else (), np.float32)
     except (TypeError, ValueError) as error:
         raise SceneError(f"are not numbers: {error}", where=where) from error
     if odd is not None:

@@ -137,10 +137,12 @@ class Layers(Role):
 
     def check(self, value: object, param: Param, where: str | None) -> tuple[Any, ...]:
         if not isinstance(value, (list, tuple)):
-            raise SceneError(f"must be a list of layers, not {value!r}", where=where)
+            message = "must be a list of clpt.scene.materials.Layer(eta=.., thickness=..)"
+            raise SceneError(f"{message}, not {value!r}", where=where)
         for i, entry in enumerate(value):
             if not (isinstance(entry, _Part) and entry.kind == "layer"):
-                raise SceneError(f"must be a layer, not {entry!r}", where=f"{where}[{i}]")
+                message = "must be a clpt.scene.materials.Layer(eta=.., thickness=..)"
+                raise SceneError(f"{message}, not {entry!r}", where=f"{where}[{i}]")
         return tuple(value)
 
 

@@ -44,10 +44,16 @@ class Spectrum(ABC):
         return None
 
     def to_rgb(self, role: Role = "reflectance") -> Floats:
-        """Linear Rec.709 stand-in (3,) float64 for the given role; never negative."""
+        """Linear Rec.709 stand-in (3,) float64 for the given role; never negative.
+
+        An emission that Rec. 709 cannot show keeps its luminance.
+        """
         values = gridded(self, cie.GRID)
         if role == "emission":
-            return np.maximum(cie.xyz_to_rgb(cie.spectrum_to_xyz(values)), 0.0)
+            xyz = cie.spectrum_to_xyz(values)
+            emitted = np.maximum(cie.xyz_to_rgb(xyz), 0.0)
+            shown = float(cie.luminance(emitted))
+            return emitted * (max(float(xyz[1]), 0.0) / shown) if shown > 0.0 else emitted
         rgb = cie.xyz_to_rgb(cie.spectrum_to_xyz(values * d65().sample(cie.GRID)))
         return np.clip(rgb, 0.0, 1.0 if role == "reflectance" else None)
 

@@ -146,3 +146,12 @@ inline void vertex_end(Slab path, uint at, mask active, mask next, mask null, in
     if (BSDF_IS_NULL || BSDF_IS_PANE) store_path_nulls(path, at, active & null, load_path_nulls(path, at) + 1);
     store_path_state(path, at, active, BSDF_IS_NULL ? state : sel_i(null, state, state + 1));
 }
+
+inline void hide_light(Slab path, uint at, mask hidden, Vertex v) /* the camera's ray goes on behind it */
+{
+    store_path_o(path, at, hidden, surface_offset(v.s, v.d));
+    store_path_pdf(path, at, hidden, load_path_pdf(path, at) + v.t);
+    store_path_null_distance(path, at, hidden, load_path_null_distance(path, at) + v.t);
+    store_path_cone(path, at, hidden, cone_word(v.cone));
+    store_path_rival(path, at, hidden, (real)(0.0f)); /* the light is in the way of what light paths bring there */
+}

@@ -33,13 +33,18 @@ def write_converted(
     multiplied = is_film(source) or source.suffix.lower() == ".exr"
     if pixels.shape[2] == 4 and multiplied != (target.suffix.lower() == ".exr"):
         pixels = images.straight(pixels) if multiplied else _multiplied(pixels)
-    metadata = {"software": f"clpt {VERSION}", "source": source.name}
+    metadata: dict[str, str | int | float] = {
+        "software": f"clpt {VERSION}", "source": source.name
+    }  # fmt: skip
+    stops = image.stops if layer is None else 0.0
+    if stops and target.suffix.lower() == ".exr":
+        metadata[images.STOPS] = stops
     images.write(
-        target, pixels, metadata=metadata, exposure=grading.exposure, tone=grading.tone,
-        view=grading.view,
+        target, pixels, metadata=metadata, exposure=images.raised(grading.exposure, stops),
+        tone=grading.tone, view=grading.view,
     )  # fmt: skip
     if grading.exposure == "auto" and for_screens((target,)):
-        tell(f"exposure {images.auto_exposure(pixels):+.1f} stops")
+        tell(f"exposure {images.auto_exposure(pixels) - stops:+.1f} stops")
     tell(str(target))
 
 

@@ -131,6 +131,6 @@ def write(
         if path.suffix.lower() in images.FOR_SCREENS:
             picture = images.straight(picture)
         images.write(
-            path, picture, metadata=stats, space=form.output_space, exposure=grading.exposure,
-            tone=grading.tone, view=grading.view,
+            path, picture, metadata=stats, space=form.output_space, tone=grading.tone,
+            view=grading.view, exposure=images.raised(grading.exposure, form.display_exposure),
         )  # fmt: skip

@@ -11,7 +11,7 @@ import click
 
 from ...choices import CHANNEL_NAMES, FOR_SCREENS, OCIO_CONFIG, TONES, Exposure
 from .records import Command, with_options
-from .values import Stops
+from .values import Choice, Stops
 
 if TYPE_CHECKING:
     from ...colour.view import View
@@ -82,7 +82,7 @@ _OPTIONS = (
         help="Brighten .png, .jpg and .webp by so many stops; auto: to a middle grey.",
     ),
     click.option(
-        "--tone", type=click.Choice(TONES),
+        "--tone", type=Choice(TONES),
         help="Tone curve of .png, .jpg and .webp.  [default: none]",
     ),
     click.option(
@@ -97,7 +97,7 @@ _OPTIONS = (
 )  # fmt: skip
 
 names_option = click.option(
-    "--names", type=click.Choice(CHANNEL_NAMES), default=CHANNEL_NAMES[0], show_default=True,
+    "--names", type=Choice(CHANNEL_NAMES), default=CHANNEL_NAMES[0], show_default=True,
     help="What .exr files call layers: depth.Z, or ViewLayer.Denoising Depth.Z.",
 )  # fmt: skip
 

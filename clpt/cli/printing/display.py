@@ -10,13 +10,12 @@ from contextlib import contextmanager
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-import click
-
 from ...render.progress import Progress
-from ..process import failures
+from ..process import terminal
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.text import Text
 
 EVERY = 5.0  # seconds between lines
 PATIENCE = 1.0  # seconds of reading or compiling before a line or a bar tells of it
@@ -77,7 +76,7 @@ class Display:
     """Shows nothing; the base of those that do."""
 
     def __init__(self, limit: float | None = None, name: str = ""):
-        self.limit, self.name = limit, name
+        self.limit, self.name = limit, terminal.cleaned(name)
         self.last = time.perf_counter()
         self.since: tuple[float, float] | None = None
 
@@ -175,7 +174,7 @@ class Lines(Display):
             self.note("  ".join(filter(None, numbers.values())))
 
     def note(self, text: str) -> None:
-        click.echo(text, err=True)
+        terminal.say(text)
 
 
 class Bar(Lines):
@@ -186,7 +185,7 @@ class Bar(Lines):
         self._begun = False  # whether the text of `begin` stands on the screen
 
     def begin(self, text: str) -> None:
-        click.echo(text, err=True, nl=False)  # before rich is imported, which takes its time
+        terminal.say(text, nl=False)  # before rich is imported, which takes its time
         self._begun = True
 
     @cached_property
@@ -195,13 +194,19 @@ class Bar(Lines):
         from rich.console import Console
 
         if self._begun:
-            failures.clear_line()
+            terminal.clear_line()
         return Console(stderr=True, highlight=False)
 
     @contextmanager
     def phase(self, text: str) -> Iterator[None]:
-        with self.console.status(f"{text} ..."):
+        with self.console.status(self._shown(f"{text} ...")):
             yield
+
+    def _shown(self, text: str) -> Text:
+        """Return a text without control characters and markup."""
+        from rich.text import Text
+
+        return Text(terminal.cleaned(text))
 
     @contextmanager
     def compiling(self, text: str) -> Iterator[Programs]:
@@ -219,8 +224,8 @@ class Bar(Lines):
 
         def changed() -> None:
             bar.update(
-                task, description=text, total=programs.begun, completed=programs.ended,
-                told=programs.told,
+                task, description=terminal.cleaned(text), total=programs.begun,
+                completed=programs.ended, told=programs.told,
             )  # fmt: skip
 
         programs = Programs(changed)
@@ -238,12 +243,12 @@ class Bar(Lines):
             TextColumn("{task.description}", markup=False),
         )
         bar = RichProgress(*columns, console=self.console, transient=True)
-        task, began = bar.add_task("", total=1.0, name=name), time.perf_counter()
+        task, began = bar.add_task("", total=1.0, name=terminal.cleaned(name)), time.perf_counter()
 
         def tell(fraction: float, what: str) -> None:
             if time.perf_counter() - began >= PATIENCE:
                 bar.start()
-                bar.update(task, completed=fraction, description=what)
+                bar.update(task, completed=fraction, description=terminal.cleaned(what))
 
         try:
             yield tell
@@ -273,7 +278,7 @@ class Bar(Lines):
             self._bar.refresh()
 
     def note(self, text: str) -> None:
-        self.console.print(text, markup=False)
+        self.console.print(self._shown(text))
 
 
 FIGURES = ("samples", "open", "noise", "rays", "elapsed", "left")

@@ -12,9 +12,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any, NoReturn
 
-import click
-
-from . import failures
+from . import failures, terminal
 
 GRACE = 1.0  # seconds after a signal in which KeyboardInterrupt may end a process by itself
 ENDING = tuple(
@@ -51,8 +49,7 @@ def ended_by(interrupt: KeyboardInterrupt) -> int:
 
 def tell() -> None:
     """Say that a signal ends the command, on a terminal whose cursor a bar may have hidden."""
-    if sys.stderr.isatty():
-        click.echo("\x1b[?25h", err=True, nl=False)
+    terminal.show_cursor()
     failures.complain("interrupted")
 
 

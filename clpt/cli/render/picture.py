@@ -196,6 +196,8 @@ class _Picture:
         if self._has_samples:
             if grading.exposure == "auto" and for_screens(targets):
                 self._shown.note(f"exposure {brightness.exposure_found(self._renderer):+.1f} stops")
+            elif for_screens(targets) and (said := brightness.display_exposure(self._renderer)):
+                self._shown.note(said)
             told += brightness.remarks(self._renderer, grading, targets)
         for text in told:
             self._shown.note(f"clpt: warning: {text}")

@@ -12,6 +12,7 @@ import json
 import math
 import re
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any, NoReturn, TypeVar
 from urllib.parse import unquote, unquote_to_bytes
@@ -189,6 +190,23 @@ class Element:
         return value
 
 
+@dataclass(frozen=True)
+class Scale:
+    """The brightness of a file's numbers.
+
+    emission: radiance of an emission of 1 [W m^-2 sr^-1 nm^-1 of D65]; lights: intensity of a
+    punctual light of 1, in the same unit [m^2].
+    """
+
+    emission: float = 1.0
+    lights: float = 1.0
+
+    @property
+    def stops(self) -> float:
+        """The stops that show an emission of 1 as 1."""
+        return math.log2(1.0 / self.emission)
+
+
 class Document:
     """A parsed file: `root` is its JSON; `warnings` say what was left out."""
 
@@ -196,7 +214,8 @@ class Document:
         self.file, self.missing = file, missing
         self.warnings: list[str] = []
         self.uv_sets: list[int] = []  # of the textures that were made since it was cleared
-        self.lumens, self.multiple_scattering = 1.0, 0.0  # see clpt.formats.gltf.load
+        self.multiple_scattering = 0.0  # see clpt.formats.gltf.load
+        self.scale = Scale()
         self.variant: int | None = None
         self._made: dict[Any, Any] = {}
         data = input_files.read_bytes(file)

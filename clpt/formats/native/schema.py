@@ -63,6 +63,12 @@ def _properties() -> Schema:
     """The entries of a scene."""
     return {
         "$schema": STRING,
+        "version": {
+            "type": "integer",
+            "minimum": 1,
+            "maximum": 2,
+            "description": "of the format: 2; files of lamps give candela since then",
+        },
         "name": STRING,
         "camera": ref("camera"),
         "film": _untyped(integrators.Film),

@@ -20,6 +20,7 @@ from clpt.errors import SceneError
 from clpt.formats.meshes import particles, strands
 from clpt.formats.meshes.triangles import TANGENT_COLUMNS
 from clpt.formats.native import forms, motion
+from clpt.formats.native.read import VERSION
 from clpt.formats.native.shape_files import MESH_ARRAYS, in_file
 from clpt.scene import Scene, kinds, materials, shapes
 from clpt.scene.media import Medium
@@ -83,7 +84,8 @@ class _Writer:
     def scene(self, scene: Scene) -> dict[str, Any]:
         """Write the whole file."""
         self.shared = _shared(scene)
-        document: dict[str, Any] = {"name": scene.name} if scene.name else {}
+        document: dict[str, Any] = {"version": VERSION}
+        document |= {"name": scene.name} if scene.name else {}
         document |= {
             "camera": self.kind(scene.camera),
             "film": self.untyped(scene.film),

@@ -20,7 +20,7 @@ NEEDED: dict[str, Callable[[Features], bool]] = {
     "sampled_hemisphere": lambda f: f.hemispheres,
     "sampled_wo": lambda f: f.lights.gloss > 0,
     "sampled_gloss": lambda f: f.lights.gloss > 0,
-    "null_distance": lambda f: f.materials.null_surfaces,
+    "null_distance": lambda f: f.materials.null_surfaces or "depth" in f.film.layers.names,
     "nulls": lambda f: f.materials.null_surfaces,
     "ratio": lambda f: f.ratios,
     "medium": lambda f: f.media.absorbing,

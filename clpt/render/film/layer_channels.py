@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
+
 from clpt import images, spectral_exr
 from clpt.arrays import Image
 from clpt.render.film import cryptomatte
@@ -44,7 +46,8 @@ def write_layers(
     stated = {**(metadata or {}), **attributes_of(form, names)}
     if form.bands:
         said = {**stated, "chromaticities": chromaticities(form.output_space)}
-        spectral, preview = source.spectral_image(), source.colours()
+        spectral = source.spectral_image()
+        preview = source.colours() * np.float32(2.0**spectral.exposure)
         spectral_exr.write(path, spectral, preview=preview, metadata=said, layers=channels)
     else:
         images.write(
@@ -88,9 +91,11 @@ def _beside(denoised: DenoisedPicture, names: str) -> dict[str, Image]:
     return made
 
 
-def attributes_of(form: PictureForm, names: str = "clpt") -> dict[str, str]:
-    """Return what an .exr says of the layers of a film: the names of mattes."""
-    found: dict[str, str] = {}
+def attributes_of(form: PictureForm, names: str = "clpt") -> dict[str, str | float]:
+    """Return what an .exr says of a film: stops for screens, the names of mattes of layers."""
+    found: dict[str, str | float] = {}
+    if form.display_exposure:
+        found[images.STOPS] = form.display_exposure
     for name in form.layers:
         if LAYERS[name].form == "matte":
             found |= cryptomatte.attributes_of(_prefix(name, names), matte_names(form, name))

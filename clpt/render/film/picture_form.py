@@ -33,6 +33,7 @@ class PictureForm:
     lambda_max: float = 830.0
     output_space: str = "rec709"
     exposure: float = 1.0
+    display_exposure: float = 0.0
     layers: tuple[str, ...] = ()
     paper: tuple[tuple[float, ...], ...] = ()
     names: LayerNames = LayerNames()

@@ -54,7 +54,9 @@ class Pictures(ABC):
         """The picture so far of a film with bands, at their centres. Raises SceneError without."""
         if not self._form.bands:
             raise SceneError("this picture has no bands; set the film's", where="film.bands")
-        return SpectralImage(self.image(), self._form.band_centres, emissive=True)
+        form = self._form
+        stops = form.display_exposure
+        return SpectralImage(self.image(), form.band_centres, emissive=True, exposure=stops)
 
     def samples_per_pixel(self) -> Image:
         """Return how many samples each pixel has, (h, w) float32."""

@@ -125,6 +125,7 @@ def _set_layers(settings: NDArray[np.void], layers: LayerFeatures) -> None:
         settings[f"layer_{name}"] = place
     settings["layer_denoising"], settings["layer_words"] = layers.first_for_denoisers, layers.words
     settings["mattes"], settings["material_numbers"] = len(layers.mattes), layers.material_numbers
+    settings["primitive_rows"] = layers.primitive_rows
     settings["matte_object"] = layers.matte_of_objects
     settings["matte_material"] = layers.matte_of_materials
     settings["layer_direct"], settings["layer_indirect"] = layers.direct, layers.indirect
