@@ -68,8 +68,9 @@ def load(
     """
     path = locate(path)
     try:
-        with budgets.opened(budget):
+        with budgets.opened(budget) as account:
             scene = _load(path, kinds, progress, missing_textures, variables)
+        scene.account = account
         scene.warnings[:] = [one_line(text, LONGEST_WARNING) for text in scene.warnings]
         return scene
     except RecursionError:

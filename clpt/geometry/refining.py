@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt import budget
 from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
 from clpt.geometry.shapes import where
@@ -23,6 +24,7 @@ from clpt.scene.textures import Bitmap
 Parts = tuple[Any, Any, Any, Any]
 DEEPEST = 10
 MOST_TRIANGLES = 1 << 25
+PER_TRIANGLE = 350  # bytes of memory for each displaced one, while they are made
 
 
 def is_refined(mesh: Mesh) -> bool:
@@ -140,10 +142,12 @@ def _displaced(mesh: Mesh, parts: Parts, name: str) -> Parts:
     if len(faces) * 4.0**levels > MOST_TRIANGLES:
         message = f"edges of {mesh.displacement_edge:g} m make more than {MOST_TRIANGLES:,} "
         raise SceneError(message + "triangles; raise displacement_edge", where=name)
+    budget.check(PER_TRIANGLE * len(faces) * 4**levels, f"{name}: its displacement")
     if normals is None:
         places, welded, own = _welded(points, faces)
         normals = _smooth(places, welded)[own]
     for _ in range(levels):
+        budget.check_time()
         edges, faces = _halved(faces, len(points))
         points, normals, uvs = (_grown(one, edges) for one in (points, normals, uvs))
     length = np.linalg.norm(normals, axis=1, keepdims=True)

@@ -14,7 +14,7 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
-from clpt import budget, output_files
+from clpt import budget, input_files, output_files
 from clpt.errors import SceneError
 from clpt.images import sizes
 
@@ -34,8 +34,10 @@ def exr_name(path: str | Path) -> str:
 def opened(path: Path, header_only: bool = False) -> Iterator[Sequence[Any]]:
     """The parts of a file, whose `header` and `channels` are those of the library.
 
-    Raises what the library does, from RuntimeError to MemoryError.
+    Raises SceneError for what is no regular file, else what the library does, from RuntimeError to
+    MemoryError.
     """
+    input_files.regular(path)
     with OpenEXR.File(exr_name(path), separate_channels=True, header_only=header_only) as file:
         yield file.parts
 
@@ -125,6 +127,7 @@ def _some(path: Path, header: Header, names: Sequence[str]) -> Channels:
     """
     budget.check(_size(header, names), _WHAT, path)
     x0, y0, x1, y1 = window(header, "dataWindow")
+    input_files.regular(path)
     file = OpenEXR.InputFile(exr_name(path))
     try:
         about = file.header()["channels"]

@@ -57,7 +57,7 @@ def read_stored(path: str | Path) -> Stored:
         image = READERS[path.suffix.lower()](path)
     if image.values.size == 0:
         raise SceneError("the image has no pixels", file=path)
-    budget.take(image.values.nbytes, "its pixels", path)
+    budget.take_image(image.values.nbytes, "its pixels", path)
     return image
 
 

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from clpt.budget import Account
 from clpt.errors import SceneError
 from clpt.scene import (
     cameras,
@@ -94,7 +95,8 @@ class Scene:
     from; film: size, mode, filter and colours of the picture. spp: samples of a pixel, for
     `clpt.render`; noise: below which it gets no more, None for all, see
     clpt.render.wavefront.adaptive; seed: of the random numbers. name: for messages and files.
-    warnings: what a loader had to pass over; extra: what else it found, for people.
+    warnings: what a loader had to pass over; extra: what else it found, for people;
+    account: of what loading it has taken, from which making it ready draws too.
 
     Raises SceneError for `spp` that is no whole number above zero, and `noise` likewise.
     """
@@ -111,6 +113,7 @@ class Scene:
     name: str = ""
     warnings: list[str] = field(default_factory=list)
     extra: dict[str, Any] = field(default_factory=dict)
+    account: Account | None = field(default=None, repr=False, compare=False)
 
     # Makes the picture that a notebook shows: given by clpt/__init__, as scenes know no renderer.
     _picture: ClassVar[Callable[[Scene], bytes] | None] = None

@@ -30,7 +30,14 @@ DIGEST = "sha256:"  # begins a value that stands for many
 SHORT = 4  # numbers of a list up to which it is shown
 MOST_LISTED = 64  # members of a list up to which each is shown in full
 MOST_DIGESTS = 4096  # up to which each has a digest; more have one together
-WITHOUT_SAMPLES = ("spp", "noise", "name", "warnings", "extra")  # of a scene: they change no sample
+WITHOUT_SAMPLES = (
+    "spp",
+    "noise",
+    "name",
+    "warnings",
+    "extra",
+    "account",
+)  # of a scene: they change no sample
 ARRAYS: dict[str, DTypeLike] = {  # how the lowering reads what a host parameter holds, by its form
     "rows2": np.float32, "rows3": np.float32, "rows4": np.float32, "normals": np.float32,
     "attributes": np.float32, "grid": np.float32, "triangles": np.uint32, "lengths": np.int64,

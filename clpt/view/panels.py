@@ -49,7 +49,8 @@ MOST_PANELS = 300
 LONGEST_NAME = 80  # characters that it is told of a name
 CURVE_AT = range(380, 781, 20)  # [nm]
 OF_FILM = (  # what can change while the renderers stay
-    "sensor", "white_balance", "exposure", "lambda_min", "lambda_max", "wavelengths",
+    "sensor", "white_balance", "exposure", "display_exposure", "lambda_min", "lambda_max",
+    "wavelengths",
 )  # fmt: skip
 
 

@@ -14,6 +14,7 @@ import clpt
 from clpt import spectra, transforms
 from clpt.geometry.lamps import plainly_lit
 from clpt.scene import Film, Scene, cameras, integrators, lights, materials, shapes
+from clpt.scene.viewpoint import surrounded
 
 CANDELA, HEIGHT = 1000.0, 2.0
 LUX = CANDELA / HEIGHT**2
@@ -172,6 +173,28 @@ def test_lights_of_gltf(tmp_path, mode):
     assert illuminance(gltf_of(tmp_path, spot), mode) == pytest.approx(LUX, rel=0.01)
     sun = gltf_of(tmp_path, {"type": "directional", "intensity": LUX})
     assert illuminance(sun, mode) == pytest.approx(LUX, rel=0.01)
+
+
+def test_a_sky_shows_as_its_image_does(tmp_path):
+    """`--env` beside lights in candela: a 1 of its image is 1 on a screen, as in viewers."""
+    clpt.write_image(tmp_path / "sky.exr", np.ones((4, 8, 3), np.float32))
+    lit = gltf_of(tmp_path, {"type": "point", "intensity": CANDELA})
+    sky = surrounded(lit, tmp_path / "sky.exr").lights[-1]
+    assert sky.scale * 2.0**lit.film.display_exposure == pytest.approx(1.0)
+    bare = surrounded(Scene.studio([PAPER]), tmp_path / "sky.exr")
+    assert bare.lights[-1].scale == 1.0
+
+
+def test_meshes_of_a_lit_file_glow_as_they_are(tmp_path):
+    """A scene file that names a .gltf for its meshes has no use for its lights' unit."""
+    gltf_of(tmp_path, {"type": "point", "intensity": CANDELA})
+    made = json.loads((tmp_path / "a.gltf").read_text())
+    made["materials"] = [{"emissiveFactor": [1, 1, 1]}]
+    made["meshes"][0]["primitives"][0]["material"] = 0
+    (tmp_path / "a.gltf").write_text(json.dumps(made))
+    scene = file_of(tmp_path, {"type": "point"}, shapes=[{"type": "mesh", "file": "a.gltf"}])
+    np.testing.assert_allclose(scene.shapes[0].emission.radiance.to_rgb("emission"), 1.0)
+    assert scene.film.display_exposure == 0.0
 
 
 @pytest.mark.parametrize("mode", ["spectral", "rgb"])

@@ -22,7 +22,7 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
-from clpt import output_files
+from clpt import input_files, output_files
 from clpt.errors import SceneError
 from clpt.images import exr_files
 from clpt.render.contract.layer_names import LayerNames
@@ -102,7 +102,7 @@ def _read(path: Path, made: Callable[[dict[str, Any], _Parts], _T], **options: b
 def _check_seal(path: Path) -> None:
     """Raise SceneError for a file that is not, to the bit, what was written."""
     try:
-        with path.open("rb") as file:
+        with input_files.opened(path) as file:
             size = file.seek(0, os.SEEK_END)
             file.seek(0)
             is_exr = file.read(len(EXR_MAGIC)) == EXR_MAGIC

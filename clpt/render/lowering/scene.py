@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import spectra, transforms
+from clpt import budget, spectra, transforms
 from clpt.geometry import shape_records, shapes
 from clpt.geometry.instancing import Instances
 from clpt.geometry.refining import is_refined
@@ -136,15 +136,17 @@ def lower(
     anew. Arrays, lights and images that are the same objects as then are taken to hold the same.
 
     Raises SceneError where the scene makes no sense: it names the shape, light or material; and
-    for an image whose file changes meanwhile.
+    for an image whose file changes meanwhile, and where it takes more than the budget of its load
+    has left.
     """
     cache = LoweringCache(former.cache if former else None)
     before = None
     if former is not None and not anew:
         before = Before(former.integrator, former.features.transport.lit_ghosts)
-    files = ImageFiles.of(named_files(scene), former.files if former else ImageFiles())
-    made = encode(analyse(scene, cache, before), cache, texture_budget)
-    files.check()
+    with budget.resumed(scene.account):
+        files = ImageFiles.of(named_files(scene), former.files if former else ImageFiles())
+        made = encode(analyse(scene, cache, before), cache, texture_budget)
+        files.check()
     return replace(made, files=files)
 
 

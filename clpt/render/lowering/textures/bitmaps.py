@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import images, spectra
+from clpt import budget, images, spectra
 from clpt.arrays import Words, on_host
 from clpt.errors import SceneError
 from clpt.images import Stored
@@ -70,7 +70,9 @@ class _Pixels:
     def begin(self) -> None:
         """Take the pixels of an array, or begin to read those of a file."""
         if self._is_file:
-            self._stored = _pool(os.getpid()).submit(images.read_stored, self._image)
+            self._stored = _pool(os.getpid()).submit(
+                budget.carried(images.read_stored), self._image
+            )
         else:
             self._stored = Future()
             self._stored.set_result(_array(self._image))
