@@ -543,7 +543,7 @@ class GltfSurface(Material):
         return self.transmission != 0.0 or self.diffuse_transmission != 0.0
 
     @property
-    def directing(self) -> tuple[object, object]:
+    def directing(self) -> tuple[object, ...]:
         return self.clearcoat_normal_x, self.anisotropy_rotation
 
     @property

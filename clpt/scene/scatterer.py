@@ -35,9 +35,9 @@ class Scatterer(Kind):
         return False
 
     @property
-    def directing(self) -> tuple[object, object]:
+    def directing(self) -> tuple[object, ...]:
         """The values or textures that tell a coat's normals, and directions along the surface."""
-        return 0.0, 0.0
+        return ()
 
     @property
     def uses_tangents(self) -> bool:

@@ -197,7 +197,7 @@ def placed_in(value: object) -> Placed | None:
 
 def turned(value: object) -> bool:
     """Return whether u and v of a value's texture have other directions than the main ones."""
-    placed = placed_in(value)
+    placed = placed_in(value) if isinstance(value, Texture) else None
     if placed is None:
         return False
     matrix = placed.to_uv[:2, :2] / placed.to_uv[2, 2]

@@ -69,7 +69,7 @@ class SceneIndex:
             placed=tuple(placed),
             prototypes=tuple(prototypes),
             leaves=(*_leaf_kinds(distinct), *_phase_kinds(scene, distinct)),
-            normal_mapped=any(any(map(_bends, mt.parts(shape.material))) for shape in distinct),
+            normal_mapped=any(map(_bends, {id(s.material): s.material for s in distinct}.values())),
             warnings=tuple(warnings),
             motions=motions,
         )
@@ -286,9 +286,10 @@ def any_of(material: mt.Material, classes: type | tuple[type, ...]) -> bool:
     return any(isinstance(part, classes) for part in mt.parts(material))
 
 
-def _bends(part: mt.Material) -> bool:
+def _bends(material: mt.Material) -> bool:
     """Whether a material bends normals, or tells directions beside other uv than the main ones."""
-    return isinstance(part, mt.NormalMapped) or any(map(turned, part.directing))
+    parts = mt.parts(material)
+    return any(isinstance(p, mt.NormalMapped) or any(map(turned, p.directing)) for p in parts)
 
 
 def _leaf_kinds(shapes_: tuple[Shape, ...]) -> tuple[type[mt.Material], ...]:

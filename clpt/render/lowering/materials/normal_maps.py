@@ -56,7 +56,7 @@ class NormalPerturbation:
             made[2] = np.float32(self.bump.scale).view(np.uint32)
             made[9:11] = _real(self.bump.height, encoder)
         along = None if self.normal is None else self.normal.map
-        for i, value in enumerate((along, *leaf.directing)):
+        for i, value in enumerate((along, *(leaf.directing or (None, None)))):
             placed = placed_in(value)
             whole = i > 0 or flags & ALONG_V
             made[TURNS + 4 * i : TURNS + 4 * i + 4] = _to_uv(placed if whole else None)
