@@ -21,6 +21,7 @@ from clpt.choices import MOST_SAMPLES, Exposure
 from clpt.colour.view import View
 from clpt.denoise import needs
 from clpt.errors import LONGEST_WARNING, ClptError, DeviceError, SceneError, one_line
+from clpt.images import exr_files
 from clpt.render.contents import Change, Contents, FilmOwner
 from clpt.render.device_film import Changes
 from clpt.render.editing.scene_edit import MaterialKey, ShapeKey
@@ -41,7 +42,7 @@ from clpt.render.stats import RenderStats, collect
 from clpt.render.wavefront import adaptive
 from clpt.render.wavefront.film_state import join_ranges
 from clpt.render.wavefront.wavefront import Counts, Wavefront
-from clpt.scene import Scene
+from clpt.scene import Scene, check_seed
 from clpt.scene.cameras import Camera
 from clpt.scene.materials import Material
 
@@ -301,17 +302,16 @@ class FilmRenderer(FilmOwner, Pictures):
     ) -> cl.Event:
         """Enqueue that the film is emptied; the next sample is the first one again.
 
-        wait_for: events of the caller that come first. first_sample: its number from now on, by
-        default as before. seed: of the samples from now
-        on, which `self.scene` then has; by default as before. Raises SceneError for a seed that is
-        no whole number, and for a number that is too large.
+        wait_for: events of the caller that come first. first_sample: its number from now on, from
+        0 to 2^31 - 1, by default as before. seed: of the samples from now on, from 0 to 2^32 - 1,
+        which `self.scene` then has; by default as before. Raises SceneError for other numbers.
 
         A renderer that says it is broken is whole again then, unless it says otherwise.
         """
         if first_sample is not None:
             first_sample = checked_number(first_sample)
-        if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int)):
-            raise SceneError(f"must be a whole number, not {seed!r}", where="seed")
+        if seed is not None:
+            check_seed(seed)
         broken = isinstance(self._contents, Change)
         self._maker.after(wait_for)
         with self._healing("reset", lambda _: self._emptied(recover=True)):
@@ -453,7 +453,8 @@ class FilmRenderer(FilmOwner, Pictures):
     ) -> None:
         """Write the picture so far to a file, in the format of the path's suffix; wait for it.
 
-        An .exr has the film's layers. A renderer with `denoise` writes what is denoised.
+        An .exr has the film's layers, and as its data window the place of a crop. A renderer with
+        `denoise` writes what is denoised.
         exposure [stops] over the film's `display_exposure`, tone, view: of files for screens, see
         `clpt.write_image`.
 
@@ -467,7 +468,11 @@ class FilmRenderer(FilmOwner, Pictures):
         picture = plain if self.denoise is None else self.denoised()
         space = film.output_space
         stops = images.raised(exposure, film.display_exposure)
-        images.write(path, picture, exposure=stops, space=space, tone=tone, view=view)
+        place = self._form.place if path.suffix.lower() == ".exr" else None
+        images.write(
+            path, picture, exposure=stops, space=space, tone=tone, view=view,
+            metadata=exr_files.windows(picture.shape, place),
+        )  # fmt: skip
 
     # ---- the end
 
@@ -535,10 +540,13 @@ def next_range(first: int, samples: int) -> tuple[int, int]:
 
 
 def checked_number(number: int) -> int:
-    """Return a sample's number. Raises SceneError for one that is too large."""
+    """Return a sample's number. Raises SceneError for one below 0, and for one too large."""
+    if isinstance(number, bool) or not isinstance(number, (int, np.integer)) or number < 0:
+        message = f"must be a whole number from 0 to {MOST_SAMPLES}, not {number!r}"
+        raise SceneError(message, where="first_sample")
     if number > MOST_SAMPLES:
         raise SceneError(f"a pixel cannot have more than {MOST_SAMPLES} samples", where="samples")
-    return number
+    return int(number)
 
 
 def checked_samples(samples: int) -> int:

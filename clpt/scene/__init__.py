@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from clpt.budget import Account
+from clpt.choices import MOST_SEED
 from clpt.errors import SceneError
 from clpt.scene import (
     cameras,
@@ -216,8 +217,16 @@ class Scene:
         check_parts(self)
         if isinstance(self.spp, bool) or not isinstance(self.spp, int) or self.spp < 1:
             raise SceneError(f"must be a whole number above zero, not {self.spp!r}", where="spp")
+        check_seed(self.seed)
         if self.noise is not None:
             check_noise(self.noise)
+
+
+def check_seed(seed: object) -> None:
+    """Raise SceneError for a seed that is no whole number of 32 bits: kernels know no others."""
+    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed <= MOST_SEED:
+        message = f"must be a whole number from 0 to {MOST_SEED}, not {seed!r}"
+        raise SceneError(message, where="seed")
 
 
 def check_parts(scene: Scene) -> None:

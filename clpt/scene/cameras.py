@@ -148,7 +148,12 @@ class Orthographic(Camera):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Spherical(Camera):
-    """All directions: the film is a map in latitude and longitude, +y up, +z in its middle."""
+    """All directions: the film is a map in latitude and longitude, +y up, +z in its middle.
+
+    The middle of row i of h rows lies at pi (i + 1/2) / h from +y. Rows of an `envmap` lie at
+    pi i / (h - 1), from pole to pole: a film of few rows that becomes one is stretched by half a
+    row at the poles, by 3 % of the height with 16 rows and nothing to see with 1024.
+    """
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -89,8 +89,8 @@ class Path(Integrator):
     With `light_paths` paths start at lights too: each vertex is joined to the camera, and weighed
     against what the camera's paths find. Caustics that the camera sees directly converge then. The
     camera must be `perspective` or `thin_lens`. A number below 1 is a share: 0.5 is one for every
-    second sample. With "auto" there are some where something is sharp and a light is small, else
-    none.
+    second sample. With "auto" there are some where something is specular and a light is small,
+    else none.
     """
 
     max_depth: int = host(8, "longest path; -1: no limit")
@@ -171,7 +171,7 @@ def _check_whole(value: object, where: str, least: int, most: int) -> None:
 class Auto(Integrator):
     """The integrator that suits the scene: `path`, `path` with light paths, or `vcm`.
 
-    Light paths where something is sharp and a light is small; photons too where the camera sees
+    Light paths where something is specular and a light is small; photons too where the camera sees
     mirrors or clear glass, and the scene asks for no limit of noise and no denoiser.
     """
 

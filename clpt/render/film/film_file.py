@@ -235,6 +235,7 @@ def _restored(header: dict[str, Any], parts: _Parts) -> SavedFilm:
     rows = {name: tuple(map(tuple, form[name])) for name in ("to_output", "paper")}
     names: dict[str, Any] = {"layers": tuple(form["layers"])}
     names["names"] = LayerNames(**{n: tuple(v) for n, v in form.get("names", {}).items()})
+    names["place"] = tuple(form["place"]) if form.get("place") else None
     taken = tuple((int(first), int(end)) for first, end in header["taken"])
     return SavedFilm(
         film=FilmState(

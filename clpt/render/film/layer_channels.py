@@ -9,6 +9,7 @@ import numpy as np
 
 from clpt import images, spectral_exr
 from clpt.arrays import Image
+from clpt.images import exr_files
 from clpt.render.film import cryptomatte
 from clpt.render.film.denoised_picture import DenoisedPicture
 from clpt.render.film.layers import GROUP, matte_names
@@ -34,7 +35,8 @@ def write_layers(
 
     path: of the file. source: has the picture. names: a set of SETS; "blender" gives names such as
     ViewLayer.Combined.R. metadata: further attributes of the file. The picture is in half floats,
-    or its bands in float32, layers in float32. Raises SceneError.
+    or its bands in float32, layers in float32. A crop has its place in the whole picture as the
+    data window. Raises SceneError.
     """
     source = source._developed()
     layers, form = source.layers(), source._form
@@ -43,7 +45,8 @@ def write_layers(
     channels = channels_of(layers, names)
     if isinstance(source, DenoisedPicture):
         channels |= _beside(source, names)
-    stated = {**(metadata or {}), **attributes_of(form, names)}
+    place = exr_files.windows(source.colours().shape, form.place)
+    stated = {**(metadata or {}), **attributes_of(form, names), **place}
     if form.bands:
         said = {**stated, "chromaticities": chromaticities(form.output_space)}
         spectral = source.spectral_image()

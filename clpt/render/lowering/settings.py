@@ -110,7 +110,7 @@ def _set_film(settings: NDArray[np.void], index: SceneIndex) -> None:
 def _set_paths(settings: NDArray[np.void], index: SceneIndex) -> None:
     """Write what the sampler and the integrator say of paths."""
     scene, integrator = index.scene, index.integrator
-    settings["seed"] = scene.seed % 2**32
+    settings["seed"] = scene.seed
     settings["sample_bits"] = min((max(scene.spp, 1) - 1).bit_length(), MOST_SAMPLE_BITS)
     depth = integrator.max_depth
     settings["max_depth"] = DEEPEST if depth < 0 else min(depth, DEEPEST)
