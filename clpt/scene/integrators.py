@@ -143,6 +143,7 @@ class Vcm(Integrator):
     max_depth: int = host(8, "longest path, as of `path`; -1: 65")
     rr_depth: int = host(3, "depth from which Russian roulette may end a path")
     hide_lights: bool = flag(False, "the camera sees through lights, also those on shapes")
+    free_panes: bool = flag(True, "as of `path`")
     light_paths: int = host(1, "paths from lights for each sample of the camera")
     light_tracing: bool = host(True, "light paths are joined to the camera")
     merging: bool = host(True, "photons are gathered")
@@ -222,6 +223,7 @@ class ParticleTracer(Integrator):
     max_depth: int = host(8, "longest path, as of `path`; -1: no limit")
     rr_depth: int = host(3, "depth from which Russian roulette may end a path")
     hide_lights: bool = flag(False, "lights shine, but are not seen to shine")
+    free_panes: bool = flag(True, "as of `path`")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

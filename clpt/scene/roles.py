@@ -271,6 +271,15 @@ class Factor(Spectral):
         return RGBUnbounded(*rgb)
 
 
+class Coefficient(Spectral):
+    """A coefficient of the inside of a body; one that is 0 at all wavelengths is the number 0."""
+
+    def check(self, value: object, param: Param, where: str | None) -> Any:
+        made = super().check(value, param, where)
+        none = isinstance(made, Spectrum) and all(found == 0.0 for found, _ in extremes(made))
+        return Constant(0.0) if none else made
+
+
 class Quantity(Factor):
     """A number that may depend on the wavelength and is no colour."""
 
@@ -304,7 +313,7 @@ EMISSION = Emission(
 )
 INDEX = Index("index", names=spectra.index, measured=True, grey=True)
 FACTOR = Factor("factor", codes=True)
-COEFFICIENT = Spectral("coefficient", "inside", measured=True)
+COEFFICIENT = Coefficient("coefficient", "inside", measured=True)
 QUANTITY = Quantity("quantity", measured=True, grey=True)
 SPECTRA = (REFLECTANCE, EMISSION, INDEX, FACTOR, COEFFICIENT, QUANTITY)
 DEVICE = (

@@ -21,8 +21,8 @@ from clpt.render.analysis.geometry import Emitter, Geometry
 from clpt.render.analysis.index import SceneIndex
 from clpt.render.analysis.lights import image_lights, light_bounds, sky_light
 from clpt.render.analysis.lights.aims import is_sharp, sharp_pieces
-from clpt.render.analysis.lights.look import Look
 from clpt.render.analysis.lights.sources import Sources
+from clpt.render.analysis.look import Look
 from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.scene import materials as mt
 from clpt.scene.integrators import Auto, Integrator, Path, Vcm, shared

@@ -19,7 +19,7 @@ from clpt import images, spectral_exr, transforms
 from clpt.arrays import Floats32, fits_single
 from clpt.errors import SceneError
 from clpt.render.analysis.lights import block_grids
-from clpt.render.analysis.lights.look import Look
+from clpt.render.analysis.look import Look
 from clpt.render.analysis.lowering_cache import version
 from clpt.render.analysis.texels import bands, texels
 from clpt.scene.lights import CubeMap, Envmap, Sky
