@@ -49,7 +49,8 @@ if TYPE_CHECKING:
     from clpt.spectral_exr import write as write_spectral
     from clpt.version import VERSION as __version__
 
-logging.getLogger("clpt").addHandler(logging.NullHandler())  # quiet until the program asks
+_Cleaning = importlib.import_module("clpt.clean_logs").Cleaning
+logging.getLogger("clpt").addHandler(_Cleaning())  # quiet until the program asks
 
 _HOMES = {  # the module of each name, and what it is called there
     "Budget": ("budget", "Budget"),

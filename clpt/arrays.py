@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import mmap
 import sys
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from clpt.errors import SceneError
 
 Array = NDArray[Any]
 Floats = NDArray[np.float64]
@@ -24,9 +27,66 @@ Balls = NDArray[np.float32]  # (n, 4): centre and radius
 
 
 def on_host(values: object) -> Any:
-    """Return values in host memory; of an array on a device a copy, for which it waits."""
+    """Return values in host memory; of an array on a device a copy, for which it waits.
+
+    Raises SceneError for a masked array, and for an array on a device whose rows it cannot follow.
+    """
     module = sys.modules.get("pyopencl.array")  # whoever has such an array has imported it
-    return values.get() if module and isinstance(values, module.Array) else values
+    if not module or not isinstance(values, module.Array):
+        check_unmasked(values)
+        return values
+    flags = values.flags
+    return values.get() if flags.c_contiguous or flags.f_contiguous else _strided(values)
+
+
+def _strided(array: Any) -> Array:
+    """Return a pyopencl array whose rows do not follow each other in memory, in host memory.
+
+    The bytes from its first element to its last are copied, and the gaps are left out here.
+    """
+    reach = [(count - 1) * stride for count, stride in zip(array.shape, array.strides, strict=True)]
+    first = array.offset + sum(min(far, 0) for far in reach)
+    end = array.offset + sum(max(far, 0) for far in reach) + array.dtype.itemsize
+    opencl, memory = sys.modules["pyopencl"], array.base_data
+    if not isinstance(memory, opencl.MemoryObjectHolder) or array.queue is None:
+        raise SceneError(f"its rows are not contiguous: {array.strides}; copy it")
+    copied = np.empty(end - first, np.uint8)
+    for event in array.events:
+        event.wait()
+    opencl.enqueue_copy(array.queue, copied, memory, src_offset=first)
+    held = np.ndarray(array.shape, array.dtype, copied, array.offset - first, array.strides)
+    return held.copy()
+
+
+def check_unmasked(values: object, where: str | None = None) -> None:
+    """Raise SceneError for an array of NumPy with elements that are masked, which have no value."""
+    if isinstance(values, np.ma.MaskedArray) and np.ma.getmaskarray(values).any():
+        raise SceneError("has masked numbers: fill them, as by array.filled(0)", where=where)
+
+
+def in_memory(value: object) -> Any:
+    """Return an argument of a scene's part with copies of the arrays that are maps of files.
+
+    A file that changes would change the scene, and one that is cut would end the process. Looks
+    into mappings and sequences; whatever else holds arrays asks by itself.
+    """
+    if isinstance(value, np.ndarray):
+        return np.array(value, order="K", subok=False) if _is_map(value) else value
+    if isinstance(value, dict):
+        kept = {name: in_memory(one) for name, one in value.items()}
+        return kept if any(kept[name] is not one for name, one in value.items()) else value
+    if isinstance(value, (list, tuple)) and any(isinstance(one, np.ndarray) for one in value):
+        parts = [in_memory(one) for one in value]
+        return tuple(parts) if isinstance(value, tuple) else parts
+    return value
+
+
+def _is_map(array: Array) -> bool:
+    """Whether an array's numbers lie in a map of a file."""
+    held: object = array
+    while isinstance(held, (np.ndarray, memoryview)) and not isinstance(held, np.memmap):
+        held = held.obj if isinstance(held, memoryview) else held.base
+    return isinstance(held, (np.memmap, mmap.mmap))
 
 
 def on_device(values: object) -> bool:

@@ -1,9 +1,10 @@
 """Limits of a load in memory, time and parts: readers ask before they take what a file announces.
 
 A file of a few bytes can announce gigabytes. So each reader asks here, before it allocates, and the
-whole of a load has one account. What files hold themselves is always allowed, as far as there is
-memory; what grows out of little is limited. Outside of a load each thing that is read has the
-machine's limit alone.
+whole of a load has one account, which its scene keeps: what is made of the scene until its first
+sample draws from it too. What files hold themselves is always allowed, as far as there is memory;
+what grows out of little is limited. What is read for a scene of no file has the machine's limit
+alone.
 """
 
 from __future__ import annotations
@@ -11,12 +12,12 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from clpt import host_memory
 from clpt.errors import SceneError
@@ -53,8 +54,11 @@ class Budget:
 
 
 @dataclass(eq=False)
-class _Account:
-    """A count of what a load has taken so far, with its limits."""
+class Account:
+    """A count of what a load has taken so far, with its limits.
+
+    passing: whether images are given back, as while a scene is made ready to be rendered.
+    """
 
     limits: Budget
     available: int
@@ -65,7 +69,21 @@ class _Account:
     read: int = 0  # bytes of files, each counted once
     files: set[tuple[int, int]] = field(default_factory=set)
     lent: int = 0  # bytes that are soon given back
+    spent: float = 0.0  # [s] before it was opened again
+    passing: bool = False
     lock: threading.Condition = field(default_factory=threading.Condition)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "lock"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state, lock=threading.Condition())
+
+    def rest(self) -> Account:
+        """Return an account of what this one has left."""
+        state = self.__getstate__() | {"files": set(self.files), "lent": 0, "passing": True}
+        available = _available() + self.held
+        return Account(**state | {"began": time.monotonic(), "available": available})
 
     @property
     def memory(self) -> int:
@@ -82,7 +100,7 @@ class _Account:
 
 
 usual = Budget()  # of loads that are given none
-_account: ContextVar[_Account | None] = ContextVar("account", default=None)
+_account: ContextVar[Account | None] = ContextVar("account", default=None)
 
 
 def set_usual(limits: Budget) -> None:
@@ -92,15 +110,37 @@ def set_usual(limits: Budget) -> None:
 
 
 @contextmanager
-def opened(limits: Budget | None = None) -> Iterator[None]:
+def opened(limits: Budget | None = None) -> Iterator[Account]:
     """Open the account of a load; one inside another has that one's account."""
-    if _account.get() is not None:
+    account = _account.get()
+    if account is not None:
+        yield account
+        return
+    account = Account(usual if limits is None else limits, _available())
+    with _drawn_from(account):
+        yield account
+
+
+@contextmanager
+def resumed(account: Account | None) -> Iterator[None]:
+    """Draw from what a load has left, each time anew: for what is made of its scene.
+
+    account: of the scene; None, or one that is open already, changes nothing.
+    """
+    if account is None or _account.get() is not None:
         yield
         return
-    token = _account.set(_Account(usual if limits is None else limits, _available()))
+    with _drawn_from(account.rest()):
+        yield
+
+
+@contextmanager
+def _drawn_from(account: Account) -> Iterator[None]:
+    token = _account.set(account)
     try:
         yield
     finally:
+        account.spent += time.monotonic() - account.began
         _account.reset(token)
 
 
@@ -133,11 +173,26 @@ def take(size: int, what: str, file: Path | None = None) -> None:
     check_time(file)
 
 
+def take_made(arrays: Iterable[Any], what: str) -> None:
+    """Ask for memory of arrays that are made of a scene, None left out. Raises as `take` does.
+
+    The scene of no file, which has no account, has no limit either.
+    """
+    if _account.get() is not None:
+        take(sum(array.nbytes for array in arrays if array is not None), what)
+
+
+def take_image(size: int, what: str, file: Path | None = None) -> None:
+    """Ask for memory [bytes] of an image, which a load keeps. Raises as `take` does."""
+    account = _account.get()
+    (check if account is not None and account.passing else take)(size, what, file)
+
+
 def check(size: int, what: str, file: Path | None = None) -> None:
     """Ask for memory [bytes] that is soon given back. Raises as `take` does."""
     account = _account.get()
     if account is None:
-        account = _Account(usual, _available(), alone=True)
+        account = Account(usual, _available(), alone=True)
     _check(account, size, what, file)
     check_time(file)
 
@@ -186,7 +241,7 @@ def check_time(file: Path | None = None) -> None:
     if account is None:
         return
     seconds = SECONDS if account.limits.seconds is None else account.limits.seconds
-    if time.monotonic() - account.began > seconds:
+    if account.spent + time.monotonic() - account.began > seconds:
         message = f"reading the scene takes more than {seconds:g} s: {_advice('seconds')}"
         raise SceneError(message, file=file)
 
@@ -209,7 +264,7 @@ def reads(status: os.stat_result) -> None:
         take_parts(1 + status.st_size // PER_REPEAT, "files are read again and again")
 
 
-def _check(account: _Account, size: int, what: str, file: Path | None) -> None:
+def _check(account: Account, size: int, what: str, file: Path | None) -> None:
     limit = account.memory
     if account.held + size > limit:
         so_far = f", {_shown(account.held)} are taken" if account.held else ""

@@ -21,7 +21,18 @@ from typing import Any
 
 
 class ClptError(Exception):
-    """Base of everything that clpt raises on purpose."""
+    """Base of everything that clpt raises on purpose.
+
+    Its text is one line of at most LONGEST characters, without control characters.
+    """
+
+    def __str__(self) -> str:
+        return one_line(self.whole)
+
+    @property
+    def whole(self) -> str:
+        """The text before it is cut, for whoever takes parts out of it first."""
+        return super().__str__()
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Python would call the class with the message, which is not what the class takes.
@@ -34,10 +45,14 @@ def _restored(cls: type[ClptError], args: tuple[Any, ...]) -> ClptError:
 
 
 LONGEST, LONGEST_PLACE = 300, 120  # characters of an error about a file, and of where it is
+LONGEST_WARNING = 1000  # characters of a warning
+LONGEST_KEPT = 1 << 14  # characters of a message that an error keeps
 
 
 def one_line(text: str, longest: int = LONGEST) -> str:
     """Return a text on one line without control characters, its middle left out if it is long."""
+    if len(text) > 8 * longest:  # the rest is never shown, and may be megabytes
+        text = f"{text[: 4 * longest]} {text[-4 * longest :]}"
     if not text.isprintable():
         text = " ".join("".join(c if c.isprintable() else " " for c in text).split())
     if len(text) <= longest:
@@ -46,10 +61,19 @@ def one_line(text: str, longest: int = LONGEST) -> str:
     return f"{text[: longest - end - 5]} ... {text[-end:]}"
 
 
+def lines(text: str) -> str:
+    """Return a text of several lines, such as a traceback, each as `one_line` makes it.
+
+    Blanks at the beginning of a line stay.
+    """
+    rows = text.split("\n")
+    return "\n".join(row[: len(row) - len(row.lstrip(" "))] + one_line(row) for row in rows)
+
+
 class SceneError(ClptError, ValueError):
     """Bad input, with the file, line and element it stands in where these are known.
 
-    Its text is one line of at most LONGEST characters, whatever the input holds.
+    message: the text without these places, before it is cut.
     """
 
     def __init__(
@@ -60,18 +84,27 @@ class SceneError(ClptError, ValueError):
         line: int | None = None,
         where: str | None = None,
     ):
-        self.message, self.file, self.line = one_line(message), file, line
+        self.message, self.file, self.line = one_line(message, LONGEST_KEPT), file, line
         super().__init__()
         self.place_at(where)
 
     def place_at(self, where: str | None) -> None:
         """Say where it is, in place of what was said: the element or the parameter."""
-        self.where = where = None if where is None else one_line(where, LONGEST_PLACE)
+        self.where = None if where is None else one_line(where, LONGEST_KEPT)
         place = one_line(str(self.file), LONGEST_PLACE) if self.file is not None else ""
         if self.line is not None:
             place += f":{self.line}"
-        before = "".join(f"{part}: " for part in (place, where) if part)
+        parts = place, one_line(self.where or "", LONGEST_PLACE)
+        before = "".join(f"{part}: " for part in parts if part)
         self.args = (before + one_line(self.message, max(LONGEST - len(before), 40)),)
+
+    @property
+    def whole(self) -> str:
+        """The element, if it is known, and the message, before they are cut."""
+        return ": ".join(part for part in (self.where, self.message) if part)
+
+    def __str__(self) -> str:
+        return str(self.args[0])
 
 
 LONGEST_NAME = 80  # characters that are compared

@@ -55,14 +55,19 @@ def named(form: str, folder: Path, path: Path) -> Path:
 
 def checked(path: Path) -> Path:
     """Return the path of a regular file, which counts as read now. Raises SceneError."""
+    budget.reads(regular(path))
+    return path
+
+
+def regular(path: Path) -> os.stat_result:
+    """Return what the system says of a regular file. Raises SceneError for anything else."""
     try:
         status = path.stat()
     except (OSError, ValueError) as error:
         raise _unreadable(path, error) from None
     if kind := _other_kind(status):
         raise SceneError(f"is {kind}, not a file", file=path)
-    budget.reads(status)
-    return path
+    return status
 
 
 def opened(path: Path) -> BinaryIO:

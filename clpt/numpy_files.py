@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import io
 import math
+import os
 import zipfile
 from collections.abc import Collection
 from pathlib import Path
-from typing import Any, BinaryIO, Literal
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,20 +20,22 @@ _SUFFIX = ".npy"  # of the members of an .npz
 
 
 def array(path: Path) -> NDArray[Any]:
-    """Return the array of a .npy file, which stays on the disk until it is looked at.
+    """Return the array of a .npy file, in memory: the file may change or go afterwards.
 
-    Raises SceneError if it is not such a file.
+    Raises SceneError if it is not such a file, and where it would take too much memory.
     """
     with input_files.opened(path) as file:
         try:
             start, dtype, shape, fortran = _header(file)
         except Exception as error:  # NumPy's parser raises tokenize's own, and more
             raise _broken(path, ".npy", error) from None
-    _check_bytes(path, dtype, shape, path.stat().st_size - start)
-    order: Literal["C", "F"] = "F" if fortran else "C"
-    if math.prod(shape) == 0:
-        return np.zeros(shape, dtype, order)
-    return np.memmap(path, dtype, "r", start, shape, order)
+        size = math.prod(shape) * dtype.itemsize
+        _check_bytes(path, size, os.fstat(file.fileno()).st_size - start)
+        budget.check(size, "its array", path)
+        values = np.empty(math.prod(shape), dtype)
+        if size:  # no map of the file: whoever writes it anew would change or end the process
+            _check_bytes(path, size, _read_into(file, values.view(np.uint8)))
+    return values.reshape(shape, order="F" if fortran else "C")
 
 
 def arrays(path: Path, names: Collection[str] | None = None) -> dict[str, NDArray[Any]]:
@@ -56,11 +59,20 @@ def arrays(path: Path, names: Collection[str] | None = None) -> dict[str, NDArra
             raise _broken(path, ".npz", error) from None
 
 
+def _read_into(file: BinaryIO, target: NDArray[np.uint8]) -> int:
+    """Fill an array from a file, and return how many bytes there were."""
+    done = 0
+    while done < len(target) and (count := file.readinto(target[done:].data)):  # type: ignore[attr-defined]
+        done += count
+    return done
+
+
 def _member(path: Path, members: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:
     with members.open(member) as packed:
         file = io.BytesIO(packed.read(member.file_size))
     start, dtype, shape, fortran = _header(file)
-    _check_bytes(path, dtype, shape, len(file.getbuffer()) - start)
+    size = math.prod(shape) * dtype.itemsize
+    _check_bytes(path, size, len(file.getbuffer()) - start)
     made = np.frombuffer(file.getbuffer(), dtype, math.prod(shape), start)
     return made.reshape(shape, order="F" if fortran else "C").copy()
 
@@ -82,9 +94,8 @@ def _header(file: BinaryIO) -> tuple[int, np.dtype[Any], tuple[int, ...], bool]:
     return file.tell(), dtype, shape, fortran
 
 
-def _check_bytes(path: Path, dtype: np.dtype[Any], shape: tuple[int, ...], held: int) -> None:
+def _check_bytes(path: Path, needed: int, held: int) -> None:
     """Raise SceneError for an array that is larger than its file."""
-    needed = math.prod(shape) * dtype.itemsize
     if needed > held:
         message = f"is cut short: its header tells of {needed:,} bytes, {max(held, 0):,} are there"
         raise SceneError(message, file=path)

@@ -18,6 +18,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from clpt import ownership
+
 if sys.platform != "win32":
     import fcntl
 
@@ -35,12 +37,13 @@ def replacing(path: str | Path, *, suffixed: bool = True, follow: bool = True) -
 
     The new file is in the same folder, and its content is on the disk before the old file goes. So
     an error, Ctrl-C, a full disk or a killed process leaves the old file as it was. A link stays a
-    link: the file that it names is replaced. What is no regular file, such as a pipe, is yielded
-    itself. suffixed: whether the new file has the suffix of `path`, by which libraries choose a
-    format, and others find files to read. follow: False lets the new file take the place of a link
-    or a pipe too. Raises OSError.
+    link: the file that it names is replaced, but for some links of other users, see
+    `ownership.followed`. What is no regular file, such as a pipe, is yielded itself. suffixed:
+    whether the new file has the suffix of `path`, by which libraries choose a format, and others
+    find files to read. follow: False lets the new file take the place of a link or a pipe too.
+    Raises OSError.
     """
-    path = Path(os.path.realpath(path) if follow else path)
+    path = ownership.followed(path) if follow else Path(path)
     if follow and path.exists() and not path.is_file():
         yield path
         return
@@ -77,7 +80,7 @@ def append_text(path: str | Path, text: str) -> None:
 
 def check_writable(path: str | Path) -> None:
     """Try whether `write` can write this file, and leave nothing behind. Raises OSError."""
-    path = Path(os.path.realpath(path))
+    path = ownership.followed(path)
     if path.is_dir():
         raise IsADirectoryError("it is a folder")
     if path.exists() and not os.access(path, os.W_OK):
@@ -103,7 +106,10 @@ def link(path: str | Path, other: str | Path) -> None:
 
     What had that name is gone. Nothing happens where there is no file, or no links can be made.
     """
-    path = Path(os.path.realpath(path))
+    try:
+        path = ownership.followed(path)
+    except OSError:  # it is not this user's, or a circle
+        return
     name = _new_name(path)
     try:
         if os.path.exists(other) and os.path.samefile(path, other):

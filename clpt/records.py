@@ -42,6 +42,7 @@ PATH = Record(
     eta=("real", "product of the relative indices so far, for Russian roulette"),
     weight=("real", "sample's weight by the pixel filter; from a light, 1 over its first beta"),
     medium=("integer", "medium of the ray, see kernels/media/medium.cl; 0: none"),
+    around=("integer", "medium from which the ray went into a body that absorbs; 0: none"),
     bodies=("integer", "bodies around the ray, see kernels/media/bodies.cl"),
     lead=("real", "how far before o the ray's medium begins: o lies off the surface [m]"),
     rival=(
@@ -154,6 +155,11 @@ SETTINGS = Record(
     aim_count=("integer", "number of these spheres, see kernels/lighting/aiming.cl"),
     camera_medium=("integer", "medium around the camera, see kernels/media/medium.cl"),
     camera_bodies=("integer", "bodies around it, see kernels/media/bodies.cl"),
+    second_u=(
+        "integer",
+        "number of the attribute vertex_u1 among those of meshes; -1: no map asks",
+    ),
+    second_v=("integer", "number of vertex_v1"),
     light_count=("integer", "rows in `lights`"),
     ambient=(
         "integer",
@@ -186,6 +192,11 @@ SETTINGS = Record(
     matte_material=("integer", "1 more than where that of materials stands; 0: there is none"),
     mattes=("integer", "lists of names of a pixel"),
     material_numbers=("integer", "where in `distributions` materials have numbers; 0: nowhere"),
+    primitive_rows=(
+        "integer",
+        "where in `distributions` rows of `shapes` have the place of their list of the caller's "
+        "rows of primitives, 0: they have none; 0: no row has one",
+    ),
     layer_direct=("integer", "1 more than where that of direct light stands; 0: there is none"),
     layer_indirect=("integer", "1 more than where that of indirect light stands; 0: there is none"),
     layer_groups=("integer", "1 more than where those of groups of lights begin; 0: there is none"),
@@ -193,7 +204,7 @@ SETTINGS = Record(
 )
 
 # the last of them, which only layers need
-LAYER_SETTINGS = tuple(m.name for m in SETTINGS.members)[-len(LAYER_PLACES) - 10 :]
+LAYER_SETTINGS = tuple(m.name for m in SETTINGS.members)[-len(LAYER_PLACES) - 11 :]
 
 SHAPE = Record(
     "ShapeRow",
@@ -352,6 +363,7 @@ LAYER_SIZES = Constants(
     "LAYER_",
     "Sizes of layers of the first samples of a pixel.",
     most_words=(64, "of all layers together"),
+    long_words=(4, "of a number of any size"),
     matte_slots=(12, "names that a matte keeps"),
 )
 MOTION_SIZES = Constants("MOTION_", "Sizes of tables of motion.", step=(29, "floats of one"))

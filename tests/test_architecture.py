@@ -24,9 +24,10 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, KERNELS = ROOT / "clpt", ROOT / "kernels"
 
 BASE = {
-    "arrays", "budget", "child_processes", "choices", "colour", "errors", "host_memory", "images",
-    "input_files", "layout", "measured", "numpy_files", "output_files", "records", "spectra",
-    "spectral_exr", "tev", "text", "transforms", "version",
+    "arrays", "budget", "child_processes", "choices", "clean_logs", "colour", "errors",
+    "host_memory", "images", "input_files", "layout", "measured", "numpy_files", "output_files",
+    "ownership", "records", "scalars", "spectra", "spectral_exr", "tev", "text", "transforms",
+    "version",
 }  # fmt: skip
 RENDERS = BASE | {"scene", "device", "denoise", "render", "formats"}
 # What a part may import of the others; itself always. Every part has a row.

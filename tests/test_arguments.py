@@ -47,14 +47,16 @@ def test_what_is_no_scene(function: Any, scene: Any, message: str) -> None:
         ({"width": 4}, TypeError, r"film's: .*dataclasses\.replace\(scene\.film, width=\.\.\)"),
         ({"seed": 1}, TypeError, r"no option 'seed'; it is the scene's: scene\.seed = \.\."),
         ({"max_depth": 4}, TypeError, r"replace\(scene\.integrator, max_depth=\.\.\)"),
+        ({"widht": 4}, TypeError, "no option 'widht'; did you mean 'width'; it is the film's"),
+        ({"max_dept": 4}, TypeError, "did you mean 'max_depth'; it is the integrator's"),
         ({"layuot": "wide8"}, TypeError, "no option 'layuot'; did you mean 'layout'"),
         ({"queue": 1}, TypeError, r"a pyopencl\.CommandQueue, not int; .* device=1"),
         ({"layout": "wide9"}, UnknownKindError, "unknown layout 'wide9'; did you mean 'wide8'"),
         ({"cancel_seconds": 0}, SceneError, "seconds above 0"),
         ({"tree_quality": "best"}, UnknownKindError, "unknown quality 'best'"),
         ({"queued": "no"}, SceneError, "queued: must be true or false, not 'no'"),
-        ({"slots": 0}, SceneError, "slots: must be a whole number from 1, not 0"),
-        ({"slots": 1.5}, SceneError, "slots: must be a whole number from 1"),
+        ({"slots": 0}, SceneError, "slots: must be a whole number above zero, not 0"),
+        ({"slots": 1.5}, SceneError, "slots: must be a whole number above zero"),
         ({"texture_budget": -1}, SceneError, "texture_budget: must be a whole number from 0"),
     ],
 )
@@ -67,7 +69,7 @@ def test_options(function: Any, options: dict[str, Any], error: type, message: s
     ("given", "message"),
     [
         ({"size": 4}, r"^film\.size: must be \(width, height\), not 4$"),
-        ({"size": (0, 4)}, r"^film\.width: must be 1 to 65536, not 0$"),
+        ({"size": (0, 4)}, r"^film\.width: must be a whole number from 1 to 65536, not 0$"),
         ({"mode": "rbg"}, r"^film\.mode: 'rbg' is none of spectral, rgb"),
         ({"camera": "front"}, r"^camera: must be a camera or \(azimuth, elevation\).* not 'front'"),
         ({"camera": (1, 2, 3, 4)}, r"^camera: must be a camera or \(azimuth, elevation\)"),
@@ -153,3 +155,14 @@ def test_the_longest_path_with_photons_is_limited_with_a_word(depth: int, told: 
     assert lowered.settings["max_depth"] == 65
     expected = "integrator.max_depth: 66 counts as 65, the longest path"
     assert (expected in lowered.warnings) == told
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [("sise", "size"), ("mod", "mode"), ("camra", "camera"), ("ssp", "spp"), ("devise", "device")],
+)
+def test_an_option_of_render_is_found_by_a_wrong_name(name: str, meant: str) -> None:
+    """Those of the picture too, of a scene and of a file."""
+    for scene in (SCENE, "scenes/cornell_box"):
+        with pytest.raises(TypeError, match=f"no option {name!r}; did you mean {meant!r}"):
+            clpt.render(scene, **{name: 1})

@@ -16,6 +16,8 @@ import pytest
 import clpt
 from clpt import images, input_files
 from clpt.errors import SceneError
+from clpt.images import exr_files
+from clpt.render.film import film_file
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no pipes, and links need rights")
 SCENE = {"camera": {"type": "perspective"}, "film": {"width": 8, "height": 8}}
@@ -216,3 +218,21 @@ def test_files_of_the_system_without_an_end_end():
     if not path.exists():
         pytest.skip("no such file here")
     assert input_files.read_bytes(path) == b""
+
+
+READ_ELSEWHERE = {  # by what is read outside of a load
+    "film": film_file.read,
+    "header of a film": film_file.read_header,
+    "headers of .exr": exr_files.headers,
+    "channels of .exr": exr_files.read_channels,
+}
+
+
+@pytest.mark.parametrize("what", READ_ELSEWHERE)
+def test_films_and_checkpoints_are_files(tmp_path, what):
+    os.mkfifo(tmp_path / "a.resume.exr")
+    (tmp_path / "b.resume.exr").symlink_to("/dev/zero")
+    (tmp_path / "c.resume.exr").mkdir()
+    for name, said in (("a", "a pipe"), ("b", "a device"), ("c", "a folder")):
+        with within(20), pytest.raises(SceneError, match=f"is {said}, not a file"):
+            READ_ELSEWHERE[what](tmp_path / f"{name}.resume.exr")

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from .options.verbosity import verbose_option
+from .process import terminal
 
 
 @click.group()
@@ -37,9 +38,9 @@ def start(host: str, port: int, keys: Path | None, verbose: int) -> int:
 
     def tell(address: str) -> None:
         keyed = "" if keys is None else f" --keys {keys}"
-        click.echo(address)
-        click.echo(f"keys:     {default_folder() if keys is None else keys}", err=True)
-        click.echo(f"workers:  clpt worker {address}{keyed}", err=True)
-        click.echo(f"pictures: clpt render SCENE --cluster {address}{keyed}", err=True)
+        terminal.say(address, err=False)
+        terminal.say(f"keys:     {default_folder() if keys is None else keys}")
+        terminal.say(f"workers:  clpt worker {address}{keyed}")
+        terminal.say(f"pictures: clpt render SCENE --cluster {address}{keyed}")
 
     return processes.run_scheduler(host, port, folder=keys, tell=tell)

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from ..formats import locate
+from .process import terminal
 
 
 @click.command()
@@ -34,6 +35,9 @@ def compare(a: Path, b: Path, output: Path | None, most: float | None, as_json: 
     from .files import comparisons
 
     pair = comparisons.Pair.read(a, b)
-    click.echo(comparisons.as_json(pair) if as_json else comparisons.as_text(pair))
+    if as_json:
+        terminal.write(comparisons.as_json(pair))
+    else:
+        terminal.say_lines(comparisons.as_text(pair))
     if output is not None:
-        click.echo(comparisons.write(pair, output, most), err=True)
+        terminal.say(comparisons.write(pair, output, most))

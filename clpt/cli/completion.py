@@ -10,13 +10,15 @@ from click.shell_completion import get_completion_class
 
 from .. import output_files
 from ..errors import ClptError
+from .options.values import Choice
+from .process import terminal
 
 SHELLS = ("bash", "zsh", "fish")
 VARIABLE = "_CLPT_COMPLETE"  # by which a shell asks clpt
 
 
 @click.command()
-@click.argument("shell", type=click.Choice(SHELLS))
+@click.argument("shell", type=Choice(SHELLS))
 @click.option("--print", "printed", is_flag=True, help="Print the script, and install nothing.")
 @click.pass_context
 def completion(ctx: click.Context, shell: str, printed: bool) -> None:
@@ -28,7 +30,7 @@ def completion(ctx: click.Context, shell: str, printed: bool) -> None:
     assert made is not None
     script = made(ctx.find_root().command, {}, "clpt", VARIABLE).source()
     if printed:
-        click.echo(script)
+        terminal.write(script)
         return
     path = file_of(shell)
     try:
@@ -36,7 +38,7 @@ def completion(ctx: click.Context, shell: str, printed: bool) -> None:
         output_files.write_text(path, script)
     except OSError as error:
         raise ClptError(f"{path}: cannot be written: {error}") from error
-    click.echo(f"{path}  {advice(shell, path)}")
+    terminal.say(f"{path}  {advice(shell, path)}", err=False)
 
 
 def file_of(shell: str) -> Path:

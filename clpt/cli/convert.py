@@ -9,6 +9,7 @@ import click
 from ..formats import locate
 from .options.grading import GradingOptions, grading_options
 from .options.records import with_records
+from .process import terminal
 
 
 @click.command()
@@ -27,4 +28,4 @@ def convert(source: Path, target: Path, layer: str | None, graded: GradingOption
     locate(source)
     from .files.conversions import write_converted
 
-    write_converted(source, target, layer, grading, lambda text: click.echo(text, err=True))
+    write_converted(source, target, layer, grading, terminal.say)

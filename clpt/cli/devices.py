@@ -8,6 +8,7 @@ import click
 
 from ..errors import DeviceError
 from .options.verbosity import verbose_option
+from .process import terminal
 
 
 @click.command()
@@ -22,7 +23,7 @@ def devices(json_wanted: bool, verbose: int) -> None:
     from .. import device  # here: help needs no OpenCL
     from ..device import runtimes
     from ..device.context import selection, trial
-    from .printing.console import output_console
+    from .printing.console import output_console, shown
     from .printing.devices import as_json, table
     from .printing.names import device_name
 
@@ -31,7 +32,7 @@ def devices(json_wanted: bool, verbose: int) -> None:
         raise DeviceError(f"no OpenCL device: {runtimes.ADVICE}")
     failures = {info.index: trial(info) for info in listed}
     if json_wanted:
-        click.echo(json.dumps(as_json(listed, failures), indent=2))
+        terminal.write(json.dumps(as_json(listed, failures), indent=2))
         return
     console = output_console()
     try:
@@ -41,4 +42,4 @@ def devices(json_wanted: bool, verbose: int) -> None:
         raise
     console.print(table(listed, failures, choice.info.index, bool(verbose)))
     name = choice.info.label if verbose else device_name(choice.info)
-    console.print(f"Taken: [{choice.info.index}] {name} ({choice.reason})", markup=False)
+    console.print(shown(f"Taken: [{choice.info.index}] {name} ({choice.reason})"))

@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from ..formats import locate
+from .process import terminal
 from .process.extras import extra
 
 Pixel = tuple[int, int]  # x, y from the top left
@@ -57,7 +58,7 @@ def inspect(
     image = contents(file)
     values = {pixel: image.pixel(pixel) for pixel in pixels}
     if as_json:
-        click.echo(json.dumps(shown_images.as_json(image, values), indent=2))
+        terminal.write(json.dumps(shown_images.as_json(image, values), indent=2))
     else:
         shown_images.print_tables(image, values)
     if plot or output is not None:
@@ -66,4 +67,4 @@ def inspect(
 
         target = output or Path(f"{file.stem}.spectrum.png")
         plots.write(target, image, values)
-        click.echo(str(target), err=True)
+        terminal.say(str(target))

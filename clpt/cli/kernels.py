@@ -14,6 +14,9 @@ from ..errors import SceneError
 from ..formats import load, locate
 from .options.loading_options import loading_options
 from .options.records import with_records
+from .options.scene_path import ScenePath
+from .options.values import Choice
+from .process import terminal
 
 if TYPE_CHECKING:
     from ..scene import Scene
@@ -38,20 +41,20 @@ class Reproduction:
 
 
 @click.command()
-@click.argument("scene", type=click.Path(path_type=Path))
+@click.argument("scene", type=ScenePath())
 @click.option(
     "-o", "--output", "folder", type=click.Path(path_type=Path), required=True,
     help="Folder for the files; created if missing.",
 )  # fmt: skip
 @click.option(
-    "--lanes", type=click.Choice(["1", "8", "16"]), default="8", show_default=True,
+    "--lanes", type=Choice(["1", "8", "16"]), default="8", show_default=True,
     help="Paths per work-item: 1 as on a GPU, 8 or 16 as on a CPU.",
 )  # fmt: skip
 @click.option(
-    "--layout", type=click.Choice(LAYOUTS), default="wide8", show_default=True,
+    "--layout", type=Choice(LAYOUTS), default="wide8", show_default=True,
     help="Acceleration structure of the triangles.",
 )  # fmt: skip
-@click.option("--mode", type=click.Choice(MODES), help="What light is made of.")
+@click.option("--mode", type=Choice(MODES), help="What light is made of.")
 @click.option(
     "--repro", metavar="STAGE",
     help="Write a program of its own, in C and in Python, that shows whether a device runs this "
@@ -100,7 +103,7 @@ def _write_texts(plan: Scene, folder: Path, texts: Texts) -> None:
         raise SceneError(f"cannot be written: {error}", file=folder) from error
     for name, source in made.items():
         rows, files = source.text.count("\n"), len(source.files)
-        click.echo(f"{folder / name}.cl  {rows:,} lines from {files} files")
+        terminal.say(f"{folder / name}.cl  {rows:,} lines from {files} files", err=False)
 
 
 def _opened(scene: Path, mode: str | None, variables: dict[str, Any]) -> Scene:
@@ -131,5 +134,5 @@ def _reproduce(plan: Scene, scene: Path, folder: Path, stage: str, which: str | 
         raise SceneError(f"no stage is wrong beside {witness.name}", file=scene)
     told = one.told or "right"
     repro.write(folder, one.launch, str(scene), on.info, witness.name, told)
-    click.echo(f"{one.launch.stage} on {on.info.label}: {told}, beside {witness.name}")
-    click.echo(f"{folder / 'README.txt'} says how to run it without clpt")
+    terminal.say(f"{one.launch.stage} on {on.info.label}: {told}, beside {witness.name}", err=False)
+    terminal.say(f"{folder / 'README.txt'} says how to run it without clpt", err=False)

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from ..errors import SceneError
+from .process import terminal
 from .process.extras import extra
 
 
@@ -28,14 +29,14 @@ from .process.extras import extra
 def lens(
     lens: str, wavelengths: str, fields: str, f_number: float | None, plot: Path | None
 ) -> None:
-    """Tell of LENS: a file (.dat, .zmx, .txt) or a name of the library.
+    """Describe LENS: a file (.dat, .zmx, .txt) or a name of the library.
 
     Lengths are in millimetres; pupils stand behind the first and the last surface. A spot's size is
     the root of its mean squared radius.
     """
     from .. import lenses  # here: help needs no numpy
     from .printing import lens as tables
-    from .printing.console import output_console
+    from .printing.console import output_console, shown
 
     made = lenses.read(lens) if Path(lens).suffix else lenses.library(lens)
     if f_number is not None:
@@ -43,9 +44,8 @@ def lens(
     waves = _numbers(wavelengths, "--wavelengths", 200.0, 2000.0)
     angles = _numbers(fields, "--fields", -89.0, 89.0)
     console = output_console()
-    console.print(
-        f"{made.name}, {len(made.surfaces)} surfaces" + f"; {made.source}" * bool(made.source)
-    )
+    source = f"; {made.source}" * bool(made.source)
+    console.print(shown(f"{made.name}, {len(made.surfaces)} surfaces{source}"))
     console.print(tables.near_axis(made, waves))
     console.print(tables.of_spots(made, waves, angles))
     if plot is not None:
@@ -53,7 +53,7 @@ def lens(
             from .plots import lens as lens_plot  # here: matplotlib is an extra, and slow to import
 
         lens_plot.write(plot, made, waves, angles)
-        click.echo(str(plot), err=True)
+        terminal.say(str(plot))
 
 
 def _numbers(text: str, option: str, low: float, high: float) -> list[float]:

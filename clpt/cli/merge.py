@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,7 @@ from .files.targets import checked
 from .options.grading import GradingOptions, grading_options, names_option
 from .options.records import with_records
 from .options.scene_options import denoise_option
+from .process import terminal
 
 if TYPE_CHECKING:
     from ..render.film.saved_film import SavedFilm
@@ -47,13 +49,14 @@ def merge(
         locate(film)
     from ..render.film.saved_film import other_devices  # here: help needs no OpenCL
     from .files import checkpoints, outputs
+    from .printing.display import display
 
     how = graded.grading
     targets = checked(paths)
 
     def note(text: str) -> None:
         if not quiet:
-            click.echo(text, err=True)
+            terminal.say(text)
 
     if text := how.unused(targets):
         note(f"clpt: warning: {text}")
@@ -61,7 +64,9 @@ def merge(
     for change in other_devices(total.sessions, total.sessions[0].device):
         note(f"clpt: warning: the films are of several classes of devices: {change}")
     stats = _figures(total) | {"films": len(films)}
-    outputs.write_all(targets, total, stats, how, note, denoise)
+    denoiser = denoise or total.denoise
+    with display(quiet, None).phase(f"denoising ({denoiser})") if denoiser else nullcontext():
+        outputs.write_all(targets, total, stats, how, note, denoise)
     note(checkpoints.summary(total))
 
 

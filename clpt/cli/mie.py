@@ -12,6 +12,8 @@ from .. import output_files
 from ..choices import DROP_SIZES
 from ..errors import SceneError
 from .options.records import with_records
+from .options.values import Choice
+from .process import terminal
 from .process.extras import extra
 
 if TYPE_CHECKING:
@@ -44,7 +46,7 @@ class Indices:
 @click.command()
 @click.argument("radius", type=float)
 @click.option(
-    "--law", default="log_normal", show_default=True, type=click.Choice(DROP_SIZES),
+    "--law", default="log_normal", show_default=True, type=Choice(DROP_SIZES),
     help="How many drops have which radius: RADIUS is that of all, the median, or the effective"
     " radius (Hansen and Travis 1974).",
 )  # fmt: skip
@@ -107,14 +109,14 @@ def mie(drops: Drops, indices: Indices, output: Path | None, plot: Path | None) 
             output_files.write_text(output, write_medium(medium, DIGITS) + "\n")
         except OSError as error:
             raise SceneError(f"cannot be written: {error.strerror}", file=output) from None
-        click.echo(str(output), err=True)
+        terminal.say(str(output))
     if plot is not None:
         with extra("plot", "a plot"):
             from .plots import mie as mie_plot  # here: matplotlib is an extra, and slow to import
 
         title = f"{drops.law}, {drops.radius:g} um, {indices.index} in {indices.host}"
         mie_plot.write(plot, medium, title)
-        click.echo(str(plot), err=True)
+        terminal.say(str(plot))
     if output is None and plot is None:
         print_medium(medium, at)
 

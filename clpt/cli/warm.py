@@ -12,11 +12,13 @@ from ..formats import locate
 from .options.headings import Grouped
 from .options.records import with_records
 from .options.scene_options import SceneOptions, denoise_option, scene_options
+from .options.scene_path import ScenePath
 from .options.verbosity import verbose_option
+from .process import terminal
 
 
 @click.command(cls=Grouped)
-@click.argument("scenes", type=click.Path(path_type=Path), nargs=-1, required=True)
+@click.argument("scenes", type=ScenePath(), nargs=-1, required=True)
 @scene_options
 @denoise_option
 @verbose_option("Log more; twice for everything.")
@@ -43,8 +45,9 @@ def warm(scenes: tuple[Path, ...], options: SceneOptions, verbose: int, quiet: b
                 renderer.prepare()
         builds, seconds = [on.builds for on in renderer.devices], time.perf_counter() - began
         programs, found = sum(b.programs for b in builds), sum(b.cached for b in builds)
-        click.echo(
+        terminal.say(
             f"{scene}: {programs} programs, {found} of them found, in {seconds:.1f}"
-            f" s; the scene took {opened.loading:.1f} s of it"
+            f" s; the scene took {opened.loading:.1f} s of it",
+            err=False,
         )
         renderer.close()

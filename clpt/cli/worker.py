@@ -9,6 +9,7 @@ import click
 from .options.records import with_records
 from .options.scene_options import Machine
 from .options.verbosity import verbose_option
+from .process import terminal
 
 
 @click.command()
@@ -49,6 +50,6 @@ def worker(
 
     def tell(text: str) -> None:
         if not quiet:
-            click.echo(f"{text}, on {chosen}", err=True)
+            terminal.say(f"{text}, on {chosen}")
 
     return processes.run_worker(address, host=host, folder=keys, name=name, tell=tell)

@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from clpt import input_files
 from clpt.arrays import Floats32
 from clpt.choices import OCIO_CONFIG
 from clpt.errors import SceneError, UnknownKindError
@@ -116,6 +118,8 @@ def _opencolorio() -> Any:
 
 def _loaded(ocio: Any, config: str) -> Any:
     """A config. Raises SceneError."""
+    if os.path.exists(config):  # else it is a name of the library's own
+        input_files.regular(Path(config))
     try:
         return ocio.Config.CreateFromFile(config)
     except (ocio.Exception, ocio.ExceptionMissingFile) as error:

@@ -33,7 +33,8 @@ def prepared(scene: Scene, method: str | None) -> Scene:
 
     Where the film splats, neighbours share samples, and denoisers take what noise they have in
     common for detail. So `film.filtering` becomes importance, where the scene does not ask for
-    splatting. Integrators without layers are left without.
+    splatting. Photons are shared too: the integrator `auto` chooses without them. Integrators
+    without layers are left without.
     """
     if method is None:
         return scene
@@ -42,7 +43,7 @@ def prepared(scene: Scene, method: str | None) -> Scene:
     wanted = (*film.layers, *(name for name in layers if name not in film.layers))
     filtering = "importance" if film.filtering == "auto" else film.filtering
     film = dataclasses.replace(film, layers=wanted, filtering=filtering)
-    return dataclasses.replace(scene, film=film)
+    return dataclasses.replace(scene, film=film, integrator=scene.integrator.for_denoiser())
 
 
 def halves(scene: Scene, method: str | None) -> bool:
@@ -58,18 +59,18 @@ def remarks(
     integrator: that renders it; splats: whether samples serve several pixels; noise_before: whether
     a limit of noise is for the picture before it is denoised.
     """
-    advice = "denoisers take what noise they share for detail"
+    advice = "denoisers keep noise that neighbouring pixels share"
     found = []
     if splats:
         found.append(
-            f"the film splats, so neighbouring pixels share samples, and {advice}: set "
+            f"the film splats, so neighbouring pixels share samples; {advice}: set "
             "film.filtering to importance"
         )
     if isinstance(integrator, Vcm) and integrator.merging:
-        found.append(f"pixels share photons of vcm, and {advice}; compare the integrator path")
+        found.append("the noise of vcm is blotchy, and may stay; try the integrator path")
     if not isinstance(sampler, PIXELWISE):
         found.append(
-            f"with the sampler {sampler.kind} neighbouring pixels err together, and {advice}: "
+            f"with the sampler {sampler.kind} neighbouring pixels err together; {advice}: "
             "choose sobol"
         )
     if noise_before:

@@ -27,7 +27,9 @@ LEAST_VARIANCES = (1e-4, 3e-4)  # of transformed light: what the eye does not se
 LIMITS, SHARPNESS = (1.3, 2.5), (3, 2)  # of both averages, see `likeness`
 ALBEDO, NORMAL = 0.05, 0.2  # differences of surfaces that count, beside three times their noise
 DARK = 0.1  # of the mean light: what is darker counts as if it were so bright
-VECTORS = 8  # MOST_VALUES, kernels/stage/denoise.cl
+BORDER = 11  # pixels of planes beside the picture, kernels/stage/denoise.cl
+ADVICE = "denoise a smaller picture"
+VECTORS = 4  # MOST_VALUES, kernels/stage/denoise.cl
 
 
 class Statistical:
@@ -47,14 +49,17 @@ class Statistical:
         normal: Image | None = None,
     ):
         self._height, self._width = halves[0].shape[:2]
+        self._lanes, self._rows = on.lanes, 2 if on.lanes == 1 else 8
         self._stream, self._buffers = device.Stream(on.queue), device.Buffers(on)
-        self._program = device.build(on, device.assemble("stage/denoise.cl"))
+        self._program = device.build(
+            on, device.assemble("stage/denoise.cl", defines={"LANES": on.lanes})
+        )
         mean = float(np.mean(halves, dtype=float))
         self._light = max(mean, 1e-12)
         empty = np.zeros_like(halves[0])
         pair = (np.clip(empty if albedo is None else albedo, 0.0, 1.0), normal)
         surfaces = [empty if image is None else image for image in pair]
-        self._surfaces = [self._upload(_padded(image)) for image in surfaces]
+        self._surfaces = [self._planes(self._upload(_padded(image)), 1) for image in surfaces]
         widths = (
             least + 3.0 * noise_of(image)
             for least, image in zip((ALBEDO, NORMAL), surfaces, strict=True)
@@ -159,13 +164,28 @@ class Statistical:
 
         by: a guide and its variance, in the place of those of both halves.
         """
-        (guide, variance), (albedo, normal) = by or self._guides[which], self._surfaces
-        made = self._allocate(count)
-        self._run(
-            "denoise_average", guide=guide, variance=variance, albedo=albedo, normal=normal,
-            values=values, averaged=made, size=self._size, count=count, features=self._features,
-            limit=LIMITS[which], sharpness=SHARPNESS[which],
+        guide, variance = (self._planes(image, 1) for image in by or self._guides[which])
+        (albedo, normal), made = self._surfaces, self._allocate(count)
+        bound = self._program.kernel("denoise_average").bind(
+            guide=guide, variance=variance, albedo=albedo, normal=normal,
+            values=self._planes(values, count), averaged=made, size=self._size,
+            extent=self._extent, count=count, features=self._features, limit=LIMITS[which],
+            sharpness=SHARPNESS[which],
         )  # fmt: skip
+        columns, rows = -(-self._width // self._lanes), -(-self._height // self._rows)
+        # drivers of CPUs keep the private arrays of a whole work-group on one stack
+        self._stream.run(bound, (columns, rows), None if self._lanes == 1 else (1, 1))
+        return made
+
+    def _planes(self, image: object, count: int) -> Any:
+        """Planes of a picture of `count` vectors a pixel, see denoise_planes."""
+        width, height = self._extent
+        nbytes = 16 * count * width * height
+        made = self._buffers.allocate("a picture to denoise", nbytes, ADVICE)
+        bound = self._program.kernel("denoise_planes").bind(
+            **{"from": image}, planes=made, size=self._size, extent=self._extent, count=count
+        )
+        self._stream.run(bound, (width, height, 4 * count))
         return made
 
     def _decide(self, halves: object, once: object, twice: object) -> Image:
@@ -191,6 +211,13 @@ class Statistical:
         return made
 
     @property
+    def _extent(self) -> tuple[int, int]:
+        """The size of a plane: borders, and whole rows and columns of what a work-item has."""
+        width = -(-self._width // self._lanes) * self._lanes
+        height = -(-self._height // self._rows) * self._rows
+        return width + 2 * BORDER, height + 2 * BORDER
+
+    @property
     def _size(self) -> tuple[int, int]:
         return self._width, self._height
 
@@ -199,9 +226,8 @@ class Statistical:
         self._stream.run(bound, (self._width * self._height,) if flat else self._size)
 
     def _allocate(self, vectors: int) -> Any:
-        advice = "denoise a smaller picture"
         nbytes = 16 * vectors * self._width * self._height
-        return self._buffers.allocate("a denoised picture", nbytes, advice)
+        return self._buffers.allocate("a denoised picture", nbytes, ADVICE)
 
     def _upload(self, image: Image) -> Any:
         return self._buffers.upload("a picture to denoise", image)

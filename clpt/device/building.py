@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
 import pyopencl as cl
-from pyopencl.characterize import has_src_build_cache
+from pyopencl.characterize import nv_compute_capability
 
 from clpt.device import (
     compile_limits,
@@ -46,22 +46,32 @@ def build(device: Device, source: Source, options: Sequence[str] = ()) -> Progra
     Raises KernelBuildError with our file and line, the log, and the path of the text.
     """
     flags = _flags(device, options)
-    on_disk = not has_src_build_cache(device.info.cl_device)
+    on_disk = not has_own_cache(device.info.cl_device)
     program = _known(device, source, flags, on_disk)
     if program is not None:
         return program
     if on_disk:
         device.builds.on_new()
-    device.builds.on_compile()
+    entry = _entry(device, source, flags)
+    device.builds.on_compile(entry)
     start = time.perf_counter()
     with compile_limits.watched(source):
         program = _from_source(device, source, flags)
         if on_disk:  # a binary is compiled to the end, a program of the driver may not be
-            entry = _entry(device, source, flags)
             binary = native_programs.binary(program.cl_program)
             disk_cache.store(entry, encode(program.signatures), binary)
             program = _from_cache(device, source, flags, entry) or program
+    device.builds.on_compiled(entry)
     return _built(device, source, flags, program, time.perf_counter() - start)
+
+
+def has_own_cache(cl_device: cl.Device) -> bool:
+    """Return whether the driver keeps programs by their text: PoCL and NVIDIA do.
+
+    PyOpenCL's own `has_src_build_cache` is not in its older versions.
+    """
+    pocl = cl_device.platform.name == "Portable Computing Language"
+    return pocl or nv_compute_capability(cl_device) is not None
 
 
 def link(
@@ -129,9 +139,10 @@ def compile_ahead(device: Device, sources: Mapping[str, Source], main: str) -> N
             text, options = next(declarations.forms(device, source.text, flags))
             seconds = compile_limits.seconds_for(source)
             told = source.name, seconds, device.info.platform, device.info.name
-            device.builds.on_compile()
+            device.builds.on_compile(part)
             job = Job(*told, " ".join(options), text)
-            device.compilers.submit(part, job, first=device.hurries)
+            compiled = partial(device.builds.on_compiled, part)
+            device.compilers.submit(part, job, first=device.hurries, done=compiled)
     device.builds.on_new()
 
 
@@ -180,15 +191,16 @@ def _part(device: Device, source: Source, flags: list[str]) -> cl.Program:
 
 def _compiled(device: Device, source: Source, flags: list[str]) -> cl.Program:
     """Return a part of a program that this process compiles. Raises KernelBuildError."""
-    device.builds.on_compile()
+    entry = _entry(device, source, [*flags, _PART])
+    device.builds.on_compile(entry)
     try:
         make = partial(native_programs.compile_part, device.context, device.info.cl_device)
         part = declarations.built(device, source.text, flags, make)
     except cl.Error as error:
         raise _build_error(source, str(error)) from error
     if _has_binaries(device):
-        entry = _entry(device, source, [*flags, _PART])
         disk_cache.store(entry, _PART, native_programs.binary(part))
+    device.builds.on_compiled(entry)
     return part
 
 

@@ -14,7 +14,7 @@ import sys
 import threading
 import weakref
 from collections import deque
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -77,12 +77,23 @@ class Compilers:
         self._closed = False
         _running.add(self)
 
-    def submit(self, key: Hashable, job: Job, first: bool = False) -> None:
-        """Let a process do a job, if none has the key yet; first: before all that wait."""
+    def submit(
+        self,
+        key: Hashable,
+        job: Job,
+        *,
+        first: bool = False,
+        done: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Let a process do a job, if none has the key yet.
+
+        first: before all that wait. done: called by a thread when the job has been done.
+        """
         with self._changed:
             if self._closed or key in self._tasks:
                 return
             task = self._tasks[key] = _Task(job)
+            task.result.add_done_callback(lambda _: done())
             self._waiting.insert(0 if first else len(self._waiting), task)
             self._changed.notify()
             if len(self._threads) < min(self.count, len(self._waiting)):

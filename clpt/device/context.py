@@ -27,6 +27,7 @@ from clpt.device import (
 )
 
 from ..errors import DeviceError
+from ..scalars import is_whole
 from .compilers import Compilers, spare_cores
 
 log = logging.getLogger(__name__)
@@ -135,15 +136,17 @@ class Builds:
     """The programs that have been built so far, and the seconds that took (summed over threads).
 
     cached: how many of them came from clpt's own cache; drivers do not tell about theirs.
-    on_compile: called when a program, or a part of one, is about to be given to a compiler. on_new:
-    called when that is in none of clpt's caches, after other processes have got their share.
-    Threads call both, and wait for them.
+    on_compile: called with a key when a program, or a part of one, is about to be given to a
+    compiler, and on_compiled with the same key when it has been. on_new: called when a program is
+    in none of clpt's caches, after other processes have got their share. Threads call all three,
+    and wait for them.
     """
 
     programs: int = 0
     cached: int = 0
     seconds: float = 0.0
-    on_compile: Callable[[], None] = lambda: None
+    on_compile: Callable[[str], None] = lambda key: None
+    on_compiled: Callable[[str], None] = lambda key: None
     on_new: Callable[[], None] = lambda: None
     _lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
 
@@ -406,11 +409,11 @@ def _key(info: DeviceInfo) -> tuple[int, DeviceInfo]:
 
 def _limited(info: DeviceInfo, threads: int) -> DeviceInfo:
     """A part of a CPU that has so many cores, or all of it. Raises DeviceError."""
-    if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
+    if not is_whole(threads) or threads < 1:
         raise DeviceError(f"threads must be a whole number above zero, not {threads!r}")
     if not info.is_cpu:
         raise DeviceError(f"threads are of a CPU, and {info.label} is none")
-    return info if threads >= info.compute_units else _part(info, threads)
+    return info if threads >= info.compute_units else _part(info, int(threads))
 
 
 @functools.cache

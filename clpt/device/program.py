@@ -30,6 +30,8 @@ _SCALARS = {
     "float": np.float32,
     "double": np.float64,
 }
+# A null pointer as bytes: None is taken by PyOpenCL from 2026.1.3 on alone.
+_NULL = np.uintp(0)
 _VECTOR = re.compile(r"([a-z]+?)(2|3|4|8|16)$")
 
 
@@ -46,13 +48,26 @@ class Argument:
         return self.space == "private" and not self.type.endswith("*")
 
     def value(self, value: Any) -> Any:
-        """Return a value as the driver takes it: scalars and vectors in the argument's type."""
-        if not self.by_value or isinstance(value, (np.void, np.ndarray)):
+        """Return a value as the driver takes it: scalars and vectors in the argument's type.
+
+        Raises TypeError for a number in the place of a pointer.
+        """
+        if not self.by_value:
+            if isinstance(value, (int, float, np.number)):  # older versions of PyOpenCL take it
+                raise TypeError("a pointer takes a buffer, or None")
+            return value
+        if isinstance(value, (np.void, np.ndarray)):
             return value
         vector = _VECTOR.match(self.type)
         base = _SCALARS.get(vector[1] if vector else self.type)
         if base is None:  # a struct, an image or a sampler
             return value
+        kind: np.dtype[Any] = np.dtype(base)
+        if kind.kind in "iu":  # NumPy before 2 cuts what does not fit
+            limits = np.iinfo(kind.str)
+            given = value if vector else (value,)
+            if not all(limits.min <= number <= limits.max for number in given):
+                raise OverflowError(f"it goes from {limits.min} to {limits.max}")
         if vector is None:
             return base(value)
         length = int(vector[2])
@@ -166,7 +181,8 @@ class BoundKernel:
             self._numbers.pop(name, None)  # first: an interrupt may come between any two lines
             try:
                 value = argument.value(new)
-                self._cl_kernel.set_arg(index, value)
+                null = value is None and argument.space in ("global", "constant")
+                self._cl_kernel.set_arg(index, _NULL if null else value)
             except (TypeError, ValueError, OverflowError, cl.Error) as error:
                 raise TypeError(
                     f"kernel {self.kernel.name!r}: {name} is {argument.type}, "

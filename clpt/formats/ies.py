@@ -1,7 +1,5 @@
 """Lamps as their makers measure them: IES files (ANSI/IES LM-63-1986 to -2019), as a table of
-directions of a `goniometric` light.
-
-Values of the picture are photometric then: 1 cd at a distance of 1 m shows 1 / pi on white.
+directions of a `goniometric` light, in candela.
 """
 
 from __future__ import annotations
@@ -73,18 +71,23 @@ def read(path: Path) -> Photometry:
 
 
 def parameters(path: Path) -> dict[str, Any]:
-    """Return the `image` of a Goniometric: candela by direction.
+    """Return the `image` and the `candela` of a Goniometric, see `table`. Raises as `read`."""
+    return table(read(path))
+
+
+def table(lamp: Photometry) -> dict[str, Any]:
+    """Return the `image` of a Goniometric: candela by direction, so that its `candela` is 1.
 
     In the light's own space -y is straight down, the vertical angle 0; horizontal angles go from
-    +z to +x. Raises SceneError as `read` does.
+    +z to +x.
     """
-    lamp = read(path)
     vertical = 180.0 - (np.arange(ROWS) + 0.5) / ROWS * 180.0
     around = COLUMNS if len(lamp.horizontal) > 1 else 1
     horizontal = (0.5 - (np.arange(around) + 0.5) / around) * 360.0
     values = lamp.intensity(vertical[:, None], horizontal)
     image = values[:, :, None].astype(np.float32)
-    return {"image": Bitmap(image=image, raw=True, wrap="repeat", wrap_v="clamp")}
+    bitmap = Bitmap(image=image, raw=True, wrap="repeat", wrap_v="clamp")
+    return {"image": bitmap, "candela": 1.0}
 
 
 def _between(angles: NDArray[np.float64], at: Floats) -> tuple[Integers, Floats]:

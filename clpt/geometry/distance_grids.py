@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt import budget
 from clpt.arrays import Floats, Integers, on_host
 from clpt.errors import SceneError
 from clpt.scene.shapes import SdfGrid
@@ -148,6 +149,7 @@ def _tetrahedra(
     Their corners (n, 4, 3) on the fine grid; the cell of each, counted from `first`; where its
     corners are in it (n, 4, 3); the distances there (n, 4).
     """
+    budget.check_time()
     side = pieces + 1
     lattice = np.indices((side,) * 3).reshape(3, -1).T
     points = cells[:, None] * pieces + lattice

@@ -1,4 +1,4 @@
-"""Lights as they shine: what temperature, power and lumens say, as their emission."""
+"""Lights as they shine: what temperature and strengths such as lumens say, as their emission."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from clpt.errors import SceneError
 from clpt.geometry import analytic
 from clpt.geometry.shapes import where
 from clpt.scene import Scene
-from clpt.scene.lights import STRENGTHS, Light, with_emission
+from clpt.scene.lights import STRENGTHS, TEMPERATURE, Light, with_emission
 from clpt.scene.shapes import Group, Instance, Shape
 
 
@@ -39,7 +39,7 @@ def _lit(shape: Shape, groups: dict[int, Group]) -> Shape:
         made = groups[id(group)]
         return shape if made is group else dataclasses.replace(shape, group=made)
     light = shape.emission
-    if light is None or not any(_asked(light, name) for name in STRENGTHS):
+    if light is None or not any(_asked(light, name) for name in (TEMPERATURE, *STRENGTHS)):
         return shape
     powered = _asked(light, "power") or _asked(light, "lumens")
     try:

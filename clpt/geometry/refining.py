@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt import budget
 from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
 from clpt.geometry.shapes import where
@@ -23,6 +24,7 @@ from clpt.scene.textures import Bitmap
 Parts = tuple[Any, Any, Any, Any]
 DEEPEST = 10
 MOST_TRIANGLES = 1 << 25
+PER_TRIANGLE = 350  # bytes of memory for each displaced one, while they are made
 
 
 def is_refined(mesh: Mesh) -> bool:
@@ -79,6 +81,20 @@ def _welded(points: Floats, faces: Integers) -> tuple[Floats, Integers, Integers
     return places, inverse[faces], inverse
 
 
+def sources(mesh: Mesh, parts: Parts, count: int) -> Integers:
+    """Return from which face of a mesh each of the `count` faces of `refined` comes, (count,)."""
+    vertices, faces = parts[0].astype(np.float64), parts[1].astype(np.int64)
+    kept = np.arange(len(faces))
+    if mesh.subdivision:
+        kept = kept[_whole(_welded(vertices, faces)[1])]
+    return np.repeat(kept, count // max(len(kept), 1))
+
+
+def _whole(welded: Integers) -> NDArray[np.bool_]:
+    """Which faces have three places."""
+    return np.asarray((np.roll(welded, 1, axis=1) != welded).all(axis=1))
+
+
 def _halved(faces: Integers, count: int) -> tuple[Integers, Integers]:
     """The edges (e, 2) of faces, and the four faces of each; a new vertex stands behind `count`."""
     halves = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
@@ -100,7 +116,7 @@ def _subdivided(
 ) -> tuple[Floats, Integers, Floats, Floats | None]:
     """Points and normals of the limit surface; uvs are linear on each triangle."""
     places, welded, _ = _welded(points, faces)
-    whole = (np.roll(welded, 1, axis=1) != welded).all(axis=1)
+    whole = _whole(welded)
     welded, faces = welded[whole], faces[whole]
     try:
         limit, finer, normals = subdivision.loop(places, welded, levels)
@@ -126,10 +142,12 @@ def _displaced(mesh: Mesh, parts: Parts, name: str) -> Parts:
     if len(faces) * 4.0**levels > MOST_TRIANGLES:
         message = f"edges of {mesh.displacement_edge:g} m make more than {MOST_TRIANGLES:,} "
         raise SceneError(message + "triangles; raise displacement_edge", where=name)
+    budget.check(PER_TRIANGLE * len(faces) * 4**levels, f"{name}: its displacement")
     if normals is None:
         places, welded, own = _welded(points, faces)
         normals = _smooth(places, welded)[own]
     for _ in range(levels):
+        budget.check_time()
         edges, faces = _halved(faces, len(points))
         points, normals, uvs = (_grown(one, edges) for one in (points, normals, uvs))
     length = np.linalg.norm(normals, axis=1, keepdims=True)

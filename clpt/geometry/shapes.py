@@ -16,7 +16,7 @@ from clpt.scene.shapes import Shape
 
 def where(shape: Shape) -> str:
     """Return how a message names the shape."""
-    kind = "curves" if shape.kind == "tubes" else shape.kind  # see `tubes`
+    kind = {"tubes": "curves", "tessellated": "mesh"}.get(shape.kind, shape.kind)
     return f"{kind} {shape.name!r}" if shape.name else kind
 
 

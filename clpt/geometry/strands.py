@@ -39,6 +39,16 @@ def pieces(shape: Curves, cut_as: Curves | None = None) -> Floats32:
 
     Raises SceneError for points that are no curves, or a transform that stretches.
     """
+    return _pieces(shape, cut_as)[0]
+
+
+def strands(shape: Curves) -> NDArray[np.int64]:
+    """Return the strand of each of `pieces`, (n,). Raises as that does."""
+    return _pieces(shape)[1]
+
+
+def _pieces(shape: Curves, cut_as: Curves | None = None) -> tuple[Floats32, NDArray[np.int64]]:
+    """The pieces of all strands, and the strand of each."""
     name = shapes.where(shape)
     spans, strand = _in_world(shape)
     cuts = _cuts(spans if cut_as is None else _in_world(cut_as)[0])
@@ -60,7 +70,8 @@ def pieces(shape: Curves, cut_as: Curves | None = None) -> Floats32:
     points[closed_start, 0, 3] *= -1.0
     points[closed_end, 3, 3] *= -1.0
     made[:, :CONTROL] = points.swapaxes(1, 2).reshape(-1, CONTROL)
-    return made[_near_to_each_other(points[:, 0, :3])]
+    order = _near_to_each_other(points[:, 0, :3])
+    return made[order], strand[span[order]]
 
 
 def boxes(placed: Floats32) -> NDArray[np.float32]:

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
+from clpt import budget
 from clpt.errors import SceneError
 from clpt.geometry.analytic import across, row
 from clpt.scene.shapes import Cylinder, Mesh, Shape, Sphere
 
 AROUND, ALONG = 96, 48  # steps of the azimuth, and of a sphere's polar angle
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tessellated(Mesh):
+    """A sphere or a tube as triangles, which layers still count as one primitive."""
 
 
 def keeps_its_kind(shape: Shape) -> bool:
@@ -20,7 +28,7 @@ def keeps_its_kind(shape: Shape) -> bool:
     return True
 
 
-def tessellate(shape: Sphere | Cylinder) -> Mesh:
+def tessellate(shape: Sphere | Cylinder) -> Tessellated:
     """Return the shape as a mesh with normals and uvs, under the same transform."""
     along = ALONG if isinstance(shape, Sphere) else 1
     u, v = np.meshgrid(np.arange(AROUND + 1) / AROUND, np.arange(along + 1) / along)
@@ -35,11 +43,13 @@ def tessellate(shape: Sphere | Cylinder) -> Mesh:
         normals = circle @ np.stack(across(axis / np.linalg.norm(axis)))
         vertices = np.asarray(shape.p0) + uvs[:, 1:] * axis + shape.radius * normals
     faces = _quads(along)
+    budget.take_made((vertices, normals, uvs, faces), f"{shape.kind} {shape.name}, in triangles")
+    budget.check_time()
     if isinstance(shape, Sphere):  # v runs down; at the poles one half of a quad has no area
         centre = faces[1:-1].reshape(-1, 3)
         faces = np.concatenate([faces[0, :, 1], centre, faces[-1, :, 0]])
         faces = faces[:, ::-1]
-    return Mesh(
+    return Tessellated(
         vertices=vertices.astype(np.float32),
         faces=faces.reshape(-1, 3).astype(np.uint32),
         normals=normals.astype(np.float32),

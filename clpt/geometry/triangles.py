@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt import transforms
+from clpt import budget, transforms
 from clpt.arrays import Faces, Points, Words, on_host, single
 from clpt.errors import SceneError
 from clpt.geometry import distance_grids, refining
@@ -29,6 +29,7 @@ SUMMED = 1 << 20  # triangles whose normals are summed at a time
 
 FAR = 2.0**61  # from where on the product of two edges may be beyond float32
 LEAST_CROSS = 2.0**-75  # up to which a square is zero in float32
+PER_KEY = 32  # bytes of a vertex at each time: place, normal, uv
 CHUNK = 1 << 16  # rows that are looked at at a time: what is made of them stays in the cache
 
 # Corners of the cube's sides in the order of _CORNER_UVS, as Mitsuba has them.
@@ -99,7 +100,8 @@ def keyed(
     else:
         alike = [at_time(shape, time) for time in times]
         at_all = [_in_world(one, alike) for one in alike]
-    _, faces, _, uvs = at_all[0]
+    vertices, faces, _, uvs = at_all[0]
+    budget.check(PER_KEY * count * len(vertices), f"{where(shape)} at {count:,} times")
     if any(not np.array_equal(one[1], faces) for one in at_all):
         raise SceneError("its triangles are others at other times", where=where(shape))
     solid = np.any([_solid(one[0], faces) for one in at_all], axis=0)
@@ -114,6 +116,13 @@ def keyed(
         None if uvs is None else np.repeat(uvs, count, axis=0),
         tuple(flat),
     )
+
+
+def kept(shape: Shape, times: Sequence[float] = ()) -> NDArray[np.bool_]:
+    """Return which of a shape's triangles `triangulate`, or at `times` [s] `keyed`, keeps, (m,)."""
+    alike = [shape] if shape.deformation is None else [at_time(shape, time) for time in times]
+    at_all = [_in_world(one, alike if times else ()) for one in alike]
+    return np.asarray(np.any([_solid(one[0], one[1]) for one in at_all], axis=0))
 
 
 def at_time(shape: Any, time: float) -> Any:
@@ -319,6 +328,17 @@ def _mesh(shape: shapes.Mesh) -> tuple[Points, Faces, Points | None, Points | No
     uvs = None if shape.uvs is None else _array(shape, "uvs", 2, len(vertices))
     parts = vertices, faces.astype(np.uint32, copy=False), normals, uvs
     return refining.refined(shape, parts, where(shape)) if refining.is_refined(shape) else parts
+
+
+def sources(shape: shapes.Mesh, count: int) -> NDArray[np.int64]:
+    """Return the row in a mesh's `faces` of each of its `count` triangles before any is left out.
+
+    It differs from their own where a mesh is subdivided or displaced.
+    """
+    if not refining.is_refined(shape):
+        return np.arange(count)
+    parts = _array(shape, "vertices", 3), np.asarray(on_host(shape.faces)), None, None
+    return refining.sources(shape, parts, count)
 
 
 def _normals(shape: shapes.Mesh, vertices: Points, faces: NDArray[Any]) -> Points | None:

@@ -50,16 +50,8 @@ def tubes(shape: Curves, name: str, alike: Sequence[Curves] = ()) -> tuple[Any, 
 
     Raises SceneError for points that are no curves.
     """
-    spans, strand = cubics(shape, name)
     linear = shape.basis == "linear"
-    parts = np.ones(len(spans), np.int64) if linear else _pieces(spans)
-    for other in () if linear else alike:
-        parts = np.maximum(parts, _pieces(cubics(other, name)[0]))
-    last = np.append(strand[1:] != strand[:-1], True)
-    rings = parts + (np.ones_like(last) if linear else last)
-    starts = np.cumsum(rings) - rings
-    span = np.repeat(np.arange(len(spans)), rings)
-    t = (np.arange(len(span)) - starts[span]) / parts[span]
+    spans, strand, span, t = _rings(shape, name, alike)
     center, slope = _bezier(spans, span, t)
     tangent = _tangents(center[:, :3], slope, strand[span])
     lower = np.flatnonzero(strand[span[1:]] == strand[span[:-1]])
@@ -70,6 +62,28 @@ def tubes(shape: Curves, name: str, alike: Sequence[Curves] = ()) -> tuple[Any, 
     first = np.r_[True, strand[span[1:]] != strand[span[:-1]]]
     v = (span + t) / len(spans)
     return _around(center, slope, tangent, frames(tangent, first), v, lower, sides)
+
+
+def strands(shape: Curves, name: str, alike: Sequence[Curves], vertices: int) -> Integers:
+    """Return the strand of each of the `vertices` that `tubes` returns, (vertices,)."""
+    _, strand, span, _ = _rings(shape, name, alike)
+    return np.repeat(strand[span], vertices // len(span))
+
+
+def _rings(
+    shape: Curves, name: str, alike: Sequence[Curves]
+) -> tuple[Floats, Integers, Integers, Floats]:
+    """The pieces and their strands, as of `cubics`; for each ring its piece, and where there."""
+    spans, strand = cubics(shape, name)
+    linear = shape.basis == "linear"
+    parts = np.ones(len(spans), np.int64) if linear else _pieces(spans)
+    for other in () if linear else alike:
+        parts = np.maximum(parts, _pieces(cubics(other, name)[0]))
+    last = np.append(strand[1:] != strand[:-1], True)
+    rings = parts + (np.ones_like(last) if linear else last)
+    starts = np.cumsum(rings) - rings
+    span = np.repeat(np.arange(len(spans)), rings)
+    return spans, strand, span, (np.arange(len(span)) - starts[span]) / parts[span]
 
 
 def cubics(shape: Curves, name: str) -> tuple[Floats, Integers]:

@@ -48,6 +48,11 @@ def auto_exposure(image: Floats32) -> float:
     return math.log2(GREY / key)
 
 
+def raised(exposure: Exposure, display: float) -> Exposure:
+    """Return an exposure over that of a film's display [stops]; "auto" needs none."""
+    return exposure if exposure == "auto" else exposure + display
+
+
 def stops(exposure: Exposure, image: Floats32) -> float:
     """Return an exposure in stops; "auto" is that of the image, see `auto_exposure`."""
     return auto_exposure(image) if exposure == "auto" else exposure

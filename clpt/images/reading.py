@@ -26,6 +26,9 @@ READERS: dict[str, Callable[[Path], Stored]] = {
 }
 
 
+STRAIGHT = pillow.SUFFIXES  # of files whose colours are not multiplied by alpha
+
+
 def read(path: str | Path, *, linear: bool = True) -> Floats32:
     """Return an image file as (h, w, c) float32, row 0 at the top; c is 1, 3 or 4.
 
@@ -57,7 +60,7 @@ def read_stored(path: str | Path) -> Stored:
         image = READERS[path.suffix.lower()](path)
     if image.values.size == 0:
         raise SceneError("the image has no pixels", file=path)
-    budget.take(image.values.nbytes, "its pixels", path)
+    budget.take_image(image.values.nbytes, "its pixels", path)
     return image
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from clpt.arrays import in_memory
 from clpt.errors import SceneError
 
 REDUCTIONS = (1, 2, 4)  # equal parts of the azimuths of which one is stored
@@ -93,14 +94,14 @@ class Measurement:
 
 
 def _ascending(name: str, values: ArrayLike) -> NDArray[Any]:
-    made = np.asarray(values, np.float32)
+    made = np.asarray(in_memory(values), np.float32)
     if made.ndim != 1 or not np.isfinite(made).all() or not (np.diff(made) > 0.0).all():
         raise SceneError(f"{name!r} must be finite numbers that ascend")
     return made
 
 
 def _table(name: str, values: ArrayLike) -> NDArray[Any]:
-    made = np.asarray(values, np.float32)
+    made = np.asarray(in_memory(values), np.float32)
     if made.ndim != AXES[name].count(",") + 1:
         raise SceneError(f"{name!r} must be {AXES[name]}, not {made.shape}")
     if min(made.shape[-2:]) < 2 or not made.size:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import input_files, output_files
-from clpt.arrays import Floats
+from clpt.arrays import Floats, in_memory
 from clpt.errors import SceneError
 from clpt.measured.fit import Reflection, area, direction, grid, spherical
 from clpt.measured.warp import sample, warp
@@ -40,7 +40,7 @@ class MerlTable:
     values: NDArray[Any]
 
     def __post_init__(self) -> None:
-        made = np.asarray(self.values, np.float32)
+        made = np.asarray(in_memory(self.values), np.float32)
         if made.ndim != 4 or made.shape[3] != 3 or min(made.shape) < 2:
             raise SceneError(f"must be (halfway, difference, azimuths, 3), not {made.shape}")
         if made.size > 3 * MOST_VALUES:

@@ -20,6 +20,7 @@ from clpt.denoise import needs
 from clpt.errors import DeviceError, SceneError
 from clpt.geometry import shapes
 from clpt.render.analysis.bodies import matter_of
+from clpt.render.analysis.image_files import ImageFiles
 from clpt.render.analysis.surroundings import bodies_around, media_around
 from clpt.render.contract import custom_materials
 from clpt.render.editing import parameter_patch, rebuild
@@ -143,7 +144,7 @@ class DeviceFilm:
             splats = first.features.film.filter.reach > 0
             weighed = scene.noise is not None and first.features.transport.weighed
             self.warnings += needs.remarks(lowered.integrator, scene.sampler, splats, weighed)
-        self._scene_read: tuple[Scene, Fingerprint] | None = None
+        self._scene_read: tuple[Scene, ImageFiles, Fingerprint] | None = None
         self._moving: Moving | None = None
         self._blurred = False  # by keys that `scene` does not have
         log.info("ready in %.2f s", self.seconds["ready"])
@@ -394,11 +395,13 @@ class DeviceFilm:
 
     def origin(self) -> Origin:
         """Return what the samples are of. Raises SceneError for a scene that cannot be read."""
-        if self._scene_read is None or self._scene_read[0] is not self.scene:
-            readable = resolve_device_arrays(self.scene, self.device.queue)
-            self._scene_read = self.scene, fingerprint(readable)
         first = self.wavefront
         lowered, features = first.scene.lowered, first.features
+        read = self._scene_read
+        if read is None or read[0] is not self.scene or read[1] is not lowered.files:
+            readable = resolve_device_arrays(self.scene, self.device.queue)
+            read = self.scene, lowered.files, fingerprint(readable, lowered.files.digests)
+            self._scene_read = read
         settings: dict[str, Plain] = {
             "chosen.integrator": lowered.integrator.kind,
             "chosen.light_paths": float(lowered.settings["light_paths"]),
@@ -412,7 +415,7 @@ class DeviceFilm:
         outside = [cls for cls in features.materials.leaves if cls.source is not None]
         texts = [custom_materials.text(cls).text for cls in outside]
         digest = hashlib.sha256("\0".join([kernels_digest(), *texts]).encode()).hexdigest()
-        return Origin(self._scene_read[1], settings, digest, VERSION)
+        return Origin(read[2], settings, digest, VERSION)
 
     def device_class(self) -> dict[str, Plain]:
         """Return what decides the last bits of samples: equal classes give equal films."""
@@ -441,11 +444,13 @@ class DeviceFilm:
             lambda_max=film.lambda_max,
             output_space=film.output_space,
             exposure=film.exposure,
+            display_exposure=film.display_exposure,
             layers=features.film.layers.names,
             paper=tuple(map(tuple, white_paper(film, features.spectra.mode).tolist())),
             names=first.scene.lowered.layer_names,
             adaptive=self.scene.noise is not None,
             octaves=self.scene.sampler.octaves if settings["octaves"] == 2 else 0.0,
+            place=film.crop and (*film.crop[:2], film.width, film.height),
         )
 
 

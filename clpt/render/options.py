@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+import difflib
+from collections.abc import Iterable, Mapping
 from typing import Any, TypedDict, get_args
 
 import pyopencl as cl
 
-from clpt import bvh
+from clpt import bvh, scalars
+from clpt.arrays import check_unmasked
 from clpt.denoise import needs, oidn
 from clpt.errors import SceneError, UnknownKindError, nearest
-from clpt.scene import Film, Scene
+from clpt.scene import Scene
 from clpt.scene.cameras import Camera
-from clpt.scene.params import params
+from clpt.scene.params import Kind, params
 
 
 class RenderOptions(TypedDict, total=False):
@@ -69,12 +71,10 @@ def check_scene(scene: object) -> None:
 def check_options(scene: Scene, options: Mapping[str, Any]) -> None:
     """Check the names and values of options.
 
-    Raises TypeError for a name that is no option, and says where such a value belongs; TypeError
-    for a queue that is none; SceneError, UnknownKindError for other values.
+    Raises TypeError as `check_names` does, and for a queue that is none; SceneError,
+    UnknownKindError for other values.
     """
-    for name in options:
-        if name not in RenderOptions.__annotations__:
-            raise TypeError(f"there is no option {name!r}{_cure(scene, name)}")
+    check_names(scene, options, RenderOptions.__annotations__)
     queue, layout = options.get("queue"), options.get("layout")
     if queue is not None and not isinstance(queue, cl.CommandQueue):
         found = f"queue must be a pyopencl.CommandQueue, not {type(queue).__name__}"
@@ -87,17 +87,14 @@ def check_options(scene: Scene, options: Mapping[str, Any]) -> None:
     if quality not in get_args(bvh.Quality):
         raise UnknownKindError("quality", str(quality), get_args(bvh.Quality), where="tree_quality")
     for name in ("queued", "looped", "halves", "profiling"):
-        if options.get(name) not in (None, False, True):
-            raise SceneError(f"must be true or false, not {options[name]!r}", where=name)
+        if options.get(name) is not None:
+            scalars.flag(options[name], name)
     seconds = options.get("cancel_seconds")
-    if seconds is not None and not (isinstance(seconds, (int, float)) and seconds > 0.0):
+    if seconds is not None and not (scalars.is_number(seconds) and seconds > 0.0):
         raise SceneError(f"must be seconds above 0, not {seconds!r}", where="cancel_seconds")
     for name, least in (("slots", 1), ("texture_budget", 0), ("first_sample", 0)):
-        number = options.get(name)
-        whole = isinstance(number, int) and not isinstance(number, bool)
-        if number is not None and not (whole and number >= least):
-            message = f"must be a whole number from {least}, not {number!r}"
-            raise SceneError(message, where=name)
+        if options.get(name) is not None:
+            scalars.whole(options[name], least, where=name)
 
 
 def check_changes(camera: object, **by_key: object) -> None:
@@ -109,18 +106,41 @@ def check_changes(camera: object, **by_key: object) -> None:
         if changes is not None and not isinstance(changes, Mapping):
             message = f"must be a dict by shape, as {name}={{scene.shapes[0]: ..}}, not {changes!r}"
             raise SceneError(message, where=name)
+        for values in (changes or {}).values():
+            check_unmasked(values, name)
 
 
-def _cure(scene: Scene, name: str) -> str:
-    """Return what to write for an option that is not there."""
-    if name == "size":
-        return (
-            "; it is the film's: scene.film = dataclasses.replace(scene.film, width=.., height=..)"
-        )
-    if name in {field.name for field in dataclasses.fields(Scene)}:
-        return f"; it is the scene's: scene.{name} = .."
-    for owner, cls in (("film", Film), ("integrator", type(scene.integrator))):
-        if name in params(cls):
-            replaced = f"dataclasses.replace(scene.{owner}, {name}=..)"
-            return f"; it is the {owner}'s: scene.{owner} = {replaced}"
-    return nearest(name, RenderOptions.__annotations__)
+def check_names(scene: Scene, names: Iterable[str], known: Iterable[str]) -> None:
+    """Raise TypeError for a name that is no option, and say where such a value belongs.
+
+    known: the options that there are.
+    """
+    known = tuple(known)
+    for name in names:
+        if name not in known:
+            places = {
+                other: at
+                for other, at in _places(film=scene.film, integrator=scene.integrator).items()
+                if other not in known
+            }
+            near = difflib.get_close_matches(name, (*known, *places), n=1)
+            cure = places.get(name) or nearest(name, known)
+            if name not in places and near and near[0] in places:
+                cure = f"; did you mean {near[0]!r}{places[near[0]]}"
+            raise TypeError(f"there is no option {name!r}{cure}")
+
+
+def _places(**parts: Kind) -> dict[str, str]:
+    """Return the end of a message for each name that belongs to a scene, or to a part of it."""
+    places = {
+        name: f"; it is the {owner}'s: scene.{owner} = "
+        f"dataclasses.replace(scene.{owner}, {name}=..)"
+        for owner, part in parts.items()
+        for name in params(type(part))
+    }
+    size = "; it is the film's: scene.film = dataclasses.replace(scene.film, width=.., height=..)"
+    of_scene = {
+        field.name: f"; it is the scene's: scene.{field.name} = .."
+        for field in dataclasses.fields(Scene)
+    }
+    return {**places, "size": size, **of_scene}

@@ -56,11 +56,11 @@ class DevicePictures(ResumableRenderer):
 
         into: the caller's Array or Buffer, or 2D Image of 8-bit or float RGBA, as OpenGL shares
         them; None makes an Array. dtype: uint8 (the default, the bytes of a .png) or float32.
-        exposure [stops]; tone: none, reinhard, aces, agx or neutral, see clpt.colour.tones; srgb:
-        whether the sRGB transfer is applied, by default to uint8 only; colours become Rec. 709.
-        view: of OpenColorIO, in the place of tone and transfer: a table of it, right to 1/512 for
-        98 of 100 colours. flip: the first row is the lowest. wait_for: events of the caller that
-        come first.
+        exposure [stops] over the film's `display_exposure`; tone: none, reinhard, aces, agx or
+        neutral, see clpt.colour.tones; srgb: whether the sRGB transfer is applied, by default to
+        uint8 only; colours become Rec. 709. view: of OpenColorIO, in the place of tone and
+        transfer: a table of it, right to 1/512 for 98 of 100 colours. flip: the first row is the
+        lowest. wait_for: events of the caller that come first.
 
         Returns the Array, whose `events` hold the event of the picture; for an Image the event.
         Raises DeviceError if the picture does not fit, UnknownKindError for names.
@@ -69,7 +69,8 @@ class DevicePictures(ResumableRenderer):
         picture = wavefront.film.picture
         if self._resolve is None or self._resolve.stream is not wavefront.stream:
             self._resolve = Resolve(wavefront.device, wavefront.stream)
-        screen = Screen(exposure, tone, srgb, view, self.scene.film.output_space)
+        film = self.scene.film
+        screen = Screen(exposure + film.display_exposure, tone, srgb, view, film.output_space)
         return self._resolve(picture, into, screen, dtype=dtype, flip=flip, wait_for=wait_for)
 
     def widget(self, **options: Any) -> Any:
@@ -87,7 +88,7 @@ class DevicePictures(ResumableRenderer):
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         """`image()`, for numpy.asarray(renderer): a copy, which waits."""
-        if copy is False:
+        if copy is not None and not copy:
             raise ValueError("a picture on a device becomes an array of numpy only by a copy")
         image = self.image()
         return image if dtype is None else image.astype(dtype, copy=False)

@@ -11,12 +11,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from clpt import input_files
+from clpt.arrays import on_device, on_host
 from clpt.errors import SceneError
 from clpt.scene import Scene
 from clpt.scene.materials import Material
@@ -30,7 +31,14 @@ DIGEST = "sha256:"  # begins a value that stands for many
 SHORT = 4  # numbers of a list up to which it is shown
 MOST_LISTED = 64  # members of a list up to which each is shown in full
 MOST_DIGESTS = 4096  # up to which each has a digest; more have one together
-WITHOUT_SAMPLES = ("spp", "noise", "name", "warnings", "extra")  # of a scene: they change no sample
+WITHOUT_SAMPLES = (
+    "spp",
+    "noise",
+    "name",
+    "warnings",
+    "extra",
+    "account",
+)  # of a scene: they change no sample
 ARRAYS: dict[str, DTypeLike] = {  # how the lowering reads what a host parameter holds, by its form
     "rows2": np.float32, "rows3": np.float32, "rows4": np.float32, "normals": np.float32,
     "attributes": np.float32, "grid": np.float32, "triangles": np.uint32, "lengths": np.int64,
@@ -70,15 +78,16 @@ class Fingerprint:
 ABSENT = DIGEST + "absent"
 
 
-def fingerprint(scene: Scene) -> Fingerprint:
+def fingerprint(scene: Scene, files: Mapping[str, str] | None = None) -> Fingerprint:
     """Return the fingerprint of a scene.
 
     It leaves out what changes no sample: how many there are, the limit of noise, names. Images are
-    read as bytes; arrays on a device are copied to the host.
+    read as bytes; arrays on a device are copied to the host. files: what stands for files that were
+    read before, by path, see `file_digest`; they may have changed since.
 
     Raises SceneError for what cannot be read, with its name.
     """
-    walk = _Walk()
+    walk = _Walk(files or {})
     values: Values = {}
     for part in dataclasses.fields(scene):
         if part.name not in WITHOUT_SAMPLES:
@@ -89,7 +98,8 @@ def fingerprint(scene: Scene) -> Fingerprint:
 class _Walk:
     """One walk through a scene; what several shapes share is read once."""
 
-    def __init__(self) -> None:
+    def __init__(self, files: Mapping[str, str]) -> None:
+        self._files = files
         self._known: dict[tuple[int, str], Values] = {}
         self._alive: list[Any] = []  # so that no id is used again
 
@@ -101,7 +111,7 @@ class _Walk:
         if thing is None or isinstance(thing, (bool, int, float, np.generic)):
             return {"": _plain(thing)}
         if isinstance(thing, (str, os.PathLike)):
-            return {"": _file(Path(thing), where) if form in FILES else os.fspath(thing)}
+            return {"": self._file(os.fspath(thing), where) if form in FILES else os.fspath(thing)}
         key = id(thing), form
         if key not in self._known:
             self._alive.append(thing)
@@ -122,13 +132,17 @@ class _Walk:
                 raise SceneError(
                     "is a buffer on a device; an Array of PyOpenCL is read", where=where
                 )
-            return {"": _array(np.asarray(thing.get()), form)}
+            read = on_host(thing) if on_device(thing) else thing.get()
+            return {"": _array(np.asarray(read), form)}
         if isinstance(thing, Sequence):
             numbers = _numbers(thing)
             if numbers is not None:
                 return {"": _array(numbers, form)}
             return self._list(thing, where, form)
         raise SceneError(f"cannot be compared: a {type(thing).__name__}", where=where)
+
+    def _file(self, path: str, where: str) -> str:
+        return self._files.get(path) or file_digest(Path(path), where)
 
     def _fields(self, thing: Any, where: str) -> Values:
         """The parameters of a kind, or the fields of another dataclass."""
@@ -157,6 +171,28 @@ class _Walk:
             shown: Values = one if len(members) <= MOST_LISTED else {"": _digest(one)}
             found |= _under(f"[{i}]", shown)
         return found
+
+
+def named_files(whole: object) -> set[str]:
+    """Return the paths of the files that the images of a scene, or of a part, are read from."""
+    found: set[str] = set()
+    seen: dict[int, object] = {}
+    waiting = [(whole, "")]
+    while waiting:
+        thing, form = waiting.pop()
+        if isinstance(thing, (str, os.PathLike)):
+            if form in FILES:
+                found.add(os.fspath(thing))
+        elif id(thing) not in seen:
+            if dataclasses.is_dataclass(thing):
+                held = fields_of(cast("Kind", thing))
+                waiting += ((held[name], one) for name, one in _plan(cast("Kind", type(thing))))
+            elif isinstance(thing, Mapping):
+                waiting += ((one, form) for one in thing.values())
+            elif isinstance(thing, (list, tuple)) and form not in ARRAYS:
+                waiting += ((one, form) for one in thing if not isinstance(one, (int, float)))
+            seen[id(thing)] = thing
+    return found
 
 
 @cache
@@ -217,8 +253,8 @@ def _array(array: NDArray[Any], form: str) -> str:
     return DIGEST + hashed.hexdigest()
 
 
-def _file(path: Path, where: str) -> str:
-    """The digest of a file's bytes."""
+def file_digest(path: Path, where: str = "") -> str:
+    """Return what stands for a file's bytes. Raises SceneError for what cannot be read."""
     hashed = hashlib.sha256()
     try:
         with input_files.opened(path) as file:

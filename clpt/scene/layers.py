@@ -11,7 +11,8 @@ Form = Literal["near", "long", "id", "light", "matte", "film"]
 
 MATTE_SLOTS = LAYER_SIZES["matte_slots"]  # names that a pixel keeps
 MOST_NAMED = (1 << 25) - 2  # what a matte can tell apart, kernels/film/layers.cl
-WORDS: dict[Form, int] = {"near": 1, "long": 3, "id": 1}  # of a channel, kernels/film/layers.cl
+# of a channel, kernels/film/layers.cl
+WORDS: dict[Form, int] = {"near": 1, "long": LAYER_SIZES["long_words"], "id": 1}
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -53,9 +53,17 @@ class Light(Kind):
     group: str = host("", "lights of one name share a layer of `light_groups`")
 
 
+def _to_the_eye(doc: str, unit: str) -> Any:
+    """Declare the photometric twin of an emission."""
+    return host(None, doc, unit, form="optional_number", positive=True)
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Lamp(Light):
-    """Base of the lights whose emission is one spectrum."""
+    """Base of the lights whose emission is one spectrum.
+
+    A strength of STRENGTHS beside it makes the emission a colour alone.
+    """
 
     temperature: float | None = host(
         None, "colour of a black body; the emission is then its luminance", "K",
@@ -68,20 +76,31 @@ class Lamp(Light):
         return next(name for name, p in params(type(self)).items() if p.role is EMISSION)
 
     def check(self) -> None:
-        """Raise SceneError for a temperature beside another colour."""
-        name = self.emission_name
+        """Raise SceneError for a temperature beside another colour, and for two strengths."""
+        name, values = self.emission_name, fields_of(self)
         if self.temperature is not None:
             Blackbody(self.temperature, normalised=True)
-            if _grey(fields_of(self)[name]) is None:
+            if _grey(values[name]) is None:
                 message = f"gives a colour, as {name} does: leave one out, or make {name} a number"
                 raise SceneError(message, where=f"{self.kind}.temperature")
+        strengths = [one for one in STRENGTHS if values.get(one) is not None]
+        if not strengths:
+            return
+        where = f"{self.kind}.{strengths[0]}"
+        if len(strengths) > 1:
+            raise SceneError(f"says what {strengths[1]} say: give either", where=where)
+        if not isinstance(values[name], Spectrum):
+            raise SceneError(f"needs {name} to be without a texture", where=where)
+        if _grey(values[name]) not in (None, 1.0):
+            message = f"says how strong it is, as a number of {name} does: give either"
+            raise SceneError(message, where=where)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PoweredLamp(Lamp):
     """Base of the lights that send out a finite power, which may be given.
 
-    With `power` or `lumens` the emission says the colour alone, or is left out.
+    Their names are `power` and `lumens`.
     """
 
     power: float | None = host(
@@ -98,23 +117,6 @@ class PoweredLamp(Lamp):
         """
         raise NotImplementedError(f"{type(self).__name__}.extent: what it sends out in all")
 
-    def check(self) -> None:
-        """Raise SceneError for a strength that is given twice."""
-        super().check()
-        strengths = {"power": self.power, "lumens": self.lumens}
-        given = [name for name, value in strengths.items() if value is not None]
-        if not given:
-            return
-        where, name = f"{self.kind}.{given[0]}", self.emission_name
-        emitted = fields_of(self)[name]
-        if len(given) > 1:
-            raise SceneError("says what lumens say: give either", where=where)
-        if not isinstance(emitted, Spectrum):
-            raise SceneError(f"needs {name} to be without a texture", where=where)
-        if _grey(emitted) not in (None, 1.0):
-            message = f"says how strong it is, as a number of {name} does: give either"
-            raise SceneError(message, where=where)
-
 
 def _grey(emitted: object) -> float | None:
     """Return the number that an emission was given as, None for a colour or a texture."""
@@ -123,31 +125,32 @@ def _grey(emitted: object) -> float | None:
 
 
 def with_emission(light: Light, area: float = 0.0) -> Light:
-    """Return a light whose emission says all that temperature, power and lumens say.
+    """Return a light whose emission says all that its temperature and its strength say.
 
     area: of the shape that it is on [m^2]. Raises SceneError for a light that is dark.
     """
     if not isinstance(light, Lamp):
         return light
-    given = fields_of(light)
-    asked = {name: None for name in STRENGTHS if given.get(name) is not None}
+    values = fields_of(light)
+    asked = {name: None for name in (TEMPERATURE, *STRENGTHS) if values.get(name) is not None}
     if not asked:
         return light
     name = light.emission_name
-    emitted = given[name]
+    emitted = values[name]
     if light.temperature is not None:
         emitted = Blackbody(light.temperature, scale=_grey(emitted) or 0.0, normalised=True)
-    if isinstance(light, PoweredLamp) and (light.power or light.lumens):
-        wanted = light.power or light.lumens or 0.0
-        measure = watts if light.power else lumens
-        sent = light.extent(area) * measure(emitted)
+    for strength in asked.keys() & set(STRENGTHS):
+        sent = watts(emitted) if strength == "power" else lumens(emitted)
+        if strength in ("power", "lumens") and isinstance(light, PoweredLamp):
+            sent *= light.extent(area)
         if not sent > 0.0:
             raise SceneError("its light is 0 whatever its strength", where=light.kind)
-        emitted = scaled(emitted, wanted / sent)
+        emitted = scaled(emitted, values[strength] / sent)
     return dataclasses.replace(light, **{**asked, name: emitted})
 
 
-STRENGTHS = ("temperature", "power", "lumens")
+TEMPERATURE = "temperature"
+STRENGTHS = ("power", "lumens", "candela", "lux", "nits")  # a lamp has one of them at most
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -157,6 +160,7 @@ class Area(PoweredLamp):
     reach = "surface"
 
     radiance: Textured = emission(1.0, "emitted radiance", RADIANCE, textured=True)
+    nits: float | None = _to_the_eye("its luminance", "cd/m^2")
     two_sided: bool = flag(False, "True: its back emits too")
 
     def extent(self, area: float) -> float:
@@ -176,6 +180,7 @@ class DirectionalArea(PoweredLamp):
     irradiance: Textured = emission(
         1.0, "through a surface across the beam", "W m^-2 nm^-1", textured=True
     )
+    lux: float | None = _to_the_eye("illuminance of a surface across the beam", "lx")
 
     def extent(self, area: float) -> float:
         """Return the area of a flat surface, from which its light goes straight ahead [m^2]."""
@@ -188,6 +193,7 @@ class Point(PoweredLamp):
 
     position: Vector3 = host((0.0, 0.0, 0.0), "where it is", "m")
     intensity: SpectrumLike = emission(1.0, "radiant intensity", "W sr^-1 nm^-1")
+    candela: float | None = _to_the_eye("its luminous intensity", "cd")
     falloff: bool = flag(True, "False: irradiance does not fall with the distance (not physical)")
 
     def extent(self, area: float) -> float:
@@ -201,6 +207,7 @@ class Spot(PoweredLamp):
 
     to_world: Matrix4 = host(np.eye(4), "placement, (4, 4); shines along its +z")
     intensity: SpectrumLike = emission(1.0, "radiant intensity on the axis", "W sr^-1 nm^-1")
+    candela: float | None = _to_the_eye("luminous intensity on the axis", "cd")
     cutoff: float = real(20.0, "half angle beyond which it is dark", "degrees", 0.0, 180.0)
     beam_width: float = real(15.0, "half angle of full intensity", "degrees", 0.0, 180.0)
     edge: str = choice(
@@ -237,6 +244,7 @@ class Projector(Lamp):
     irradiance: SpectrumLike = emission(
         1.0, "where the image is 1, in the middle, a metre away", "W m^-2 nm^-1"
     )
+    lux: float | None = _to_the_eye("illuminance there", "lx")
     fov: float = real(45.0, "angle that the image's width takes", "degrees", 1e-3, 179.0)
     aspect: float = real(0.0, "width over height; 0: that of the image, 1 if it has none", low=0.0)
     to_world: Matrix4 = host(np.eye(4), "placement, (4, 4), without a shear")
@@ -252,6 +260,7 @@ class Goniometric(PoweredLamp):
     intensity: SpectrumLike = emission(
         1.0, "radiant intensity where the image is 1", "W sr^-1 nm^-1"
     )
+    candela: float | None = _to_the_eye("luminous intensity where the image is 1", "cd")
     image: Textured = reflectance(1.0, "factor by direction; a bitmap may go beyond 1")
     to_world: Matrix4 = host(np.eye(4), "placement, (4, 4), without a shear")
 
@@ -268,6 +277,7 @@ class Directional(Lamp):
 
     direction: Vector3 = host((0.0, 0.0, -1.0), "in which the light travels", form="direction")
     irradiance: SpectrumLike = emission(1.0, "on a surface that faces it", "W m^-2 nm^-1")
+    lux: float | None = _to_the_eye("illuminance of a surface that faces it", "lx")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -277,13 +287,16 @@ class Constant(Lamp):
     reach = "infinite"
 
     radiance: SpectrumLike = emission(1.0, "radiance of the surroundings", RADIANCE)
+    nits: float | None = _to_the_eye("luminance of the surroundings", "cd/m^2")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Envmap(Light):
     """Radiance from an image in latitude and longitude around the scene.
 
-    In the light's own space +y is up, and the middle of the image is in the direction +z.
+    In the light's own space +y is up, and the middle of the image is in the direction +z. Row i of
+    h rows lies at pi i / (h - 1) from +y, as in Mitsuba: the first and the last row are the poles.
+    Pixels of the camera `spherical` have their middles at pi (i + 1/2) / h.
     """
 
     reach = "infinite"

@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt import transforms
+from clpt.arrays import in_memory
 from clpt.errors import SceneError
+from clpt.scalars import number
 
 SHAPES = {"box": (1.0, 1.0), "triangle": (0.0, 1.0, 0.0)}  # of shutters, by name
 
@@ -34,7 +36,7 @@ class Keys:
     def __post_init__(self) -> None:
         try:
             times = np.asarray(self.times, np.float64).reshape(-1)
-            matrices = np.asarray(self.transforms, np.float64)
+            matrices = np.asarray(in_memory(self.transforms), np.float64)
         except (TypeError, ValueError) as error:
             raise SceneError(f"its keys are not numbers: {error}", where="motion") from error
         if not len(times):
@@ -147,7 +149,7 @@ def _keyed(values: Any, where: str, count: int, widths: tuple[int, ...]) -> NDAr
     try:
         rows = [np.shape(one) for one in values]
         odd = next((i for i, shape in enumerate(rows) if shape != rows[0]), None)
-        found = np.asarray(values if odd is None else (), np.float32)
+        found = np.asarray(in_memory(values) if odd is None else (), np.float32)
     except (TypeError, ValueError) as error:
         raise SceneError(f"are not numbers: {error}", where=where) from error
     if odd is not None:
@@ -216,10 +218,8 @@ class Shutter:
 
     def __post_init__(self) -> None:
         for name, value in (("open", self.open), ("close", self.close)):
-            number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
-            if not number or not math.isfinite(value):
-                raise SceneError(f"must be a time [s], not {value!r}", where=f"shutter.{name}")
-            object.__setattr__(self, name, float(value))
+            time = number(value, f"shutter.{name}", "a time [s]")
+            object.__setattr__(self, name, time)
         if self.close < self.open:
             message = f"{self.close:g} s is before it opens, {self.open:g} s"
             raise SceneError(message, where="shutter.close")

@@ -40,6 +40,7 @@ from typing import Any, ClassVar, Literal, cast
 
 import numpy as np
 
+from clpt.arrays import check_unmasked, in_memory
 from clpt.errors import SceneError, UnusedParameterError
 from clpt.scene import roles
 from clpt.scene.roles import HostForm, Param
@@ -228,7 +229,8 @@ class KindType(type):
             message = f"{cls.__name__} takes its parameters by name: {cls.__name__}({example}=...)"
             raise TypeError(message)
         try:
-            return super().__call__(**_spelled_out(kind, given))
+            plain = _spelled_out(kind, given)
+            return super().__call__(**{name: in_memory(one) for name, one in plain.items()})
         except SceneError as error:
             name, where = given.get("name"), error.where or kind.kind
             if name and isinstance(name, str) and where.startswith(kind.kind):
@@ -236,15 +238,25 @@ class KindType(type):
             raise
 
 
+OF_FILES = {  # keys of objects in a scene file, and what Python has instead
+    "file": "clpt.load reads a scene.json that has it, a mesh also by itself",
+    "type": "in Python the class says it",
+}
+
+
 def _spelled_out(kind: type[Kind], given: dict[str, object]) -> dict[str, object]:
     """Return arguments of a kind without shorthands. Raises SceneError, UnusedParameterError."""
     known, short = _field_names(kind), shorthands(kind)
     for name in given:
+        if name in OF_FILES:
+            raise SceneError(f"{name!r} is for scene files: {OF_FILES[name]}", where=kind.kind)
         if name not in known and name not in short:
             raise UnusedParameterError(kind.kind, name, (*known, *short))
     plain = {name: value for name, value in given.items() if name not in short}
     for shorthand in kind.shorthands:
         asked = {name: given[name] for name in shorthand.arguments if given.get(name) is not None}
+        for name, value in asked.items():
+            check_unmasked(value, f"{kind.kind}.{name}")
         for name in shorthand.stands_for if asked else ():
             if name in plain:
                 first = next(iter(asked))
@@ -393,4 +405,6 @@ def _checked(value: object, param: Param, where: str) -> Any:
         if not param.textured:
             raise SceneError("cannot be a texture", where=where)
         return value
+    for held in value.values() if isinstance(value, Mapping) else (value,):
+        check_unmasked(held, where)
     return param.role.check(value, param, where)

@@ -25,6 +25,7 @@ def loop(points: Floats, faces: Integers, levels: int) -> tuple[Floats, Integers
     """
     budget.check(PER_TRIANGLE * len(faces) * 4**levels, f"{levels} levels of subdivision")
     for _ in range(levels):
+        budget.check_time()
         points, faces = _finer(points, faces)
     edges = _Edges(faces, len(points))
     return _limit(points, edges), faces, _normals(points, faces, edges)

@@ -92,13 +92,15 @@ def orbiting(scene: Scene, azimuth: float, elevation: float, distance: float = 1
 def surrounded(scene: Scene, image: str | Path, rotation: float = 0.0) -> Scene:
     """Return a scene in an image, without its own surroundings and without the studio's light.
 
-    rotation: of the image about the vertical [degrees]. Raises SceneError for what is no image.
+    rotation: of the image about the vertical [degrees]. A 1 in the image shows 1 on a screen, so
+    the film's `display_exposure` is taken off. Raises SceneError for what is no image.
     """
     images.check_input(Path(image))
     studio = scene.extra.get("studio", {})
     lights = scene.lights[: len(scene.lights) - studio.get("lights", 0)]
     turned = up_of(scene) @ transforms.rotate([0.0, 1.0, 0.0], rotation)
-    around = Envmap(image=str(image), to_world=turned)
+    scale = 2.0**-scene.film.display_exposure
+    around = Envmap(image=str(image), scale=scale, to_world=turned)
     return dataclasses.replace(
         scene,
         shapes=_own_shapes(scene),

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import in_memory
 from clpt.errors import SceneError
 from clpt.scene.values import Matrix4
 
@@ -22,6 +23,9 @@ class Volume:
 
     values: Any
     to_world: Matrix4
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "values", in_memory(self.values))
 
 
 def check_density(values: np.ndarray, where: str) -> None:

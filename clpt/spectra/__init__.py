@@ -19,6 +19,8 @@ from clpt.spectra.cie import (
 )
 from clpt.spectra.emission import (
     LED,
+    LUMENS,
+    UNIT_LUMINANCE,
     Blackbody,
     Illuminant,
     Lines,
@@ -51,8 +53,10 @@ __all__ = [
     "LAMBDA_MAX",
     "LAMBDA_MIN",
     "LED",
+    "LUMENS",
     "REC709_TO_XYZ",
     "RGB",
+    "UNIT_LUMINANCE",
     "XYZ_TO_REC709",
     "Blackbody",
     "Cauchy",

@@ -21,12 +21,14 @@ from clpt.spectra.spectrum import (
     RGBUnbounded,
     Spectrum,
     Tabulated,
+    gridded,
     with_luminance_one,
 )
 
 # CODATA 2018, exact: Planck [J s], light [m/s], Boltzmann [J/K].
 PLANCK, LIGHT, BOLTZMANN = 6.62607015e-34, 299792458.0, 1.380649e-23
 LUMENS = 683.0  # of a watt of 555 nm, by which the candela is defined
+UNIT_LUMINANCE = LUMENS * cie.CIE_Y_INTEGRAL  # [cd/m^2] of a picture's luminance of 1
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,7 @@ class Blackbody(Spectrum):
     normalised: bool = False
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not 0.0 < self.kelvin < np.inf:
             raise SceneError(f"a black body's temperature must be positive, found {self.kelvin} K")
         _check_scale(self.scale)
@@ -116,6 +119,7 @@ class LED(Spectrum):
     scale: float = 1.0
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not (0.0 < self.peak < np.inf and 0.0 < self.width < np.inf):
             raise SceneError(f"an LED's peak and width must be positive: {self.peak}, {self.width}")
         _check_scale(self.scale)
@@ -133,6 +137,7 @@ class Illuminant(Spectrum):
     scale: float = 1.0
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.name not in illuminants():
             raise UnknownKindError("illuminant", self.name, illuminants())
         _check_scale(self.scale)
@@ -208,10 +213,10 @@ def lumens(spectrum: Spectrum) -> float:
 
 
 def _emitted(spectrum: Spectrum) -> Floats:
-    """An emitted spectrum at each whole nanometre from 360 to 830."""
+    """An emitted spectrum around each whole nanometre from 360 to 830."""
     if isinstance(spectrum, RGB):
         spectrum = RGBIlluminant(spectrum.r, spectrum.g, spectrum.b)
-    return spectrum.sample(cie.GRID)
+    return gridded(spectrum, cie.GRID)
 
 
 def _check_scale(scale: float) -> None:

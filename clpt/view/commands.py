@@ -10,6 +10,7 @@ from typing import Any, Protocol
 
 from clpt.colour.tones import TONES
 from clpt.errors import ClptError
+from clpt.scalars import is_flag, is_number, is_whole
 from clpt.spectra import illuminants
 
 OF_VIEW = "view"  # of OpenColorIO, in the place of a tone curve
@@ -38,7 +39,7 @@ class Number:
     high: float
 
     def check(self, value: object) -> float:
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
+        if not is_number(value):
             raise CommandError(f"must be a number, not {_shown(value)}")
         if not self.low <= value <= self.high:  # a NaN is neither
             raise CommandError(f"must be {self.low:g} to {self.high:g}, not {_shown(value)}")
@@ -53,7 +54,7 @@ class Whole:
     high: int
 
     def check(self, value: object) -> int:
-        if isinstance(value, bool) or not isinstance(value, int):
+        if not is_whole(value):
             raise CommandError(f"must be a whole number, not {_shown(value)}")
         if not self.low <= value <= self.high:
             raise CommandError(f"must be {self.low} to {self.high}, not {_shown(value)}")
@@ -65,7 +66,7 @@ class Flag:
     """True or false."""
 
     def check(self, value: object) -> bool:
-        if not isinstance(value, bool):
+        if not is_flag(value):
             raise CommandError(f"must be true or false, not {_shown(value)}")
         return value
 
@@ -131,6 +132,7 @@ class Command:
     parameters: Mapping[str, Type] = field(default_factory=dict)
     steers: bool = True
     restarts: bool = False
+    certain: bool = False
     quick: bool = False
 
 
@@ -154,16 +156,19 @@ COMMANDS: dict[str, Command] = {
     "steer": Command("take the wheel", steers=False),
     "invite": Command("make an address that opens the page once, for somebody else"),
     # the camera
-    "orbit": Command("turn about the pivot", {"dx": DRAG, "dy": DRAG}, restarts=True),
-    "look": Command("turn the head", {"dx": DRAG, "dy": DRAG}, restarts=True),
-    "pan": Command("move across the view", {"dx": DRAG, "dy": DRAG}, restarts=True),
-    "dolly": Command("come nearer, in powers of e", {"by": Number(-5.0, 5.0)}, restarts=True),
+    "orbit": Command("turn about the pivot", {"dx": DRAG, "dy": DRAG}, restarts=True, certain=True),
+    "look": Command("turn the head", {"dx": DRAG, "dy": DRAG}, restarts=True, certain=True),
+    "pan": Command("move across the view", {"dx": DRAG, "dy": DRAG}, restarts=True, certain=True),
+    "dolly": Command(
+        "come nearer, in powers of e", {"by": Number(-5.0, 5.0)}, restarts=True, certain=True
+    ),
     "fly": Command(
         "move by shares of the distance to the pivot",
         {"right": DRAG, "up": DRAG, "forward": DRAG},
         restarts=True,
+        certain=True,
     ),
-    "home": Command("the camera that the scene's file has", restarts=True),
+    "home": Command("the camera that the scene's file has", restarts=True, certain=True),
     "open_view": Command(
         "look as a view does that was saved or copied",
         {
@@ -235,7 +240,7 @@ COMMANDS: dict[str, Command] = {
         "where the render ends: samples, and perhaps noise",
         {"spp": Whole(1, 2**31 - 1), "noise": Optional(Number(1e-4, 1.0))},
     ),
-    "restart": Command("begin again", restarts=True),
+    "restart": Command("begin again", restarts=True, certain=True),
     "keep": Command("keep the picture to compare with, or keep none", {"kept": Flag()}),
     "statistics": Command("tell what the render takes", steers=False, quick=True),
     "save": Command("write a new file into the folder", {"what": Choice(FILES)}),

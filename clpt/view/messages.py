@@ -17,7 +17,9 @@ log = logging.getLogger(__name__)
 
 QUOTED_FOLDER = re.compile(r"""(?<=['"])(?:[A-Za-z]:)?[/\\][^'"\n]*[/\\]""")
 FOLDER = re.compile(r"""(?<![\w.~-])(?:[A-Za-z]:)?[/\\][^\s'"]*[/\\]""")
-CUT_FOLDER = re.compile(r"""(?<= \.\.\. )[^'"]*[/\\]""")  # where `one_line` has cut its beginning
+# A folder that `one_line` has cut, in an error that quotes the text of another.
+CUT_NAME = re.compile(r"""(?<=['"])(?:[A-Za-z]:)?[/\\][^'"\n]* \.\.\. (?:[^'"]*[/\\])?""")
+CUT_FOLDER = re.compile(r"""(?<= \.\.\. )[^'"]*[/\\]""")
 
 PREPARING: Final[dict[str, Any]] = {"type": "status", "phase": "preparing"}
 Reply = Callable[[dict[str, Any]], None]
@@ -46,7 +48,7 @@ def error_message(error: BaseException, before: str = "") -> dict[str, Any]:
     before: begins the line. Of a file only the name is told, not its folder.
     """
     text = f"{before}{_reason(error)}"
-    for folder in (QUOTED_FOLDER, FOLDER, CUT_FOLDER):
+    for folder in (CUT_NAME, QUOTED_FOLDER, FOLDER, CUT_FOLDER):
         text = folder.sub("", text)
     return {"type": "error", "text": one_line(text)}
 
@@ -65,11 +67,11 @@ def _reason(error: BaseException) -> str:
     if isinstance(error, SceneError):
         line = f"line {error.line}" if error.line is not None else None
         name = None if error.file is None else Path(error.file).name
-        return ": ".join(str(part) for part in (name, line, error.where, error.message) if part)
+        return ": ".join(part for part in (name, line, error.whole) if part)
     if isinstance(error, KernelBuildError):
         return f"the kernel program {error.stage!r} did not build"
     if isinstance(error, ClptError):
-        return str(error)
+        return error.whole
     if isinstance(error, MemoryError):
         return "there is not enough memory"
     if isinstance(error, OSError):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+from functools import cache
 from typing import Any, NoReturn
 
 import numpy as np
@@ -16,9 +17,9 @@ from clpt.formats.native import forms
 from clpt.formats.native.cursor import Cursor
 from clpt.render.editing.scene_edit import Successors, edit_scene
 from clpt.scene import Scene
-from clpt.scene.materials import Material, parts
+from clpt.scene.materials import LEAVES, Material, parts
 from clpt.scene.params import Kind, defaults, fields_of, params
-from clpt.scene.roles import INDEX, SPECTRA, Param
+from clpt.scene.roles import INDEX, MEASUREMENT, MERL, SPECTRA, Param
 from clpt.scene.shapes import Group, Instance, Shape
 from clpt.scene.textures import Texture
 from clpt.spectra.sensors import OBSERVERS
@@ -42,20 +43,24 @@ CONTROLS = {
     "sensor": "choice",
     "number_or_auto": "number_or_auto",
 }
+METAL = "metal"  # a name in place of `eta` and `k`
+KIND = "type"  # of a material, as scene.json calls it
 MOST_OBJECTS = 500  # that a page lists
 MOST_PANELS = 300
 LONGEST_NAME = 80  # characters that it is told of a name
 CURVE_AT = range(380, 781, 20)  # [nm]
 OF_FILM = (  # what can change while the renderers stay
-    "sensor", "white_balance", "exposure", "lambda_min", "lambda_max", "wavelengths",
+    "sensor", "white_balance", "exposure", "display_exposure", "lambda_min", "lambda_max",
+    "wavelengths",
 )  # fmt: skip
 
 
 def panels(scene: Scene) -> list[dict[str, Any]]:
     """Return a description of a panel for each thing that can be edited.
 
-    target, index: what `edited` takes; title, kind, doc: for people; shapes: indices of those that
-    have a material or an emission; parameters: see `_parameter`.
+    target, index: what `edited` takes; title, kind, doc: for people; kinds: those that it can
+    become, by KIND as the key; metals: those that METAL as the key takes; shapes: indices of those
+    that have a material or an emission; parameters: see `_parameter`.
     """
     found: list[dict[str, Any]] = []
     for target, things in _targets(scene).items():
@@ -66,6 +71,8 @@ def panels(scene: Scene) -> list[dict[str, Any]]:
                     "index": index,
                     "title": _title(target, thing, owners, scene),
                     "kind": thing.kind,
+                    "kinds": list(_material_kinds()) if target == "material" else [],
+                    "metals": list(spectra.metals()) if _is_metal(thing) else [],
                     "doc": (type(thing).__doc__ or "").strip().splitlines()[0],
                     "shapes": owners[:MOST_OBJECTS],
                     "parameters": _parameters(target, thing),
@@ -120,17 +127,66 @@ def for_people(name: str) -> str:
 def edited(scene: Scene, target: str, index: int, key: str, value: object) -> tuple[Scene, Change]:
     """Return a scene in which a parameter has another value, and how it differs.
 
-    value: as in scene.json, but it names no file. Raises CommandError, SceneError.
+    value: as in scene.json, but it names no file; of a material KIND is a key too. Raises
+    CommandError, SceneError.
     """
     things = _targets(scene).get(target, [])
     if index >= len(things):
         raise CommandError(f"the scene has no {target} {index + 1}")
     thing = things[index][0]
+    if key == KIND and target == "material":
+        return _replaced(scene, target, thing, _of_kind(thing, value))
+    if key == METAL and target == "material" and _is_metal(thing):
+        return _replaced(scene, target, thing, _of_metal(thing, value))
     param = params(type(thing)).get(key)
     if param is None or not _editable(target, key, param):
         raise CommandError(f"{thing.kind}.{key} cannot be edited")
     new = dataclasses.replace(thing, **{key: read(key, value, param)})
     return _replaced(scene, target, thing, new)
+
+
+@cache
+def _material_kinds() -> dict[str, type[Material]]:
+    """Return the materials that need no parameter and no measured table, by their kinds."""
+    measured = {MEASUREMENT, MERL}
+    return {
+        cls.kind: cls
+        for cls in LEAVES
+        if not measured & {param.role for param in params(cls).values()}
+    }
+
+
+def _is_metal(thing: Kind) -> bool:
+    return any(METAL in shorthand.arguments for shorthand in thing.shorthands)
+
+
+def _of_metal(material: Material, metal: object) -> Material:
+    """Return a material with the optical constants of a metal by its name. Raises SceneError."""
+    if not isinstance(metal, str):
+        raise CommandError("a metal is given by its name")
+    known = fields_of(material)
+    plain = {name: value for name, value in known.items() if name not in ("eta", "k")}
+    return type(material)(**plain, **{METAL: metal})
+
+
+def _of_kind(material: Material, kind: object) -> Material:
+    """Return a material of another kind, with the parameters that both have.
+
+    Raises CommandError for a name of no such kind.
+    """
+    cls = _material_kinds().get(str(kind))
+    if cls is None:
+        raise CommandError(f"there is no kind {kind!r} to choose")
+    old, new = params(type(material)), params(cls)
+    values = {
+        name: value
+        for name, value in fields_of(material).items()
+        if name in new and name in old and new[name].role is old[name].role
+    }
+    try:
+        return cls(**values)
+    except SceneError:  # of values that fit one kind alone
+        return cls(name=material.name)
 
 
 def written(thing: Kind) -> dict[str, Any]:
@@ -269,7 +325,8 @@ def _replaced(scene: Scene, target: str, old: Any, new: Any) -> tuple[Scene, Cha
         return dataclasses.replace(scene, lights=lights), Change(whole=True)
     if target == "material":
         changed, _ = edit_scene(scene, Successors(), {old: new})
-        return changed, Change(materials={old: new})
+        same = type(old) is type(new)
+        return changed, Change(materials={old: new}) if same else Change(whole=True)
     groups: dict[int, Group] = {}
     shapes = [_with_emission(shape, old, new, groups) for shape in scene.shapes]
     return dataclasses.replace(scene, shapes=shapes), Change(whole=True)

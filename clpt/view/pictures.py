@@ -41,7 +41,8 @@ def png(pixels: NDArray[np.uint8]) -> bytes:
 class Display:
     """Settings by which a page shows the picture; the render does not know of them.
 
-    exposure [stops]; tone: a curve of clpt.colour.tones, or that of `view`, of OpenColorIO.
+    exposure [stops] over that of the film; tone: a curve of clpt.colour.tones, or that of `view`,
+    of OpenColorIO.
     """
 
     exposure: float = 0.0
@@ -65,10 +66,12 @@ def denoised(source: Pictures, display: Display) -> NDArray[np.uint8]:
 
     Raises SceneError where the denoiser is not installed.
     """
-    colours = images.to_rec709(DenoisedPicture(source, METHOD).colours(), source._form.output_space)
+    form = source._form
+    colours = images.to_rec709(DenoisedPicture(source, METHOD).colours(), form.output_space)
+    stops = display.exposure + form.display_exposure
     if display.tone == OF_VIEW:
-        return images.to_codes(colours, display.exposure, view=display.view)
-    return images.to_codes(colours, display.exposure, display.tone)
+        return images.to_codes(colours, stops, view=display.view)
+    return images.to_codes(colours, stops, display.tone)
 
 
 class Budget:

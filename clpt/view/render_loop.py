@@ -181,6 +181,10 @@ class RenderLoop:
             self._asked = time.perf_counter()
         self._full.cancel(discard)
 
+    def forget_request(self) -> None:
+        """Note that what was asked for restarts nothing."""
+        self._asked = None
+
     def stop(self) -> None:
         """Let all work end soon, for good."""
         self._closing = True

@@ -120,7 +120,7 @@ class Session(CameraWork):
             left_out[1](error_message(CommandError(f"{left_out[0].name} was left out: too many")))
         command = COMMANDS.get(request.name)  # None for what the probe asks for
         if command is not None and command.restarts:
-            self._loop.cancel(discard=True)
+            self._loop.cancel(discard=command.certain)
 
     def watched(self, viewers: int) -> None:
         """Note how many viewers there are; when the last one has left the render waits."""
@@ -244,6 +244,7 @@ class Session(CameraWork):
             yield
         except Exception:
             self._pivot, self._up, self._aimed = pivot
+            self._loop.forget_request()
             if self.scene is not scene or self.look != look:
                 self._show(scene, Change(whole=True), look)
             raise
@@ -359,6 +360,8 @@ class Session(CameraWork):
             self._move(scene.camera)
             return
         self._show(scene, change)
+        if key in (panels.KIND, panels.METAL):  # the panel has other values
+            self._tell_state()
 
     def _do_undo(self, reply: Reply) -> None:
         self._go_to(self._history.back(State(self.scene, self.look)), "undo")
@@ -376,12 +379,17 @@ class Session(CameraWork):
         self._tell_state()
 
     def _do_size(self, reply: Reply, width: int, height: int) -> None:
-        film = dataclasses.replace(self.scene.film, width=width, height=height, crop=None)
+        before = self.scene.film
+        film = dataclasses.replace(before, width=width, height=height, crop=None)
+        if before.crop is None and before.size == film.size and self.look.region is None:
+            return
         look = dataclasses.replace(self.look, region=None)  # it is told in pixels
         self._show(dataclasses.replace(self.scene, film=film), Change(whole=True), look)
         self._tell_state()
 
     def _do_restore(self, reply: Reply) -> None:
+        if self.scene is self._first and self.look == Look():
+            raise CommandError("the scene is as in the file")
         self._show(self._first, Change(whole=True), Look())
         self._set_pivot()
         self._tell_state()
@@ -427,7 +435,9 @@ class Session(CameraWork):
         self._look(region=(x, y, width, height))
 
     def _look(self, **changes: Any) -> None:
-        self._show(self.scene, Change(whole=True), dataclasses.replace(self.look, **changes))
+        look = dataclasses.replace(self.look, **changes)
+        if look != self.look:
+            self._show(self.scene, Change(whole=True), look)
         self._tell_state()
 
     # the render

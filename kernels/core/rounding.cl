@@ -19,3 +19,10 @@ inline real triangle_size(real side, real inverse)
 
 /* The least distance to keep from a primitive of this size at p [m]. */
 inline real rounding_step(vec3 p, real size) { return SURFACE_ROUNDING * (size3(p) + size); }
+
+/* Balls, tubes and disks are met, and their points put onto them, with heights of twice a float's digits
+ * (core/twofold.cl): what a point is off them hardly grows with their size, but with its own coordinates. */
+#define EXACT_SIZE 0x1p-20f
+
+/* How far beside a primitive of this size a point at p may seem to be that lies on it [m]. Rays begin farther off. */
+inline real beside_step(vec3 p, real size) { return 0.25f * rounding_step(p, size); }

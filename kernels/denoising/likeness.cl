@@ -11,29 +11,37 @@
 #define PATCH 1      /* pixels beside one that are compared with it, to each side */
 #define PATCH_TERMS 27.0f
 
-/* A pixel near the border stands for those beyond it. */
-inline size_t denoise_index(int2 size, int x, int y)
+/* LANES floats at any address. */
+typedef real unaligned_real __attribute__((aligned(4)));
+#define unaligned_load(p) (*(global const unaligned_real *)(p))
+
+/* The square of the difference of three planes here and `step` floats away. */
+inline real square_apart(global const float *image, size_t plane, int step)
 {
-    return (size_t)clamp(y, 0, size.y - 1) * size.x + clamp(x, 0, size.x - 1);
+    real x = unaligned_load(image) - unaligned_load(image + step);
+    real y = unaligned_load(image + plane) - unaligned_load(image + plane + step);
+    real z = unaligned_load(image + 2 * plane) - unaligned_load(image + 2 * plane + step);
+    return x * x + y * y + z * z;
 }
 
-/* Welch's statistic of the patches around two pixels; guide: transformed means; variance: of these. */
-inline float patch_statistic(global const float4 *guide, global const float4 *variance, int2 size, int2 a, int2 b)
+/* A row of a patch: the sum of Welch's statistic, here and `step` floats away, over three channels and the pixels from
+ * PATCH to the left to PATCH to the right. guide: planes of transformed means; variance: of these. */
+inline real patch_row(global const float *guide, global const float *variance, size_t plane, int step)
 {
-    float sum = 0.0f;
-    for (int y = -PATCH; y <= PATCH; y++)
-        for (int x = -PATCH; x <= PATCH; x++) {
-            size_t i = denoise_index(size, a.x + x, a.y + y), j = denoise_index(size, b.x + x, b.y + y);
-            float4 apart = guide[i] - guide[j], term = apart * apart / (variance[i] + variance[j]);
-            sum += term.x + term.y + term.z;
+    real sum = (real)(0.0f);
+    for (int x = -PATCH; x <= PATCH; x++)
+        for (int channel = 0; channel < 3; channel++) {
+            size_t i = channel * plane + x, j = i + step;
+            real apart = unaligned_load(guide + i) - unaligned_load(guide + j);
+            sum += apart * apart / (unaligned_load(variance + i) + unaligned_load(variance + j));
         }
-    return sum / PATCH_TERMS;
+    return sum;
 }
 
 /* How much of a neighbour's light counts, by a statistic: half at `limit`, then less by its power 2 * sharpness. */
-inline float likeness(float statistic, float limit, int sharpness)
+inline real likeness(real statistic, float limit, int sharpness)
 {
-    float ratio = statistic / limit, square = ratio * ratio, power = 1.0f;
+    real ratio = statistic / limit, square = ratio * ratio, power = (real)(1.0f);
     for (int i = 0; i < sharpness; i++) power *= square;
     return 1.0f / (1.0f + power);
 }

@@ -46,7 +46,7 @@ inline void exposure_sum(Slab path, uint at, global uint *counters, mask m, vec3
     }
 }
 
-/* Adds the weight of a sample that met a surface. */
+/* Adds how much a sample covers, by its weight. */
 inline void exposure_cover(Slab path, uint at, mask m, real weight)
 {
     store_path_covered(path, at, m, fixed_add(load_path_covered(path, at), fixed_of(sel(m, weight, (real)(0.0f)))));
@@ -58,7 +58,7 @@ inline void exposure_add(Scene scene, Slab path, uint at, BEGIN_ARGS, mask m, in
 {
     exposure_sum(path, at, counters, m, light.value, light.small);
 #if USES_ALPHA
-    exposure_cover(path, at, m & light.covers, load_path_weight(path, at));
+    exposure_cover(path, at, m, load_path_weight(path, at) * light.covers);
 #endif
 #if USES_BANDS
     integer full = bands_add(scene, bands, m, part, pixel_index, light.radiance, light.lambdas, light.scale);

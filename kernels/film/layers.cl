@@ -2,9 +2,10 @@
  * little; whole numbers, which add in any order. What is summed is in path/layers.cl.
  *
  * `layers` has Settings.layer_words words for each pixel, side by side, as its samples then touch one line of a cache:
- * how many samples; a word for each number that is near 1, in units of 2^-22; three for others, in units of 2^8, 2^-16
- * and 2^-40, the lower ones below 2^24; one for an id, 1 more than it, of the sample of number 0. No word leaves its
- * 32 bits, so words add without a carry. Settings.layer_<name> is the first word of a layer. */
+ * how many samples; a word for each number that is near 1, in units of 2^-22; four for others, in units of 2^18, 2^-6,
+ * 2^-30 and 2^-54, the lower ones below 2^24, all of the number's sign; one for an id, 1 more than it, of the sample of
+ * number 0. No word leaves its 32 bits, so words add without a carry. Settings.layer_<name> is the first word of a
+ * layer. */
 #include "film/sums.cl"
 #include "generated/layer_sizes.cl"
 #define LAYER_SAMPLES 64
@@ -59,14 +60,18 @@ inline void layer_put(integer *words, mask m, vec3 v)
     words[2] = to_integer(clamp_r(v.z, -most, most) * LAYER_UNITS);
 }
 
-/* Puts a number of any size below 2^31. */
+/* Puts a number below 2^43: its digits from 2^-54 on, so that small ones keep theirs, above 0 and below. */
 inline void layer_put_long(integer *words, mask m, real v)
 {
-    v = sel(m & (fabs(v) < 0x1p31f), v, (real)(0.0f));
-    real high = floor(v * 0x1p-8f), rest = v - high * 0x1p8f, middle = floor(rest * 0x1p16f);
-    words[0] = to_integer(high);
-    words[1] = to_integer(middle);
-    words[2] = to_integer(floor((rest - middle * 0x1p-16f) * 0x1p40f));
+    v = sel(m & (fabs(v) < 0x1p43f), v, (real)(0.0f));
+    real unit = 0x1p18f, digits = trunc(v * 0x1p-18f);
+    words[0] = to_integer(digits);
+    for (int i = 1; i < LAYER_LONG_WORDS; i++) {
+        v -= digits * unit; /* exact */
+        unit *= 0x1p-24f;
+        digits = trunc(v / unit);
+        words[i] = to_integer(digits);
+    }
 }
 
 /* Puts an id. */

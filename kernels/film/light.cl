@@ -6,7 +6,7 @@
 typedef struct {
     vec3 value;          /* of the film's three channels, times `scale` */
     int small;           /* whether all values are as fixed_of_small takes them */
-    mask covers;         /* the sample met a surface */
+    real covers;         /* how much of what is behind the picture the sample covers */
     Spectrum radiance;   /* for a film of bands, which takes `scale` times this */
     Wavelengths lambdas;
     real scale;

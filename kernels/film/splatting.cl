@@ -122,7 +122,7 @@ inline void exposure_add(Scene scene, Slab path, uint at, BEGIN_ARGS, mask m, in
     store_path_samples(path, at, m, taken);
     mask adds = m & !bright;
     integer first = (s.y - own_y + FILTER_REACH) * FOOTPRINT + (s.x - own_x + FILTER_REACH);
-    real covers = sel(light.covers, (real)(1.0f), (real)(0.0f));
+    real covers = light.covers;
     const int *at_lane = (const int *)&adds, *firsts = (const int *)&first;
     const float *r = (const float *)&v.x, *g = (const float *)&v.y, *b = (const float *)&v.z;
     for (int i = 0; i < LANES; i++) {

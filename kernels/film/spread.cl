@@ -86,7 +86,7 @@ inline integer spread_add(Scene scene, SPREAD_ARGS, mask m, mask colours, intege
         e.weight = fixed_of(f);
 #endif
 #if USES_ALPHA
-        e.covered = fixed_of(sel(light.covers, f, (real)(0.0f)));
+        e.covered = fixed_of(f * light.covers);
 #endif
         full += film_add(scene.settings, film, there & colours, part, pixel_index, e);
 #if USES_BANDS

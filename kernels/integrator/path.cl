@@ -9,6 +9,7 @@
 #include "generated/rivals.cl"
 #include "generated/guide.cl"
 #include "generated/path_steps.cl"
+#include "generated/scout.cl"
 
 inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask active, Vertex v SHADE_ARGS)
 {
@@ -60,6 +61,6 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
 inline void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active SHADE_ARGS)
 {
     Vertex v = vertex_load(scene, path, hit, at, active);
-    path_vertex(scene, path, shadow, at, active, v SHADE_PASSED);
+    path_vertex(scene, path, shadow, at, scout_vertex(scene, path, at, LAYER_PASSED, active, v), v SHADE_PASSED);
 }
 #endif

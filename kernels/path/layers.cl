@@ -1,6 +1,7 @@
 /* Layers beside the picture: what the camera sees at a path's first surface and, for denoisers, at the first one that
  * is not a mirror or smooth glass, as dark and as coloured as what is before lets it through. */
 #include "film/layers.cl"
+#include "generated/scouts.cl"
 
 #include "generated/mattes.cl"
 #define DENOISERS_SEE (settings->layer_denoising && !BSDF_DELTA) /* past mirrors and smooth glass */
@@ -12,12 +13,13 @@ inline vec3 layer_albedo(Scene scene, Scattering scatter, Wavelengths lambdas, S
     return scale3(film_value(scene, albedo, lambdas), weight);
 }
 
-/* How far a point is from the camera along its axis, the third column of `to_world` [m]. */
+/* How far a point is from the camera along its axis, the third column of `to_world` at the path's time [m]. */
 inline real layer_z(Scene scene, vec3 p)
 {
     global const float *m = (global const float *)scene.camera;
-    float length = sqrt(m[2] * m[2] + m[6] * m[6] + m[10] * m[10]);
-    return ((p.x - m[3]) * m[2] + (p.y - m[7]) * m[6] + (p.z - m[11]) * m[10]) / length;
+    vec3 axis = v3(m[2], m[6], m[10]), from = v3(m[3], m[7], m[11]);
+    camera_axis_moved(scene, &from, &axis);
+    return dot3(sub3(p, from), axis) / sqrt(dot3(axis, axis));
 }
 
 /* The shading normal; points of media have none. */
@@ -30,8 +32,8 @@ inline vec3 layer_normal(Scattering scatter)
 inline void layer_put_long3(integer *words, mask m, vec3 v, real weight)
 {
     layer_put_long(words, m, v.x * weight);
-    layer_put_long(words + 3, m, v.y * weight);
-    layer_put_long(words + 6, m, v.z * weight);
+    layer_put_long(words + LAYER_LONG_WORDS, m, v.y * weight);
+    layer_put_long(words + 2 * LAYER_LONG_WORDS, m, v.z * weight);
 }
 
 /* Puts what the camera sees `first`; Settings.layer_<name> is 0 where there is no such layer. */
@@ -54,7 +56,7 @@ inline void layers_put_first(Scene scene, Slab path, uint at, integer *words, ma
     if (settings->layer_position) layer_put_long3(words + settings->layer_position, first, v.s.p, weight);
     if (settings->layer_uv) {
         layer_put_long(words + settings->layer_uv, first, v.s.uv.x * weight);
-        layer_put_long(words + settings->layer_uv + 3, first, v.s.uv.y * weight);
+        layer_put_long(words + settings->layer_uv + LAYER_LONG_WORDS, first, v.s.uv.y * weight);
     }
     if (settings->layer_motion) screen_motion_record(scene, words + settings->layer_motion, first, v, weight);
     mask zeroth = first & (load_path_sample(path, at) == 0);
@@ -63,7 +65,19 @@ inline void layers_put_first(Scene scene, Slab path, uint at, integer *words, ma
     if (settings->layer_material_id) layer_put_id(words + settings->layer_material_id, zeroth, v.material);
 }
 
-/* Adds what the `met` paths see here. Returns the paths' state, which says whether denoisers have got theirs. */
+/* Adds what the `first` paths see first. */
+inline void layers_see(Scene scene, Slab path, uint at, LAYER_ARGS, mask first, Vertex v, Scattering scatter)
+{
+    first = layers_want(path, at, first);
+    integer words[LAYER_MOST_WORDS], pixel_index = load_path_pixel_index(path, at);
+    int before = scene.settings->layer_denoising; /* theirs come last */
+    layers_put_first(scene, path, at, words, first, v, scatter, layer_weight(path, at));
+    layers_add(scene, layers, first, pixel_index, words, before ? before : scene.settings->layer_words);
+    mattes_record(scene, mattes, first, pixel_index, v);
+}
+
+/* Adds what the `met` paths see here, but what they see first where other paths scout for that. Returns the paths'
+ * state, which says whether denoisers have got theirs. */
 inline integer layers_record(Scene scene, Slab path, uint at, LAYER_ARGS, mask met, Vertex v, Scattering scatter,
                              integer state)
 {
@@ -74,19 +88,14 @@ inline integer layers_record(Scene scene, Slab path, uint at, LAYER_ARGS, mask m
         state |= sel_i(met, (integer)(PATH_SEEN), (integer)(0));
     }
     if (!any(adds)) return state;
-    real weight = layer_weight(path, at);
+    if (!LAYERS_SCOUT && any(first)) layers_see(scene, path, at, LAYER_PASSED, first, v, scatter);
+    if (!DENOISERS_SEE) return state;
     integer words[LAYER_MOST_WORDS];
-    layers_put_first(scene, path, at, words, first, v, scatter, weight);
-    if (DENOISERS_SEE && settings->layer_denoising_albedo) {
-        vec3 albedo = layer_albedo(scene, scatter, v.lambdas, v.beta, weight);
-        layer_put(words + settings->layer_denoising_albedo, adds, albedo);
-    }
-    if (DENOISERS_SEE && settings->layer_denoising_normal)
-        layer_put(words + settings->layer_denoising_normal, adds, scale3(layer_normal(scatter), weight));
-    int count = settings->layer_words, before = settings->layer_denoising; /* theirs come last */
-    if (before && BSDF_DELTA) count = before;
-    integer pixel_index = load_path_pixel_index(path, at);
-    layers_add(scene, layers, adds, pixel_index, words, count);
-    mattes_record(scene, mattes, first, pixel_index, v);
+    int before = settings->layer_denoising, albedo = settings->layer_denoising_albedo - before;
+    int normal = settings->layer_denoising_normal - before;
+    real weight = layer_weight(path, at);
+    if (albedo >= 0) layer_put(words + albedo, adds, layer_albedo(scene, scatter, v.lambdas, v.beta, weight));
+    if (normal >= 0) layer_put(words + normal, adds, scale3(layer_normal(scatter), weight));
+    layers_add(scene, layers + before, adds, load_path_pixel_index(path, at), words, settings->layer_words - before);
     return state;
 }

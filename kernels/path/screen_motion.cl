@@ -55,9 +55,9 @@ inline ScreenMotion screen_motion(Scene scene, integer object, vec3 p, vec3 firs
 inline void screen_motion_put(integer *words, mask m, ScreenMotion s, real weight)
 {
     layer_put_long(words, m, s.backward.x * weight);
-    layer_put_long(words + 3, m, s.backward.y * weight);
-    layer_put_long(words + 6, m, s.forward.x * weight);
-    layer_put_long(words + 9, m, s.forward.y * weight);
+    layer_put_long(words + LAYER_LONG_WORDS, m, s.backward.y * weight);
+    layer_put_long(words + 2 * LAYER_LONG_WORDS, m, s.forward.x * weight);
+    layer_put_long(words + 3 * LAYER_LONG_WORDS, m, s.forward.y * weight);
 }
 
 /* Adds the motion of the sky, which the `unseen` paths have come to. */
@@ -65,9 +65,10 @@ inline void layers_of_sky(Scene scene, Slab path, uint at, global uint *layers, 
 {
     mask m = layers_want(path, at, unseen);
     if (!any(m)) return;
-    integer words[12];
+    integer words[4 * LAYER_LONG_WORDS];
     vec3 d = sel3(m, load_path_d(path, at), v3(0.0f, 0.0f, 1.0f));
     ScreenMotion s = screen_motion(scene, (integer)(-1), d, d, d, mask_of(1));
     screen_motion_put(words, m, s, layer_weight(path, at));
-    layers_add(scene, layers + scene.settings->layer_motion, m, load_path_pixel_index(path, at), words, 12);
+    layers_add(scene, layers + scene.settings->layer_motion, m, load_path_pixel_index(path, at), words,
+               4 * LAYER_LONG_WORDS);
 }

@@ -1,6 +1,7 @@
 /* Light from all around, which paths find that have left the scene. */
 #include "path/met_light.cl"
 #include "generated/light_layers.cl"
+#include "path/sky_dimmed.cl"
 
 typedef struct {
     mask seen;
@@ -20,16 +21,6 @@ inline SkyView sky_view(Scene scene, Slab path, uint at, PathEnd end)
     v.receiver = path_receiver(path, at);
     v.rival = path_rival(path, at, end.depth);
     return v;
-}
-
-/* Light that comes to the beginning of the paths' last rays, of what `light` is infinitely far away. */
-inline Spectrum sky_dimmed(Scene scene, Slab path, uint at, mask seen, Wavelengths lambdas, Spectrum light)
-{
-#if USES_ABSORPTION
-    integer medium = sel_i(seen, MEDIUM_LEFT(load_path_medium(path, at)), (integer)(0));
-    light = spectrum_mul(light, medium_transmittance(scene, medium, (real)(FAR), lambdas));
-#endif
-    return light;
 }
 
 /* `radiance` of paths, with what those that left the scene find there. */

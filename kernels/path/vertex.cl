@@ -87,7 +87,8 @@ inline Scattering vertex_scattering(Scene scene, Slab path, uint at, mask active
     store_path_lambdas(path, at, active, scatter.lambdas);
 #endif
     scatter.shading = shading_frame_load(scene, v.row, v.s, v.d, scatter.lambdas);
-    scatter.bsdf = coat_normal_turned(scatter.bsdf, v.s, scatter.shading.frame);
+    scatter.bsdf = coat_normal_turned(scene, v.row, scatter.bsdf, v.s, scatter.shading.frame);
+    scatter.bsdf = anisotropy_turned(scene, v.row, scatter.bsdf, v.s, scatter.shading.frame);
     scatter.wo = to_frame(scatter.shading.frame, neg3(v.d));
     return scatter;
 }
@@ -133,6 +134,7 @@ inline void vertex_leave(Slab path, uint at, mask next, mask null, Vertex v, vec
     store_path_d(path, at, next, d);
     store_path_beta(path, at, next, beta);
     store_path_medium(path, at, next, vertex_medium(v, d));
+    store_path_around(path, at, next, vertex_around(v, d));
     store_path_lead(path, at, next, surface_lead(v.s, d));
     store_path_bodies(path, at, next, vertex_through(v, d));
 }
@@ -143,4 +145,13 @@ inline void vertex_end(Slab path, uint at, mask active, mask next, mask null, in
     state = sel_i(next, state, state - (state & PATH_ALIVE));
     if (BSDF_IS_NULL || BSDF_IS_PANE) store_path_nulls(path, at, active & null, load_path_nulls(path, at) + 1);
     store_path_state(path, at, active, BSDF_IS_NULL ? state : sel_i(null, state, state + 1));
+}
+
+inline void hide_light(Slab path, uint at, mask hidden, Vertex v) /* the camera's ray goes on behind it */
+{
+    store_path_o(path, at, hidden, surface_offset(v.s, v.d));
+    store_path_pdf(path, at, hidden, load_path_pdf(path, at) + v.t);
+    store_path_null_distance(path, at, hidden, load_path_null_distance(path, at) + v.t);
+    store_path_cone(path, at, hidden, cone_word(v.cone));
+    store_path_rival(path, at, hidden, (real)(0.0f)); /* the light is in the way of what light paths bring there */
 }

@@ -14,5 +14,13 @@ inline void vertex_names(Scene scene, Slab hit, uint at, mask active, Vertex *v)
     v->object = sel_i(instance > 0, instance_row_row(scene.instances, placed).number, v->object);
 #endif
     mask many = (shape.kind == 0) | ((shape.flags & SHAPE_MANY) != 0);
-    v->primitive = sel_i(active & many, load_hit_prim(hit, at) - shape.prim, (integer)(0));
+    integer own = load_hit_prim(hit, at) - shape.prim;
+    v->primitive = sel_i(active & many, own, (integer)(0));
+    int rows = scene.settings->primitive_rows;
+    if (rows) { /* as the caller counts faces, and strands */
+        integer place = as_integer(gather(scene.distributions, rows + row));
+        mask listed = active & (place > 0);
+        integer told = as_integer(gather(scene.distributions, sel_i(listed, place + own, (integer)(0))));
+        v->primitive = sel_i(listed, told, v->primitive);
+    }
 }

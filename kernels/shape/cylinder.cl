@@ -1,7 +1,14 @@
 /* An open tube; sampled evenly over its area. u is the azimuth over 2 pi, v runs along the axis. */
 #include "tracing/analytic.cl"
 
-real cylinder_size(Cylinder q) { return q.radius + size3(q.axis); }
+real cylinder_size(Cylinder q) { return EXACT_SIZE * (q.radius + size3(q.axis) + size3(q.p0)); }
+
+/* By how much the square of the distance (x, y) from the axis is more than that of the radius. */
+inline Twofold cylinder_beyond(Cylinder q, Twofold x, Twofold y)
+{
+    Twofold square = twofold_add(twofold_sqr(x), twofold_sqr(y));
+    return twofold_add(square, twofold_neg(twofold_product(q.radius, q.radius)));
+}
 
 inline real cylinder_pdf_area(Cylinder q)
 {
@@ -19,7 +26,7 @@ ShapeSample cylinder_sample(Cylinder q, vec3 p, vec2 u)
     r.wi = scale3(to, 1.0f / r.t);
     r.n = scale3(outward, q.side);
     r.uv = u;
-    r.size = cylinder_size(q);
+    r.size = q.radius + size3(q.axis);
     r.pdf = solid_angle_pdf(cylinder_pdf_area(q), r.t, fabs(dot3(outward, r.wi)));
     return r;
 }
@@ -32,18 +39,18 @@ real cylinder_pdf(Cylinder q, vec3 p, vec3 wi, real t, vec3 n)
 /* As a sphere (see there), in the plane across the axis; both walls are tried. */
 ShapeHit cylinder_intersect(Cylinder q, vec3 o, vec3 d, real tmin, real tmax)
 {
-    vec3 f = sub3(o, q.p0);
-    real fx = dot3(f, q.x), fy = dot3(f, q.y), dx = dot3(d, q.x), dy = dot3(d, q.y);
+    Twofold3 f = twofold_sub3(o, q.p0);
+    Twofold x2 = twofold_dot3(f, q.x), y2 = twofold_dot3(f, q.y), beyond = cylinder_beyond(q, x2, y2);
+    real fx = x2.high, fy = y2.high, dx = dot3(d, q.x), dy = dot3(d, q.y);
     real a = dx * dx + dy * dy, over_a = 1.0f / max_r(a, (real)(1e-20f));
-    real b = -(fx * dx + fy * dy) * over_a, length = sqrt(fx * fx + fy * fy);
+    real b = -(fx * dx + fy * dy) * over_a, square = q.radius * q.radius, c = twofold_real(beyond);
     real lx = fx + b * dx, ly = fy + b * dy;
-    real disc = (q.radius * q.radius - lx * lx - ly * ly) * over_a, s = sqrt_r(disc);
-    real height = length - q.radius;
-    real rounding = SURFACE_ROUNDING * (size3(q.p0) + size3(f) + q.radius);
-    real c = sel(fabs(height) < rounding, (real)(0.0f), height * (length + q.radius) * over_a);
+    real disc = sel(fabs(c) < square, b * b - c * over_a, (square - lx * lx - ly * ly) * over_a), s = sqrt_r(disc);
+    real rounding = beside_step(o, cylinder_size(q) + EXACT_SIZE * size3(f.high));
+    c = sel(fabs(c) < 2.0f * q.radius * rounding, (real)(0.0f), c * over_a);
     real far = b + sel(b < 0.0f, -s, s), near = safe_div(c, far);
     real lo = min_r(near, far), hi = max_r(near, far);
-    real along = 1.0f / dot3(q.axis, q.axis), v0 = dot3(f, q.axis) * along, dv = dot3(d, q.axis) * along;
+    real along = 1.0f / dot3(q.axis, q.axis), v0 = dot3(f.high, q.axis) * along, dv = dot3(d, q.axis) * along;
     real v_lo = v0 + lo * dv, v_hi = v0 + hi * dv;
     mask first = (lo > tmin) & (v_lo >= 0.0f) & (v_lo <= 1.0f);
     real t = sel(first, lo, hi), v = sel(first, v_lo, v_hi), step = sel(first, -s, s);
@@ -59,9 +66,11 @@ ShapeHit cylinder_intersect(Cylinder q, vec3 o, vec3 d, real tmin, real tmax)
 
 vec3 cylinder_onto(Cylinder q, vec3 p)
 {
-    vec3 f = sub3(p, q.p0), out = add3(scale3(q.x, dot3(f, q.x)), scale3(q.y, dot3(f, q.y)));
-    real v = dot3(f, q.axis) / dot3(q.axis, q.axis);
-    return add3(madd3(normalize3(out), q.radius, scale3(q.axis, v)), q.p0);
+    Twofold3 f = twofold_sub3(p, q.p0);
+    Twofold x = twofold_dot3(f, q.x), y = twofold_dot3(f, q.y);
+    real length = sqrt(max_r(x.high * x.high + y.high * y.high, (real)(1e-35f)));
+    real height = twofold_real(cylinder_beyond(q, x, y)) / (length + q.radius);
+    return madd3(add3(scale3(q.x, x.high), scale3(q.y, y.high)), -height / length, p);
 }
 
 vec3 cylinder_dpdu(Cylinder q, vec3 p, vec2 uv)

@@ -2,7 +2,13 @@
  * its area from inside. u is the azimuth about its z axis over 2 pi, v the angle from it over pi. */
 #include "tracing/analytic.cl"
 
-real sphere_size(Sphere q) { return q.radius; }
+real sphere_size(Sphere q) { return EXACT_SIZE * (q.radius + size3(q.center)); }
+
+/* By how much the square of the distance `f` from the centre is more than that of the radius. */
+inline Twofold sphere_beyond(Sphere q, Twofold3 f)
+{
+    return twofold_add(twofold_square3(f), twofold_neg(twofold_product(q.radius, q.radius)));
+}
 
 inline vec2 sphere_uv(Sphere q, vec3 outward)
 {
@@ -57,7 +63,7 @@ ShapeSample sphere_sample(Sphere q, vec3 p, vec2 u)
     }
     r.n = scale3(outward, q.side);
     r.uv = sphere_uv(q, outward);
-    r.size = sphere_size(q);
+    r.size = q.radius;
     return r;
 }
 
@@ -71,17 +77,19 @@ real sphere_pdf(Sphere q, vec3 p, vec3 wi, real t, vec3 n)
     return sel(outside, INV_2PI / one_minus_cos, inside);
 }
 
-/* Haines et al. 2019 (Ray Tracing Gems, 7): the discriminant from the ray's distance to the centre. An
- * origin that lies on the surface to rounding is taken to lie on it, so that it does not meet itself. */
+/* The discriminant from the ray's distance to the centre (Haines et al. 2019, Ray Tracing Gems, 7); from the height
+ * over the surface where that is no more than the radius. An origin that is closer to the surface than its coordinates
+ * can tell lies on it. */
 ShapeHit sphere_intersect(Sphere q, vec3 o, vec3 d, real tmin, real tmax)
 {
-    vec3 f = sub3(o, q.center);
-    real b = -dot3(f, d), length = sqrt(dot3(f, f));
-    vec3 l = madd3(d, b, f);
-    real disc = q.radius * q.radius - dot3(l, l), s = sqrt_r(disc);
-    real height = length - q.radius;
-    real rounding = SURFACE_ROUNDING * (size3(q.center) + q.radius);
-    real c = sel(fabs(height) < rounding, (real)(0.0f), height * (length + q.radius));
+    Twofold3 f = twofold_sub3(o, q.center);
+    Twofold beyond = sphere_beyond(q, f);
+    real b = -twofold_real(twofold_dot3(f, d)), c = twofold_real(beyond), square = q.radius * q.radius;
+    vec3 l = madd3(d, b, f.high);
+    real disc = sel(fabs(c) < square, twofold_real(twofold_add(twofold_product(b, b), twofold_neg(beyond))),
+                    square - dot3(l, l));
+    real s = sqrt_r(disc);
+    c = sel(fabs(c) < 2.0f * q.radius * beside_step(o, sphere_size(q)), (real)(0.0f), c);
     real far = b + sel(b < 0.0f, -s, s), near = safe_div(c, far);
     real lo = min_r(near, far), hi = max_r(near, far);
     mask first = lo > tmin;
@@ -95,7 +103,13 @@ ShapeHit sphere_intersect(Sphere q, vec3 o, vec3 d, real tmin, real tmax)
     return h;
 }
 
-vec3 sphere_onto(Sphere q, vec3 p) { return madd3(normalize3(sub3(p, q.center)), q.radius, q.center); }
+vec3 sphere_onto(Sphere q, vec3 p)
+{
+    Twofold3 f = twofold_sub3(p, q.center);
+    real length = sqrt(max_r(dot3(f.high, f.high), (real)(1e-35f)));
+    real height = twofold_real(sphere_beyond(q, f)) / (length + q.radius);
+    return madd3(f.high, -height / length, p);
+}
 
 vec3 sphere_dpdu(Sphere q, vec3 p, vec2 uv)
 {

@@ -1,10 +1,18 @@
 /* Takes noise away by averages over pixels that see the same light (clpt/denoise/statistical.py). All pictures are of
  * four floats a pixel, of which the fourth is padding but where it is named. */
+#include "core/lanes.cl"
+#include "core/math.cl"
 #include "denoising/likeness.cl"
 
 #define RADIUS 10      /* pixels, of the disk over which a pixel is averaged */
+#define BORDER (RADIUS + PATCH) /* pixels of planes beside the picture */
 #define FAR_FEATURES 8.0f /* minus the logarithm of a weight that is too small to count */
-#define MOST_VALUES 8  /* of four floats, that are averaged at once */
+#define MOST_VALUES 4  /* of four floats, that are averaged at once */
+#if LANES == 1
+#define ROWS 2         /* that a work-item averages: rows of patches are shared, and registers are few */
+#else
+#define ROWS 8
+#endif
 #define SURE 0.02f     /* no error is thought to be smaller, relative to the noise */
 
 /* Two halves' transformed mean and its variance, by their difference alone. */
@@ -33,34 +41,87 @@ kernel void denoise_blur(global const float4 *from, global float4 *into, int2 si
     into[(size_t)y * size.x + x] = sum / count + least;
 }
 
-/* The weighted mean of values over the pixels around each. values, averaged: `count` vectors a pixel. features: how
- * albedo and normal count, the squares of their differences. A pixel counts itself as much as the neighbour that is
- * most alike: so one with an outlier, like nothing around it, still loses it. */
-kernel void denoise_average(global const float4 *guide, global const float4 *variance, global const float4 *albedo,
-                            global const float4 *normal, global const float4 *values, global float4 *averaged,
-                            int2 size, int count, float2 features, float limit, int sharpness)
+/* Planes of one float a pixel from a picture of `count` vectors a pixel: lanes read neighbours in one load. `extent`
+ * is the size of a plane, BORDER pixels more than the picture to each side; a pixel near the border stands for those
+ * beyond it. */
+kernel void denoise_planes(global const float *from, global float *planes, int2 size, int2 extent, int count)
 {
-    int x = get_global_id(0), y = get_global_id(1);
-    size_t here = (size_t)y * size.x + x;
-    float4 own_albedo = albedo[here], own_normal = normal[here], sums[MOST_VALUES];
-    float total = 0.0f, largest = 1e-6f;
-    for (int k = 0; k < count; k++) sums[k] = (float4)(0.0f);
+    int x = get_global_id(0), y = get_global_id(1), plane = get_global_id(2);
+    int u = clamp(x - BORDER, 0, size.x - 1), v = clamp(y - BORDER, 0, size.y - 1);
+    planes[((size_t)plane * extent.y + y) * extent.x + x] = from[((size_t)v * size.x + u) * (4 * count) + plane];
+}
+
+/* For each row of a work-item: whether pixels `dx`, `dy` away are in the picture and not too far in albedo and normal,
+ * and how far they are there. Returns whether any of them is near. */
+inline int near_surfaces(global const float *albedo, global const float *normal, int2 first, int2 size, int2 extent,
+                         int2 d, float2 features, mask *near, real *apart)
+{
+    size_t plane = (size_t)extent.x * extent.y;
+    int step = d.y * extent.x + d.x;
+    integer column = first.x + d.x + LANE_INDEX;
+    mask some = mask_of(0);
+    for (int row = 0; row < ROWS; row++) {
+        int y = first.y + row;
+        size_t at = (size_t)row * extent.x;
+        apart[row] = features.x * square_apart(albedo + at, plane, step) +
+                     features.y * square_apart(normal + at, plane, step);
+        near[row] = (column >= 0) & (column < size.x) & !(apart[row] > FAR_FEATURES);
+        near[row] = near[row] & mask_of(y + d.y >= 0 && y + d.y < size.y && y < size.y);
+        some = some | near[row];
+    }
+    return any(some);
+}
+
+/* The weighted mean of values over the pixels around each. A work-item has LANES pixels in each of ROWS rows. All but
+ * `averaged` are planes. values, averaged: `count` vectors a pixel. features: how albedo and normal count, the squares
+ * of their differences. A pixel counts itself as much as the neighbour that is most alike: so one with an outlier, like
+ * nothing around it, still loses it. */
+kernel void denoise_average(global const float *guide, global const float *variance, global const float *albedo,
+                            global const float *normal, global const float *values, global float *averaged, int2 size,
+                            int2 extent, int count, float2 features, float limit, int sharpness)
+{
+    int x = get_global_id(0) * LANES, y = get_global_id(1) * ROWS, channels = 4 * count;
+    size_t plane = (size_t)extent.x * extent.y, here = (size_t)(y + BORDER) * extent.x + x + BORDER;
+    real sums[ROWS][4 * MOST_VALUES], total[ROWS], largest[ROWS];
+    for (int row = 0; row < ROWS; row++) {
+        total[row] = (real)(0.0f);
+        largest[row] = (real)(1e-6f);
+        for (int k = 0; k < channels; k++) sums[row][k] = (real)(0.0f);
+    }
     for (int dy = -RADIUS; dy <= RADIUS; dy++)
         for (int dx = -RADIUS; dx <= RADIUS; dx++) {
-            int u = x + dx, v = y + dy;
-            if (dx * dx + dy * dy > RADIUS * RADIUS || u < 0 || v < 0 || u >= size.x || v >= size.y) continue;
-            size_t there = (size_t)v * size.x + u;
-            float4 of_albedo = own_albedo - albedo[there], of_normal = own_normal - normal[there];
-            float apart = features.x * dot(of_albedo, of_albedo) + features.y * dot(of_normal, of_normal);
-            if (apart > FAR_FEATURES || there == here) continue;
-            float statistic = patch_statistic(guide, variance, size, (int2)(x, y), (int2)(u, v));
-            float weight = exp(-apart) * likeness(statistic, limit, sharpness);
-            for (int k = 0; k < count; k++) sums[k] += weight * values[there * count + k];
-            total += weight;
-            largest = fmax(largest, weight);
+            if (dx * dx + dy * dy > RADIUS * RADIUS || (dx == 0 && dy == 0)) continue;
+            int step = dy * extent.x + dx;
+            mask near[ROWS];
+            real apart[ROWS];
+            if (!near_surfaces(albedo + here, normal + here, (int2)(x, y), size, extent, (int2)(dx, dy), features, near,
+                               apart))
+                continue;
+            real above = patch_row(guide + here - extent.x, variance + here - extent.x, plane, step);
+            real middle = patch_row(guide + here, variance + here, plane, step);
+            for (int row = 0; row < ROWS; row++) {
+                size_t at = here + (size_t)row * extent.x, next = at + extent.x, there = at + step;
+                real below = patch_row(guide + next, variance + next, plane, step);
+                real statistic = (above + middle + below) / PATCH_TERMS;
+                real weight = exp_r(-apart[row]) * likeness(statistic, limit, sharpness);
+                weight = sel(near[row], weight, (real)(0.0f));
+                above = middle;
+                middle = below;
+                for (int k = 0; k < channels; k++) {
+                    real value = weight * unaligned_load(values + k * plane + there);
+                    sums[row][k] += sel(near[row], value, (real)(0.0f));
+                }
+                total[row] += weight;
+                largest[row] = max_r(largest[row], weight);
+            }
         }
-    for (int k = 0; k < count; k++)
-        averaged[here * count + k] = (sums[k] + largest * values[here * count + k]) / (total + largest);
+    for (int row = 0; row < ROWS && y + row < size.y; row++)
+        for (int k = 0; k < channels; k++) {
+            real own = unaligned_load(values + k * plane + here + (size_t)row * extent.x);
+            real mean = (sums[row][k] + largest[row] * own) / (total[row] + largest[row]);
+            global float *into = averaged + ((size_t)(y + row) * size.x + x) * channels + k;
+            scatter_if(into, LANE_INDEX * channels, x + LANE_INDEX < size.x, mean);
+        }
 }
 
 /* The mean squares of what is wrong, relative to light, of two averages of halves and of the noisy picture: by how far

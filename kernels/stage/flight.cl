@@ -7,6 +7,7 @@
 #include "interface/stage.cl"
 #include "generated/sampler.cl"
 #include "path/path_state.cl"
+#include "generated/scouts.cl"
 #include "generated/textures.cl"
 #include "generated/medium.cl"
 #include "generated/grid_flight.cl"
@@ -31,7 +32,7 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS FLIGHT_ARGS STAGE_AT_ARG)
     integer state = load_path_state(path, at);
     mask alive = (state & PATH_ALIVE) != 0, met = alive & (load_hit_prim(hit, at) >= 0);
     integer name = flight_medium(scene, path, hit, at, alive, met);
-    mask flies = alive & ((name & MEDIUM_FLIES) != 0);
+    mask flies = alive & ((name & MEDIUM_FLIES) != 0) & !path_scouts(state);
     if (any(flies)) {
         Wavelengths lambdas = load_path_lambdas(path, at);
         Medium m = medium_load(scene, sel_i(flies, name, (integer)(0)), lambdas);

@@ -6,6 +6,7 @@
 #include "generated/gather_args.cl"
 #include "generated/sampler.cl"
 #include "path/path_state.cl"
+#include "generated/scouts.cl"
 #include "path/surface_flags.cl"
 #include "generated/textures.cl"
 #include "interface/bsdf.cl"
@@ -26,7 +27,7 @@ STAGE(gather_along)(SLAB_ARGS, SCENE_ARGS GATHER_ARGS STAGE_AT_ARG)
     STAGE_AT
     integer state = load_path_state(path, at);
     mask alive = (state & PATH_ALIVE) != 0, met = alive & (load_hit_prim(hit, at) >= 0);
-    mask merges = alive & merging_here(state, state & PATH_DEPTH);
+    mask merges = alive & !path_scouts(state) & merging_here(state, state & PATH_DEPTH);
     integer medium = 0, word = -1;
     if (any(merges)) {
         medium = flight_medium(scene, path, hit, at, alive, met);

@@ -19,9 +19,41 @@
 #include "generated/seen_wavelengths.cl"
 #include "generated/ghosts.cl"
 #include "generated/sky.cl"
+#include "generated/path_covers.cl"
 #include "generated/first_ray.cl"
 #include "path/first_cone.cl"
 #include "generated/layer_sums.cl"
+#include "path/path_state.cl"
+#include "generated/scouts_begin.cl"
+
+/* What a sample begins with. */
+typedef struct {
+    CameraRay ray;
+    Spectrum beta;
+    Wavelengths lambdas;
+    real time;
+    vec2 position, lens;
+} SampleBegin;
+
+/* Draws it; `go`: the paths that take it. */
+inline SampleBegin sample_begin(Scene scene, Slab path, uint at, mask go, integer pixel_index, integer sample)
+{
+    global const Settings *settings = scene.settings;
+    vec2 pixel = pixel_of_index(settings, pixel_index);
+    Sampler sampler = pixel_sampler(settings, pixel_key(settings, pixel_index), sample);
+    vec2 offset = exposure_begin(scene, path, at, go, sampler);
+    vec2 u = sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH));
+    SampleBegin b;
+    b.position = film_position(settings, pixel, offset);
+    b.time = motion_time(scene, merging_moment(scene, u.x, u.y, sample));
+    b.lambdas = wavelengths_sample(scene, merging_wavelength(scene, u.x, sample));
+    b.lens = sampler_pair(sampler, (natural)(DIMENSION_LENS));
+    scene.time = b.time;
+    b.ray = first_ray(scene, b.position, b.lens, b.lambdas, &b.beta);
+    return b;
+}
+
+#include "generated/path_start.cl"
 
 /* Adds the finished paths to the sums of their pixels. What is not finite counts as black, at its own wavelength. */
 inline void add_sample(Scene scene, Slab path, uint at, BEGIN_ARGS, PathEnd end, integer part, integer pixel_index,
@@ -46,7 +78,9 @@ inline void add_sample(Scene scene, Slab path, uint at, BEGIN_ARGS, PathEnd end,
         rejected = finished & !film_accepts(value);
         value = sel3(rejected, v3(0.0f, 0.0f, 0.0f), value);
     }
-    Light light = {value, small, !(end.missed & (end.depth == 0)), radiance, lambdas, scale};
+    Spectrum start = path_start(scene, path, at, pixel_index, sample);
+    real covers = path_covers(scene, path, at, end, lambdas, start);
+    Light light = {value, small, covers, radiance, lambdas, scale};
     exposure_add(scene, path, at, BEGIN_PASSED, finished, part, pixel_index, sample, light);
     path_end_count(counters, end, end.depth + load_path_nulls(path, at));
 }
@@ -55,25 +89,16 @@ inline void add_sample(Scene scene, Slab path, uint at, BEGIN_ARGS, PathEnd end,
 inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_index, integer sample)
 {
     global const Settings *settings = scene.settings;
-    vec2 pixel = pixel_of_index(settings, pixel_index);
-    natural key = pixel_key(settings, pixel_index);
-    Sampler sampler = pixel_sampler(settings, key, sample);
-    vec2 offset = exposure_begin(scene, path, at, go, sampler);
-    vec2 position = film_position(settings, pixel, offset);
-    vec2 u = sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH));
-    scene.time = motion_time(scene, merging_moment(scene, u.x, u.y, sample));
-    Wavelengths lambdas = wavelengths_sample(scene, merging_wavelength(scene, u.x, sample));
-    vec2 lens = sampler_pair(sampler, (natural)(DIMENSION_LENS));
-    Spectrum beta;
-    CameraRay ray = first_ray(scene, position, lens, lambdas, &beta);
-    store_path_time(path, at, go, scene.time);
-    store_path_cone(path, at, go, first_cone(scene, ray, position, lens, lambdas));
-    store_path_o(path, at, go, ray.o);
-    store_path_d(path, at, go, ray.d);
-    store_path_lambdas(path, at, go, lambdas);
-    store_path_beta(path, at, go, beta);
+    SampleBegin b = sample_begin(scene, path, at, go, pixel_index, sample);
+    scene.time = b.time;
+    store_path_time(path, at, go, b.time);
+    store_path_cone(path, at, go, first_cone(scene, b.ray, b.position, b.lens, b.lambdas));
+    store_path_o(path, at, go, b.ray.o);
+    store_path_d(path, at, go, b.ray.d);
+    store_path_lambdas(path, at, go, b.lambdas);
+    store_path_beta(path, at, go, b.beta);
     store_path_radiance(path, at, go, spectrum_of((real)(0.0f)));
-    store_path_pdf(path, at, go, -ray.far);
+    store_path_pdf(path, at, go, -b.ray.far);
     store_path_eta(path, at, go, (real)(1.0f));
     store_path_rival(path, at, go, (real)(settings->light_paths));
     store_path_expected(path, at, go, (real)(0.0f));
@@ -81,7 +106,9 @@ inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_i
     store_path_nulls(path, at, go, (integer)(0));
     store_path_null_distance(path, at, go, (real)(0.0f));
     store_path_medium(path, at, go, (integer)(settings->camera_medium));
+    store_path_around(path, at, go, (integer)(0));
     store_path_lead(path, at, go, (real)(0.0f));
+    store_path_escape_width(path, at, go, (real)(0.0f));
     store_path_bodies(path, at, go, (integer)(settings->camera_bodies));
     store_path_ratio(path, at, go, camera_start());
 }
@@ -97,10 +124,13 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
         integer slot = LANE_INDEX + (int)at;
         integer pixel_index = load_path_pixel_index(path, at), sample = load_path_sample(path, at);
         integer part = film_part(settings, sample);
-        add_sample(scene, path, at, BEGIN_PASSED, end, part, pixel_index, sample);
-        mask unseen = end.ended & end.begun & (end.depth == 0);
+        mask scouted = scouts_ended(end), unseen = LAYERS_END(end, scouted) & (end.depth == 0);
         layers_count(scene, path, at, layers, unseen);
         layers_of_sky(scene, path, at, layers, unseen);
+        mask begins = end.ended;
+        end.ended = end.ended & !scouted;
+        end.missed = end.missed & !scouted;
+        add_sample(scene, path, at, BEGIN_PASSED, end, part, pixel_index, sample);
         NextSample next = next_sample(settings, work_list, samples, slot, end.ended, end.begun, pixel_index, sample);
         mask turns = end.ended & !next.leaves & (film_part(settings, next.sample) != part);
         if (any(next.leaves | turns)) {
@@ -112,8 +142,10 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
         count(counters, COUNTER_DONE, next.done, (integer)(1));
         mask go = end.ended & !next.done;
         store_path_sample(path, at, go, next.sample);
-        begin_path(scene, path, at, go, next.pixel_index, next.sample);
+        next.sample = sel_i(scouted, sample, next.sample);
+        begin_path(scene, path, at, go | scouted, next.pixel_index, next.sample);
         integer begun = PATH_BEGUN | ghost_bit(scene, next.pixel_index, next.sample);
-        store_path_state(path, at, end.ended, sel_i(next.done, (integer)(PATH_DONE), begun));
+        begun |= scouts_begin(scouted, next.sample);
+        store_path_state(path, at, begins, sel_i(next.done, (integer)(PATH_DONE), begun));
     }
 }

@@ -7,6 +7,7 @@
 #include "interface/shape.cl"
 #include "generated/textures.cl"
 #include "generated/mixture.cl"
+#include "generated/scout_choice.cl"
 #include "generated/shapes.cl"
 #include "surface/surface.cl"
 
@@ -27,6 +28,7 @@ STAGE(mix_materials)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
         integer met = (state & PATH_DEPTH) + load_path_nulls(path, at);
         natural dimension = as_natural(DIMENSION_VERTEX + met * DIMENSIONS_A_VERTEX + DIMENSION_ROULETTE);
         real u = sampler_pair(sampler, dimension).y;
+        u = scout_choice(scene, load_path_pixel_key(path, at), state, dimension, u);
         for (; any(open); open = open & (MATERIAL_KIND(word) == MATERIAL_MIXTURE)) {
             integer row = sel_i(open, MATERIAL_ROW(word), (integer)(0));
             real w = mixture_weight(scene, row, surface_texture_point(s), lambdas);

@@ -1,30 +1,20 @@
 /* Light that a path from the camera meets, on surfaces that shine. */
 #include "generated/met_weight.cl"
 
-/* The camera's ray goes on behind a light that is to be hidden. */
-inline void hide_light(Slab path, uint at, mask hidden, Vertex v)
-{
-    store_path_o(path, at, hidden, surface_offset(v.s, v.d));
-    store_path_pdf(path, at, hidden, load_path_pdf(path, at) + v.t);
-    store_path_cone(path, at, hidden, cone_word(v.cone));
-    store_path_rival(path, at, hidden, (real)(0.0f)); /* the light is in the way of what light paths bring there */
-}
-
 /* Adds the light that the `active` paths have met. Returns for which it is to be hidden. */
 inline mask met_emission(Scene scene, Slab path, uint at, mask active, Vertex v SHADE_ARGS)
 {
-    Surface s = v.s;
-    mask hidden = active & (s.light >= 0) & (v.depth == 0) & mask_of(scene.settings->hide_lights != 0);
+    mask hidden = active & (v.s.light >= 0) & (v.depth == 0) & mask_of(scene.settings->hide_lights != 0);
     if (any(hidden)) hide_light(path, at, hidden, v);
-    mask lit = active & (s.light >= 0) & light_shows(scene, s.light, v.front) & !hidden;
-    lit = lit & !left_to_flare(v.state, v.depth);
+    mask shows = active & (v.s.light >= 0) & light_shows(scene, v.s.light, v.front);
+    mask lit = shows & !hidden & !left_to_flare(v.state, v.depth);
     if (any(lit)) {
-        integer light = sel_i(lit, s.light, (integer)(0));
+        integer light = sel_i(lit, v.s.light, (integer)(0));
         real pdf = load_path_pdf(path, at), null_distance = load_path_null_distance(path, at);
         vec3 from = madd3(v.d, -null_distance, v.o);
-        real other = light_pdf(scene, light, from, path_receiver(path, at), v.d, v.t + null_distance, s.n);
+        real other = light_pdf(scene, light, from, path_receiver(path, at), v.d, v.t + null_distance, v.s.n);
         real w = met_weight(scene, path, at, v, light, pdf, other);
-        Spectrum le = emission_load(scene, light_at(scene, light).radiance, surface_texture_point(s), v.lambdas);
+        Spectrum le = emission_load(scene, light_at(scene, light).radiance, surface_texture_point(v.s), v.lambdas);
         le = spectrum_scale(spectrum_mul(v.beta, le), w);
         store_path_radiance(path, at, lit, spectrum_add(load_path_radiance(path, at), le));
         light_layers_add(scene, path, at, lit, v.depth, light, le, light_layers);

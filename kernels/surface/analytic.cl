@@ -11,7 +11,7 @@ inline void surface_analytic(Scene scene, ShapeRow shape, integer prim, mask act
         vec3 rest = onto_of_shape(scene, shape, prim, shape_point_back(motion, end));
         s->p = sel3(analytic, shape_point(motion, rest), s->p);
         spheres_move(scene, shape, prim, analytic, motion, rest, s);
-        s->size = sel(analytic, size_of_shape(scene, shape, prim), s->size);
+        s->size = sel(analytic, size_of_shape(scene, shape, prim) + shape_motion_size(motion, rest), s->size);
         analytic_tangents(scene, shape, prim, analytic, motion, rest, s);
     }
 }

@@ -4,3 +4,4 @@ typedef integer ShapeMotion;
 #define shape_point(motion, p) (p)
 #define shape_point_back(motion, p) (p)
 #define shape_vector(motion, v) (v)
+#define shape_motion_size(motion, rest) 0.0f

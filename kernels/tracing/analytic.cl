@@ -1,5 +1,6 @@
 /* What shapes share that rays meet as they are, not as triangles. Lengths in metres. */
 #include "core/rounding.cl"
+#include "core/twofold.cl"
 
 /* The azimuth of (x, y) over 2 pi, in [0, 1). */
 inline real turn_of(real y, real x)

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from clpt.cli import COMMANDS, cli
 from clpt.cli.inspect import PixelType
 from clpt.cli.options.applied import changed
 from clpt.cli.options.changes import SceneChanges
@@ -69,3 +70,25 @@ def test_what_is_accepted_makes_a_scene_or_is_refused(size, crop, camera):
     x, y, width, height = made.film.crop
     assert 0 <= x < x + width <= size[0] and 0 <= y < y + height <= size[1]
     assert all(map(math.isfinite, made.camera.to_world.ravel()))
+
+
+def test_names_may_have_capitals() -> None:
+    """Every choice of every command, and names of the options whose values are of several forms."""
+    for command in COMMANDS:
+        for param in cli.get_command(click.Context(cli), command).params:
+            if isinstance(param.type, click.Choice):
+                for name in param.type.choices:
+                    assert param.type(str(name).upper(), param, None) == name
+    assert SensorName()("CIE1964", None, None) == "cie1964"
+    assert White()("d65", None, None) == "D65" and White()("None", None, None) == "none"
+    assert Stops()("Auto", None, None) == LightPaths()("AUTO", None, None) == "auto"
+    assert Names(["depth", "albedo"])("Depth,ALBEDO", None, None) == ("depth", "albedo")
+
+
+@pytest.mark.parametrize(
+    "noise, advice", [("30", "write 30% or 0.3"), ("300", None), ("70%", None)]
+)
+def test_advice_of_noise_is_taken(noise: str, advice: str | None) -> None:
+    with pytest.raises(click.BadParameter) as caught:
+        Noise()(noise, None, None)
+    assert (advice in caught.value.message) if advice else "write" not in caught.value.message

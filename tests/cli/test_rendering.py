@@ -154,13 +154,14 @@ def test_lines_come_now_and_then(monkeypatch, capsys):
 def test_a_terminal_gets_a_bar():
     bar = Bar(None, "a_{box}")
     bar.console = Console(file=io.StringIO(), force_terminal=True, width=80, highlight=False)
-    with bar.compiling("building kernels") as compiles:
-        compiles()
+    with bar.compiling("compiling") as programs:
+        programs.begin("a"), programs.begin("b"), programs.begin("a"), programs.end("a")
     with bar.rendering():
         bar.show(Progress(1.0, 64, 31_250, 100_000, 1.5))
         bar.show(Progress(64.0, 64, 2_000_000, 9_000_000, 2.0))
     bar.note("a warning with [brackets]")
     told = bar.console.file.getvalue()
+    assert "1 of 2, once for this kind of scene" in told
     for words in ("64/64 spp", "a_{box}", "4.5 Mrays/s", "0:00 left", "[brackets]"):
         assert words in told
 
@@ -168,18 +169,19 @@ def test_a_terminal_gets_a_bar():
 def test_compilers_are_told_of_where_they_take_long(monkeypatch, capsys):
     """What a cache has, of clpt or of the driver, is there within the patience."""
     lines = Lines()
-    with lines.compiling("building kernels") as compiles:
-        compiles()
-    with lines.compiling("building kernels"):
+    with lines.compiling("compiling") as programs:
+        programs.begin("a")
+    with lines.compiling("compiling"):
         pass
     assert not capsys.readouterr().err
     told = threading.Event()
     monkeypatch.setattr(display, "PATIENCE", 0.001)
     monkeypatch.setattr(lines, "note", lambda text: (print(text), told.set()))
-    with lines.compiling("building kernels") as compiles:
-        compiles(), compiles()
+    with lines.compiling("compiling") as programs:
+        programs.begin("a"), programs.begin("b")
         assert told.wait(60)
-    assert capsys.readouterr().out == "building kernels ...\n"
+    line = capsys.readouterr().out
+    assert line.startswith("compiling: 0 of ") and "once for this kind of scene ..." in line
 
 
 def test_a_text_stands_at_once_and_goes(monkeypatch, capsys):

@@ -142,6 +142,22 @@ def test_the_first_average_is_that_of_its_formula(on):
     np.testing.assert_allclose(found[y, x, :3], wanted, rtol=1e-4)
 
 
+@pytest.mark.parametrize("lanes", [1, 8, 16])
+@pytest.mark.parametrize("shape", [(19, 33), (8, 16), (1, 40), (40, 1)])
+def test_lanes_and_rows_of_work_items_change_nothing(on, monkeypatch, lanes, shape):
+    """Pixels of a row and rows of a work-item, whole and in part, beside a vector of one pixel."""
+    rng = np.random.default_rng(5)
+    given = tuple(rng.uniform(0.2, 1, (*shape, 3)).astype(np.float32) for _ in range(2))
+    albedo, normal = (rng.uniform(0, 1, (*shape, 3)).astype(np.float32) for _ in range(2))
+    pictures = []
+    for count in (on.lanes, lanes):
+        monkeypatch.setattr(type(on), "lanes", property(lambda _, count=count: count))
+        made = Statistical(on, given, albedo, normal)
+        pictures.append((made.colours, made.error(), made.bands(np.tile(given[0], 7))))
+    for one, other in zip(*pictures, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-4, atol=1e-5)
+
+
 @pytest.mark.parametrize("shape", [(1, 1), (1, 7), (3, 2)])
 def test_small_pictures(on, shape):
     given = halves(np.full((*shape, 3), 0.5, np.float32))

@@ -87,7 +87,7 @@ class Given:
     def __init__(self, binary: bytes):
         self.binary = binary
 
-    def submit(self, key: str, job: Job, first: bool = False) -> None:
+    def submit(self, key: str, job: Job, **options: object) -> None:
         pass
 
     def drop(self, key: str) -> None:

@@ -13,12 +13,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from pyopencl.characterize import has_src_build_cache
 
 import clpt
 from clpt import device, output_files
 from clpt.cluster.bundle import Bundle, Store
 from clpt.device import disk_cache, runtimes
+from clpt.device.building import has_own_cache
 from clpt.device.source import Source
 from clpt.errors import ClusterError, SceneError
 
@@ -223,7 +223,7 @@ def test_a_file_of_a_scene_that_is_swapped_is_missing(user: Path) -> None:
 def test_a_render_with_damaged_programs(user: Path, caplog) -> None:
     """Whatever the driver's own cache holds, clpt's is only looked at where its files are whole."""
     info = device.choose().info
-    if has_src_build_cache(info.cl_device) and not info.is_cpu:
+    if has_own_cache(info.cl_device) and not info.is_cpu:
         pytest.skip("the driver keeps all programs itself, and none is linked")
     scene = clpt.load(Path(__file__).resolve().parents[2] / "scenes" / "cornell_box")
     scene = dataclasses.replace(scene, film=dataclasses.replace(scene.film, width=8, height=8))

@@ -181,7 +181,7 @@ def test_build_all(device):
 
 def test_our_cache(device, cache_folder, monkeypatch):
     """As for a driver without a cache of its own: kept, taken again, rebuilt when damaged."""
-    monkeypatch.setattr(building, "has_src_build_cache", lambda device: False)
+    monkeypatch.setattr(building, "has_own_cache", lambda device: False)
     from_source = building._from_source
     built = []
     monkeypatch.setattr(building, "_from_source", lambda *a: built.append(1) or from_source(*a))
@@ -227,7 +227,7 @@ def test_remarks_of_a_driver_are_no_warnings(device, cache_folder, monkeypatch, 
             return super().get_build_info(*of) + "kernel was vectorised"
 
     monkeypatch.setattr(native_programs._cl, "_Program", Remarking)
-    monkeypatch.setattr(building, "has_src_build_cache", lambda device: False)
+    monkeypatch.setattr(building, "has_own_cache", lambda device: False)
     with warnings.catch_warnings(), caplog.at_level(logging.DEBUG, "clpt"):
         warnings.simplefilter("error")
         before = list(warnings.filters)

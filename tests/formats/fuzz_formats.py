@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 
 from clpt import images, lenses, measured, spectra
-from clpt.formats import ies, load, volumes
+from clpt.formats import eulumdat, ies, load, volumes
 from clpt.formats.meshes import mesh, mtl, particles, strands
 from clpt.formats.mitsuba.serialized import read as read_serialized
 from clpt.images import read_stored
@@ -463,6 +463,12 @@ IES = (
     b"IESNA:LM-63-2002\n[TEST] a\nTILT=NONE\n1 1000 1 3 2 1 2 0.1 0.1 0.1\n1 1 50\n0 45 90\n0 90\n"
     b"100 50 10\n90 40 5\n"
 )
+LDT = "\n".join(
+    [
+        "", "1", "1", "1", "0", "3", "90", *[""] * 5, *["0"] * 9, "100", "100", "1", "0", "1",
+        "1", "LED", "2000", "3000", "80", "20", *["1"] * 10, "0", "0", "90", "180", *["500"] * 3,
+    ]
+).encode()  # fmt: skip
 ROWS = (
     b"# a lens\n# radius thickness eta aperture\n35.98 1.21 1.54 23.7\n0 0.8 0 15\n"
     b"-30 3.5 1.62 20\n50 40 1 20\n"
@@ -592,6 +598,7 @@ FORMATS: dict[str, Format] = {
     "spd": Format(".spd", lambda: [SPD], words, spectra.read_table),
     "sensor": Format(".csv", lambda: [SENSOR], words, spectra.read_sensor),
     "ies": Format(".ies", lambda: [IES], words, ies.read),
+    "eulumdat": Format(".ldt", lambda: [LDT], words, eulumdat.read),
     "lens dat": Format(".dat", lambda: [ROWS], words, lenses.read),
     "lens zmx": Format(".zmx", lambda: [ZMX], words, lenses.read),
     "lens txt": Format(

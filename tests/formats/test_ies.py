@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import clpt
+from clpt import spectra
 from clpt import transforms as tf
 from clpt.errors import SceneError
-from clpt.formats import ies
+from clpt.formats import eulumdat, ies
 
 VERTICAL = np.arange(0.0, 91.0, 5.0)
 
@@ -62,9 +63,10 @@ def test_a_floor_below_a_lamp(written, tmp_path):
     """Candela over the square of the distance, times the cosine: as native, and as Mitsuba's."""
     path = written(lamp((0, 90, 180, 270, 360)))
     (tmp_path / "a.json").write_text(
-        """{"camera": {"type": "orthographic", "to_world": [{"look_at": {"origin": [0, 0, 1],
-        "target": [0, 0, 0], "up": [0, 1, 0]}}, {"scale": 2}]}, "film": {"width": 16, "height": 16,
-        "mode": "rgb"}, "integrator": {"type": "direct"}, "shapes": [{"type": "rectangle",
+        """{"version": 2, "camera": {"type": "orthographic",
+        "to_world": [{"look_at": {"origin": [0, 0, 1], "target": [0, 0, 0], "up": [0, 1, 0]}},
+        {"scale": 2}]}, "film": {"width": 16, "height": 16, "mode": "rgb"},
+        "integrator": {"type": "direct"}, "shapes": [{"type": "rectangle",
         "to_world": [{"scale": 3}], "material": {"type": "diffuse", "reflectance": 0.5}}],
         "lights": [{"type": "goniometric", "file": "lamp.ies", "intensity": [1, 1, 1],
         "to_world": [{"rotate": {"axis": [1, 0, 0], "angle": 90}}, {"translate": [0, 0, 2]}]}]}"""
@@ -76,7 +78,7 @@ def test_a_floor_below_a_lamp(written, tmp_path):
     cos = 2.0 / np.sqrt(x * x + y * y + 4.0)
     around = np.degrees(np.arctan2(x, -y))  # the file's 0 lies at -y, 90 at +x
     candela = ies.read(path).intensity(np.degrees(np.arccos(cos)), around)
-    expected = 0.5 / np.pi * candela * cos / (x * x + y * y + 4.0)
+    expected = 0.5 / np.pi * candela * cos / (x * x + y * y + 4.0) / spectra.UNIT_LUMINANCE
     away = np.abs(around) > 20.0  # where 360 meets 0 the file jumps
     np.testing.assert_allclose(picture[away], expected[away], rtol=0.02)
     (tmp_path / "a.xml").write_text(
@@ -109,3 +111,58 @@ def test_a_floor_below_a_lamp(written, tmp_path):
 def test_refused(written, text, message):
     with pytest.raises(SceneError, match=message):
         ies.read(written(text))
+
+
+def ldt(symmetry: int, planes: tuple[float, ...], rows: np.ndarray, **more: object) -> str:
+    """An EULUMDAT file of two sets of lamps, the first of 2000 lm; rows: cd for 1000 lm."""
+    lines = ["a maker", "1", str(symmetry), str(len(planes)), "0", str(len(VERTICAL)), "5"]
+    lines += ["report", "name", "number", "file", "today", *["0"] * 9, "100", "80"]
+    lines += [str(more.get("factor", 0.5)), "0", "2"]
+    lines += 2 * ["1", "LED", str(more.get("lumens", 2000)), "3000", "80", "20"]
+    lines += ["0.5"] * 10 + [f"{c:g}" for c in planes] + [f"{v:g}" for v in VERTICAL]
+    return "\n".join([*lines, *(f"{value:.6g}" for value in rows.ravel())]) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("symmetry", "measured"),
+    [
+        (0, np.arange(0.0, 360.0, 45.0)), (1, [0.0]), (2, np.arange(0.0, 181.0, 45.0)),
+        (3, np.arange(-90.0, 91.0, 45.0)), (4, [0.0, 45.0, 90.0]),
+    ],
+)  # fmt: skip
+def test_eulumdat_of_each_symmetry(tmp_path, symmetry, measured):
+    """The intensity is even in what the symmetry mirrors, by a formula at every angle."""
+
+    def formula(vertical, around):
+        c = np.radians(around)
+        wave = [np.sin(c) + np.cos(c), 0.0 * c, np.cos(c), np.sin(c), np.cos(2.0 * c)][symmetry]
+        return np.cos(np.radians(vertical)) * (200.0 + 50.0 * wave)
+
+    planes = tuple(np.arange(0.0, 360.0, 45.0))
+    rows = formula(VERTICAL, np.asarray(measured)[:, None])
+    path = tmp_path / "lamp.ldt"
+    path.write_text(ldt(symmetry, planes, rows))
+    at = np.arange(0.0, 361.0, 45.0)[:, None]
+    found = eulumdat.read(path).intensity(VERTICAL, at)
+    np.testing.assert_allclose(found, formula(VERTICAL, at), rtol=1e-5, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("nothing", ":1: ends early, before its kind of symmetry"),
+        (ldt(7, (0.0,), np.ones((1, 19))), ":3: the kind of symmetry must be a whole number"),
+        (ldt(1, (0.0,), -np.ones((1, 19))), "negative"),
+        (ldt(1, (0.0,), np.ones((1, 19)), lumens="many"), ":29: 'many' is no number"),
+        (ldt(1, (0.0,), np.ones((1, 19)), lumens=0), ":29: the luminous flux of its lamps is 0"),
+        (ldt(1, (0.0,), np.ones((1, 19)))[:-9], "ends early"),
+        (ldt(4, (0.0, 90.0), np.ones((1, 19))), "do not cover"),
+        (ldt(2, (10.0, 0.0), np.ones((2, 19))), "must rise"),
+        (ldt(1, (0.0,), np.ones((1, 19)), factor="nan"), ":24: 'nan' is no number"),
+    ],
+)
+def test_eulumdat_refused(tmp_path, text, message):
+    path = tmp_path / "lamp.ldt"
+    path.write_text(text)
+    with pytest.raises(SceneError, match=message):
+        eulumdat.read(path)

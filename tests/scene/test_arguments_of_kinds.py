@@ -23,6 +23,17 @@ CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
             r"^diffuse has no parameter 'color'; known: name, reflectance$",
         ),
         (
+            lambda: lights.Goniometric(file="a.ies"),
+            SceneError,
+            "goniometric: 'file' is for scene f",
+        ),
+        (lambda: shapes.Sphere(type="sphere"), SceneError, "'type' is for scene files: .* class"),
+        (
+            lambda: materials.Dielectric(layers=[{"eta": 1.3}]),
+            SceneError,
+            r"clpt\.scene\.materials\.Layer\(eta=",
+        ),
+        (
             lambda: cameras.Perspective(fovy=40.0),
             UnusedParameterError,
             r"^perspective has no parameter 'fovy'; did you mean 'fov' or 'fov_axis'\?$",

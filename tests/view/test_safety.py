@@ -152,14 +152,19 @@ def test_hear_and_inotify_notice(tmp_path: Path) -> None:
             read()  # type: ignore[operator]
 
 
-@pytest.mark.parametrize("relative", [False, True])
+@pytest.mark.parametrize(
+    ("relative", "deeper"), [(True, 0), (False, 0), *((False, length) for length in (7, 65, 123))]
+)
 def test_no_parameter_of_a_scene_names_a_file(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, relative: bool
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, relative: bool, deeper: int
 ) -> None:
     """Every parameter of every kind that a page may edit, and those that it may not.
 
-    What is told is the same where there is such a file and where there is none.
+    What is told is the same where there is such a file and where there is none. Messages are cut,
+    so the folders have names of several lengths.
     """
+    tmp_path = tmp_path / ("d" * deeper)
+    tmp_path.mkdir(exist_ok=True)
     (tmp_path / "present").mkdir()
     (tmp_path / "missing").mkdir()
     paths = secrets(tmp_path / "present")
@@ -269,7 +274,9 @@ def test_no_answer_tells_of_a_folder(on: device.Device, audience: Audience, tmp_
          "s.json: line 3: shapes[0]: is odd"),
         (SceneError("there is no file '/home/my own/wood.png'"), "there is no file 'wood.png'"),
         (ClptError("cannot read /var/lib/x.csv, C:\\Users\\me\\y.csv"), "cannot read x.csv, y.csv"),
-        (SceneError(f"{'x' * 300} '/home/me/{'y' * 180}/z.png'"), f"{'x' * 195} ... z.png'"),
+        (SceneError(f"{'x' * 300} '/home/me/{'y' * 180}/z.png'"),
+         f"{'x' * 195} ... {'x' * 92} 'z.png'"),
+        (ClptError(f"no '/home/{'y' * 90} ... {'y' * 90}/z.png'"), "no 'z.png'"),
         (ClptError("12 rays/s at 3 W/m^2"), "12 rays/s at 3 W/m^2"),
         (OSError(28, "No space left on device", "/home/me/x"), "No space left on device"),
         (KernelBuildError("path", "/a/b.cl", 3, "error: x", "/home/me/.cache/x"),

@@ -330,6 +330,81 @@ def test_changes_are_undone_and_redone(opened, audience) -> None:
     assert audience.answer("error")["text"] == "there is nothing to redo"
 
 
+FAIL = (  # whatever restarts the picture, but cannot be done
+    ("undo", {}),
+    ("redo", {}),
+    ("hide", {"shape": 999, "hidden": True}),
+    ("wavelength", {"nm": 500.0, "width": 10.0}),
+    ("region", {"x": 0, "y": 0, "width": 500, "height": 500}),
+    ("open_view", {"camera": {"type": "nothing"}, "exposure": 0.0, "tone": "none"}),
+    ("edit", {"target": "material", "index": 999, "key": "reflectance", "value": 0.5}),
+    ("edit", {"target": "material", "index": 0, "key": "reflectance", "value": [2, -1, 0]}),
+    ("edit", {"target": "material", "index": 0, "key": "type", "value": "nothing"}),
+)
+IN_VAIN = (  # what changes nothing
+    ("show_all", {}),
+    ("lamp", {"name": None}),
+    ("size", {"width": 32, "height": 24}),
+    ("region", {}),
+)
+
+
+def test_the_picture_stays_where_a_command_changes_nothing(opened, audience) -> None:
+    session = opened(small(spp=10**6))
+    restarting = {name for name, command in COMMANDS.items() if command.restarts}
+    tried = {name for name, _ in (*FAIL, *IN_VAIN)}
+    certain = {name for name, command in COMMANDS.items() if command.certain}
+    assert restarting - tried - certain == {"field_of_view", "restore"}  # which succeed here
+    audience.wait(lambda: session.status().get("samples", 0) >= 3)
+    for name, values in (*FAIL, *IN_VAIN):
+        changes, samples = session._loop._changes, session.status()["samples"]
+        ask(session, audience, name, **values)
+        if (name, values) in FAIL:
+            audience.answer("error")
+        audience.wait(lambda samples=samples: session.status()["samples"] > samples)
+        assert session._loop._changes == changes and samples >= 3, name
+
+
+@pytest.mark.parametrize("kind", panels._material_kinds())
+def test_a_material_becomes_one_of_another_kind(kind: str) -> None:
+    """With the name and the parameters that both kinds have; and it is a change like others."""
+    scene = small()
+    red = next(one for one in panels.panels(scene) if one["title"] == "red")
+    assert kind in red["kinds"]
+    changed, change = panels.edited(scene, "material", red["index"], "type", kind)
+    new = next(one for one in panels.panels(changed) if one["index"] == red["index"]
+               and one["target"] == "material")  # fmt: skip
+    assert new["kind"] == kind and new["title"] == "red"
+    assert change.whole or kind == red["kind"]
+    values = {one["key"]: one["value"] for one in new["parameters"]}
+    if "reflectance" in values:
+        assert values["reflectance"] == red["parameters"][0]["value"]
+
+
+def test_a_red_wall_becomes_gold(opened, audience, on) -> None:
+    session = opened(dataclasses.replace(small(), integrator=integrators.Path(light_paths=0)))
+    _, first = audience.rest()
+    red = next(one for one in session.state()["panels"] if one["title"] == "red")
+    which = {"target": "material", "index": red["index"]}
+    ask(session, audience, "edit", **which, key="type", value="rough_conductor")
+    _, gold = audience.rest()
+    assert not np.array_equal(gold, first)
+    assert np.array_equal(gold, expected(session.scene, on))
+    ask(session, audience, "edit", **which, key="metal", value="gold")
+    audience.rest()
+    metal = session.state()["panels"]
+    wall = next(one for one in metal if one["title"] == "red")
+    eta = next(one for one in wall["parameters"] if one["key"] == "eta")
+    assert eta["curve"][0] > 1.2 > 0.4 > eta["curve"][15]  # gold: 1.6 in blue, 0.2 in red
+    for name in ("nothing", 7):
+        ask(session, audience, "edit", **which, key="metal", value=name)
+        audience.answer("error")
+    ask(session, audience, "undo")
+    audience.rest()
+    ask(session, audience, "undo")
+    assert np.array_equal(audience.rest()[1], first)
+
+
 def test_the_film_gets_another_size(opened, audience, on) -> None:
     session = opened(small())
     audience.rest()

@@ -8,6 +8,7 @@ import click
 
 from ...choices import MODES, PICTURE_SIZES, TREES
 from ..options.records import with_records
+from ..options.values import Choice
 from .settings import Report, Subject
 
 
@@ -17,14 +18,14 @@ from .settings import Report, Subject
     "--stage", "stages", multiple=True, metavar="NAME",
     help="What to measure: see --list; repeat it for several.  [default: all but shading]",
 )  # fmt: skip
-@click.option("--layout", "layouts", multiple=True, type=click.Choice(TREES), help="Of the trees.")
-@click.option("--mode", type=click.Choice(MODES), help="What light is made of.")
+@click.option("--layout", "layouts", multiple=True, type=Choice(TREES), help="Of the trees.")
+@click.option("--mode", type=Choice(MODES), help="What light is made of.")
 @click.option("--device", help="Index or part of the name of a device, or all.")
 @click.option(
     "--rounds", type=click.IntRange(1), default=5, show_default=True, help="Of each figure."
 )
 @click.option(
-    "--size", type=click.Choice(PICTURE_SIZES), default="standard", show_default=True,
+    "--size", type=Choice(PICTURE_SIZES), default="standard", show_default=True,
     help="Of the pictures; quick takes two minutes.",
 )  # fmt: skip
 @click.option(

@@ -11,7 +11,7 @@ import numpy as np
 from ... import images, output_files
 from ...choices import FOR_SCREENS
 from ...colour.false_colours import false_colours
-from ...errors import SceneError
+from ...errors import SceneError, one_line
 from ...images import screen_files
 from ...images.differences import Differences, differences, size_of
 from .conversions import contents
@@ -37,7 +37,8 @@ class Pair:
         first, second = contents(a), contents(b)
         sizes = size_text(first.values), size_text(second.values)
         if sizes[0] != sizes[1]:
-            raise SceneError(f"is {sizes[1]} pixels, and {a} is {sizes[0]}", file=b)
+            advice = "; render both with the same --size"
+            raise SceneError(f"is {sizes[1]} pixels, and {a} is {sizes[0]}{advice}", file=b)
         if _same_wavelengths(first.lambdas, second.lambdas):
             values, labels = (first.values, second.values), first.labels
         elif first.colours is not None and second.colours is not None:
@@ -53,7 +54,7 @@ class Pair:
     def place(self) -> str:
         """Where the largest difference is."""
         x, y, channel = self.found.where
-        return f"{x},{y} {self.labels[channel]}"
+        return one_line(f"{x},{y} {self.labels[channel]}")
 
 
 def _same_wavelengths(a: np.ndarray | None, b: np.ndarray | None) -> bool:

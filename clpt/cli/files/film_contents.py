@@ -53,4 +53,5 @@ def film_contents(path: Path) -> ImageContents:
         labels = [*"RGBA"[: values.shape[2]], *beside]
         values = np.dstack([values, *beside.values()])
     facts = {"size": size_text(values)} | {k: shown(v).plain for k, v in summary.items()}
-    return ImageContents(path, values, tuple(labels), lambdas, colours, quantity, facts)
+    stops = form.display_exposure
+    return ImageContents(path, values, tuple(labels), lambdas, colours, quantity, facts, stops)

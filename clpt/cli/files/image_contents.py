@@ -23,6 +23,7 @@ LAYOUT = (
 )  # fmt: skip
 TYPES = {"float16": "half", "float32": "float", "uint32": "uint"}  # of channels, in EXR's words
 MATTES = "cryptomatte/"  # begins their attributes
+MOST_STOPS = 64.0  # of a film's display_exposure
 LETTERS = {1: "Y", 2: "YA", 3: "RGB", 4: "RGBA"}
 
 
@@ -32,7 +33,8 @@ class ImageContents:
 
     values: (h, w, n); labels: a wavelength or a channel's name per value; lambdas: (n,) [nm], None
     where the image is not spectral; colours: (h, w, 3) linear Rec. 709, None where it has none;
-    quantity: what the values are, with their unit; facts: what else the file says.
+    quantity: what the values are, with their unit; facts: what else the file says; stops: by which
+    screens show the colours brighter.
     """
 
     path: Path
@@ -42,6 +44,7 @@ class ImageContents:
     colours: np.ndarray | None
     quantity: str
     facts: dict[str, str]
+    stops: float = 0.0
 
     def pixel(self, pixel: Pixel) -> np.ndarray:
         """Return a pixel's values (n,). Raises SceneError outside of the image."""
@@ -59,7 +62,8 @@ class ImageContents:
         if self.colours is None:
             return None
         x, y = pixel
-        return "#" + bytes(images.to_srgb8(self.colours[y : y + 1, x : x + 1])[0, 0]).hex()
+        colours = self.colours[y : y + 1, x : x + 1]
+        return "#" + bytes(images.to_srgb8(colours, self.stops)[0, 0]).hex()
 
 
 def read_contents(path: Path) -> ImageContents:
@@ -120,8 +124,10 @@ def _read(path: Path) -> ImageContents:
     if spectral_exr.is_spectral(path):
         return _spectral(path)
     more: dict[str, str] = {}
+    stops = 0.0
     if path.suffix.lower() == ".exr":
         channels = images.read_channels(path)
+        stops = _stops(images.attributes(path))
         if len({channel.shape for channel in channels.values()}) != 1:
             raise SceneError("its channels are of different sizes", file=path)
         more = {"layers": "\n".join(_layers(channels))}
@@ -141,7 +147,14 @@ def _read(path: Path) -> ImageContents:
     if labels[0] == "Y":
         colours = np.repeat(values[..., :1], 3, axis=2)
     facts = {"size": size_text(values), "channels": ", ".join(labels), **more}
-    return ImageContents(path, values, labels, None, colours, "value (linear)", facts)
+    return ImageContents(path, values, labels, None, colours, "value (linear)", facts, stops)
+
+
+def _stops(attributes: Mapping[str, Any]) -> float:
+    """The stops by which screens show a picture brighter, 0 for what is no such number."""
+    stated = attributes.get(images.STOPS, 0.0)
+    usable = isinstance(stated, (int, float)) and abs(stated) <= MOST_STOPS
+    return float(stated) if usable else 0.0
 
 
 def _spectral(path: Path) -> ImageContents:

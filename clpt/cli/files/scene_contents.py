@@ -121,6 +121,9 @@ def _film(scene: Scene) -> dict[str, Any]:
     film = scene.film
     size = dict(zip(("width", "height"), film.size, strict=True))
     whole = {} if film.crop is None else {"crop": [*film.crop], "of": [film.width, film.height]}
-    usual = {"bands": 0, "alpha": False, "layers": (), "output_space": "rec709"}
+    usual = {
+        "bands": 0, "alpha": False, "layers": (), "output_space": "rec709", "exposure": 1.0,
+        "display_exposure": 0.0,
+    }  # fmt: skip
     unusual = {k: given for k, given in fields_of(film).items() if k in usual and given != usual[k]}
     return {**size, **whole, "mode": film.mode, "filter": film.filter.kind, **unusual}

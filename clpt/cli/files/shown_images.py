@@ -21,20 +21,20 @@ def as_json(image: ImageContents, values: dict[Pixel, np.ndarray]) -> dict[str, 
 def print_tables(image: ImageContents, values: dict[Pixel, np.ndarray]) -> None:
     """Print what an image is, and the values of its pixels."""
     console = output_console()
-    console.print(str(image.path), markup=False, highlight=False)
+    console.print(shown(image.path))
     facts = Table(show_header=False)
     for name, value in image.facts.items():
         facts.add_row(shown(name), shown(value))
     console.print(facts)
     if not values:
         return
-    console.print(image.quantity, markup=False)
+    console.print(shown(image.quantity))
     numbers = Table()
     numbers.add_column("wavelength" if image.lambdas is not None else "channel", justify="right")
     for x, y in values:
         numbers.add_column(f"{x},{y}", justify="right")
     for i, label in enumerate(image.labels):
-        numbers.add_row(label, *(f"{row[i]:.5g}" for row in values.values()))
+        numbers.add_row(shown(label), *(f"{row[i]:.5g}" for row in values.values()))
     if image.colours is not None:
         names = [image.hex_colour(pixel) for pixel in values]
         numbers.add_section()

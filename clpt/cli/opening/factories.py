@@ -73,11 +73,11 @@ class DeviceFactory(RendererFactory):
 
     def make(self, scene: Scene, shown: Display, first_sample: int = 0) -> DevicePictures:
         """Return a new renderer of a scene; note its warnings."""
-        text = f"building kernels for {device_names([on.info for on in self.devices])}"
+        text = f"compiling for {device_names([on.info for on in self.devices])}"
         compiling = shown.compiling(text)
-        with prompt(dev.kill_compilers), ending_at_limit(), reusing(), compiling as compiles:
+        with prompt(dev.kill_compilers), ending_at_limit(), reusing(), compiling as programs:
             for on in self.devices:
-                on.builds.on_compile = compiles
+                on.builds.on_compile, on.builds.on_compiled = programs.begin, programs.end
             renderer = new_renderer(scene, self.devices, first_sample=first_sample, **self._made)
         for warning in renderer.warnings:
             shown.note(f"clpt: warning: {warning}")

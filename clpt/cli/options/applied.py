@@ -46,8 +46,8 @@ def changed(scene: Scene, changes: SceneChanges) -> Scene:
 
 def _integrator(how: Any, transport: Transport) -> Any:
     """Return an integrator, as the options want it. Raises click.BadParameter."""
-    if transport.integrator is not None and transport.integrator != how.kind:
-        how = _of_kind(transport.integrator, how)
+    if transport.integrator is not None and transport.integrator.lower() != how.kind:
+        how = _of_kind(transport.integrator.lower(), how)
     if isinstance(how, Auto) and transport.implied != how.kind:
         how = _of_kind(transport.implied, how)
     for name, what in PARAMETERS.items():

@@ -11,7 +11,7 @@ import click
 
 from ...choices import CHANNEL_NAMES, FOR_SCREENS, OCIO_CONFIG, TONES, Exposure
 from .records import Command, with_options
-from .values import Stops
+from .values import Choice, Stops
 
 if TYPE_CHECKING:
     from ...colour.view import View
@@ -41,7 +41,9 @@ class Grading:
         if not names or for_screens(targets):
             return None
         suffixes = " ".join(FOR_SCREENS)
-        return f"{' and '.join(names)} without effect: of {suffixes} only, others keep the light"
+        return (
+            f"{' and '.join(names)} ignored: for {suffixes} only; other formats keep linear light"
+        )
 
 
 def for_screens(targets: tuple[Path, ...]) -> list[Path]:
@@ -82,7 +84,7 @@ _OPTIONS = (
         help="Brighten .png, .jpg and .webp by so many stops; auto: to a middle grey.",
     ),
     click.option(
-        "--tone", type=click.Choice(TONES),
+        "--tone", type=Choice(TONES),
         help="Tone curve of .png, .jpg and .webp.  [default: none]",
     ),
     click.option(
@@ -97,7 +99,7 @@ _OPTIONS = (
 )  # fmt: skip
 
 names_option = click.option(
-    "--names", type=click.Choice(CHANNEL_NAMES), default=CHANNEL_NAMES[0], show_default=True,
+    "--names", type=Choice(CHANNEL_NAMES), default=CHANNEL_NAMES[0], show_default=True,
     help="What .exr files call layers: depth.Z, or ViewLayer.Denoising Depth.Z.",
 )  # fmt: skip
 

@@ -25,7 +25,7 @@ from .changes import SceneChanges
 from .composition import composition_options
 from .loading_options import Bytes, loading_options
 from .records import Command, with_options
-from .values import LightPaths, Names, SensorName, Size, White
+from .values import Choice, LightPaths, Names, SensorName, Size, White
 
 if TYPE_CHECKING:
     from ...scene import Scene
@@ -88,14 +88,14 @@ class SceneOptions:
 
 
 denoise_option = click.option(
-    "--denoise", type=click.Choice(DENOISERS), is_flag=False, flag_value=DENOISERS[0],
+    "--denoise", type=Choice(DENOISERS), is_flag=False, flag_value=DENOISERS[0],
     help="Take noise away: oidn is Open Image Denoise of clpt[denoise]; statistical needs nothing. "
     f"The noisy picture is kept as a layer of .exr.  [default: none; alone: {DENOISERS[0]}]",
 )  # fmt: skip
 
 _OPTIONS = (
     click.option(
-        "--mode", type=click.Choice(MODES), help="Whether light is spectra or RGB."
+        "--mode", type=Choice(MODES), help="Whether light is spectra or RGB."
     ),
     click.option("--size", type=Size(), help="Size of the picture."),
     click.option(
@@ -104,18 +104,18 @@ _OPTIONS = (
     ),
     click.option("--threads", type=click.IntRange(1), help="Cores of a CPU to use, at most."),
     click.option(
-        "--bvh", "layout", type=click.Choice(LAYOUTS),
+        "--bvh", "layout", type=Choice(LAYOUTS),
         help="Acceleration structure of the triangles.",
     ),
     click.option(
-        "--tree-quality", type=click.Choice(get_args(Quality)), default="high",
+        "--tree-quality", type=Choice(get_args(Quality)), default="high",
         help="fast: built sooner, a little slower to trace.",
     ),
     click.option(
         "--integrator", metavar="NAME", help=f"One of {', '.join(INTEGRATORS)}."
     ),
     click.option(
-        "--sampler", type=click.Choice(SAMPLERS),
+        "--sampler", type=Choice(SAMPLERS),
         help="Where random numbers come from.",
     ),
     click.option(
@@ -124,7 +124,7 @@ _OPTIONS = (
     click.option(
         "--light-paths", type=LightPaths(),
         help="Of path and vcm: paths from lights for each sample, for caustics. Of path, 0: none; "
-        "auto: some where something is sharp and a light is small.",
+        "auto: some where something is specular and a light is small.",
     ),
     click.option(
         "--guiding", is_flag=True, default=None,
@@ -141,7 +141,7 @@ _OPTIONS = (
         "--white-balance", type=White(), help="What becomes white: none, D65, 3200 or x,y."
     ),
     click.option(
-        "--output-space", type=click.Choice(SPACES), help="Colour space of the picture."
+        "--output-space", type=Choice(SPACES), help="Colour space of the picture."
     ),
     click.option(
         "--bands", type=click.IntRange(0), help="Bands of a spectral picture, for .npy and .exr."
@@ -155,7 +155,7 @@ _OPTIONS = (
         help=f"Pictures beside the picture, for .exr: {', '.join(LAYERS)}.",
     ),
     click.option(
-        "--alpha", is_flag=True, default=None, help="Leave the sky out, and write what is covered."
+        "--alpha", is_flag=True, default=None, help="Transparent background (alpha channel)."
     ),
     loading_options,
     click.option(
@@ -163,7 +163,7 @@ _OPTIONS = (
         help="Memory for images, such as 500M; larger ones are halved.  [default: half the free]",
     ),
     click.option(
-        "--missing-textures", type=click.Choice(get_args(Missing)), default="error",
+        "--missing-textures", type=Choice(get_args(Missing)), default="error",
         help="grey: go on with grey where an image is not there.",
     ),
 )  # fmt: skip

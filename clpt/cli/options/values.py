@@ -16,6 +16,13 @@ MOST_NOISE = 0.5  # that --noise takes: beyond, a few samples of each pixel are 
 MOST_STOPS = 120.0  # float32 has not many more
 
 
+class Choice(click.Choice):
+    """One of some names, in small letters or capitals."""
+
+    def __init__(self, names: Iterable[str]):
+        super().__init__(tuple(names), case_sensitive=False)
+
+
 class Size(click.ParamType):
     """WIDTHxHEIGHT in pixels."""
 
@@ -46,7 +53,8 @@ class Noise(click.ParamType):
             self.fail(f"{value!r} does not look like 0.02 or 2%", param, ctx)
         share = float(str(value).strip().rstrip(" %")) / (100.0 if found[2] else 1.0)
         if share > MOST_NOISE:
-            advice = f"; write {share:g}% or {share / 100.0:g}" if not found[2] else ""
+            percent = not found[2] and share / 100.0 <= MOST_NOISE
+            advice = f"; write {share:g}% or {share / 100.0:g}" if percent else ""
             self.fail(f"{value} is a noise above {MOST_NOISE:.0%}{advice}", param, ctx)
         return share
 
@@ -81,7 +89,7 @@ class Stops(click.ParamType):
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> float | str:
         limits = click.FloatRange(-MOST_STOPS, MOST_STOPS)
-        return AUTO if value == AUTO else limits(value, param, ctx)
+        return AUTO if str(value).lower() == AUTO else limits(value, param, ctx)
 
 
 class SensorName(click.ParamType):
@@ -90,8 +98,8 @@ class SensorName(click.ParamType):
     name = "NAME-OR-FILE"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        if value in OBSERVERS:
-            return value
+        if str(value).lower() in OBSERVERS:
+            return str(value).lower()
         from ...spectra import read_sensor  # here: help needs no tables of spectra
 
         return read_sensor(value)
@@ -105,7 +113,11 @@ class LightPaths(click.ParamType):
     def convert(
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> Any:
-        return AUTO if value == AUTO else click.FloatRange(0.0, MOST_LIGHT_PATHS)(value, param, ctx)
+        return (
+            AUTO
+            if str(value).lower() == AUTO
+            else click.FloatRange(0.0, MOST_LIGHT_PATHS)(value, param, ctx)
+        )
 
 
 class Names(click.ParamType):
@@ -119,7 +131,7 @@ class Names(click.ParamType):
     def convert(
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> Any:
-        given = tuple(str(value).split(","))
+        given = tuple(str(value).lower().split(","))
         for name in given:
             if name not in self.known:
                 self.fail(f"{name!r} is unknown{nearest(name, self.known)}", param, ctx)
@@ -137,5 +149,8 @@ class White(click.ParamType):
         try:
             numbers = [float(part) for part in str(value).split(",")]
         except ValueError:
-            return value
+            from ...spectra import illuminants  # here: help needs no tables of spectra
+
+            names = {name.lower(): name for name in ("none", *illuminants())}
+            return names.get(str(value).lower(), value)
         return numbers[0] if len(numbers) == 1 else tuple(numbers)

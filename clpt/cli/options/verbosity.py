@@ -8,7 +8,8 @@ from typing import Any, TypeVar
 
 import click
 
-from ..process import failures
+from ... import clean_logs
+from ..process import terminal
 
 LEVELS = (logging.WARNING, logging.INFO, logging.DEBUG)
 _COUNT = "clpt.verbosity"  # in what nested contexts share
@@ -20,9 +21,10 @@ class Handler(logging.Handler):
     """Prints messages of clpt's log as the commands print theirs: clpt: warning: ..."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Print a message as one line."""
-        failures.clear_line()
-        click.echo(f"clpt: {record.levelname.lower()}: {self.format(record)}", err=True)
+        """Print a message, which has more lines where it tells a traceback."""
+        clean_logs.clean(record)  # another library's too
+        terminal.clear_line()
+        terminal.say_lines(f"clpt: {record.levelname.lower()}: {self.format(record)}", err=True)
 
 
 def verbose_option(text: str) -> Callable[[Command], Command]:

@@ -7,6 +7,8 @@ from typing import Any
 from rich.console import Console
 from rich.text import Text
 
+from ..process.terminal import LONGEST
+
 
 def output_console() -> Console:
     """Return a console on stdout, wide where that is a file or a pipe: these wrap nothing."""
@@ -19,23 +21,28 @@ def shown(value: object) -> Text:
 
     What a file says is no markup, and controls no terminal.
     """
-    text = _text(value)
-    return Text("".join(c if c.isprintable() or c == "\n" else "\ufffd" for c in text))
+    return Text(_text(value))
 
 
 def _text(value: object) -> str:
     if value is None or isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, dict):
-        return ", ".join(f"{key}: {_part(part)}" for key, part in value.items()) or "none"
+        return ", ".join(f"{_plain(key)}: {_part(part)}" for key, part in value.items()) or "none"
     if isinstance(value, list) and value and isinstance(value[0], list):
         return " to ".join("(" + ", ".join(f"{x:g}" for x in corner) + ")" for corner in value)
     if isinstance(value, list):
-        return "\n".join(str(entry) for entry in value) or "none"
-    return f"{value:,}" if isinstance(value, int) else str(value)
+        return "\n".join(_plain(entry) for entry in value) or "none"
+    return f"{value:,}" if isinstance(value, int) else _plain(value)
 
 
 def _part(value: Any) -> str:
     """Return a value inside of others."""
     several = isinstance(value, (list, tuple))
-    return " ".join(str(part) for part in value) if several else str(value)
+    return " ".join(map(_plain, value)) if several else _plain(value)
+
+
+def _plain(value: object) -> str:
+    """Return a text that controls no terminal: another character marks what is left out."""
+    text = str(value)[:LONGEST]
+    return "".join(c if c.isprintable() else "\ufffd" for c in text)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from rich.table import Table
 
 from ...device.context import DeviceInfo, selection
+from .console import shown
 from .names import device_name
 
 
@@ -40,12 +41,12 @@ def table(
         own = (info.platform, info.name, info.driver) if verbose else (device_name(info),)
         made.add_row(
             f"{'*' if info.index == taken else ' '} {info.index}",
-            *own,
+            *map(shown, own),
             info.kind.upper() if info.kind != "accelerator" else info.kind,
             str(info.compute_units),
             f"{info.global_mem / 2**30:.1f} GiB",
             str(info.lanes),
-            "works" if failure is None else f"fails: {failure}",
+            "works" if failure is None else shown(f"fails: {failure}"),
             style="bold" if info.index == taken else None,
         )
     return made

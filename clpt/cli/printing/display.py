@@ -10,13 +10,12 @@ from contextlib import contextmanager
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-import click
-
 from ...render.progress import Progress
-from ..process import failures
+from ..process import terminal
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.text import Text
 
 EVERY = 5.0  # seconds between lines
 PATIENCE = 1.0  # seconds of reading or compiling before a line or a bar tells of it
@@ -35,11 +34,49 @@ def display(quiet: bool, limit: float | None, name: str = "") -> Display:
     return Bar(limit, name) if sys.stderr.isatty() else Lines(limit, name)
 
 
+class Programs:
+    """Counts programs that are compiled; changed: called after each change, one at a time."""
+
+    def __init__(self, changed: Callable[[], None] = lambda: None):
+        self._begun: set[str] = set()
+        self._ended: set[str] = set()
+        self._changed, self._lock = changed, threading.Lock()
+
+    def begin(self, key: str) -> None:
+        """Note that a program is about to be compiled."""
+        self._note(key, self._begun)
+
+    def end(self, key: str) -> None:
+        """Note that a program has been compiled."""
+        self._note(key, self._ended)
+
+    def _note(self, key: str, keys: set[str]) -> None:
+        with self._lock:
+            if key not in keys:
+                keys.add(key)
+                self._changed()
+
+    @property
+    def begun(self) -> int:
+        """The number of programs that a compiler has, or has had."""
+        return len(self._begun)
+
+    @property
+    def ended(self) -> int:
+        """The number of programs that are ready."""
+        return len(self._ended)
+
+    @property
+    def told(self) -> str:
+        """The count of ready programs, for people."""
+        return f"{self.ended} of {self.begun}, once for this kind of scene"
+
+
 class Display:
     """Shows nothing; the base of those that do."""
 
     def __init__(self, limit: float | None = None, name: str = ""):
-        self.limit, self.name = limit, name
+        self.limit, self.name = limit, terminal.cleaned(name)
         self.last = time.perf_counter()
         self.since: tuple[float, float] | None = None
 
@@ -49,9 +86,9 @@ class Display:
         yield
 
     @contextmanager
-    def compiling(self, text: str) -> Iterator[Callable[[], None]]:
-        """Yield a function that any thread calls when a compiler begins; show it if it lasts."""
-        yield lambda: None
+    def compiling(self, text: str) -> Iterator[Programs]:
+        """Yield programs, of which any thread tells what is compiled; show them if it lasts."""
+        yield Programs()
 
     def begin(self, text: str) -> None:
         """Show a text at once, until something else is shown."""
@@ -105,25 +142,19 @@ class Lines(Display):
         yield
 
     @contextmanager
-    def compiling(self, text: str) -> Iterator[Callable[[], None]]:
-        timer = threading.Timer(PATIENCE, self._compiles, [text])
+    def compiling(self, text: str) -> Iterator[Programs]:
+        timer = threading.Timer(PATIENCE, lambda: self.note(f"{text}: {programs.told} ..."))
         timer.daemon = True
-        lock, begun = threading.Lock(), False
 
-        def begin() -> None:
-            nonlocal begun
-            with lock:
-                if not begun:
-                    timer.start()
-                begun = True
+        def begun() -> None:
+            if programs.begun == 1 and not programs.ended:
+                timer.start()
 
+        programs = Programs(begun)
         try:
-            yield begin
+            yield programs
         finally:
             timer.cancel()
-
-    def _compiles(self, text: str) -> None:
-        self.note(f"{text} ...")
 
     @contextmanager
     def loading(self, name: str) -> Iterator[Callable[[float, str], None]]:
@@ -143,7 +174,7 @@ class Lines(Display):
             self.note("  ".join(filter(None, numbers.values())))
 
     def note(self, text: str) -> None:
-        click.echo(text, err=True)
+        terminal.say(text)
 
 
 class Bar(Lines):
@@ -154,7 +185,7 @@ class Bar(Lines):
         self._begun = False  # whether the text of `begin` stands on the screen
 
     def begin(self, text: str) -> None:
-        click.echo(text, err=True, nl=False)  # before rich is imported, which takes its time
+        terminal.say(text, nl=False)  # before rich is imported, which takes its time
         self._begun = True
 
     @cached_property
@@ -163,18 +194,43 @@ class Bar(Lines):
         from rich.console import Console
 
         if self._begun:
-            failures.clear_line()
+            terminal.clear_line()
         return Console(stderr=True, highlight=False)
 
     @contextmanager
     def phase(self, text: str) -> Iterator[None]:
-        with self.console.status(text):
+        with self.console.status(self._shown(f"{text} ...")):
             yield
 
+    def _shown(self, text: str) -> Text:
+        """Return a text without control characters and markup."""
+        from rich.text import Text
+
+        return Text(terminal.cleaned(text))
+
     @contextmanager
-    def compiling(self, text: str) -> Iterator[Callable[[], None]]:
-        with self.console.status(self.name) as status:
-            yield lambda: status.update(text)
+    def compiling(self, text: str) -> Iterator[Programs]:
+        from rich.progress import BarColumn, SpinnerColumn, TextColumn
+        from rich.progress import Progress as RichProgress
+
+        columns = (
+            SpinnerColumn(),
+            TextColumn("{task.description}", markup=False),
+            BarColumn(NARROW),
+            TextColumn("{task.fields[told]}", markup=False),
+        )
+        bar = RichProgress(*columns, console=self.console, transient=True)
+        task = bar.add_task(self.name[:LONGEST_NAME], total=None, told="")
+
+        def changed() -> None:
+            bar.update(
+                task, description=terminal.cleaned(text), total=programs.begun,
+                completed=programs.ended, told=programs.told,
+            )  # fmt: skip
+
+        programs = Programs(changed)
+        with bar:
+            yield programs
 
     @contextmanager
     def loading(self, name: str) -> Iterator[Callable[[float, str], None]]:
@@ -187,12 +243,12 @@ class Bar(Lines):
             TextColumn("{task.description}", markup=False),
         )
         bar = RichProgress(*columns, console=self.console, transient=True)
-        task, began = bar.add_task("", total=1.0, name=name), time.perf_counter()
+        task, began = bar.add_task("", total=1.0, name=terminal.cleaned(name)), time.perf_counter()
 
         def tell(fraction: float, what: str) -> None:
             if time.perf_counter() - began >= PATIENCE:
                 bar.start()
-                bar.update(task, completed=fraction, description=what)
+                bar.update(task, completed=fraction, description=terminal.cleaned(what))
 
         try:
             yield tell
@@ -222,7 +278,7 @@ class Bar(Lines):
             self._bar.refresh()
 
     def note(self, text: str) -> None:
-        self.console.print(text, markup=False)
+        self.console.print(self._shown(text))
 
 
 FIGURES = ("samples", "open", "noise", "rays", "elapsed", "left")

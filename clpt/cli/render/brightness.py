@@ -9,32 +9,45 @@ import numpy as np
 
 from ... import images
 from ...arrays import Floats32
+from ...geometry import analytic
+from ...geometry.lamps import plainly_lit
 from ...render.analysis.lights import light_power
 from ...render.analysis.lights.sources import emissions_of
+from ...render.analysis.look import Look
 from ...render.pictures import DevicePictures
 from ...scene import Scene
-from ...scene.lights import Light
+from ...scene.lights import Light, PoweredLamp
+from ...scene.shapes import Shape
+from ...spectra import RGBIlluminant, Spectrum, watts
 from ..options.grading import Grading, for_screens
 
 MOSTLY_WHITE = 0.5  # of the lit pixels
 NEARLY_BLACK = 0.98  # of all pixels
 DARK = 2.0  # stops by which a picture that is nearly black would have to be brightened
 OUTSHINING = 1000.0  # times as strong as any other lamp
+WHITE = watts(RGBIlluminant(1.0, 1.0, 1.0))  # of an emission of 1 [nm]
 ADVICE = "docs/lighting.md has a list: Why is it black?"
 
 
 def exposure_found(renderer: DevicePictures) -> float:
     """Return the stops of `--exposure auto`."""
-    return images.auto_exposure(_pixels(renderer))
+    return images.auto_exposure(_pixels(renderer)) - renderer.scene.film.display_exposure
+
+
+def display_exposure(renderer: DevicePictures) -> str:
+    """Return what to say of the exposure that the scene's film has for screens, "" for none."""
+    stops = renderer.scene.film.display_exposure
+    return f"exposure {stops:+.1f} stops, of the scene: film.display_exposure" if stops else ""
 
 
 def remarks(renderer: DevicePictures, grading: Grading, targets: tuple[Path, ...]) -> Iterator[str]:
     """Yield sentences of a picture in which little is seen, with what mends it."""
     scene, pixels = renderer.scene, _pixels(renderer)
-    exposure = images.stops(grading.exposure, pixels)
+    display = scene.film.display_exposure
+    exposure = images.stops(images.raised(grading.exposure, display), pixels)
     found = images.levels(pixels, exposure, grading.tone, grading.view)
     mended = images.auto_exposure(pixels)
-    advice = f"--exposure auto, {mended:+.1f} stops, shows it"
+    advice = f"--exposure auto, {mended - display:+.1f} stops, shows it"
     if not found.lit:
         yield f"the picture is black: no path has found a light; {ADVICE}"
         return
@@ -48,26 +61,41 @@ def remarks(renderer: DevicePictures, grading: Grading, targets: tuple[Path, ...
 
 def _pixels(renderer: DevicePictures) -> Floats32:
     """The picture so far in linear Rec. 709, (h, w, c)."""
-    colours = renderer.colours() if renderer._form.bands else renderer.image()
+    colours = renderer.picture()
     return images.to_rec709(images.straight(colours), renderer.scene.film.output_space)
 
 
 def _outshone(scene: Scene) -> Iterator[str]:
-    """Yield a sentence where one lamp with a place is far stronger than any other."""
+    """Yield a sentence where one lamp with a place sends out far more watts than any other lamp."""
+    lit, look = plainly_lit(scene), Look.of(scene.film)
     powers = [
-        (light_power.power(lamp, _strength(lamp), 1.0), f"lights[{i}] ({lamp.kind})")
-        for i, lamp in enumerate(scene.lights)
+        (light_power.power(lamp, _watts(lamp, look), 1.0, look), f"lights[{i}] ({lamp.kind})")
+        for i, lamp in enumerate(lit.lights)
         if lamp.reach == "placed"
     ]
-    if len(powers) < 2:
+    if not powers:
         return
-    (next_best, _), (best, name) = sorted(powers)[-2:]
-    if best > OUTSHINING * next_best:
+    best, name = max(powers)
+    others = [power for power, other in powers if other != name]
+    others += [_shape_watts(shape, look) for shape in lit.shapes if shape.emission is not None]
+    if others and best > OUTSHINING * max(others):
+        next_best = max(others)
         times = f"{best / next_best:,.0f} times as strong as" if next_best else "stronger than"
         yield f"{name} is {times} any other lamp: little is seen of what the others light"
 
 
-def _strength(lamp: Light) -> float:
-    """The mean of the emissions of a lamp."""
-    values = [light_power.brightness(value) for value in emissions_of(lamp).values()]
+def _watts(lamp: Light, look: Look) -> float:
+    """The emission of a lamp from 360 to 830 nm, such as its intensity [W/sr]."""
+    values = [
+        watts(value) if isinstance(value, Spectrum) else WHITE * light_power.brightness(value, look)
+        for value in emissions_of(lamp).values()
+    ]
     return float(np.mean(values)) if values else 0.0
+
+
+def _shape_watts(shape: Shape, look: Look) -> float:
+    """The power of a shape's light [W]."""
+    emission = shape.emission
+    if not isinstance(emission, PoweredLamp):
+        return 0.0
+    return _watts(emission, look) * emission.extent(analytic.area(shape))

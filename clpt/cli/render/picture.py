@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -196,6 +196,8 @@ class _Picture:
         if self._has_samples:
             if grading.exposure == "auto" and for_screens(targets):
                 self._shown.note(f"exposure {brightness.exposure_found(self._renderer):+.1f} stops")
+            elif for_screens(targets) and (said := brightness.display_exposure(self._renderer)):
+                self._shown.note(said)
             told += brightness.remarks(self._renderer, grading, targets)
         for text in told:
             self._shown.note(f"clpt: warning: {text}")
@@ -215,8 +217,11 @@ class _Picture:
 
     def _write(self) -> float:
         """Write the files of the picture; return the samples of a pixel in the mean."""
-        job, stats = self._job, self._stats()
-        outputs.write_all(job.targets, self._renderer, stats, job.graded.grading, self._shown.note)
+        job, stats, denoiser = self._job, self._stats(), self._renderer.denoise
+        with self._shown.phase(f"denoising ({denoiser})") if denoiser else nullcontext():
+            outputs.write_all(
+                job.targets, self._renderer, stats, job.graded.grading, self._shown.note
+            )
         return float(stats["spp"])
 
     @contextmanager

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import click
-
 from ...render.pictures import DevicePictures
+from ..process import terminal
 from .passes import End
 
 TIMES = {  # of RenderStats.seconds
@@ -95,7 +94,7 @@ def after(renderer: DevicePictures) -> None:
 
 
 def _line(what: str, text: str) -> None:
-    click.echo(f"{what:<24} {text}", err=True)
+    terminal.say(f"{what:<24} {text}")
 
 
 def _bytes(n: int) -> str:

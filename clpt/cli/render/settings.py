@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ...choices import MOST_SAMPLES, VIEWER
+from ...choices import MOST_SAMPLES, MOST_SEED, VIEWER
 from ..files.standard_output import FORMATS
 from ..files.targets import default
 from ..options.changes import Sampling
 from ..options.grading import GradingOptions
 from ..options.records import Command, with_options
 from ..options.scene_options import SceneOptions
-from ..options.values import Count, Noise
+from ..options.values import Choice, Count, Noise
 from ..options.workers import Workers
 from .frame_values import Frames
 
@@ -226,7 +226,7 @@ _OUTPUT = (
         "[default: {scene}.exr and {scene}.png]",
     ),
     click.option(
-        "--format", "form", type=click.Choice(FORMATS),
+        "--format", "form", type=Choice(FORMATS),
         help="Of the picture of -o -.  [default: png]",
     ),
     click.option(
@@ -241,7 +241,8 @@ _UNTIL = (
         help="Stop sampling pixels with less noise, such as 2% of their light, after --denoise "
         "if that is given; 0: never.",
     ),
-    click.option("--time", "limit", type=Duration(), help="Stop after 30s, 5m, 1h30m."),
+    click.option("--time", "limit", type=Duration(),
+        help="Stop after 30s, 5m, 1h30m of rendering, which begins when the kernels are compiled."),
     click.option(
         "--samples", "numbers", type=SampleRange(),
         help="Take samples of these numbers only, END without: -o a.film, for `clpt merge`.",
@@ -273,7 +274,7 @@ _ANIMATION = (
     ),
 )  # fmt: skip
 _SEED = click.option(
-    "--seed", type=click.IntRange(0, 2**31 - 1), help="Seed of the random numbers."
+    "--seed", type=click.IntRange(0, MOST_SEED), help="Seed of the random numbers."
 )
 
 

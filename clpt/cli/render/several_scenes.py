@@ -14,7 +14,7 @@ import click
 from ...errors import SceneError
 from ..files import targets
 from ..files.standard_output import STANDARD, standard_output
-from ..process import failures
+from ..process import failures, terminal
 from .settings import Job, Settings
 
 NAME = "{scene}"  # in the name of an output, the scene's
@@ -94,7 +94,7 @@ def _all(run: Callable[[Job], int], jobs: list[Job]) -> int:
     for number, job in enumerate(jobs, start=1):
         if not job.quiet:
             which = "" if job.camera is None else f", camera {job.camera}"
-            click.echo(f"{job.scene}{which} ({number} of {len(jobs)})", err=True)
+            terminal.say(f"{job.scene}{which} ({number} of {len(jobs)})")
         status = _one(run, job)
         if status > failures.BAD_INPUT:
             return status  # a signal

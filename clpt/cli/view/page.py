@@ -29,6 +29,7 @@ from ..options.grading import Grading
 from ..options.scene_options import SceneOptions
 from ..printing.display import Display as Progress
 from ..printing.display import display
+from ..process import terminal
 from ..process.extras import extra
 from ..process.stopping import STATUS, stops
 from .settings import Settings
@@ -81,13 +82,13 @@ def _display(settings: Settings) -> Display:
 def _announce(address: str, settings: Settings) -> None:
     """Print the page's address, say what to do with it, and open the page."""
     listening = settings.listening
-    click.echo(address)
+    terminal.say(address, err=False)
     if not settings.quiet:
         what = "open this address in a browser" if listening.no_browser else "opens in your browser"
-        click.echo(f"{what}; Ctrl-C ends it", err=True)
+        terminal.say(f"{what}; Ctrl-C ends it")
     if not is_loopback(listening.host):
         warning = f"other machines can reach {listening.host}, and read along"
-        click.echo(f"clpt: warning: {warning}", err=True)
+        terminal.say(f"clpt: warning: {warning}")
     if not listening.no_browser:
         webbrowser.open(address)
 

@@ -24,7 +24,7 @@ from clpt.formats.gltf import (
     pointers,
     variants,
 )  # fmt: skip
-from clpt.formats.gltf.document import Document
+from clpt.formats.gltf.document import Document, Scale
 from clpt.formats.meshes import framing
 from clpt.formats.meshes.mesh import MeshFile
 from clpt.scene import Scene
@@ -48,12 +48,11 @@ def load(path: Path, missing: Missing = "error", /, **variables: Any) -> Scene:
     """Read a glTF file; a camera or light that it lacks is added, as for a bare mesh.
 
     variables: `time` [s] of an animation (the first, or the `animation` of that number or name);
-    without it nodes have their own transforms, and materials, lights
-    and cameras their own numbers. `camera` and `scene` choose by number or name.
+    without it nodes have their own transforms, and materials, lights and cameras their own numbers.
+    `camera` and `scene` choose by number or name.
     `shutter` [s] is how long light comes to the film from `time` on, while nodes move.
-    `variant` chooses among material variants. `lumens`: of a watt, by which punctual lights are
-    divided; of files of Blender 683 by itself. `multiple_scattering`: 1 keeps what facets reflect
-    to each other.
+    `variant` chooses among material variants. `lumens`: of a watt, as clpt.formats.gltf.lights has
+    it. `multiple_scattering`: 1 keeps what facets reflect to each other.
     missing: see clpt.load. Raises SceneError with the JSON path of what is wrong.
     """
     if "shutter" in variables:
@@ -79,9 +78,11 @@ def load(path: Path, missing: Missing = "error", /, **variables: Any) -> Scene:
     scene.extra["cameras"] = cameras.descriptions(graph)
     scene.extra["animations"] = animation.descriptions(document)
     scene.extra |= _provenance(document)
+    film = dataclasses.replace(scene.film, display_exposure=document.scale.stops)
     if chosen:
         width, height = chosen[1]
-        scene.film = dataclasses.replace(scene.film, width=width, height=height)
+        film = dataclasses.replace(film, width=width, height=height)
+    scene.film = film
     return scene
 
 
@@ -101,6 +102,7 @@ def _provenance(document: Document) -> dict[str, Any]:
 def read_mesh(path: Path) -> MeshFile:
     """Return the meshes of a file as its scene shows them. Raises SceneError if there are none."""
     document, graph = _open(path, {})
+    document.scale = Scale()  # the scene that shows the meshes has lights of its own
     shapes = meshes.shapes(graph, instances=False)
     if not shapes:
         raise SceneError("holds no triangles", file=path)
@@ -115,7 +117,6 @@ def _open(
     if unknown:
         advice = nearest(unknown[0], VARIABLES)
         raise SceneError(f"glTF has no variable {unknown[0]!r}{advice}", file=path)
-    document.lumens = _number(path, variables, "lumens", lights.lumens_of(document), 1e-6, 1e6)
     document.multiple_scattering = _number(path, variables, "multiple_scattering", 0.0, 0.0, 1.0)
     document.variant = variants.chosen(document, _text(variables.get("variant")))
     _check_extensions(document)
@@ -124,7 +125,12 @@ def _open(
     if "time" in variables or "animation" in variables:
         chosen = _text(variables.get("animation"))
         pose = animation.pose(document, chosen, _seconds(path, variables.get("time", 0.0)))
-    return document, nodes.graph(document, _text(variables.get("scene")), pose)
+    graph = nodes.graph(document, _text(variables.get("scene")), pose)
+    lumens = lights.lumens_of(document)
+    if "lumens" in variables:
+        lumens = _number(path, variables, "lumens", 1.0, 1e-6, 1e6)
+    document.scale = lights.scale_of(graph, lumens)
+    return document, graph
 
 
 def _check_extensions(document: Document) -> None:

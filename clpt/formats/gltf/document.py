@@ -12,6 +12,7 @@ import json
 import math
 import re
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any, NoReturn, TypeVar
 from urllib.parse import unquote, unquote_to_bytes
@@ -19,6 +20,7 @@ from urllib.parse import unquote, unquote_to_bytes
 from clpt import budget, input_files, text
 from clpt.choices import Missing
 from clpt.errors import SceneError
+from clpt.scalars import is_flag, is_number, is_whole
 
 T = TypeVar("T")
 REQUIRED: Any = object()
@@ -63,7 +65,7 @@ class Element:
             return default
         if isinstance(value, float) and value.is_integer():
             value = int(value)  # JSON's 3.0
-        if isinstance(value, bool) or not isinstance(value, int):
+        if not is_whole(value):
             raise self.error(f"must be a whole number, not {_shown(value)}", key)
         if not low <= value <= high:
             raise self.error(f"{_shown(value)} is outside {low} to {high}", key)
@@ -106,7 +108,7 @@ class Element:
     def flag(self, key: str, default: bool = False) -> bool:
         """Return a yes or no."""
         value = self._get(key, default)
-        if not isinstance(value, bool):
+        if not is_flag(value):
             raise self.error(f"must be true or false, not {_shown(value)}", key)
         return value
 
@@ -151,7 +153,7 @@ class Element:
         self.count(key)
         indices = []
         for i, value in enumerate(self.value.get(key, [])):
-            if isinstance(value, bool) or not isinstance(value, int):
+            if not is_whole(value):
                 raise self.error(f"must be a whole number, not {_shown(value)}", f"{key}[{i}]")
             indices.append(self._in_table(value, f"{key}[{i}]", table))
         return indices
@@ -173,7 +175,7 @@ class Element:
         return value
 
     def _number(self, value: object, key: str, low: float, high: float) -> float:
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
+        if not is_number(value):
             raise self.error(f"must be a number, not {_shown(value)}", key)
         if abs(value) > 1e38:  # beyond what single precision holds; JSON's 1e999 is infinity
             raise self.error(f"{_shown(value)} is too large", key)
@@ -189,6 +191,23 @@ class Element:
         return value
 
 
+@dataclass(frozen=True)
+class Scale:
+    """The brightness of a file's numbers.
+
+    emission: radiance of an emission of 1 [W m^-2 sr^-1 nm^-1 of D65]; lights: intensity of a
+    punctual light of 1, in the same unit [m^2].
+    """
+
+    emission: float = 1.0
+    lights: float = 1.0
+
+    @property
+    def stops(self) -> float:
+        """The stops that show an emission of 1 as 1."""
+        return math.log2(1.0 / self.emission)
+
+
 class Document:
     """A parsed file: `root` is its JSON; `warnings` say what was left out."""
 
@@ -196,7 +215,8 @@ class Document:
         self.file, self.missing = file, missing
         self.warnings: list[str] = []
         self.uv_sets: list[int] = []  # of the textures that were made since it was cleared
-        self.lumens, self.multiple_scattering = 1.0, 0.0  # see clpt.formats.gltf.load
+        self.multiple_scattering = 0.0  # see clpt.formats.gltf.load
+        self.scale = Scale()
         self.variant: int | None = None
         self._made: dict[Any, Any] = {}
         data = input_files.read_bytes(file)

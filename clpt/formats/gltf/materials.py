@@ -22,6 +22,7 @@ from clpt.scene.materials import (
 )
 from clpt.scene.params import Texture
 from clpt.scene.textures import Bitmap, MeshAttribute, Product
+from clpt.scene.values import Textured
 
 UNLIT, EMISSIVE = "KHR_materials_unlit", "KHR_materials_emissive_strength"
 EXTENSIONS: tuple[str, ...] = (
@@ -47,7 +48,7 @@ def material(element: Element | None, *, colours: bool = False) -> tuple[Materia
         shown = surface.base_color(element)
         if colours:
             shown = Product(first=shown, second=MeshAttribute(), rgb=True)
-        emission: Area | None = Area(radiance=shown, two_sided=both)
+        emission: Area | None = Area(radiance=_scaled(shown, element), two_sided=both)
     else:
         inner = surface.surface(element, colours)
         emission = _emission(element, both)
@@ -90,7 +91,17 @@ def _emission(element: Element, both: bool) -> Area | None:
         else:
             tinted = max(radiance) > min(radiance)
             radiance = Product(first=image, second=surface.unbounded(radiance), rgb=tinted)
-    return Area(radiance=radiance, two_sided=both)
+    return Area(radiance=_scaled(radiance, element), two_sided=both)
+
+
+def _scaled(shown: Textured, element: Element) -> Textured:
+    """An emission that the file counts in its own unit, as radiance."""
+    scale = element.document.scale.emission
+    if scale == 1.0:
+        return shown
+    if isinstance(shown, tuple):
+        return tuple(scale * value for value in shown)
+    return Product(first=shown, second=scale)
 
 
 def _opacity(element: Element, colours: bool) -> Any:

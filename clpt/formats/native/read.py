@@ -17,15 +17,20 @@ from clpt.formats.missing import EVEN, GREY, grey_for
 from clpt.formats.native import forms, shape_files
 from clpt.formats.native.cursor import Cursor, parse
 from clpt.formats.native.spectra import find_file, kind_name
-from clpt.scene import Scene, check_noise, integrators, kinds, lights, materials, media, shapes
+from clpt.scene import Scene, checked_noise, integrators, kinds, lights, materials, media, shapes
 from clpt.scene.params import Kind, params, shorthands
 from clpt.scene.volumes import Volume
 
 ON_SHAPES = tuple(cls.kind for cls in lights.ON_SHAPES)
 KEYS = (
-    "$schema", "name", "camera", "film", "integrator", "sampler", "materials", "media", "groups",
-    "shapes",    "lights", "spp", "noise", "seed",
+    "$schema", "version", "name", "camera", "film", "integrator", "sampler", "materials", "media",
+    "groups", "shapes", "lights", "spp", "noise", "seed",
 )  # fmt: skip
+VERSION = 2  # since it, lamps' files give candela: version 1 took them for W sr^-1 nm^-1
+CANDELA = (
+    "lamps' files are in candela, as in version 2 of scene files, on a scale with lumens; before, "
+    'such a lamp was 72,983 times as bright: write "version": 2 to confirm, 1 for the former light'
+)
 FILM_KEYS = frozenset(params(integrators.Film))
 
 
@@ -61,6 +66,7 @@ class _Reader:
         self.volumes: dict[str, Volume] = {}
         self.measurements: dict[str, Any] = {}
         self.groups: dict[str, shapes.Group | None] = {}
+        self.version = _version(root)
         self.warnings: list[str] = []
 
     def scene(self) -> Scene:
@@ -171,9 +177,14 @@ class _Reader:
         if cls in shape_files.FILES and "file" in cursor.value:
             shape_files.check_only_in_file(cursor, cls)
             made, file = self.object_of(cursor, cls, ("type", "file")), cursor.at("file")
-            path, reader = find_file(file), shape_files.FILES[cls].read
+            path, known = find_file(file), shape_files.FILES[cls]
             with file.locating():
-                return dataclasses.replace(made, **reader(path)) if reader else made
+                values = known.read(path) if known.read else {}
+                if self.version == 1:
+                    return dataclasses.replace(made, **{**values, "candela": None})
+                if self.version is None and CANDELA not in self.warnings:
+                    self.warnings.append(CANDELA)
+                return known.join(made, values)
         return self.kind(cursor, "light")
 
     def area_light(self, cursor: Cursor) -> Any:
@@ -301,8 +312,19 @@ def _merged(
     )
 
 
+def _version(root: Cursor) -> int | None:
+    """Return the version that a scene says it has, None without. Raises SceneError."""
+    if not isinstance(root.value, dict) or "version" not in root.value:
+        return None
+    cursor = root.at("version")
+    version = cursor.integer()
+    if not 1 <= version <= VERSION:
+        raise cursor.error(f"this clpt reads the versions 1 to {VERSION}, not {version}")
+    return version
+
+
 def _noise(cursor: Cursor) -> float:
     noise = cursor.number()
     with cursor.locating():
-        check_noise(noise)
+        checked_noise(noise)
     return noise

@@ -12,7 +12,7 @@ import numpy as np
 
 from clpt import budget, numpy_files
 from clpt.choices import Missing
-from clpt.formats import ies
+from clpt.formats import luminaires
 from clpt.formats.meshes import mesh, particles, strands
 from clpt.formats.meshes.triangles import TANGENTS
 from clpt.formats.native.cursor import Cursor
@@ -30,13 +30,17 @@ class ShapeFile:
     """A kind of file that a shape may name by its key `file`.
 
     accepts, meaning: for the schema and the reference; replaces: the parameters that the file
-    holds; read: returns these, None where one file makes several shapes.
+    holds; read: returns these, None where one file makes several shapes; join: returns the kind
+    with what `read` has returned.
     """
 
     accepts: str
     meaning: str
     replaces: tuple[str, ...] = ()
     read: Callable[[Path], dict[str, Any]] | None = None
+    join: Callable[[Any, dict[str, Any]], Any] = lambda made, values: dataclasses.replace(
+        made, **values
+    )
 
 
 def sdf_grid(path: Path) -> dict[str, Any]:
@@ -67,10 +71,11 @@ FILES: dict[type[Kind], ShapeFile] = {
         "name of a .npy or .vol file", "signed distances, in place of values", ("values",), sdf_grid
     ),
     lights.Goniometric: ShapeFile(
-        "name of an .ies file",
+        "name of an .ies or .ldt file",
         "candela by direction, in place of `image`",
         ("image",),
-        ies.parameters,
+        luminaires.parameters,
+        luminaires.joined,
     ),
 }
 

@@ -16,10 +16,12 @@ from typing import Any
 import numpy as np
 
 from clpt import images, measured, output_files, spectral_exr
+from clpt.arrays import on_host
 from clpt.errors import SceneError
 from clpt.formats.meshes import particles, strands
 from clpt.formats.meshes.triangles import TANGENT_COLUMNS
 from clpt.formats.native import forms, motion
+from clpt.formats.native.read import VERSION
 from clpt.formats.native.shape_files import MESH_ARRAYS, in_file
 from clpt.scene import Scene, kinds, materials, shapes
 from clpt.scene.media import Medium
@@ -83,7 +85,8 @@ class _Writer:
     def scene(self, scene: Scene) -> dict[str, Any]:
         """Write the whole file."""
         self.shared = _shared(scene)
-        document: dict[str, Any] = {"name": scene.name} if scene.name else {}
+        document: dict[str, Any] = {"version": VERSION}
+        document |= {"name": scene.name} if scene.name else {}
         document |= {
             "camera": self.kind(scene.camera),
             "film": self.untyped(scene.film),
@@ -327,7 +330,7 @@ def _on_host(thing: Kind) -> Kind:
         if not hasattr(value, "get"):
             message = "a buffer has no shape: give a pyopencl.array.Array"
             raise SceneError(message, where=f"{thing.kind}.{name}")
-        on_device[name] = value.get()
+        on_device[name] = on_host(value)
     return dataclasses.replace(thing, **on_device) if on_device else thing
 
 

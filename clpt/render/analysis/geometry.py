@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import transforms
+from clpt import budget, transforms
 from clpt.arrays import Faces, Points, fits_single
 from clpt.bvh.build import MOST
 from clpt.errors import SceneError
@@ -210,6 +210,7 @@ class _Builder:
 
         times: at which the vertices have rows, for what belongs to something that deforms.
         """
+        budget.check_time()
         shape = one.shape
         row = np.zeros((), SHAPE.dtype)
         row["number"], row["light"] = one.number, -1
@@ -252,9 +253,11 @@ class _Builder:
         if times:
             keyed = self.cache(spheres.keyed, shape, times, by=(*by, times))
             self.many.append(spheres.swept(keyed))
+            budget.take_made((keyed, self.many[-1]), shapes.where(shape))
             return keyed[:, 0], Stored(many=keyed)
         balls = self.cache(spheres.balls, shape, by=by)
         self.many.append(spheres.boxes([balls]))
+        budget.take_made((balls, self.many[-1]), shapes.where(shape))
         return balls, Stored(many=balls)
 
     def _add_curves(self, shape: Shape, row: np.ndarray) -> Stored:
@@ -262,6 +265,7 @@ class _Builder:
         row["prim"] = self.single_count + sum(map(len, self.many))
         found = self.cache(strands.pieces, shape, by=shapes.geometry(shape))
         self.many.append(strands.boxes(found))
+        budget.take_made((found, self.many[-1]), shapes.where(shape))
         return Stored(many=found)
 
     def _add_triangles(
@@ -276,6 +280,7 @@ class _Builder:
         else:
             made = self.cache(triangles.counted, shape, by=by)
         vertices, faces, normals, uvs, flat = made
+        budget.take_made((vertices, faces, normals, uvs), shapes.where(shape))
         self.flat += flat
         row["prim"] = self.face_count
         row["flags"] |= SHAPE_BITS["normals"] if normals is not None else 0

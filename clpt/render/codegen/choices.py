@@ -70,10 +70,18 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
             "generated/layer_args.cl",
             *_screen_motion(f),
             *either(f.screen_motion, "path/screen_motion_record.cl"),
+            *either(f.motion.camera, "path/camera_axis.cl"),
             "path/layers.cl",
         )
         or ("path/layers_none.cl",)
     ),
+    "generated/path_covers.cl": lambda f, _: either(f.film.alpha, "path/covers.cl"),
+    "generated/path_start.cl": lambda f, _: either(
+        f.film.alpha and f.camera.weighs, "path/start.cl"
+    ),
+    "generated/scouts.cl": lambda f, _: either(f.scouts, "path/scouts.cl"),
+    "generated/scouts_begin.cl": lambda f, _: either(f.scouts, "path/scouts_begin.cl"),
+    "generated/scout_choice.cl": lambda f, _: either(f.scouts, "path/scout_choice.cl"),
     "generated/mattes.cl": lambda f, _: either(f.film.layers.mattes, "path/mattes.cl"),
     "generated/light_layers.cl": lambda f, _: (
         *when(f.film.layers.lights, "generated/light_layer_args.cl", "generated/sampler.cl"),
@@ -196,6 +204,10 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         *either(f.geometry.normals, "surface/triangle_normal.cl"),
         *either(f.geometry.uvs, "surface/triangle_uv.cl"),
         *either(
+            f.geometry.tangents and f.textures.mappings and f.textures.attributes,
+            "surface/second_uv.cl",
+        ),
+        *either(
             f.geometry.uvs and f.geometry.tangents and f.geometry.vertex_tangents,
             "surface/triangle_tangents.cl",
         ),
@@ -292,6 +304,9 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
         "steps/adjoint_weight.cl",
         *either(not flags.is_null(f, cls), "steps/light_path_roulette.cl"),
     ),
+    "generated/scout.cl": lambda f, cls: when(
+        f.film.layers.words > 0, *either(f.scouts and not cls.is_phase, "path/scout.cl")
+    ),
     "generated/vertex_steps.cl": lambda f, cls: (
         *either(f.names_surfaces, "path/vertex_names.cl"),
         *(
@@ -300,6 +315,7 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
         ),
         *either(flags.between_bodies(f, cls), "path/between_bodies.cl"),
         *either(flags.has_lobe(f, cls, "clearcoat_apart"), "path/coat_normal.cl"),
+        *either(flags.has_lobe(f, cls, "anisotropy"), "path/anisotropy.cl"),
     ),
 }
 

@@ -19,7 +19,7 @@ from clpt.scene.layers import LAYERS
 from clpt.spectra import cie
 
 UNITS = 2.0**22  # kernels/film/layers.cl
-LONG_UNITS = (2.0**8, 2.0**-16, 2.0**-40)
+LONG_UNITS = (2.0**18, 2.0**-6, 2.0**-30, 2.0**-54)
 GROUP = "light_"  # begins the name of a group's picture
 
 

@@ -50,11 +50,20 @@ class Pictures(ABC):
         """The picture so far in three colours, (h, w, 3) float32, also of a film with bands."""
         return self._developed("words").colours()
 
+    def picture(self) -> Image:
+        """The picture so far in three colours, (h, w, 3) float32; (h, w, 4) of a film with alpha.
+
+        Also of a film with bands.
+        """
+        return self._developed("words").picture()
+
     def spectral_image(self) -> SpectralImage:
         """The picture so far of a film with bands, at their centres. Raises SceneError without."""
         if not self._form.bands:
             raise SceneError("this picture has no bands; set the film's", where="film.bands")
-        return SpectralImage(self.image(), self._form.band_centres, emissive=True)
+        form = self._form
+        stops = form.display_exposure
+        return SpectralImage(self.image(), form.band_centres, emissive=True, exposure=stops)
 
     def samples_per_pixel(self) -> Image:
         """Return how many samples each pixel has, (h, w) float32."""

@@ -6,12 +6,17 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from clpt.errors import SceneError
 from clpt.geometry import instancing
+from clpt.geometry.primitive_rows import primitive_rows
+from clpt.geometry.shapes import geometry as geometry_of
+from clpt.records import SHAPE_BITS
 from clpt.render.analysis.geometry import Geometry
 from clpt.render.analysis.index import SceneIndex
 from clpt.render.analysis.lights.sources import row_order
+from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.render.contract.features import LayerFeatures
 from clpt.render.contract.layer_names import LayerNames
 from clpt.render.lowering.lights.lights import LightRows
@@ -24,12 +29,18 @@ REST = "rest"  # the group of lights that name none
 
 
 def lower_names(
-    index: SceneIndex, geometry: Geometry, lights: LightRows, store: TableStore
+    index: SceneIndex,
+    geometry: Geometry,
+    lights: LightRows,
+    store: TableStore,
+    cache: LoweringCache,
 ) -> tuple[LayerNames, LayerFeatures]:
     """Return the names that the layers of a film need, and the layers' features.
 
     The numbers of materials and groups go to `distributions`, for each row of `shapes` and of
-    `lights`. Raises SceneError for more shapes than a matte can tell apart.
+    `lights`, and those of the caller's faces and strands for each primitive.
+
+    Raises SceneError for more shapes than a matte can tell apart.
     """
     layers, things = index.layers, index.listed
     names: dict[str, tuple[str, ...]] = {}
@@ -45,6 +56,9 @@ def lower_names(
         row = store.append_floats("distributions", np.array([*of_rows, 0.0]))
         features = replace(features, material_numbers=row)
         names["materials"] = tuple(_material_name(one, i) for i, one in enumerate(found))
+    if "primitive_id" in layers:
+        first = _primitive_rows(index, geometry, store, cache)
+        features = replace(features, primitive_rows=first)
     if "light_groups" in layers:
         groups = _groups(index, geometry, lights)
         groups += [REST] * bool(index.emitting)  # of what rays gather in media
@@ -54,6 +68,25 @@ def lower_names(
         count = len(names["light_groups"])
         features = replace(features, light_groups=count, light_group_row=row)
     return LayerNames(**names), features
+
+
+def _primitive_rows(
+    index: SceneIndex, geometry: Geometry, store: TableStore, cache: LoweringCache
+) -> int:
+    """Put the caller's rows of primitives into `distributions`; return where, see SETTINGS."""
+    places, deforming = [], index.motions.deforming
+    for row, shape, _, _ in geometry.owners:
+        times = (
+            deforming.get(int(row["number"]), ()) if row["flags"] & SHAPE_BITS["deforms"] else ()
+        )
+        rows = cache(primitive_rows, shape, times, by=(*geometry_of(shape), times))
+        places.append(0 if rows is None else store.append_floats("distributions", _words(rows)))
+    return store.append_floats("distributions", _words([*places, 0])) if any(places) else 0
+
+
+def _words(numbers: ArrayLike) -> NDArray[np.float32]:
+    """Whole numbers as the bits of floats."""
+    return np.asarray(numbers, np.int32).view(np.float32)
 
 
 def _materials(shapes: Iterable[Shape]) -> tuple[dict[int, int], list[mt.Material]]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import spectra, transforms
+from clpt import budget, spectra, transforms
 from clpt.geometry import shape_records, shapes
 from clpt.geometry.instancing import Instances
 from clpt.geometry.refining import is_refined
@@ -21,6 +21,7 @@ from clpt.render.analysis.geometry import (
     Owner,
     spheres_move,
 )
+from clpt.render.analysis.image_files import ImageFiles
 from clpt.render.analysis.index import SceneIndex
 from clpt.render.analysis.lights.sources import Sources
 from clpt.render.analysis.lowering_cache import LoweringCache
@@ -52,6 +53,7 @@ from clpt.render.lowering.settings import Found, settings_of
 from clpt.render.lowering.textures.attributes import lower_attributes
 from clpt.scene import Scene
 from clpt.scene import materials as mt
+from clpt.scene.fingerprint import named_files
 from clpt.scene.integrators import DEEPEST, Film, Integrator
 from clpt.scene.lights import Point
 from clpt.scene.media import Lattice
@@ -77,7 +79,8 @@ class Lowered:
     reason: why, "" where there was no choice; candidates: see `SceneIndex`; samples: of the
     whole film, as the scene asks for. encoder: what made the tables, for values that are edited.
     cache: what the next lowering need not make again. around: media at the camera, or the matter of
-    bodies. device_grids: densities whose bricks kernels put into `images`.
+    bodies. device_grids: densities whose bricks kernels put into `images`. files: what stands for
+    the files that images were read from.
     """
 
     features: Features
@@ -101,6 +104,7 @@ class Lowered:
     cache: LoweringCache
     around: tuple[Any, ...] = ()
     device_grids: tuple[DeviceGrid, ...] = ()
+    files: ImageFiles = field(default_factory=ImageFiles)
 
     def __post_init__(self) -> None:
         own = (self.vertices, self.faces, self.tags, self.boxes, self.settings)
@@ -131,13 +135,19 @@ def lower(
     common with this one: it saves time, and what is "auto" stays as chosen, unless it is chosen
     anew. Arrays, lights and images that are the same objects as then are taken to hold the same.
 
-    Raises SceneError where the scene makes no sense: it names the shape, light or material.
+    Raises SceneError where the scene makes no sense: it names the shape, light or material; and
+    for an image whose file changes meanwhile, and where it takes more than the budget of its load
+    has left.
     """
     cache = LoweringCache(former.cache if former else None)
     before = None
     if former is not None and not anew:
         before = Before(former.integrator, former.features.transport.lit_ghosts)
-    return encode(analyse(scene, cache, before), cache, texture_budget)
+    with budget.resumed(scene.account):
+        files = ImageFiles.of(named_files(scene), former.files if former else ImageFiles())
+        made = encode(analyse(scene, cache, before), cache, texture_budget)
+        files.check()
+    return replace(made, files=files)
 
 
 def encode(found: Analysis, cache: LoweringCache, texture_budget: int | None = None) -> Lowered:
@@ -157,10 +167,10 @@ def encode(found: Analysis, cache: LoweringCache, texture_budget: int | None = N
         *encoder.textures.finish(),
     )  # fmt: skip
     motion_row = _lower_motion(found, lights, encoder)
-    names, layers = lower_names(index, geometry, lights, encoder.store)
+    names, layers = lower_names(index, geometry, lights, encoder.store, cache)
     features = _features(found, encoder, surfaces, rows, motion_row, layers)
     aims, around, disperses = (rows.aims, len(found.aims)), surfaces.around, features.dispersion
-    own = Found(rows.density, rows.ambient, aims, around, disperses, layers)
+    own = Found(rows.density, rows.ambient, aims, around, disperses, layers, encoder.second_uv)
     settings = settings_of(index, geometry, lights, wavelengths, found.sphere, own)
     cache.settle()
     tables = encoder.store.arrays()

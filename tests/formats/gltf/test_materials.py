@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from clpt import spectra
 from clpt.errors import SceneError
 from clpt.scene.materials import Diffuse, GltfSurface, Mask, NormalMap, Null, TwoSided
 from clpt.scene.media import Homogeneous
@@ -181,6 +182,29 @@ def test_directions_of_anisotropy(shape):
     np.testing.assert_allclose(angles.image, [expected], atol=1e-3)
 
 
+def test_a_turn_without_an_image_is_counted_from_the_normal_map(shape):
+    """KHR_materials_anisotropy: tangents are those of `normalTexture` where there is no TANGENT."""
+    given = _extension("anisotropy", anisotropyStrength=1, anisotropyRotation=0.5)
+    for more, (mapping, linear) in {
+        (0, 0.0): ("uv", None),
+        (1, 0.0): ("uv1", np.eye(2)),
+        (0, np.pi / 2): ("uv", np.array([[0, -1], [1, 0]])),
+    }.items():
+        where = {"KHR_texture_transform": {"rotation": more[1], "texCoord": more[0]}}
+        base = {"baseColorTexture": {"index": 0}}
+        mapped = {
+            "normalTexture": {"index": 0, "extensions": where},
+            "pbrMetallicRoughness": base,
+        }
+        front = _front(shape({**given, **mapped}))
+        turn = front.material.anisotropy_rotation
+        if linear is None:
+            assert turn == pytest.approx(np.degrees(0.5))
+            continue
+        assert turn.mapping == mapping and np.ravel(turn.image) == pytest.approx(np.degrees(0.5))
+        np.testing.assert_allclose(turn.to_uv[:2, :2], linear, atol=1e-7)
+
+
 def test_specular(shape):
     strong = _front(shape(_extension("specular", specularColorFactor=[2, 1, 0])))
     f0 = ((strong.ior.value - 1) / (strong.ior.value + 1)) ** 2
@@ -274,35 +298,52 @@ def test_variants_and_units_by_choice(build, read):
     chosen = read(document, variant="second", lumens=683, multiple_scattering="1")
     surface = chosen.shapes[0].material.front
     assert (surface.name, surface.multiple_scattering, chosen.warnings) == ("b", 1.0, [])
-    strengths = [scene.lights[0].intensity.r for scene in (usual, chosen)]
-    assert strengths == pytest.approx([683.0, 1.0])
+    lumens = spectra.lumens(usual.lights[0].intensity)
+    assert (lumens, spectra.watts(chosen.lights[0].intensity)) == pytest.approx((683.0, 1.0))
     for wrong in ({"variant": "third"}, {"lumens": 0}, {"multiple_scattering": "much"}):
         with pytest.raises(SceneError, match=next(iter(wrong))):
             read(document, **wrong)
 
 
 @pytest.mark.parametrize(
-    ("generator", "intensity", "strength"),
+    ("generator", "intensity", "measure", "strength"),
     [
-        ("Khronos glTF Blender I/O v4.3.47", 54351.4, 54351.4 / 683.0),  # 1000 W / 4 pi
-        ("Khronos glTF Blender I/O v4.3.47", 79.6, 79.6),  # of the mode "Unitless"
-        ("Khronos glTF Blender I/O v3.3.27", 54351.4, 54351.4),  # without modes
-        ("Khronos Blender glTF 2.0 exporter", 1000.0, 1000.0),
-        (None, 54351.4, 54351.4),
+        ("Khronos glTF Blender I/O v4.3.47", 54351.4, spectra.watts, 1000.0),  # 683 / (4 pi)
+        ("Khronos glTF Blender I/O v4.3.47", 79.577, spectra.watts, 1000.0),  # "Unitless"
+        ("Khronos glTF Blender I/O v3.3.27", 54351.4, spectra.lumens, 683000.0),  # without modes
+        ("Khronos Blender glTF 2.0 exporter", 1000.0, spectra.lumens, 4000.0 * math.pi),
+        (None, 54351.4, spectra.lumens, 683000.0),
     ],
 )
-def test_lamps_of_blender(build, read, generator, intensity, strength):
-    """Its watts show as in Blender, whatever factor its exporter has put before them."""
+@pytest.mark.parametrize("unlit", [False, True])
+def test_lamps_of_blender(build, read, generator, intensity, measure, strength, unlit):
+    """Its watts are those of `power=`, and emission stays as strong beside them."""
     name = "KHR_lights_punctual"
-    document = build()
-    document.mesh()
+    extensions = {"extensions": {"KHR_materials_unlit": {}}} if unlit else {}
+    glow = {"emissiveFactor": [1, 1, 1], "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 1]}}
+    document = build(materials=[{**glow, **extensions}])
+    document.mesh(material=0)
     document.json["asset"] |= {} if generator is None else {"generator": generator}
     document.json["extensions"] = {name: {"lights": [{"type": "point", "intensity": intensity}]}}
-    document.json["extensionsUsed"] = [name]
+    document.json["extensionsUsed"] = [name, *["KHR_materials_unlit"] * unlit]
     document.json["nodes"] += [{"extensions": {name: {"light": 0}}}]
     document.json["scenes"] = [{"nodes": [0, 1]}]
-    assert read(document).lights[0].intensity.r == pytest.approx(strength)
-    assert read(document, lumens=1).lights[0].intensity.r == pytest.approx(intensity)
+    scene = read(document)
+    sent = 4.0 * math.pi * measure(scene.lights[0].intensity)
+    assert sent == pytest.approx(strength, rel=1e-3)
+    shown = scene.shapes[0].emission.radiance
+    assert measure(shown) == pytest.approx(1.0, rel=1e-3)  # W m^-2 sr^-1, or cd/m^2
+    on_a_screen = shown.to_rgb("emission") * 2.0**scene.film.display_exposure
+    np.testing.assert_allclose(on_a_screen, 1.0, rtol=1e-6)
+    watts = read(document, lumens=intensity).lights[0].intensity
+    assert spectra.watts(watts) == pytest.approx(1.0)
+
+
+def test_a_file_without_lights_has_no_unit(build, read):
+    document = build(materials=[{"emissiveFactor": [1, 0.5, 0.25]}])
+    scene = read(document.mesh(material=0))
+    assert scene.film.display_exposure == 0.0
+    np.testing.assert_allclose(scene.shapes[0].emission.radiance.to_rgb("emission"), [1, 0.5, 0.25])
 
 
 @pytest.mark.parametrize(

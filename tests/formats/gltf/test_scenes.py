@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from clpt import transforms
+from clpt import spectra, transforms
 from clpt.errors import SceneError
 from clpt.scene import cameras, lights
 
@@ -329,10 +329,13 @@ def test_lights(read, build):
         scenes=[{"nodes": [0, 1, 2, 3]}],
         extensions={"KHR_lights_punctual": {"lights": listed}},
     )
-    directional, point, cone = read(made.mesh()).lights
+    scene = read(made.mesh())
+    directional, point, cone = scene.lights
     assert np.allclose(directional.direction, [-1, 0, 0])
     found = directional.irradiance
-    assert np.allclose([found.r, found.g, found.b], [2, 1, 0])
+    lux = spectra.UNIT_LUMINANCE * np.array([found.r, found.g, found.b])
+    assert np.allclose(lux, [2, 1, 0])
+    assert 2.0**scene.film.display_exposure == pytest.approx(spectra.UNIT_LUMINANCE)
     assert isinstance(point, lights.Point) and np.allclose(point.position, [1, 2, 3])
     assert np.allclose(cone.to_world[:3, 2], [0, 0, -1])
     assert np.isclose(cone.cutoff, math.degrees(0.5)) and np.isclose(

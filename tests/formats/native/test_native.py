@@ -59,7 +59,7 @@ def same(a, b) -> bool:
         return all(
             same(getattr(a, f.name), getattr(b, f.name))
             for f in dataclasses.fields(a)
-            if f.name not in ("warnings", "extra")
+            if f.name not in ("warnings", "extra", "account")
         )
     return a == b
 
@@ -214,13 +214,23 @@ ERRORS = [
     ({"spp": 0}, "spp", "above zero"),
     ({"spp": 1.5}, "spp", "whole number"),
     ({"seed": "x"}, "seed", "must be a number, not a string"),
-    ({"film": {"width": 0}}, "film.width", "must be 1 to 65536"),
+    ({"film": {"width": 0}}, "film.width", "must be a whole number from 1 to 65536"),
     ({"film": {"width": 1e12}}, "film.width", "below 2^31"),
     ({"film": {"mode": "cmyk"}}, "film.mode", "is none of spectral, rgb"),
     ({"camera": {**CAMERA, "fov": float("nan")}}, "camera.fov", "finite"),
     ({"camera": {**CAMERA, "fov": True}}, "camera.fov", "not true or false"),
     ({"camera": {**CAMERA, "to_world": [[1]]}}, "camera.to_world", "4 entries"),
     ({"camera": {**CAMERA, "to_world": {"skew": 1}}}, "camera.to_world.skew", "unknown transform"),
+    ({"camera": {**CAMERA, "to_world": {"rotate": [1, 0, 0], "angle": 90}}},
+     "camera.to_world", "'angle' stands inside of 'rotate', as {\"rotate\": {\"axis\": [1, 0, 0]"),
+    ({"camera": {**CAMERA, "to_world": [{"look_at": [0, 0, 1], "target": [0, 0, 0]}]}},
+     "camera.to_world[0]", "'target' stands inside of 'look_at'"),
+    ({"camera": {**CAMERA, "to_world": {"rotate": [1, 0, 0]}}},
+     "camera.to_world.rotate", "must be an object, as {\"rotate\": {\"axis\""),
+    ({"camera": {**CAMERA, "to_world": {"translate": [0, 1, 0], "scale": 2}}},
+     "camera.to_world", "several steps are a list"),
+    ({"camera": {**CAMERA, "to_world": {"translate": [0, 1, 0], "x": 2}}},
+     "camera.to_world", "a step is one of translate, scale, rotate, look_at, alone"),
     ({"camera": {**CAMERA, "to_world": [{"rotate": {"axis": [0, 0, 0], "angle": 1}}]}},
      "camera.to_world[0].rotate", "no length"),
     ({"shapes": [{"type": "mesh", "file": "no.ply"}]}, "shapes[0].file", "no file 'no.ply'"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,12 +14,12 @@ from clpt import transforms as tf
 from clpt.cli.files import outputs
 from clpt.cli.options.grading import Grading
 from clpt.errors import SceneError
-from clpt.scene import Film, Scene
+from clpt.scene import Film, Scene, media
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Path
 from clpt.scene.lights import Area, Constant
-from clpt.scene.materials import Dielectric, Diffuse, Mask
-from clpt.scene.shapes import Rectangle, Sphere
+from clpt.scene.materials import Dielectric, Diffuse, Mask, Null, ThinDielectric
+from clpt.scene.shapes import Cube, Rectangle, Shape, Sphere
 from tests.pictures.support import with_film
 
 SKY = np.array([0.2, 0.4, 0.8], np.float32)
@@ -95,3 +96,57 @@ def test_files(tmp_path, transparent):
 def test_another_film_needs_another_renderer():
     with clpt.Renderer(still_life()) as renderer, pytest.raises(SceneError, match="alpha"):
         renderer.update(scene=with_film(still_life(), alpha=True))
+
+
+def _before(material: Any, **options: Any) -> list[Shape]:
+    return [Cube(to_world=tf.scale(0.5), material=material, **options)]
+
+
+BLACK_SMOKE = media.Grid(
+    density=np.ones((2, 2, 2), np.float32),
+    to_world=tf.translate([-0.5, -0.5, -0.5]),
+    sigma_a=1.0,
+    sigma_s=0.0,
+)
+COVERS = {
+    "smoke": _before(Null(), interior=media.Homogeneous(sigma_a=1.0, sigma_s=0.0)),
+    "coloured smoke": _before(
+        Null(), interior=media.Homogeneous(sigma_a=(0.2, 1.0, 3.0), sigma_s=0.0)
+    ),
+    "fog": _before(Null(), interior=media.Homogeneous(sigma_a=0.5, sigma_s=0.5)),
+    "a black grid": _before(Null(), interior=BLACK_SMOKE),
+    "a tinted pane": [Rectangle(material=ThinDielectric(specular_transmittance=0.25))],
+    "a mask": [Rectangle(material=Mask(opacity=0.4, material=Diffuse()))],
+    "smoke before a wall": [
+        *_before(Null(), interior=media.Homogeneous(sigma_a=1.0, sigma_s=0.0)),
+        Rectangle(to_world=tf.translate([0.3, 0, -1]) @ tf.scale(0.3)),
+    ],
+}  # fmt: skip
+QUICK = [("smoke", "rgb"), ("a tinted pane", "rgb"), ("a black grid", "spectral")]
+ALL = [(what, mode) for what in COVERS for mode in ("rgb", "spectral")]
+
+
+@pytest.mark.parametrize(
+    ("what", "mode"),
+    [pytest.param(*one, marks=() if one in QUICK else pytest.mark.slow) for one in ALL],
+)
+def test_what_takes_light_away_covers(what: str, mode: str) -> None:
+    """Laid over white it is the picture before a white sky: of the same samples, whose alpha is a
+    mean over the colours. Where these differ the means of the pictures are compared."""
+
+    def made(**film: Any) -> np.ndarray:
+        one = Scene(
+            camera=Perspective(origin=(0, 0, 4), target=(0, 0, 0), fov=30),
+            shapes=COVERS[what],
+            lights=[Constant(radiance=1.0)],
+            integrator=Path(light_paths=0),
+            film=Film(width=9, height=9, mode=mode, **film),
+        )
+        return clpt.render(one, 32)
+
+    sky, cut = made(), made(alpha=True)
+    over = cut[..., :3] + (1.0 - cut[..., 3:])
+    each = mode == "rgb" and what != "coloured smoke"  # else colours are noise, or differ
+    error = np.abs(sky - over).max() if each else abs((sky - over).mean())
+    assert error < (1e-5 if each else 0.02)
+    assert 0.1 < cut[4, 4, 3] < 1.0 + 1e-6

@@ -15,6 +15,7 @@ from clpt.__main__ import run
 from clpt.denoise import needs
 from clpt.errors import SceneError, UnknownKindError
 from clpt.scene.integrators import (
+    Auto,
     Film,
     Gaussian,
     Independent,
@@ -71,7 +72,7 @@ def test_integrators_without_layers_are_denoised_without(box, integrator):
 
 @pytest.mark.parametrize(
     "integrator, splats, words",
-    [(Path(), False, ()), (Path(), True, ("importance",)), (Vcm(), False, ("photons",)),
+    [(Path(), False, ()), (Path(), True, ("importance",)), (Vcm(), False, ("vcm",)),
      (Vcm(merging=False), False, ()), (ParticleTracer(), True, ("importance", "layers"))],
 )  # fmt: skip
 def test_correlated_pixels_are_remarked(box, integrator, splats, words):
@@ -217,3 +218,14 @@ def test_a_denoiser_that_is_not_there_is_told_before_rendering(box, monkeypatch)
     monkeypatch.setitem(sys.modules, "pyoidn", None)
     with pytest.raises(SceneError, match="clpt\\[denoise\\]"):
         clpt.Renderer(box, denoise="oidn")
+
+
+def test_auto_chooses_what_denoises_well(box):
+    """`auto` has no photons for a denoiser; without one it stays, and so do other integrators."""
+    auto = dataclasses.replace(box, integrator=Auto(max_depth=5))
+    chosen = needs.prepared(auto, "statistical").integrator
+    assert isinstance(chosen, Path) and chosen.max_depth == 5 and chosen.leaves_choice
+    assert needs.prepared(auto, None).integrator is auto.integrator
+    for integrator in (Vcm(), Path(light_paths=0.5), ParticleTracer()):
+        asked = dataclasses.replace(box, integrator=integrator)
+        assert needs.prepared(asked, "oidn").integrator is integrator

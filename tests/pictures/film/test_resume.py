@@ -126,3 +126,45 @@ def test_what_begins_anew_has_no_history():
         assert renderer.samples == 7 and not saved.film.words.any()
         assert len(saved.sessions) == 1 and saved.seconds == 0.0 and not saved.film.taken
         assert saved.origin.scene.values["seed"] == 3
+
+
+def image_scene(path: Path) -> Scene:
+    return with_film(
+        Scene(camera=Perspective(), lights=[lights.Envmap(image=path)]),
+        width=4, height=3, mode="rgb",
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("suffix", [".npy", ".hdr", ".pfm", ".exr"])
+def test_a_film_is_of_the_image_that_was_read(tmp_path: Path, suffix: str) -> None:
+    """The file of an image changes while it is rendered: the film goes on with the old one alone"""
+    path, film = tmp_path / f"sky{suffix}", tmp_path / "a.film"
+    clpt.write_image(path, np.ones((4, 8, 3), np.float32))
+    before = path.read_bytes()
+    with clpt.Renderer(image_scene(path)) as renderer:
+        renderer.run(1)
+        clpt.write_image(path, np.full((4, 8, 3), 9.0, np.float32))
+        renderer.run(1)
+        renderer.save_state(film)
+        with clpt.Renderer(image_scene(path)) as other:
+            with pytest.raises(SceneError, match=r"lights\[0\].image: its content differs"):
+                other.load_state(film)
+            assert other.image().mean() != renderer.image().mean()
+        path.write_bytes(before)
+        with clpt.Renderer(image_scene(path)) as other:
+            other.load_state(film)
+            np.testing.assert_array_equal(other.image(), renderer.image())
+
+
+def test_an_update_reads_an_image_anew(tmp_path: Path) -> None:
+    path, film = tmp_path / "sky.npy", tmp_path / "a.film"
+    clpt.write_image(path, np.ones((4, 8, 3), np.float32))
+    scene = image_scene(path)
+    with clpt.Renderer(scene) as renderer:
+        renderer.run(1)
+        renderer.save_state(film)
+        clpt.write_image(path, np.full((4, 8, 3), 9.0, np.float32))
+        renderer.update(scene=scene)
+        renderer.run(1)
+        with pytest.raises(SceneError, match=r"lights\[0\].image: its content differs"):
+            renderer.load_state(film)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 from clpt.errors import SceneError
 from clpt.render.analysis.checks.indices import check_indices
 from clpt.render.analysis.checks.textures import check_textures
@@ -15,6 +17,8 @@ Maps = tuple[tuple[type[Material], bool], ...]
 def check_material(material: Material, film: Film) -> None:
     """Raise SceneError for a material whose parts do not go together, or not with a film."""
     made = list(parts(material))
+    for part in made:
+        _check_held(part)
     if len(made) > 1:
         _check_sides(made)
         _check_maps(material, (), False)
@@ -23,6 +27,14 @@ def check_material(material: Material, film: Film) -> None:
         check_indices((part, *part.layers), film)
         if part.layers and film.mode == "rgb":
             _check_layers(part, part.layers)
+
+
+def _check_held(material: Material) -> None:
+    """Raise SceneError for a material in which another is missing that it cannot do without."""
+    own = fields_of(material)
+    for field in dataclasses.fields(material):
+        if field.type == "Material" and own[field.name] is None:
+            raise SceneError(f"{material.kind} needs a material as its {field.name!r}, not none")
 
 
 def _check_sides(made: list[Material]) -> None:

@@ -148,6 +148,12 @@ class Features:
         return self.screen_motion or not forms.isdisjoint(("id", "matte"))
 
     @property
+    def scouts(self) -> bool:
+        """Whether paths go ahead to the first surface, as chance decides what others meet."""
+        chance = self.media.present or self.materials.mixtures or self.materials.free_panes
+        return self.film.layers.of_surfaces and bool(chance)
+
+    @property
     @macro("FILM_WEIGHTS")
     def film_weights(self) -> bool:
         """Whether samples serve several pixels, whose sums are then divided by their weights."""

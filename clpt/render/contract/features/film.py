@@ -45,6 +45,7 @@ class LayerFeatures:
     names: tuple[str, ...] = ()
     present: bool = False  # for any kind of paths of the scene
     material_numbers: int = 0  # where they stand in `distributions`
+    primitive_rows: int = 0  # where those stand of shapes whose primitives have other rows
     light_groups: int = 0  # of lights, where there is a layer for each
     light_group_row: int | None = None  # where in `distributions` they are
 
@@ -65,6 +66,12 @@ class LayerFeatures:
         if not self.places and not self.mattes:
             return 0
         return 1 + sum(LAYERS[name].words for name in self.names)
+
+    @property
+    def of_surfaces(self) -> bool:
+        """Whether some layer is of the first surface that is seen."""
+        first = (name for name in self.places if not LAYERS[name].denoising)
+        return any(first) or bool(self.mattes)
 
     @property
     @macro("USES_LAYERS")

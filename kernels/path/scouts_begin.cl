@@ -1,0 +1,11 @@
+/* Which paths that ended only scouted: their samples begin anew. */
+#include "generated/scouts.cl"
+
+inline mask scouts_ended(PathEnd end) { return end.ended & end.begun & path_scouts(end.state); }
+
+/* The bits of Path.state by which the paths begin that go ahead of their samples. */
+inline integer scouts_begin(mask ended, integer sample)
+{
+    return sel_i(!ended & (sample < LAYER_SAMPLES), (integer)(PATH_SCOUTS), (integer)(0));
+}
+#define LAYERS_END(end, scouted) (scouted)
