@@ -77,7 +77,7 @@ def kernels(root: Path) -> Iterator[Figure]:
 
 def features(root: Path) -> Iterator[Figure]:
     """What the compiled text of a scene depends on."""
-    from clpt.render.codegen import flags
+    from clpt.render.flow import flags
 
     yield Figure("compile-time flags of a scene", len(flags.SCENE))
     records = [

@@ -124,7 +124,7 @@ def kernels(broken: Callable[[str, str], Iterable[tuple[int, str]]]) -> Iterator
 
 
 def part_of(name: str) -> str | None:
-    """The part of clpt that a full name belongs to: "render" of clpt.render.lowering.scene."""
+    """The part of clpt that a full name belongs to: "render" of clpt.render.flow.scene_to_tables."""
     parts = name.split(".")
     return parts[1] if parts[0] == "clpt" and len(parts) > 1 else None
 

@@ -15,7 +15,7 @@ from clpt import choices
 from clpt.bvh import layouts
 from clpt.cli import COMMANDS, cli
 from clpt.cli.options.headings import HEADINGS, OTHER, Grouped
-from clpt.colour import tones
+from clpt.images.colour import tones
 from clpt.render.film import layer_channels
 from clpt.scene import kinds
 from clpt.scene.layers import LAYERS
