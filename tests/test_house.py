@@ -127,7 +127,7 @@ def test_a_scene_is_followed(tmp_path: Path) -> None:
     root = checkout(
         tmp_path,
         {
-            "clpt/render/one_call.py": "from .render import Renderer\n"
+            "clpt/render/one_call.py": "from clpt.render import Renderer\n"
             "def render(scene: Scene | str): return Renderer(scene).tables\n",
             "clpt/render/__init__.py": "from clpt.render.renderer import Renderer\n",
             "clpt/render/renderer.py": "from clpt.render import steps\n"
