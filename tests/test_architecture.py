@@ -25,7 +25,7 @@ PACKAGE, KERNELS = ROOT / "clpt", ROOT / "kernels"
 
 BASE = {
     "arrays", "choices", "clean_logs", "errors", "files", "images", "layout", "measured", "records",
-    "spectra", "transforms", "version",
+    "scalars", "spectra", "transforms", "version",
 }  # fmt: skip
 RENDERS = BASE | {"scene", "device", "denoise", "render", "formats"}
 # What a part may import of the others; itself always. Every part has a row.

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from clpt.geometry import analytic, shape_records, shapes, triangles
 from clpt.render.camera import find as cameras
-from clpt.render.flow.look import Look
 from clpt.render.geometry import surroundings
 from clpt.render.geometry.find import Emitter, Geometry
 from clpt.render.lights import bounds as light_bounds
@@ -27,6 +26,7 @@ from clpt.render.lights.aims import is_sharp, sharp_pieces
 from clpt.render.lights.find import Sources
 from clpt.render.records.lowering_cache import LoweringCache
 from clpt.render.scene_index import SceneIndex
+from clpt.render.spectra.look import Look
 from clpt.render.transport import guides, worth
 from clpt.scene import materials as mt
 from clpt.scene.integrators import Auto, Integrator, Path, Vcm, shared
