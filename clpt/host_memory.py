@@ -9,14 +9,17 @@ from pathlib import Path
 # nobody has used of late. These count as used, but the kernel gives them up first.
 _CGROUPS = (
     ("memory.max", "memory.current", "inactive_file"),
-    ("memory/memory.limit_in_bytes", "memory/memory.usage_in_bytes", "total_inactive_file"),
+    ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),
 )
 
 
-def available(root: Path = Path("/sys/fs/cgroup")) -> int | None:
+def available(
+    root: Path = Path("/sys/fs/cgroup"), own: Path = Path("/proc/self/cgroup")
+) -> int | None:
     """Return the host memory left to this process [bytes]; None where the system does not tell.
 
-    root: the folder of the process's control group, whose limit counts too, as does `ulimit -v`.
+    The limits of the process's control group and of all groups that hold it count too, as does
+    `ulimit -v`. root: the folder of all groups; own: the file that names the process's.
     """
     amounts = []
     try:
@@ -25,16 +28,38 @@ def available(root: Path = Path("/sys/fs/cgroup")) -> int | None:
                 amounts.append(int(row.split()[1]) * 1024)
     except OSError:
         pass
-    for limit, usage, files in _CGROUPS:
-        try:
-            left = int((root / limit).read_text()) - int((root / usage).read_text())
-            stat = (root / usage).with_name("memory.stat").read_text().splitlines()
-            inactive = dict(row.split() for row in stat).get(files, 0)
-            amounts.append(left + int(inactive))
-        except (OSError, ValueError):  # no cgroup of that version, or the limit is "max"
-            continue
+    for group in _groups(root, own):
+        for limit, usage, files in _CGROUPS:
+            try:
+                left = int((group / limit).read_text()) - int((group / usage).read_text())
+                stat = (group / "memory.stat").read_text().splitlines()
+                inactive = dict(row.split() for row in stat).get(files, 0)
+                amounts.append(left + int(inactive))
+            except (OSError, ValueError):  # no cgroup of that version, or the limit is "max"
+                continue
     amounts += _of_process()
     return max(0, min(amounts)) if amounts else None
+
+
+def _groups(root: Path, own: Path) -> set[Path]:
+    """Return the folders of the process's control group and of all that hold it.
+
+    A row is ID:CONTROLLERS:PATH, without controllers in version 2. In version 1 those of memory
+    stand in a folder of their own, which has the name of the controllers that share it.
+    """
+    groups = {root, root / "memory"}
+    try:
+        rows = own.read_text().splitlines()
+    except OSError:
+        return groups
+    for row in rows:
+        _, controllers, path = row.split(":", 2)
+        if controllers and "memory" not in controllers.split(","):
+            continue
+        for tree in {root / controllers, root / "memory"} if controllers else {root}:
+            group = tree / path.lstrip("/")
+            groups |= {group, *(one for one in group.parents if one.is_relative_to(tree))}
+    return groups
 
 
 def _of_process() -> list[int]:

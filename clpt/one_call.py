@@ -6,7 +6,10 @@ import dataclasses
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
 
 from clpt import device as dev
 from clpt import formats
@@ -16,13 +19,14 @@ from clpt.render.film_renderer import checked_samples
 from clpt.render.options import RenderOptions, check_names, check_scene
 from clpt.render.progress import Progress
 from clpt.render.renderer import Renderer
+from clpt.scalars import is_number, is_whole, plain
 from clpt.scene import Film, Scene, viewpoint
 from clpt.scene.cameras import Camera
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-CameraLike = Camera | Sequence[float] | str | int
+CameraLike = Camera | Sequence[float] | NDArray[Any] | str | int
 SHOWN, SHOWN_SAMPLES = 400, 32  # pixels a side and samples of what a notebook shows of a scene
 ORBIT = "(azimuth, elevation), such as (45, 20), or with a distance, in those that frame the scene"
 
@@ -93,10 +97,10 @@ def render(
 def _loaded(file: Path, options: PictureOptions) -> Scene:
     """Return the scene of a file, with the camera whose name or number is taken from options."""
     camera = options.get("camera")
-    if not isinstance(camera, (str, int)):
+    if not isinstance(camera, str) and not is_whole(camera):
         return formats.load(file)
     del options["camera"]
-    return formats.load(file, camera=camera)
+    return formats.load(file, camera=plain(camera))
 
 
 def small_picture(scene: Scene) -> bytes:
@@ -129,8 +133,9 @@ def _camera(scene: Scene, camera: CameraLike) -> Camera:
     """Return the camera that is meant. Raises SceneError."""
     if isinstance(camera, Camera):
         return camera
-    numbers = () if isinstance(camera, (str, int)) else tuple(camera)
-    if not 2 <= len(numbers) <= 3 or not all(isinstance(n, (int, float)) for n in numbers):
+    listed = isinstance(camera, (list, tuple)) or (isinstance(camera, np.ndarray) and camera.ndim)
+    numbers = tuple(map(plain, camera)) if listed else ()  # type: ignore[arg-type]
+    if not 2 <= len(numbers) <= 3 or not all(map(is_number, numbers)):
         of_file = "; a name or a number is for files with several cameras"
         message = f"must be a camera or {ORBIT}, not {camera!r}{of_file}"
         raise SceneError(message, where="camera")

@@ -42,6 +42,7 @@ PATH = Record(
     eta=("real", "product of the relative indices so far, for Russian roulette"),
     weight=("real", "sample's weight by the pixel filter; from a light, 1 over its first beta"),
     medium=("integer", "medium of the ray, see kernels/media/medium.cl; 0: none"),
+    around=("integer", "medium from which the ray went into a body that absorbs; 0: none"),
     bodies=("integer", "bodies around the ray, see kernels/media/bodies.cl"),
     lead=("real", "how far before o the ray's medium begins: o lies off the surface [m]"),
     rival=(
@@ -154,6 +155,11 @@ SETTINGS = Record(
     aim_count=("integer", "number of these spheres, see kernels/lighting/aiming.cl"),
     camera_medium=("integer", "medium around the camera, see kernels/media/medium.cl"),
     camera_bodies=("integer", "bodies around it, see kernels/media/bodies.cl"),
+    second_u=(
+        "integer",
+        "number of the attribute vertex_u1 among those of meshes; -1: no map asks",
+    ),
+    second_v=("integer", "number of vertex_v1"),
     light_count=("integer", "rows in `lights`"),
     ambient=(
         "integer",

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import images
-from clpt.arrays import Floats32, in_memory
+from clpt.arrays import Floats32, in_memory, on_host, single
 from clpt.errors import SceneError
 from clpt.images import exr, exr_files
 from clpt.images.failures import check_there, reading
@@ -63,7 +63,10 @@ class SpectralImage:
     warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        values = np.asarray(in_memory(self.values), np.float32)
+        given = np.asarray(in_memory(on_host(self.values)))
+        if given.dtype.kind != "f":
+            raise SceneError(f"a spectral image holds floats, not {given.dtype}")
+        values = single(given)
         lambdas = np.asarray(self.lambdas, np.float64)
         if values.ndim != 3 or values.size == 0:
             raise SceneError(f"a spectral image is (h, w, n) and not empty, not {values.shape}")

@@ -26,7 +26,8 @@ PACKAGE, KERNELS = ROOT / "clpt", ROOT / "kernels"
 BASE = {
     "arrays", "budget", "child_processes", "choices", "clean_logs", "colour", "errors",
     "host_memory", "images", "input_files", "layout", "measured", "numpy_files", "output_files",
-    "ownership", "records", "spectra", "spectral_exr", "tev", "text", "transforms", "version",
+    "ownership", "records", "scalars", "spectra", "spectral_exr", "tev", "text", "transforms",
+    "version",
 }  # fmt: skip
 RENDERS = BASE | {"scene", "device", "denoise", "render", "formats"}
 # What a part may import of the others; itself always. Every part has a row.

@@ -342,7 +342,8 @@ def test_the_code_of_layers(run: Run, capsys: pytest.CaptureFixture):
 
 def test_the_code_of_limits(run: Run):
     messages = run("limits.md")["messages"]
-    assert "must be 1 to 65536" in messages[0] and "are more than 64 Mi pixels" in messages[1]
+    assert "must be a whole number from 1 to 65536" in messages[0]
+    assert "are more than 64 Mi pixels" in messages[1]
 
 
 LIMITS = (  # on the page, and where the code has them

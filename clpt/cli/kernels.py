@@ -14,6 +14,7 @@ from ..errors import SceneError
 from ..formats import load, locate
 from .options.loading_options import loading_options
 from .options.records import with_records
+from .options.scene_path import ScenePath
 from .options.values import Choice
 from .process import terminal
 
@@ -40,7 +41,7 @@ class Reproduction:
 
 
 @click.command()
-@click.argument("scene", type=click.Path(path_type=Path))
+@click.argument("scene", type=ScenePath())
 @click.option(
     "-o", "--output", "folder", type=click.Path(path_type=Path), required=True,
     help="Folder for the files; created if missing.",

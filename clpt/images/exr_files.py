@@ -79,6 +79,21 @@ def window(header: Header, name: str) -> Window:
     return int(x0), int(y0), int(x1) + 1, int(y1) + 1
 
 
+def windows(
+    shape: tuple[int, ...], place: tuple[int, int, int, int] | None
+) -> dict[str, tuple[float, ...]]:
+    """The attributes that say where a part (h, w, ..) of a whole picture lies: first and last x, y.
+
+    place: the column and the row where it begins, and the size of the whole, (x, y, width, height);
+    None: it is the whole, which needs no attributes.
+    """
+    if place is None:
+        return {}
+    x, y, width, height = place
+    data = (x, y, x + shape[1] - 1, y + shape[0] - 1)
+    return {"dataWindow": data, "displayWindow": (0, 0, width - 1, height - 1)}
+
+
 def check(path: Path, header: Header) -> None:
     """Raise SceneError for a part of too many pixels, or of deep ones."""
     if _is_deep(header):
@@ -204,8 +219,12 @@ def _unpacked(form: str, file: BinaryIO) -> tuple[Any, ...]:
 
 
 def write_channels(path: Path, metadata: Mapping[str, Any], channels: Channels) -> None:
-    """Write channels (h, w) by name, and attributes, as an .exr."""
+    """Write channels (h, w) by name, and attributes, as an .exr; windows are as of `windows`."""
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    for name in ("dataWindow", "displayWindow"):
+        if name in metadata:
+            first, last = np.array(metadata[name], np.int32).reshape(2, 2)
+            header[name] = first, last
     with output_files.replacing(path) as partial:
         OpenEXR.File({**metadata, **header}, dict(channels)).write(exr_name(partial))
         _check_whole(partial)

@@ -26,6 +26,9 @@ READERS: dict[str, Callable[[Path], Stored]] = {
 }
 
 
+STRAIGHT = pillow.SUFFIXES  # of files whose colours are not multiplied by alpha
+
+
 def read(path: str | Path, *, linear: bool = True) -> Floats32:
     """Return an image file as (h, w, c) float32, row 0 at the top; c is 1, 3 or 4.
 

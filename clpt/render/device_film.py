@@ -450,6 +450,7 @@ class DeviceFilm:
             names=first.scene.lowered.layer_names,
             adaptive=self.scene.noise is not None,
             octaves=self.scene.sampler.octaves if settings["octaves"] == 2 else 0.0,
+            place=film.crop and (*film.crop[:2], film.width, film.height),
         )
 
 

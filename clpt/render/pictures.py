@@ -88,7 +88,7 @@ class DevicePictures(ResumableRenderer):
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         """`image()`, for numpy.asarray(renderer): a copy, which waits."""
-        if copy is False:
+        if copy is not None and not copy:
             raise ValueError("a picture on a device becomes an array of numpy only by a copy")
         image = self.image()
         return image if dtype is None else image.astype(dtype, copy=False)

@@ -35,6 +35,11 @@ class Scatterer(Kind):
         return False
 
     @property
+    def directing(self) -> tuple[object, ...]:
+        """The values or textures that tell a coat's normals, and directions along the surface."""
+        return ()
+
+    @property
     def uses_tangents(self) -> bool:
         """Whether what it does differs between the tangent and across."""
         given = fields_of(self)

@@ -1,7 +1,8 @@
 /* The frame in which a surface is shaded, perturbed by a normal map (Cohen et al. 1998) or a bump map (Blinn
  * 1978) where its material has one. NORMAL_MAP_WORDS words before a material's row say so: flags, what scales
  * the normal map, what scales the bump map, then reals of two words each: x, y and z of the normal, 0 to 1,
- * and the height. normal_map_real is generated.
+ * and the height; then `to_uv` of surface/map_frame.cl, four words each, of the normal map, of a coat's normals and
+ * of directions of anisotropy. normal_map_real is generated.
  *
  * A normal that faces away from the viewer is turned about the one of the surface (Schuessler et al. 2017).
  * The edge where a perturbed surface turns dark is softened as Estevez et al. 2019 do, "A Microfacet-Based
@@ -12,6 +13,8 @@
 #define PERTURB_UNSHADED 8   /* the edge is not softened */
 #define PERTURB_NORMAL 16    /* there is a normal map */
 #define PERTURB_HEIGHT 32    /* there is a bump map */
+#define PERTURB_SECOND 64    /* the normal map is on a mesh's second uv; twice and four times that: the other two */
+#define PERTURB_TURNS 11     /* first of the words `to_uv` */
 #define PERTURB_STEP 1e-4f   /* of uv, over which heights are compared */
 
 typedef struct {
@@ -26,7 +29,16 @@ inline real perturbed_height(Scene scene, integer at, TexturePoint point, Surfac
     point.uv.x += u;
     point.uv.y += v;
     point.p = madd3(s.dpdu, u, madd3(s.dpdv, v, point.p));
+    surface_attributes_move(s, u, v, &point);
     return normal_map_real(scene, at, point, lambdas);
+}
+
+/* What the normal map is along (which: 0), a coat's normals (1), or directions of anisotropy (2). */
+inline MapFrame shading_map_frame(Scene scene, integer row, Surface s, Frame base, int which)
+{
+    integer at = max_i(row - NORMAL_MAP_WORDS, (integer)(0)), flags = gather_i(scene.materials, at);
+    mask second = (flags & (PERTURB_SECOND << which)) != 0;
+    return map_frame_of(s, base, second, row4(scene.materials, at + PERTURB_TURNS + 4 * which));
 }
 
 inline ShadingFrame shading_frame_load(Scene scene, integer row, Surface s, vec3 d, Wavelengths lambdas)
@@ -57,11 +69,15 @@ inline ShadingFrame shading_frame_load(Scene scene, integer row, Surface s, vec3
         real x = (normal_map_real(scene, at + 3, point, lambdas) - 0.5f) * scale;
         real y = (normal_map_real(scene, at + 5, point, lambdas) - 0.5f) * scale;
         real z = normal_map_real(scene, at + 7, point, lambdas) * 2.0f - 1.0f;
-        mask mirrored = ((flags & PERTURB_ALONG_V) != 0) & (dot3(f.base.t, s.dpdv) < 0.0f) & !s.flipped;
-        mask behind = ((flags & PERTURB_ALONG_V) != 0) & (dot3(f.base.t, s.dpdv) > 0.0f) & s.flipped;
         x = sel(s.flipped & !inside, -x, x);
-        y = sel((s.flipped & inside) != (mirrored | behind), -y, y);
-        vec3 m = v3(x, y, z);
+        y = sel(s.flipped & inside, -y, y);
+        MapFrame own = shading_map_frame(scene, row, s, f.base, 0);
+        mask by_v = (flags & PERTURB_ALONG_V) != 0, turned = by_v | ((flags & PERTURB_SECOND) != 0);
+        /* Mitsuba's y is at the left of u, whatever v is along; on a back the frame's own sides are exchanged. */
+        own.side = sel(by_v, sel(s.flipped, -own.side, own.side), (real)(1.0f));
+        own.c = sel(turned, own.c, (real)(1.0f));
+        own.s = sel(turned, own.s, (real)(0.0f));
+        vec3 m = map_frame_vector(own, v3(x, y, z));
         n = sel3(mapped & (dot3(m, m) > 1e-12f), m, n);
     }
     vec3 wo = to_frame(f.base, neg3(d));

@@ -87,7 +87,8 @@ inline Scattering vertex_scattering(Scene scene, Slab path, uint at, mask active
     store_path_lambdas(path, at, active, scatter.lambdas);
 #endif
     scatter.shading = shading_frame_load(scene, v.row, v.s, v.d, scatter.lambdas);
-    scatter.bsdf = coat_normal_turned(scatter.bsdf, v.s, scatter.shading.frame);
+    scatter.bsdf = coat_normal_turned(scene, v.row, scatter.bsdf, v.s, scatter.shading.frame);
+    scatter.bsdf = anisotropy_turned(scene, v.row, scatter.bsdf, v.s, scatter.shading.frame);
     scatter.wo = to_frame(scatter.shading.frame, neg3(v.d));
     return scatter;
 }
@@ -133,6 +134,7 @@ inline void vertex_leave(Slab path, uint at, mask next, mask null, Vertex v, vec
     store_path_d(path, at, next, d);
     store_path_beta(path, at, next, beta);
     store_path_medium(path, at, next, vertex_medium(v, d));
+    store_path_around(path, at, next, vertex_around(v, d));
     store_path_lead(path, at, next, surface_lead(v.s, d));
     store_path_bodies(path, at, next, vertex_through(v, d));
 }

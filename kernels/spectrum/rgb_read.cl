@@ -7,6 +7,8 @@ inline Spectrum spectrum_constant(vec4 words, Wavelengths lambdas)
     Spectrum r = {words.x, words.y, words.z};
     return r;
 }
+/* Whether it is 0, whatever the wavelength. */
+inline mask spectrum_constant_none(vec4 words) { return (words.x == 0.0f) & (words.y == 0.0f) & (words.z == 0.0f); }
 /* The same of a value without colour. */
 inline Spectrum spectrum_grey(vec4 words) { return spectrum_of(words.x); }
 /* Tabulated spectra were turned to rgb on the host. */

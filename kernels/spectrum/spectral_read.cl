@@ -38,6 +38,8 @@ inline Spectrum spectrum_constant(vec4 words, Wavelengths lambdas)
 {
     return sigmoid_spectrum(words.x, words.y, words.z, words.w, lambdas);
 }
+/* Whether it is 0, whatever the wavelength. */
+inline mask spectrum_constant_none(vec4 words) { return words.w == 0.0f; }
 /* The same of a value without colour: the factor alone. */
 inline Spectrum spectrum_grey(vec4 words) { return spectrum_of(words.w); }
 /* A tabulated spectrum: the fifth word, its source, is -1 - its row, the fourth a factor. */

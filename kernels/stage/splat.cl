@@ -30,7 +30,7 @@ STAGE(splat)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)
         seen.y = sel(accepted, seen.y, (real)(0.0f));
         vec2 offset = {seen.x - floor(seen.x) - 0.5f, seen.y - floor(seen.y) - 0.5f};
         Spread spread = spread_point(scene, to_integer(floor(seen.x)), to_integer(floor(seen.y)), offset);
-        Light light = {colour, 0, accepted, value, lambdas, scale};
+        Light light = {colour, 0, (real)(1.0f), value, lambdas, scale};
 #if LIGHT_LAYERS
         integer surfaces = (load_path_state(path, at) & PATH_DEPTH) - 1, row = load_path_light(path, at);
         for (int i = 0; i < SPREAD_PIXELS; i++) {

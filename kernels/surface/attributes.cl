@@ -16,3 +16,10 @@ inline void surface_attributes_tell(Surface s, TexturePoint *t)
     t->face = s.face;
     t->b = s.b;
 }
+
+/* A point that is moved by u and v along the surface. */
+inline void surface_attributes_move(Surface s, real u, real v, TexturePoint *t)
+{
+    t->b.x += s.dbdu.x * u + s.dbdv.x * v;
+    t->b.y += s.dbdu.y * u + s.dbdv.y * v;
+}

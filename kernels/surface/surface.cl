@@ -3,6 +3,7 @@
 #include "path/surface_flags.cl"
 #include "tracing/trace_hit.cl"
 #include "surface/surface_point.cl"
+#include "surface/map_frame.cl"
 #include "generated/hit_space.cl"
 #include "generated/surface_steps.cl"
 
@@ -41,12 +42,12 @@ inline TexturePoint surface_texture_point(Surface s)
     return t;
 }
 
-/* The shading frame: s along dpdu where there is one (Mitsuba's and pbrt's convention). */
+/* The shading frame: s along u where there is one (Mitsuba's and pbrt's convention). */
 inline Frame surface_frame(Surface s)
 {
     Frame f = frame_of(s.ns);
 #if USES_TANGENTS
-    vec3 t = sub3(s.dpdu, scale3(s.ns, dot3(s.ns, s.dpdu)));
+    vec3 t = sub3(s.along, scale3(s.ns, dot3(s.ns, s.along)));
     mask given = dot3(t, t) > 1e-20f;
     t = normalize3(sel3(given, t, f.s));
     f.s = t;

@@ -4,13 +4,18 @@ typedef struct {
     real size;    /* of the primitive [m], see core/rounding.cl */
     vec3 n;       /* geometric normal, unit length, on the side of the front */
     vec3 ns;      /* shading normal, unit length */
-    vec3 dpdu;    /* along the surface's u; not normalised, may be zero */
-    vec3 dpdv;    /* and along v */
+    vec3 dpdu;    /* how p moves with the surface's u; may be zero */
+    vec3 dpdv;    /* and with v */
+    vec3 along;   /* what maps and frames are along: dpdu, or the tangent that the mesh tells; of any length */
+    vec3 beside;  /* and dpdv, or the other direction of that tangent's frame */
+    vec3 along1;  /* the same for the mesh's second set of uv */
+    vec3 beside1;
+    mask told;    /* the mesh tells tangents, so that all sets have the same directions */
     vec2 uv;
     mask flipped; /* the back of a two-sided surface was hit, and ns negated */
     integer light; /* row in `lights`, -1: does not emit */
     integer attributes, face; /* of triangles, see texturing/texture_point.cl */
-    vec2 b;
+    vec2 b, dbdu, dbdv; /* dbdu, dbdv: how b moves with the surface's uv */
     real footprint; /* of the path's cone, see texturing/texture_point.cl */
     vec3 to_open, to_close; /* from p to where what deforms has the point when the shutter opens, closes [m] */
 } Surface;
@@ -25,6 +30,11 @@ inline Surface surface_of_point(vec3 p)
     s.ns = s.n;
     s.dpdu = s.n;
     s.dpdv = s.n;
+    s.along = s.n;
+    s.beside = s.n;
+    s.along1 = s.n;
+    s.beside1 = s.n;
+    s.told = mask_of(0);
     s.uv.x = 0.0f;
     s.uv.y = 0.0f;
     s.flipped = mask_of(0);
@@ -32,6 +42,8 @@ inline Surface surface_of_point(vec3 p)
     s.attributes = 0;
     s.face = 0;
     s.b = s.uv;
+    s.dbdu = s.uv;
+    s.dbdv = s.uv;
     s.footprint = 0.0f;
     s.to_open = s.n;
     s.to_close = s.n;

@@ -7,5 +7,6 @@ inline void surface_triangle(Scene scene, ShapeRow shape, HitSpace space, intege
     Corners c = corners_of(scene, shape, prim, active, s->uv);
     triangle_normal(scene, space, &c, s);
     triangle_uv(scene, shape, space, c, s);
+    triangle_second_uv(scene, shape, space, c, s);
     triangle_tangents(scene, shape, space, c, s);
 }

@@ -1,11 +1,5 @@
-/* Directions along a surface as its mesh tells them: tangents of vertices, which with the normal give the other one. */
-
-/* The direction of `along`, as long as `other`; of unit length where that has none. */
-inline vec3 tangent_of_length(vec3 along, vec3 other)
-{
-    real length2 = dot3(other, other);
-    return scale3(along, sqrt(sel(length2 > 0.0f, length2, (real)(1.0f)) / max_r(dot3(along, along), (real)(1e-30f))));
-}
+/* Directions along a surface as its mesh tells them: tangents of vertices, which with the normal give the other one.
+ * They hold for all sets of uv. */
 
 inline void triangle_tangents(Scene scene, ShapeRow shape, HitSpace space, Corners c, Surface *s)
 {
@@ -20,7 +14,10 @@ inline void triangle_tangents(Scene scene, ShapeRow shape, HitSpace space, Corne
         along = hit_vector(space, along);
         beside = hit_vector(space, beside);
         told = told & (dot3(beside, beside) > 1e-12f);
-        s->dpdu = sel3(told, tangent_of_length(along, s->dpdu), s->dpdu);
-        s->dpdv = sel3(told, tangent_of_length(beside, s->dpdv), s->dpdv);
+        s->told = told;
+        s->along = sel3(told, along, s->along);
+        s->beside = sel3(told, beside, s->beside);
+        s->along1 = sel3(told, along, s->along1);
+        s->beside1 = sel3(told, beside, s->beside1);
     }
 }

@@ -302,7 +302,7 @@ def test_verbose_tells_of_tables_and_stages(tmp_path, capsys):
     told = capsys.readouterr().err
     expected = ("36 triangles", "tree triangles", "table vertices", "from clpt's cache",
                 "time to read the file", "time until it is ready", "time to the first sample",
-                "path: nothing is sharp",
+                "path: nothing is specular",
                 "stage loop" if device.choose().info.is_cpu else "stage shade_diffuse")  # fmt: skip
     for words in expected:
         assert words in told

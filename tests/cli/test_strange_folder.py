@@ -75,6 +75,7 @@ def test_commands_that_end(folder: Path) -> None:
         ("merge", "out/a.film", "-o", "out/b.exr"),
         ("warm", "scene", "--size", "4x4"),
         ("devices",),
+        ("scenes",),
         ("info", "scene"),
         ("inspect", "out/a.exr", "--json"),
         ("convert", "out/a.exr", "out/c.png"),

@@ -49,9 +49,7 @@ def read_scene(
     for warning in scene.warnings:
         shown.note(f"clpt: warning: {warning}")
     if scene.film.filtering != loaded.film.filtering:
-        shown.note(
-            "film.filtering is importance now: for the denoiser each pixel has its own samples"
-        )
+        shown.note("the pixel filter is applied by importance sampling, which denoisers need")
     return scene
 
 

@@ -41,7 +41,9 @@ class Grading:
         if not names or for_screens(targets):
             return None
         suffixes = " ".join(FOR_SCREENS)
-        return f"{' and '.join(names)} without effect: of {suffixes} only, others keep the light"
+        return (
+            f"{' and '.join(names)} ignored: for {suffixes} only; other formats keep linear light"
+        )
 
 
 def for_screens(targets: tuple[Path, ...]) -> list[Path]:

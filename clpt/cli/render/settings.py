@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ...choices import MOST_SAMPLES, VIEWER
+from ...choices import MOST_SAMPLES, MOST_SEED, VIEWER
 from ..files.standard_output import FORMATS
 from ..files.targets import default
 from ..options.changes import Sampling
@@ -274,7 +274,7 @@ _ANIMATION = (
     ),
 )  # fmt: skip
 _SEED = click.option(
-    "--seed", type=click.IntRange(0, 2**31 - 1), help="Seed of the random numbers."
+    "--seed", type=click.IntRange(0, MOST_SEED), help="Seed of the random numbers."
 )
 
 

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from clpt import images, measured, output_files, spectral_exr
+from clpt.arrays import on_host
 from clpt.errors import SceneError
 from clpt.formats.meshes import particles, strands
 from clpt.formats.meshes.triangles import TANGENT_COLUMNS
@@ -329,7 +330,7 @@ def _on_host(thing: Kind) -> Kind:
         if not hasattr(value, "get"):
             message = "a buffer has no shape: give a pyopencl.array.Array"
             raise SceneError(message, where=f"{thing.kind}.{name}")
-        on_device[name] = value.get()
+        on_device[name] = on_host(value)
     return dataclasses.replace(thing, **on_device) if on_device else thing
 
 

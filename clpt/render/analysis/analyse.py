@@ -19,8 +19,8 @@ from clpt.render.analysis.lights.aims import aims
 from clpt.render.analysis.lights.escapes import escape_lamps
 from clpt.render.analysis.lights.hard_light import Lit, decided
 from clpt.render.analysis.lights.light_media import NOWHERE, LightMedia, light_media
-from clpt.render.analysis.lights.look import Look
 from clpt.render.analysis.lights.sources import Sources, sources_of
+from clpt.render.analysis.look import Look
 from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.render.analysis.sealed import sealed_media
 from clpt.render.analysis.surroundings import (
@@ -85,7 +85,7 @@ def analyse(scene: Scene, cache: LoweringCache, before: Before | None = None) ->
     index = replace(SceneIndex.of(scene), lit_before=before.lit_ghosts if before else None)
     geometry = assembled(index, cache)
     sphere = geometry.bounding_sphere()
-    look = Look(index.spectral, scene.film.lambda_min, scene.film.lambda_max, cache)
+    look = Look.of(scene.film, cache)
     sources = sources_of(index, geometry, sphere[1], look)
     index, lit = _media_at_lights(index, geometry, sources, sphere, cache)
     former = before.integrator if before else None

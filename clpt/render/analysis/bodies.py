@@ -9,6 +9,7 @@ from collections.abc import Iterable
 
 from clpt.errors import SceneError
 from clpt.geometry import shapes
+from clpt.scalars import is_whole
 from clpt.scene.materials import Dielectric, Material, Null, RoughDielectric
 from clpt.scene.media import Medium
 from clpt.scene.shapes import Curves, Cylinder, Disk, Instance, Rectangle, Shape
@@ -31,7 +32,7 @@ def check_bodies(things: Iterable[Shape]) -> None:
     found = list(things)
     for shape in found:
         where, given = shapes.where(shape), shape.priority
-        if isinstance(given, bool) or not isinstance(given, int) or given < 0:
+        if not is_whole(given) or given < 0:
             raise SceneError(f"priority must be an integer from 0, not {given!r}", where=where)
         if given and isinstance(shape, Instance):
             raise SceneError("priority is for the shapes of its group", where=where)

@@ -9,16 +9,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.arrays import on_device
+from clpt.arrays import Floats, on_device
 from clpt.geometry import analytic, shapes
 from clpt.geometry.tessellate import keeps_its_kind
 from clpt.geometry.winding import box
 from clpt.render.analysis.bricks import Glow, black_bodies, glow
 from clpt.render.analysis.index import SceneIndex, leaves_of
+from clpt.render.analysis.look import Look
 from clpt.render.analysis.open_boundaries import HOLE, hole_around
 from clpt.render.analysis.surroundings import every
 from clpt.scene.media import Grid, Lattice, Medium
 from clpt.scene.shapes import Cube, Cylinder, Disk, Mesh, Rectangle, SdfGrid, Shape, Sphere
+from clpt.spectra import Spectrum
+from clpt.spectra.spectrum import gridded
 
 SOLID = Sphere | Cube | Mesh | SdfGrid
 WALLS = Cylinder | Disk | Rectangle  # which may enclose something together
@@ -52,37 +55,50 @@ class GlowingBody:
         return np.asarray(found)
 
 
-def glows(index: SceneIndex, cached: Cached) -> dict[Medium, Glow | GlowingBody]:
+def glows(index: SceneIndex, look: Look) -> dict[Medium, Glow | GlowingBody]:
     """Return the lights that media are: of each with a density, and of each that is homogeneous.
 
-    cached: `LoweringCache`, which keeps the triangles of boundaries.
+    look: of the film; its cache keeps the triangles of boundaries.
     """
     found: dict[Medium, Glow | GlowingBody] = {}
     for medium in index.emitting:
         if isinstance(medium, Grid):
-            found[medium] = _glow(medium, index.spectral)
-        elif not isinstance(medium, Lattice) and (body := _body(medium, index, cached)):
+            found[medium] = _glow(medium, look)
+        elif not isinstance(medium, Lattice) and (body := _body(medium, index, look)):
             found[medium] = body
     return found
 
 
-def _glow(medium: Grid, spectral: bool) -> Glow:
+def _glow(medium: Grid, look: Look) -> Glow:
     light: Any = medium.light
-    absorbs, _ = medium.coefficients(spectral)
-    strength, brightness = np.asarray(absorbs.to_rgb("unbounded"), float), None
+    absorbs, _ = medium.coefficients(look.spectral)
+    strength, brightness = float(np.mean(absorbs.to_rgb("unbounded"))), None
     if medium.temperature is not None:
         table = black_bodies(medium, light.kelvin)
         brightness = np.stack([table[:, 0], table[:, 1:].mean(axis=1)], axis=1)
     else:
-        strength = strength * np.asarray(light.to_rgb("emission"), float)
-    return glow(medium, max(float(strength.mean()), 1e-30), brightness).brightest()
+        strength = _brightness(light, absorbs, look, lambda given: given)
+    return glow(medium, max(strength, 1e-30), brightness).brightest()
 
 
-def _body(medium: Medium, index: SceneIndex, cached: Cached) -> GlowingBody | None:
+def _brightness(
+    light: Spectrum, absorbs: Spectrum, look: Look, share: Callable[[Floats], Floats]
+) -> float:
+    """Return how much light counts, times a share that follows from a coefficient [1/m]."""
+    colour = np.asarray(light.to_rgb("emission"), float)
+    seen = float((colour * share(np.asarray(absorbs.to_rgb("unbounded"), float))).mean())
+    if not look.spectral:
+        return seen
+    power = gridded(light, look.grid) * share(gridded(absorbs, look.grid))
+    return seen + look.unseen * max(float(power.mean()), 0.0)
+
+
+def _body(medium: Medium, index: SceneIndex, look: Look) -> GlowingBody | None:
     """Return a homogeneous medium as a light, None where rays to it are no use.
 
     It must be in closed boundaries that rest, let light straight on, and fill a box well.
     """
+    cached = look.cache
     elsewhere = {index.camera.medium, *(shape.exterior for shape in index.shapes)}
     around = [shape for shape in every(index.listed) if shape.interior is medium]
     if medium in elsewhere or not around or not all(_encloses(shape) for shape in around):
@@ -99,7 +115,7 @@ def _body(medium: Medium, index: SceneIndex, cached: Cached) -> GlowingBody | No
     filled = sum(_volume(*place) for place in places) if apart else whole
     if not whole > 0.0 or filled < FILLED * whole:
         return None
-    return GlowingBody(matrix, ball, _power(medium, matrix, ball, index.spectral))
+    return GlowingBody(matrix, ball, _power(medium, matrix, ball, look))
 
 
 def _encloses(shape: Shape) -> bool:
@@ -134,14 +150,13 @@ def _volume(matrix: NDArray[np.float64], ball: bool) -> float:
     return (4.0 / 3.0 * np.pi if ball else 8.0) * abs(float(np.linalg.det(matrix[:, :3])))
 
 
-def _power(medium: Medium, matrix: NDArray[np.float64], ball: bool, spectral: bool) -> float:
+def _power(medium: Medium, matrix: NDArray[np.float64], ball: bool, look: Look) -> float:
     """The power of a ball or box [W/nm]: pi, its surface and the radiance of its mean chord."""
     light: Any = medium.light
-    absorbs = np.asarray(medium.coefficients(spectral)[0].to_rgb("unbounded"), float)
-    radiance = np.asarray(light.to_rgb("emission"), float)
+    absorbs = medium.coefficients(look.spectral)[0]
     volume, edges = _volume(matrix, ball), matrix[:, :3]
     sides = [np.linalg.norm(np.cross(edges[:, i], edges[:, i - 1])) for i in range(3)]
     surface = 4.0 * (np.pi * float(np.mean(sides)) if ball else 2.0 * float(np.sum(sides)))
     chord = 4.0 * volume / surface
-    shown = radiance * -np.expm1(-np.maximum(absorbs, 0.0) * chord)
-    return max(float(np.pi * surface * shown.mean()), 1e-30)
+    shown = _brightness(light, absorbs, look, lambda a: -np.expm1(-np.maximum(a, 0.0) * chord))
+    return max(np.pi * surface * shown, 1e-30)

@@ -22,6 +22,7 @@ from clpt.scene.media import Grid, Lattice, Medium, Mixture
 from clpt.scene.phases import LEAVES
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.shapes import Shape
+from clpt.scene.textures import turned
 
 GHOSTS = 1.0  # light paths for each sample that are ghosts of a lens
 UNKNOWN = "its medium was not looked for"
@@ -68,7 +69,7 @@ class SceneIndex:
             placed=tuple(placed),
             prototypes=tuple(prototypes),
             leaves=(*_leaf_kinds(distinct), *_phase_kinds(scene, distinct)),
-            normal_mapped=any(any_of(shape.material, mt.NormalMapped) for shape in distinct),
+            normal_mapped=any(map(_bends, {id(s.material): s.material for s in distinct}.values())),
             warnings=tuple(warnings),
             motions=motions,
         )
@@ -283,6 +284,12 @@ class SceneIndex:
 def any_of(material: mt.Material, classes: type | tuple[type, ...]) -> bool:
     """Return whether a material, or one inside it, is of these classes."""
     return any(isinstance(part, classes) for part in mt.parts(material))
+
+
+def _bends(material: mt.Material) -> bool:
+    """Whether a material bends normals, or tells directions beside other uv than the main ones."""
+    parts = mt.parts(material)
+    return any(isinstance(p, mt.NormalMapped) or any(map(turned, p.directing)) for p in parts)
 
 
 def _leaf_kinds(shapes_: tuple[Shape, ...]) -> tuple[type[mt.Material], ...]:

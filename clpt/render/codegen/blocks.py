@@ -10,8 +10,8 @@ from clpt.render.contract.features import Features
 ESCAPE = ("escape", "escape_axis", "escape_width", "escape_plane", "escape_depth")
 CHANGED = (
     "o", "d", "beta", "radiance", "lambdas", "pdf", "sampled_hemisphere", "sampled_wo",
-    "sampled_gloss", "null_distance", "nulls", "ratio", "eta", "medium", "bodies", "lead", "rival",
-    "pending", "expected", *ESCAPE, "state", "cone",
+    "sampled_gloss", "null_distance", "nulls", "ratio", "eta", "medium", "around", "bodies", "lead",
+    "rival", "pending", "expected", *ESCAPE, "state", "cone",
 )  # fmt: skip
 READ = ("weight", "light", "time", "pixel_index", "pixel_key", "sample")  # and not changed
 # members that not every scene has, each with the features that ask for it
@@ -24,6 +24,7 @@ NEEDED: dict[str, Callable[[Features], bool]] = {
     "nulls": lambda f: f.materials.null_surfaces,
     "ratio": lambda f: f.ratios,
     "medium": lambda f: f.media.absorbing,
+    "around": lambda f: f.media.present and f.media.absorption and not f.media.bodies,
     "bodies": lambda f: f.media.bodies,
     "lead": lambda f: f.media.absorbing,
     "through": lambda f: f.shadow_media,

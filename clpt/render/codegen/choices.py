@@ -204,6 +204,10 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         *either(f.geometry.normals, "surface/triangle_normal.cl"),
         *either(f.geometry.uvs, "surface/triangle_uv.cl"),
         *either(
+            f.geometry.tangents and f.textures.mappings and f.textures.attributes,
+            "surface/second_uv.cl",
+        ),
+        *either(
             f.geometry.uvs and f.geometry.tangents and f.geometry.vertex_tangents,
             "surface/triangle_tangents.cl",
         ),
@@ -311,6 +315,7 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
         ),
         *either(flags.between_bodies(f, cls), "path/between_bodies.cl"),
         *either(flags.has_lobe(f, cls, "clearcoat_apart"), "path/coat_normal.cl"),
+        *either(flags.has_lobe(f, cls, "anisotropy"), "path/anisotropy.cl"),
     ),
 }
 

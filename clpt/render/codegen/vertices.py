@@ -50,7 +50,7 @@ def _may_share(features: Features, cls: type[Scatterer]) -> bool:
     """Whether the vertex asks a kind once: photons, guides, escapes, hero wavelengths ask more."""
     own = (flags.is_chromatic, flags.fluoresces, flags.is_guided, flags.between_bodies)
     merged = features.transport.merged and flags.gathers_photons(features, cls)
-    turned = flags.has_lobe(features, cls, "clearcoat_apart")
+    turned = any(flags.has_lobe(features, cls, one) for one in ("clearcoat_apart", "anisotropy"))
     sent = features.media.escapes and cls.is_phase
     alone = merged or turned or sent or any(holds(features, cls) for holds in own)
     return features.transport.integrator != "whitted" and not alone

@@ -15,6 +15,7 @@ from clpt.errors import SceneError
 from clpt.geometry import shapes
 from clpt.geometry.instancing import distinct
 from clpt.render.lowering.device_arrays import fresh_view, readable
+from clpt.scalars import is_whole
 from clpt.scene import Scene
 from clpt.scene.materials import Material, inner, parts
 from clpt.scene.shapes import SMOOTH, Group, Instance, Shape
@@ -135,7 +136,7 @@ class _Edit:
                 return named[0]
             count = f"{len(named)} shapes have" if named else "no shape has"
             raise SceneError(f"{count} the name {key!r}", where=where)
-        if isinstance(key, bool) or not isinstance(key, (int, np.integer)):
+        if not is_whole(key):
             raise SceneError(f"{key!r} is no shape, name or index", where=where)
         if not 0 <= key < len(self.scene.shapes):
             count = f"there are {len(self.scene.shapes)} shapes"

@@ -40,9 +40,12 @@ class Developed(Still):
         """The picture: colours, with alpha where the film has it, or the film's bands."""
         if self._form.bands:
             return self._mean_bands() * np.float32(self._form.exposure)
-        if self._form.alpha:
-            return np.dstack([self.colours(), self._alpha()])
-        return self.colours()
+        return self.picture()
+
+    def picture(self) -> Image:
+        """The picture in three colours, with alpha where the film has it, also with bands."""
+        colours = self.colours()
+        return np.dstack([colours, self._alpha()]) if self._form.alpha else colours
 
     def colours(self) -> Image:
         """The picture in three colours, (h, w, 3) float32, also of a film with bands."""

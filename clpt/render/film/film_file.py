@@ -155,7 +155,7 @@ def _header(path: Path, text: object) -> dict[str, Any]:
 def _picture(saved: SavedFilm) -> Any:
     """The picture so far, with the header: what viewers show."""
     form, made = saved.form, saved._developed()
-    pixels = made.colours() if form.bands else made.image()
+    pixels = made.picture()
     letters = "RGBA"[: pixels.shape[2]]
     stored = np.clip(np.nan_to_num(pixels), -HALF_MAX, HALF_MAX).astype(np.float16)
     channels = {n: np.ascontiguousarray(stored[..., i]) for i, n in enumerate(letters)}
@@ -235,6 +235,7 @@ def _restored(header: dict[str, Any], parts: _Parts) -> SavedFilm:
     rows = {name: tuple(map(tuple, form[name])) for name in ("to_output", "paper")}
     names: dict[str, Any] = {"layers": tuple(form["layers"])}
     names["names"] = LayerNames(**{n: tuple(v) for n, v in form.get("names", {}).items()})
+    names["place"] = tuple(form["place"]) if form.get("place") else None
     taken = tuple((int(first), int(end)) for first, end in header["taken"])
     return SavedFilm(
         film=FilmState(

@@ -50,6 +50,13 @@ class Pictures(ABC):
         """The picture so far in three colours, (h, w, 3) float32, also of a film with bands."""
         return self._developed("words").colours()
 
+    def picture(self) -> Image:
+        """The picture so far in three colours, (h, w, 3) float32; (h, w, 4) of a film with alpha.
+
+        Also of a film with bands.
+        """
+        return self._developed("words").picture()
+
     def spectral_image(self) -> SpectralImage:
         """The picture so far of a film with bands, at their centres. Raises SceneError without."""
         if not self._form.bands:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from clpt.arrays import Words
-from clpt.render.analysis.lights.look import Look
+from clpt.render.analysis.look import Look
 from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.render.analysis.wavelengths import Density
 from clpt.render.contract.features.materials import Sources
@@ -71,6 +71,11 @@ class Encoder:
     def look(self) -> Look:
         """The way in which the film looks at lights that are images."""
         return Look(self.spectra.spectral, *self.spectra.range, self.cache)
+
+    @property
+    def second_uv(self) -> tuple[int, int]:
+        """See `TextureTable.second_uv`."""
+        return self.textures.second_uv
 
     @property
     def sources(self) -> Sources:

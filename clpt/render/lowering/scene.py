@@ -170,7 +170,7 @@ def encode(found: Analysis, cache: LoweringCache, texture_budget: int | None = N
     names, layers = lower_names(index, geometry, lights, encoder.store, cache)
     features = _features(found, encoder, surfaces, rows, motion_row, layers)
     aims, around, disperses = (rows.aims, len(found.aims)), surfaces.around, features.dispersion
-    own = Found(rows.density, rows.ambient, aims, around, disperses, layers)
+    own = Found(rows.density, rows.ambient, aims, around, disperses, layers, encoder.second_uv)
     settings = settings_of(index, geometry, lights, wavelengths, found.sphere, own)
     cache.settle()
     tables = encoder.store.arrays()

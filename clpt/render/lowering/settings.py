@@ -32,7 +32,8 @@ class Found:
     density_row: where the table of the density of wavelengths begins in `distributions`;
     ambient_row: where the ambient light is in `light_params`; aims: the first of the spheres at
     which light paths aim, and their number; around: words of the bodies and of the medium at the
-    camera; disperses: whether directions depend on wavelengths; layers: beside the picture.
+    camera; disperses: whether directions depend on wavelengths; layers: beside the picture;
+    second_uv: numbers of the attributes that a mesh's second set of uv are, -1 for none.
     """
 
     density_row: int
@@ -41,6 +42,7 @@ class Found:
     around: tuple[int, int]
     disperses: bool
     layers: LayerFeatures
+    second_uv: tuple[int, int]
 
 
 def settings_of(
@@ -65,17 +67,14 @@ def settings_of(
         settings["photon_cells"], side = guides.cells_for(paths)
         settings["guide_side"] = side * sphere[1]
     settings["rival_area"] = rival_area(sphere[1])
-    settings["aims"], settings["aim_count"] = found.aims
-    settings["camera_bodies"], settings["camera_medium"] = found.around
+    _set_places(settings, found)
     settings["light_count"] = len(lights.rows)
     settings["infinite_count"] = lights.infinite
-    settings["ambient"] = found.ambient_row
     settings["first_analytic"] = geometry.first_analytic
     settings["analytic_count"] = len(geometry.boxes)
     settings["single_count"] = geometry.single_count
     settings["shape_count"] = len(geometry.rows)
     settings["tanh_min"], settings["tanh_max"] = tanh_ends(density.lo, density.hi)
-    settings["density"] = found.density_row
     film = index.film
     matrix = output_matrix(film, index.mode)
     scale = settings["film_scale"] = film_scale(film, light_level(index, lights, sphere))
@@ -83,6 +82,14 @@ def settings_of(
     settings["center"], settings["scene_radius"] = sphere
     _set_layers(settings, found.layers)
     return settings
+
+
+def _set_places(settings: NDArray[np.void], found: Found) -> None:
+    """Write where tables have what earlier steps found."""
+    settings["aims"], settings["aim_count"] = found.aims
+    settings["camera_bodies"], settings["camera_medium"] = found.around
+    settings["second_u"], settings["second_v"] = found.second_uv
+    settings["ambient"], settings["density"] = found.ambient_row, found.density_row
 
 
 def _set_film(settings: NDArray[np.void], index: SceneIndex) -> None:
@@ -103,7 +110,7 @@ def _set_film(settings: NDArray[np.void], index: SceneIndex) -> None:
 def _set_paths(settings: NDArray[np.void], index: SceneIndex) -> None:
     """Write what the sampler and the integrator say of paths."""
     scene, integrator = index.scene, index.integrator
-    settings["seed"] = scene.seed % 2**32
+    settings["seed"] = scene.seed
     settings["sample_bits"] = min((max(scene.spp, 1) - 1).bit_length(), MOST_SAMPLE_BITS)
     depth = integrator.max_depth
     settings["max_depth"] = DEEPEST if depth < 0 else min(depth, DEEPEST)

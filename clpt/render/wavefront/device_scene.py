@@ -8,6 +8,7 @@ import numpy as np
 import pyopencl as cl
 
 from clpt import bvh, device
+from clpt.arrays import on_host
 from clpt.device.buffers import Buffers
 from clpt.records import TABLES
 from clpt.render.lowering.device_grids import POINT_WORDS, CloudDensity, Values
@@ -98,7 +99,7 @@ class DeviceScene:
         if values.context == self.device.context:
             self.stream.after(values.events)
             return values.base_data, values.offset // 4
-        return self.upload("densities", values.get()), 0
+        return self.upload("densities", on_host(values)), 0
 
     def upload(self, name: str, table: np.ndarray) -> cl.Buffer:
         """Return a new buffer that holds a table. Raises MemoryBudgetError."""

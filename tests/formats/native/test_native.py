@@ -214,7 +214,7 @@ ERRORS = [
     ({"spp": 0}, "spp", "above zero"),
     ({"spp": 1.5}, "spp", "whole number"),
     ({"seed": "x"}, "seed", "must be a number, not a string"),
-    ({"film": {"width": 0}}, "film.width", "must be 1 to 65536"),
+    ({"film": {"width": 0}}, "film.width", "must be a whole number from 1 to 65536"),
     ({"film": {"width": 1e12}}, "film.width", "below 2^31"),
     ({"film": {"mode": "cmyk"}}, "film.mode", "is none of spectral, rgb"),
     ({"camera": {**CAMERA, "fov": float("nan")}}, "camera.fov", "finite"),

@@ -37,7 +37,7 @@ def scene(**changes: object) -> Scene:
 def test_the_integrator_is_decided_without_words() -> None:
     found = analyse(scene(), LoweringCache())
     assert not isinstance(found.index.scene.integrator, Auto)
-    assert "is sharp" in found.reason
+    assert "is specular" in found.reason
     made = lower(scene())
     assert type(made.integrator) is type(found.index.scene.integrator)
     assert made.reason == found.reason

@@ -11,7 +11,7 @@ import clpt
 from clpt.errors import SceneError
 from clpt.records import SETTINGS, SHAPE, SHAPE_BITS, TABLES
 from clpt.render.analysis import geometry
-from clpt.render.contract.parameter_words import MIXTURE
+from clpt.render.contract.parameter_words import MIXTURE, NORMAL_MAP_WORDS
 from clpt.render.lowering.materials import gloss
 from clpt.render.lowering.scene import TREE_FROM, lower
 from clpt.render.lowering.settings import DEEPEST
@@ -180,7 +180,7 @@ def test_gloss_stands_before_rows_where_a_tree_asks_for_it() -> None:
     lamps = [Point(position=(i, 5.0, 0.0), intensity=1.0) for i in range(TREE_FROM)]
     rough, dull = m.RoughConductor(alpha_u=0.1, alpha_v=0.4), m.Diffuse()
     wavy = m.BumpMap(material=rough, height=Bitmap(image=np.zeros((2, 2, 1), np.float32)))
-    for shapes, words in (((rough, dull), 1), ((rough, wavy), 12), ((dull,), 0)):
+    for shapes, words in (((rough, dull), 1), ((rough, wavy), 1 + NORMAL_MAP_WORDS), ((dull,), 0)):
         made = lower(scene(*(Sphere(material=one) for one in shapes), lights=lamps))
         assert made.features.lights.tree and made.features.lights.gloss == words
         for material, row in zip(shapes, rows(made)["front"] & 0xFFFFFF, strict=True):

@@ -16,7 +16,7 @@ from clpt.render.analysis.checks.materials import check_material
 from clpt.render.analysis.checks.shapes import check_instances, check_shapes
 from clpt.render.analysis.checks.textures import check_textures
 from clpt.render.analysis.lowering_cache import LoweringCache
-from clpt.scene import Scene, check_parts
+from clpt.scene import Scene, check_parts, checked_seed
 from clpt.scene.integrators import Film, ParticleTracer
 from clpt.scene.lights import with_emission
 from clpt.scene.shapes import Instance, Shape
@@ -33,8 +33,7 @@ def check(scene: Scene) -> None:
 def check_at_rest(scene: Scene, cache: LoweringCache) -> None:
     """Raise SceneError as `check` does, for a scene that is `at_rest`; cache: of its analysis."""
     check_parts(scene)
-    if isinstance(scene.seed, bool) or not isinstance(scene.seed, int):
-        raise SceneError(f"must be a whole number, not {scene.seed!r}", where="seed")
+    checked_seed(scene.seed)
     shapes_ = list(distinct(scene.shapes))
     check_film(scene)
     check_camera(scene.camera, scene.film)

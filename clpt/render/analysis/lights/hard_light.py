@@ -21,8 +21,8 @@ from clpt.render.analysis.geometry import Emitter, Geometry
 from clpt.render.analysis.index import SceneIndex
 from clpt.render.analysis.lights import image_lights, light_bounds, sky_light
 from clpt.render.analysis.lights.aims import is_sharp, sharp_pieces
-from clpt.render.analysis.lights.look import Look
 from clpt.render.analysis.lights.sources import Sources
+from clpt.render.analysis.look import Look
 from clpt.render.analysis.lowering_cache import LoweringCache
 from clpt.scene import materials as mt
 from clpt.scene.integrators import Auto, Integrator, Path, Vcm, shared
@@ -141,13 +141,13 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
         return in_fog
     sharp = _first_with((one for one in index.shapes if not _hides(one)), is_sharp)
     if sharp is None:
-        return without, "nothing is sharp"
+        return without, "nothing is specular"
     if _first_with((one for one in index.shapes if one.emission is None), _is_dull) is None:
         return without, "there is nothing dull for a caustic to be seen on"
     small = list(_small_lights(lit))
     if not small:
         return without, "no light is small"
-    reason = f"{shapes.where(sharp)} is sharp, and {small[0][0]} is a small light"
+    reason = f"{shapes.where(sharp)} is specular, and {small[0][0]} is a small light"
     if sum(share for *_, share in small) < MOSTLY:
         return Path(light_paths=FEW), f"{reason}, though most light is of large ones"
     number = SOME

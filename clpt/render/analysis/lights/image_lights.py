@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt import images, spectral_exr, transforms
-from clpt.arrays import Floats32, fits_single, on_host
+from clpt.arrays import Floats32, fits_single
 from clpt.errors import SceneError
 from clpt.render.analysis.lights import block_grids
-from clpt.render.analysis.lights.look import Look
+from clpt.render.analysis.look import Look
 from clpt.render.analysis.lowering_cache import version
 from clpt.render.analysis.texels import bands, texels
 from clpt.scene.lights import CubeMap, Envmap, Sky
@@ -188,20 +188,13 @@ def _loaded(image: object, where: str, notes: list[str]) -> Floats32:
     """
     if spectral_exr.find(image, emissive=True, where=where) is not None:
         raise SceneError("spectral images can be an envmap only", where=where)
-    values: NDArray[Any]
     if isinstance(image, (str, Path)):
         stored = images.read_stored(image)
         notes += [f"{image}: {note}" for note in stored.notes_of(raw=False)]
-        values = stored.decoded()
+        stored = images.from_array(stored.decoded(), where)
     else:
-        values = np.asarray(on_host(image))
-    if values.ndim == 2:
-        values = values[..., None]
-    if values.ndim != 3 or values.shape[2] not in (1, 3, 4) or 0 in values.shape:
-        raise SceneError(f"must be (h, w, 3), found {values.shape}", where=where)
-    if values.dtype == np.uint8:  # as the files have it to which such an array is saved
-        values = images.Stored(values, True).decoded()
-    values = values.astype(np.float32, copy=False)
+        stored = images.from_array(image, where)
+    values = stored.decoded()
     values = np.repeat(values, 3, axis=2) if values.shape[2] == 1 else values[..., :3]
     if not np.isfinite(values).all():
         raise SceneError("has a texel that is not finite", where=where)

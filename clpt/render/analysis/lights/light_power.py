@@ -10,25 +10,26 @@ from numpy.typing import ArrayLike, NDArray
 from clpt import transforms
 from clpt.arrays import fits_single
 from clpt.errors import SceneError
+from clpt.render.analysis.look import Look
 from clpt.scene import lights
 from clpt.scene.lights import Light, Projector
 from clpt.scene.pixels import pixels
-from clpt.scene.roles import EMISSION, REFLECTANCE
+from clpt.scene.roles import REFLECTANCE
 from clpt.scene.textures import Bitmap, Checkerboard, Dots, MeshAttribute, Mix, Product, Solid
 
 SHEAR = 1e-5  # largest cosine between axes that are at right angles
 
 
-def power(lamp: Light, strength: float, scene_radius: float) -> float:
+def power(lamp: Light, strength: float, scene_radius: float, look: Look) -> float:
     """Estimate what a light off all shapes sends into the scene, mean of channels [W/nm].
 
     strength: the mean of its intensity, irradiance or radiance. A light of which nothing more is
     known shines to all sides, or on the whole disk of the scene.
     """
     if isinstance(lamp, lights.Goniometric):
-        return 4.0 * np.pi * strength * brightness(lamp.image)
+        return 4.0 * np.pi * strength * brightness(lamp.image, look)
     if isinstance(lamp, lights.Projector):
-        return image_area(lamp) * strength * brightness(lamp.image)
+        return image_area(lamp) * strength * brightness(lamp.image, look)
     if isinstance(lamp, lights.Spot):
         edge = np.radians([min(lamp.beam_width, lamp.cutoff), lamp.cutoff])
         return 2.0 * np.pi * (1.0 - float(np.cos(edge).mean())) * strength
@@ -49,20 +50,22 @@ def importance(lamp: Light, strength: float, power: float) -> float:
     return np.pi * strength * (np.pi if lamp.reach == "infinite" else 1.0)
 
 
-def brightness(value: Any) -> float:
-    """Return the mean over channels, and over a texture, of an emission."""
+def brightness(value: Any, look: Look) -> float:
+    """Return how much an emission counts, in the mean over a texture; see `Look.brightness`."""
     if isinstance(value, Bitmap):
-        return float(np.maximum(pixels(value, EMISSION), 0.0).mean(dtype=np.float64))
+        return float(look.levels(value).mean())
     if isinstance(value, Checkerboard):
-        return 0.5 * (brightness(value.color0) + brightness(value.color1))
+        return 0.5 * (brightness(value.color0, look) + brightness(value.color1, look))
     if isinstance(value, (MeshAttribute, Solid, Dots)):
         return 0.5  # whatever it is: this only shares out samples
     if isinstance(value, Product):
-        return brightness(value.first) * brightness(value.second)
+        return brightness(value.first, look) * brightness(value.second, look)
     if isinstance(value, Mix):
-        share = value.amount if isinstance(value.amount, float) else brightness(value.amount)
-        return (1.0 - share) * brightness(value.first) + share * brightness(value.second)
-    return float(np.mean(value.to_rgb("emission")))
+        given = value.amount
+        share = given if isinstance(given, float) else brightness(given, look)
+        first, second = (brightness(one, look) for one in (value.first, value.second))
+        return (1.0 - share) * first + share * second
+    return look.brightness(value)
 
 
 def image_area(lamp: Projector) -> float:

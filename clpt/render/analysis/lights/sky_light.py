@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from clpt.arrays import Floats
 from clpt.device import kept_arrays
 from clpt.render.analysis.lights import block_grids, image_lights
-from clpt.render.analysis.lights.look import Look
+from clpt.render.analysis.look import Look
 from clpt.render.analysis.texels import bands, texels
 from clpt.scene.lights import Sky
 from clpt.scene.roles import EMISSION

@@ -20,9 +20,8 @@ from clpt.render.analysis.glow import GlowingBody, glows
 from clpt.render.analysis.index import SceneIndex
 from clpt.render.analysis.lights import image_lights, light_bounds, light_power, sky_light
 from clpt.render.analysis.lights.light_bounds import Bounds
-from clpt.render.analysis.lights.look import Look
 from clpt.render.analysis.lights.triangle_means import triangle_means
-from clpt.render.analysis.lowering_cache import LoweringCache
+from clpt.render.analysis.look import Look
 from clpt.render.contract.light_records import INFINITE
 from clpt.scene import lights
 from clpt.scene.lights import Area, DirectionalArea, Light
@@ -94,7 +93,7 @@ def sources_of(index: SceneIndex, geometry: Geometry, scene_radius: float, look:
 
     Raises SceneError for a light that has no place, and for an image that is none.
     """
-    found = glows(index, look.cache)
+    found = glows(index, look)
     around = _around(index, geometry) if index.motions else None
     return measured(index.lights, geometry.emitters, scene_radius, look, found, around)
 
@@ -116,7 +115,7 @@ def measured(
     glows = glows or {}
     made = [_of_lamp(lamps[i], scene_radius, look) for i in order]
     media = [_of_medium(glow) for glow in glows.values()]
-    shining = [_of_emitter(emitter, look.cache) for emitter in emitters]
+    shining = [_of_emitter(emitter, look) for emitter in emitters]
     if around is not None:
         made = [_moved(one, around(i, one.bounds)) for i, one in zip(order, made, strict=True)]
         shining = [
@@ -150,8 +149,8 @@ def _of_lamp(lamp: Light, scene_radius: float, look: Look) -> Source:
         strength = sky_light.content(lamp, look).strength
     else:
         values = emissions_of(lamp).values()
-        strength = float(np.mean([light_power.brightness(value) for value in values]))
-    power = light_power.power(lamp, strength, scene_radius)
+        strength = float(np.mean([light_power.brightness(value, look) for value in values]))
+    power = light_power.power(lamp, strength, scene_radius, look)
     counts = light_power.importance(lamp, strength, power)
     return Source(np.array([power]), light_bounds.of_lamp(lamp), np.array([counts]))
 
@@ -177,9 +176,9 @@ def _all_around(low: NDArray[np.float64], high: NDArray[np.float64]) -> Bounds:
     )  # fmt: skip
 
 
-def _of_emitter(emitter: Emitter, cache: LoweringCache) -> Source:
+def _of_emitter(emitter: Emitter, look: Look) -> Source:
     """Return the source of a shape that emits."""
-    shape = emitter.shape
+    shape, cache = emitter.shape, look.cache
     emission = shape.emission
     assert isinstance(emission, (Area, DirectionalArea))
     along = isinstance(emission, DirectionalArea)
@@ -187,11 +186,11 @@ def _of_emitter(emitter: Emitter, cache: LoweringCache) -> Source:
     value = emission.radiance if isinstance(emission, Area) else emission.irradiance
     strength = 1.0 if along else 2.0 * np.pi if both else np.pi
     if is_whole(shape):
-        bright = light_power.brightness(value)
+        bright = light_power.brightness(value, look)
         power = np.array([strength * analytic.area(shape) * bright])
         return Source(power, light_bounds.of_shape(shape, both), power, bright)
     if shape.kind in shape_records.ONE_OF and emitter.vertices is not None:
-        bright = light_power.brightness(value)
+        bright = light_power.brightness(value, look)
         areas = 4.0 * np.pi * emitter.vertices[:, 3].astype(np.float64) ** 2
         power = strength * bright * areas
         return Source(power, light_bounds.of_balls(emitter.vertices), power, bright)
@@ -200,9 +199,11 @@ def _of_emitter(emitter: Emitter, cache: LoweringCache) -> Source:
     given = emitter.vertices, emitter.faces, emitter.keys
     by_face = _face_attributes(shape, value)
     if by_face:
-        means = triangle_means(value, emitter.uvs, emitter.faces, by_face)
+        means = triangle_means(value, look, emitter.uvs, emitter.faces, by_face)
     else:
-        means = cache(triangle_means, value, emitter.uvs, emitter.faces)
+        own = value, emitter.uvs, emitter.faces
+        seen = look.spectral, look.lo, look.hi, look.unseen
+        means = cache(triangle_means, value, look, *own[1:], by=(*own, *seen))
     power = strength * cache(_triangle_areas, *given) * means
     bounds = cache(_triangle_bounds, *given, both)
     return Source(power, bounds, power, float(means.max(initial=0.0)))

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Floats
 from clpt.render.analysis.lights.light_power import brightness
-from clpt.scene.pixels import pixels
-from clpt.scene.roles import EMISSION
+from clpt.render.analysis.look import Look
 from clpt.scene.textures import Bitmap, Checkerboard, MeshAttribute, Mix, Product, Texture
 
 LOOKS = 1 << 18  # at a texture, all triangles together
@@ -23,6 +22,7 @@ _GOLDEN = np.array([0.7548776662466927, 0.5698402909980532])  # Roberts' sequenc
 
 def triangle_means(
     value: object,
+    look: Look,
     uvs: NDArray[np.float32] | None,
     faces: NDArray[Any],
     attributes: Mapping[str, NDArray[np.float32]] = MappingProxyType({}),
@@ -30,9 +30,10 @@ def triangle_means(
     """Return the mean brightness of an emission over triangles (m, 3), as (m,).
 
     uvs (n, 2): of the vertices; None: the barycentrics stand for them, as in kernels/light/area.cl.
-    attributes: the values (m, k) of each triangle, of those that the emission reads by face.
+    look: of the film; attributes: the values (m, k) of each triangle, of those that the emission
+    reads by face.
     """
-    mean = brightness(value)
+    mean = brightness(value, look)
     if not isinstance(value, Texture):
         return np.full(len(faces), mean)
     corners = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)])
@@ -44,12 +45,16 @@ def triangle_means(
     places = np.einsum("kc,mcd->mkd", weights, given)
     edges = given[:, 1:] - given[:, :1]
     area = 0.5 * np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
-    found = looked_up(value, places, area / count, attributes).mean(axis=1)
+    found = looked_up(value, look, places, area / count, attributes).mean(axis=1)
     return np.maximum(found, LEAST * mean)
 
 
 def looked_up(
-    value: object, uv: Floats, area: Floats, attributes: Mapping[str, NDArray[np.float32]]
+    value: object,
+    look: Look,
+    uv: Floats,
+    area: Floats,
+    attributes: Mapping[str, NDArray[np.float32]],
 ) -> Floats:
     """Return the brightness of a value at uv (m, k, 2); area (m,): of uv that a look stands for.
 
@@ -59,27 +64,33 @@ def looked_up(
         means = attributes[value.name].mean(axis=1, dtype=np.float64)
         return np.broadcast_to(np.maximum(means, 0.0)[:, None], uv.shape[:2])
     if isinstance(value, Product):
-        first, second = (looked_up(v, uv, area, attributes) for v in (value.first, value.second))
+        first, second = (
+            looked_up(v, look, uv, area, attributes) for v in (value.first, value.second)
+        )
         return first * second
     if isinstance(value, Mix):
-        share = looked_up(value.amount, uv, area, attributes)
-        first, second = (looked_up(v, uv, area, attributes) for v in (value.first, value.second))
+        share = looked_up(value.amount, look, uv, area, attributes)
+        first, second = (
+            looked_up(v, look, uv, area, attributes) for v in (value.first, value.second)
+        )
         return (1.0 - share) * first + share * second
     if isinstance(value, (Bitmap, Checkerboard)):
         matrix = value.to_uv / value.to_uv[2, 2]
         there = uv @ matrix[:2, :2].T + matrix[:2, 2]
         if isinstance(value, Bitmap):
-            return _bitmap(value, there, area * abs(np.linalg.det(matrix[:2, :2])))
+            return _bitmap(value, look, there, area * abs(np.linalg.det(matrix[:2, :2])))
         same = np.equal(*np.moveaxis(there % 1.0 < 0.5, -1, 0))
-        first, second = (looked_up(v, uv, area, attributes) for v in (value.color0, value.color1))
+        first, second = (
+            looked_up(v, look, uv, area, attributes) for v in (value.color0, value.color1)
+        )
         return np.where(same, first, second)
-    known = value if isinstance(value, (int, float)) else brightness(value)
+    known = value if isinstance(value, (int, float)) else brightness(value, look)
     return np.full(uv.shape[:2], float(known))
 
 
-def _bitmap(texture: Bitmap, uv: Floats, area: Floats) -> Floats:
+def _bitmap(texture: Bitmap, look: Look, uv: Floats, area: Floats) -> Floats:
     """Looks at an image that is averaged over as many texels as one of them stands for."""
-    level = np.maximum(pixels(texture, EMISSION), 0.0).mean(axis=2, dtype=np.float64)
+    level = look.levels(texture)
     texels = area * level.size
     steps = np.ceil(0.5 * np.log2(np.maximum(texels, 1.0))).astype(np.int64)
     found = np.empty(uv.shape[:2])

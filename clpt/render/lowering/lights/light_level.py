@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from clpt.render.analysis.index import SceneIndex
 from clpt.render.analysis.lights.light_bounds import concatenated
 from clpt.render.analysis.lights.light_power import brightness
+from clpt.render.analysis.look import Look
 from clpt.render.lowering.lights.lights import LightRows
 
 
@@ -27,7 +28,8 @@ def light_level(
         away = np.square((bounds.low + bounds.high) / 2.0 - centre).sum(axis=1)
         square = np.where(bounds.placed, np.maximum(away, radius**2), radius**2)
         arrives = float((lights.power / (4.0 * np.pi * square)).sum())
-    glow = [brightness(one.light) * radius for one in index.emitting if one.light is not None]
+    look = Look.of(index.film)
+    glow = [brightness(one.light, look) * radius for one in index.emitting if one.light is not None]
     ambient = index.integrator.ambient
-    around = 0.0 if ambient is None else brightness(ambient)
+    around = 0.0 if ambient is None else brightness(ambient, look)
     return max(lights.radiance, arrives, around, *glow)

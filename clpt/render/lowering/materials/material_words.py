@@ -118,7 +118,7 @@ class MaterialWords:
         return self._leaf(material, side)
 
     def _leaf(self, material: Scatterer, side: _Side) -> int:
-        before = side.perturbation.words(self._encoder) if self._normal_mapped else None
+        before = side.perturbation.words(self._encoder, material) if self._normal_mapped else None
         if self.gloss_before:
             maps = () if before is None else before
             before = np.array([gloss.word(material), *maps], np.uint32)

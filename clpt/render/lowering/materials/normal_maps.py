@@ -13,9 +13,11 @@ from clpt.render.contract.parameter_words import NORMAL_MAP_WORDS
 from clpt.render.lowering.encoder import Encoder
 from clpt.scene import roles
 from clpt.scene.materials import BumpMap, NormalMap
-from clpt.scene.textures import Bitmap
+from clpt.scene.scatterer import Scatterer
+from clpt.scene.textures import Bitmap, Placed, placed_in
 
-INSIDE, ALONG_V, AS_IT_IS, UNSHADED, NORMAL, HEIGHT = (1 << i for i in range(6))
+INSIDE, ALONG_V, AS_IT_IS, UNSHADED, NORMAL, HEIGHT, SECOND = (1 << i for i in range(7))
+TURNS = 11  # first of the words that tell what maps are along
 
 Map: TypeAlias = NormalMap | BumpMap
 
@@ -39,7 +41,7 @@ class NormalPerturbation:
         """A key that is equal for perturbations by the same maps."""
         return id(self.normal), id(self.bump), self.inside
 
-    def words(self, encoder: Encoder) -> Words:
+    def words(self, encoder: Encoder, leaf: Scatterer) -> Words:
         """Return the NORMAL_MAP_WORDS words, and put the textures into the tables."""
         made = np.zeros(NORMAL_MAP_WORDS, np.uint32)
         flags = INSIDE if self.inside else 0
@@ -53,8 +55,25 @@ class NormalPerturbation:
             flags |= HEIGHT | _flags(self.bump)
             made[2] = np.float32(self.bump.scale).view(np.uint32)
             made[9:11] = _real(self.bump.height, encoder)
+        along = None if self.normal is None else self.normal.map
+        for i, value in enumerate((along, *(leaf.directing or (None, None)))):
+            placed = placed_in(value)
+            whole = i > 0 or flags & ALONG_V
+            made[TURNS + 4 * i : TURNS + 4 * i + 4] = _to_uv(placed if whole else None)
+            if placed is not None and placed.mapping == "uv1":
+                flags |= SECOND << i
         made[0] = flags
         return made
+
+
+def _to_uv(placed: Placed | None) -> Words:
+    """Return what the directions of a texture's u and v have of those of its set of uv."""
+    matrix = np.eye(2) if placed is None else placed.to_uv[:2, :2] / placed.to_uv[2, 2]
+    lengths = np.linalg.norm(matrix, axis=0)
+    if not lengths.all() or abs(np.linalg.det(matrix / lengths)) < 1e-9:
+        matrix = np.eye(2)
+    inverse = np.linalg.inv(matrix)
+    return (inverse / np.linalg.norm(inverse, axis=0)).T.astype(np.float32).ravel().view(np.uint32)
 
 
 def _real(value: object, encoder: Encoder) -> Words:

@@ -24,13 +24,15 @@ from clpt.render.lowering.lights.brick_lights import BrickLights
 from clpt.render.lowering.lights.lights import LightRows
 from clpt.render.lowering.materials.material_words import MaterialWords
 from clpt.render.lowering.tables import as_words
+from clpt.scene import materials as mt
 from clpt.scene import roles
 from clpt.scene.media import Dyed, Grid, Lattice, Medium, Mixture
 from clpt.scene.params import fields_of
 from clpt.scene.phases import Phase
 from clpt.scene.shapes import Shape
-from clpt.spectra import Constant, Spectrum
+from clpt.spectra import Constant, Spectrum, index
 
+MIDDLE = 589.3  # wavelength at which indices are named [nm]
 BROAD = 1.4  # [rad] half angle from which a cone is none
 
 
@@ -180,6 +182,20 @@ class MediumWords:
         apart = name == "albedo_grid" and not medium.albedo_with_density
         return np.array([-first if apart else first], np.int32).view(np.uint32)
 
+    def _within(self, medium: Grid) -> float:
+        """Return how much more radiance a black body has in a medium than in a vacuum: n^2.
+
+        n: the index behind the medium's own boundaries, at the yellow line of sodium. A black
+        body that is normalised has 1 wherever it is.
+        """
+        if medium.normalised:
+            return 1.0
+        bounds = (one.material for one in self._index.shapes if one.interior is medium)
+        parts = [part for material in bounds for part in mt.parts(material)]
+        given: list[Any] = [part.inside_index for part in parts]
+        found = [float(index(one).sample(MIDDLE)) for one in given]
+        return max((n for n in found if n > 0.0), default=1.0) ** 2
+
     def _glow(self, medium: Lattice, word: int) -> Words:
         """Return the words behind a grid's row: its bricks' light and their rows of `lights`."""
         words = np.zeros(grids.GLOW_WORDS, np.uint32)
@@ -194,10 +210,11 @@ class MediumWords:
         source = medium.emission_grid
         if medium.temperature is not None:
             source = medium.temperature
-            table = black_bodies(medium, light.kelvin)
+            table, more = black_bodies(medium, light.kelvin), self._within(medium)
             words[1] = 2 if medium.normalised else 1
-            words[4] = store.append_floats("distributions", table[:, 1:])
-            words[3], words[5] = as_words([medium.brightness, (len(table) - 1) / light.kelvin])
+            words[4] = store.append_floats("distributions", more * table[:, 1:])
+            brightness = more * medium.brightness
+            words[3], words[5] = as_words([brightness, (len(table) - 1) / light.kelvin])
         if source is not None:
             words[2] = store.append("images", self._encoder.cache(grids.bricks, source))
         bright = self._glows[medium]

@@ -22,9 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import budget, images, spectra
-from clpt.arrays import Words, on_host
+from clpt.arrays import Words
 from clpt.errors import SceneError
-from clpt.images import Stored
+from clpt.images import Stored, arrays
 from clpt.render.analysis.lowering_cache import LoweringCache, version
 from clpt.render.analysis.texels import texels
 from clpt.render.contract.texture_records import KINDS, MIPS
@@ -75,7 +75,7 @@ class _Pixels:
             )
         else:
             self._stored = Future()
-            self._stored.set_result(_array(self._image))
+            self._stored.set_result(images.from_array(self._image, "bitmap.image"))
 
     @property
     def stored(self) -> Stored:
@@ -228,7 +228,8 @@ class Images:
         """The words of an image, level by level, of each row by row from the top."""
         texture, stored = image.texture, image.pixels.stored.meant(image.texture.raw)
         packs = _packs(image.form, image, self.spectral)
-        values, curved = _shaped(stored.values), stored.encoded and not texture.raw
+        values = arrays.checked(stored.values, "bitmap.image")
+        curved = stored.encoded and not texture.raw
         if image.halvings:
             values = _halved(values, curved, image.halvings)
         if not image.has_levels:
@@ -304,24 +305,6 @@ def has_levels(texture: Bitmap, role: Role) -> bool:
 def _pool(process: int) -> ThreadPoolExecutor:
     """The threads of a process, by its id: those of a parent do not come along when it forks."""
     return ThreadPoolExecutor(min(THREADS, os.cpu_count() or 1), "clpt-images")
-
-
-def _array(image: object) -> Stored:
-    values = np.asarray(on_host(image))
-    values = values[..., None] if values.ndim == 2 else values
-    if values.dtype != np.uint8 and values.dtype.kind != "f":
-        wanted = "must be a path or an array of floats or of bytes"
-        raise SceneError(wanted, where="bitmap.image")
-    if values.dtype != np.uint8:
-        return Stored(_shaped(values).astype(np.float32, copy=False), encoded=False)
-    return Stored(_shaped(values), encoded=True)
-
-
-def _shaped(values: NDArray[Any]) -> NDArray[Any]:
-    if values.ndim != 3 or values.shape[2] not in (1, 3, 4) or values.size == 0:
-        wanted = "must be (h, w) or (h, w, 1, 3 or 4) and not empty"
-        raise SceneError(f"{wanted}, not {values.shape}", where="bitmap.image")
-    return values
 
 
 def _is_alpha(image: _Image) -> bool:

@@ -92,6 +92,12 @@ class TextureTable:
         """Put the images into the tables, when all of them are known; return warnings."""
         return self.images.finish(self.store, self.roles)
 
+    @property
+    def second_uv(self) -> tuple[int, int]:
+        """The indices of the attributes that make a mesh's second set of uv; -1: none asks."""
+        u, v = (self.attributes.get((name, REAL, ""), -1) for name in SECOND_UV)
+        return u, v
+
     def attribute(self, name: str, role: Role, channel: str = "") -> int:
         """Return the index of a mesh attribute in the directories of `attributes`.
 

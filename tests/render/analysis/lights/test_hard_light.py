@@ -74,7 +74,7 @@ def sky(share: float, side: int = 64) -> np.ndarray:
     ids=lambda lamp: lamp.kind,
 )
 def test_small_lights(lamp: Light) -> None:
-    reason = "sphere is sharp, and lights[0] is a small light"
+    reason = "sphere is specular, and lights[0] is a small light"
     assert chosen(scene_of(ROOM, BALL, lights=[lamp])) == (SOME, reason)
 
 
@@ -136,7 +136,7 @@ GLASS_LENS = ThinLens(glass="bk7", focal_length=0.05)
 @pytest.mark.parametrize(
     ("scene", "words"),
     [
-        (scene_of(ROOM), "nothing is sharp"),
+        (scene_of(ROOM), "nothing is specular"),
         (scene_of(dataclasses.replace(ROOM, material=m.Conductor()), BALL), "nothing dull"),
         (scene_of(BALL, Sphere(material=m.Null())), "nothing dull"),
         (scene_of(BALL, Rectangle(material=m.BumpMap())), "nothing dull"),

@@ -7,12 +7,14 @@ import pytest
 
 from clpt.render.analysis.lights import sources
 from clpt.render.analysis.lights.triangle_means import LEAST, triangle_means
+from clpt.render.analysis.look import Look
 from clpt.render.lowering.encoder import Encoder
 from clpt.render.lowering.lights import lights
 from clpt.scene.lights import Area
 from clpt.scene.shapes import Mesh
 from clpt.scene.textures import Bitmap, Checkerboard, Mix, Product
 
+SEEN = Look(False, 360.0, 830.0)  # in colours
 UVS = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], np.float32)
 HALVES = np.array([(0, 1, 2), (0, 2, 3)])
 
@@ -27,14 +29,14 @@ def over_texels(image: np.ndarray) -> list[float]:
 @pytest.mark.parametrize("size", [4, 64, 500])
 def test_bitmaps(size):
     image = np.random.default_rng(size).random((size, size)).astype(np.float32) ** 6
-    found = triangle_means(Bitmap(image=image), UVS, HALVES)
+    found = triangle_means(Bitmap(image=image), SEEN, UVS, HALVES)
     np.testing.assert_allclose(found, over_texels(image), rtol=0.05)
 
 
 def test_a_bright_corner_is_found():
     image = np.zeros((256, 256), np.float32)
     image[250, 200] = 1e4  # below the diagonal
-    found = triangle_means(Bitmap(image=image), UVS, HALVES)
+    found = triangle_means(Bitmap(image=image), SEEN, UVS, HALVES)
     assert found[0] == pytest.approx(2e4 / image.size, rel=0.3)
     assert found[1] == pytest.approx(LEAST * image.mean())
 
@@ -49,23 +51,25 @@ def test_where_the_uvs_lie():
         (1.5, "zero", 0.0), (1.0, "mirror", 1.0),
     ):  # fmt: skip
         there = left + np.array([move, 0.0], np.float32)
-        found = triangle_means(Bitmap(image=image, wrap=wrap), there, corner)
+        found = triangle_means(Bitmap(image=image, wrap=wrap), SEEN, there, corner)
         assert found[0] == pytest.approx(max(expected, LEAST * 0.5)), (move, wrap)
     shifted = Bitmap(image=image, to_uv=np.array([(1, 0, 0.5), (0, 1, 0), (0, 0, 1.0)]))
-    assert triangle_means(shifted, left, corner)[0] == pytest.approx(1.0)
+    assert triangle_means(shifted, SEEN, left, corner)[0] == pytest.approx(1.0)
 
 
 def test_what_combines_textures():
     image = np.random.default_rng(3).random((16, 16)).astype(np.float32)
     plain, (low, high) = Bitmap(image=image), over_texels(image)
     product = Product(first=(2.0, 2.0, 2.0), second=plain)
-    np.testing.assert_allclose(triangle_means(product, UVS, HALVES), [2 * low, 2 * high], rtol=0.03)
+    np.testing.assert_allclose(
+        triangle_means(product, SEEN, UVS, HALVES), [2 * low, 2 * high], rtol=0.03
+    )
     mixed = Mix(first=(1.0, 1.0, 1.0), second=plain, amount=0.25)
     expected = [0.75 + 0.25 * low, 0.75 + 0.25 * high]
-    np.testing.assert_allclose(triangle_means(mixed, UVS, HALVES), expected, rtol=0.03)
+    np.testing.assert_allclose(triangle_means(mixed, SEEN, UVS, HALVES), expected, rtol=0.03)
     board = Checkerboard(color0=(1.0, 1.0, 1.0), color1=(0.0, 0.0, 0.0))
     quarter = np.array([(0, 0), (0.5, 0), (0, 0.5)], np.float32)
-    assert triangle_means(board, quarter, np.array([[0, 1, 2]]))[0] == pytest.approx(1.0)
+    assert triangle_means(board, SEEN, quarter, np.array([[0, 1, 2]]))[0] == pytest.approx(1.0)
 
 
 def test_dark_triangles_are_seldom_chosen():
