@@ -9,7 +9,7 @@ import pytest
 
 import clpt
 from clpt.errors import SceneError, UnknownKindError
-from clpt.render.lowering.scene import lower
+from clpt.render.flow.scene_to_tables import lower
 from clpt.render.options import RenderOptions
 from clpt.scene import Film, Scene, cameras, integrators, lights, materials, shapes
 from clpt.spectra import illuminant

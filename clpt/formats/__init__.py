@@ -10,10 +10,10 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
-from clpt import budget as budgets
-from clpt.budget import Budget
 from clpt.choices import Missing
 from clpt.errors import LONGEST_WARNING, SceneError, nearest, one_line
+from clpt.files import budget as budgets
+from clpt.files.budget import Budget
 from clpt.formats import own_scenes
 
 if TYPE_CHECKING:  # a name of a file is looked up without the kinds of scenes

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import budget, numpy_files, output_files
 from clpt.errors import SceneError
+from clpt.files import budget, numpy_files, output_files
 from clpt.images import sizes
 from clpt.images.stored import Stored
 

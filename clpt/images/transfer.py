@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.arrays import Floats32
-from clpt.colour import tones
-from clpt.colour.view import View
 from clpt.errors import SceneError
+from clpt.images.colour import tones
+from clpt.images.colour.view import View
 from clpt.spectra.spaces import between
 
 HEX = r"#([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})"
@@ -70,7 +70,8 @@ def to_codes(
 ) -> NDArray[np.uint8]:
     """Linear Rec. 709 (h, w, c), scaled by 2^exposure, as 8-bit codes of a display.
 
-    tone: see clpt.colour.tones, then sRGB; view: in the place of both. Raises UnknownKindError.
+    tone: see clpt.images.colour.tones, then sRGB; view: in the place of both. Raises
+    UnknownKindError.
     """
     if view is None and tone == "none":
         return to_srgb8(image, exposure)

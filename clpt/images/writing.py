@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt import output_files
 from clpt.arrays import Floats32
 from clpt.choices import FOR_SCREENS, WRITABLE, Exposure
-from clpt.colour.view import View
 from clpt.errors import SceneError
+from clpt.files import output_files
 from clpt.images import exr, hdr, npy, pfm, screen_files
 from clpt.images.arrays import from_array
 from clpt.images.brightness import stops
+from clpt.images.colour.view import View
 from clpt.images.png_files import Metadata, png
 from clpt.images.transfer import multiplied, straight, to_codes, to_rec709
 from clpt.spectra.spaces import chromaticities
@@ -51,8 +51,8 @@ def write(
     space: of the colours, see clpt.spectra.spaces; an .exr states it by its chromaticities, an .hdr
     by its primaries. Files for screens are converted to sRGB and a .pfm to Rec. 709, white to
     white, which is what they mean; an .npy is not converted.
-    tone: of files for screens, see clpt.colour.tones; view: of them, a `clpt.View` of OpenColorIO,
-    in the place of tone and sRGB transfer.
+    tone: of files for screens, see clpt.images.colour.tones; view: of them, a `clpt.View` of
+    OpenColorIO, in the place of tone and sRGB transfer.
 
     Raises SceneError if the suffix, the space or the tone is unknown, the shape does not fit or the
     file cannot be made.

@@ -16,12 +16,10 @@ from clpt import device as dev
 from clpt import images, scalars
 from clpt.arrays import Image
 from clpt.choices import MOST_SAMPLES, Exposure
-from clpt.colour.view import View
 from clpt.denoise import needs
 from clpt.errors import LONGEST_WARNING, ClptError, DeviceError, SceneError, one_line
-from clpt.render.contents import Change, Contents, FilmOwner
-from clpt.render.device_film import Changes
-from clpt.render.editing.scene_edit import MaterialKey, ShapeKey
+from clpt.images.colour.view import View
+from clpt.render.edit.scene_edit import MaterialKey, ShapeKey
 from clpt.render.film.denoised_picture import DenoisedPicture
 from clpt.render.film.developed import Developed
 from clpt.render.film.layer_channels import write_picture
@@ -31,13 +29,15 @@ from clpt.render.film.saved_film import (
     classes_text,
     other_devices,
 )
-from clpt.render.locking import Stop, healing, synchronized
-from clpt.render.maker import Call, Discarded, Maker, Settle
+from clpt.render.film.state import join_ranges
+from clpt.render.makers.contents import Change, Contents, FilmOwner
+from clpt.render.makers.device_film import Changes
+from clpt.render.makers.locking import Stop, healing, synchronized
+from clpt.render.makers.maker import Call, Discarded, Maker, Settle
 from clpt.render.options import check_changes, check_scene
 from clpt.render.progress import Progress
 from clpt.render.stats import RenderStats, collect
 from clpt.render.wavefront import adaptive
-from clpt.render.wavefront.film_state import join_ranges
 from clpt.render.wavefront.wavefront import Counts, Wavefront
 from clpt.scene import Scene, checked_seed
 from clpt.scene.cameras import Camera
@@ -353,7 +353,7 @@ class FilmRenderer(FilmOwner, Pictures):
         The first of three ways that is possible is taken:
 
         1. Shapes that only move do so on the device, where trees are refitted to them; nothing is
-           waited for. See clpt.render.editing.moving.
+           waited for. See clpt.render.edit.moving.
         2. A camera of the same kind, and values of materials, take a few written words.
         3. Else the scene is lowered again: tables are written where they differ, trees are built
            where triangles do, kernels where others are needed.

@@ -11,9 +11,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from clpt import scalars
-from clpt.budget import Account
 from clpt.choices import MOST_SEED
 from clpt.errors import SceneError
+from clpt.files.budget import Account
 from clpt.scene import (
     cameras,
     integrators,

@@ -16,9 +16,9 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from clpt import input_files
 from clpt.arrays import on_device, on_host
 from clpt.errors import SceneError
+from clpt.files import input_files
 from clpt.scene import Scene
 from clpt.scene.materials import Material
 from clpt.scene.params import Kind, fields_of, params

@@ -1,6 +1,7 @@
 """Materials: what a surface does with light. Local frame: z is the shading normal.
 
-A leaf material has a pair kernels/bsdf/<kind>.cl. A composite (`two_sided`, `mask`, `blend`) has
+A leaf material has a pair kernels/materials/kinds/<kind>.cl. A composite (`two_sided`, `mask`,
+`blend`) has
 none: lowering turns it into rules by which a hit chooses its leaf.
 """
 

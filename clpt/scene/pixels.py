@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import images, spectra, spectral_exr
+from clpt import images, spectra
 from clpt.arrays import Floats32, on_host
+from clpt.images import spectral_exr
+from clpt.images.spectral_exr import SpectralImage
 from clpt.scene.roles import EMISSION, REAL, Role
 from clpt.scene.textures import Bitmap
-from clpt.spectral_exr import SpectralImage
 
 
 def spectral_image(texture: object, role: Role) -> SpectralImage | None:

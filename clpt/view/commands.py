@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from clpt.colour.tones import TONES
 from clpt.errors import ClptError
+from clpt.images.colour.tones import TONES
 from clpt.scalars import is_flag, is_number, is_whole
 from clpt.spectra import illuminants
 

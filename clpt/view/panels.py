@@ -11,11 +11,11 @@ from typing import Any, NoReturn
 import numpy as np
 
 from clpt import spectra
-from clpt.colour.tones import TONES
 from clpt.errors import SceneError
 from clpt.formats.native import forms
 from clpt.formats.native.cursor import Cursor
-from clpt.render.editing.scene_edit import Successors, edit_scene
+from clpt.images.colour.tones import TONES
+from clpt.render.edit.scene_edit import Successors, edit_scene
 from clpt.scene import Scene
 from clpt.scene.materials import LEAVES, Material, parts
 from clpt.scene.params import Kind, defaults, fields_of, params

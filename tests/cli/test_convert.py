@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clpt import images, spectral_exr
+from clpt import images
 from clpt.__main__ import run
-from clpt.spectral_exr import SpectralImage
+from clpt.images import spectral_exr
+from clpt.images.spectral_exr import SpectralImage
 
 COLOURS = np.random.default_rng(3).random((6, 8, 3)).astype(np.float32)
 ROOT = Path(__file__).resolve().parents[2]

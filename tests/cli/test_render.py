@@ -18,7 +18,7 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from clpt import __version__, device, images, spectral_exr
+from clpt import __version__, device, images
 from clpt.__main__ import run
 from clpt.cli.files import outputs
 from clpt.cli.files import targets as names
@@ -27,10 +27,10 @@ from clpt.cli.options.changes import SceneChanges
 from clpt.cli.process import stopping
 from clpt.cli.render import picture
 from clpt.cli.render.passes import render_samples
-from clpt.colour.view import View
 from clpt.errors import DeviceError, SceneError
 from clpt.formats import load
-from clpt.images import exr_files
+from clpt.images import exr_files, spectral_exr
+from clpt.images.colour.view import View
 from clpt.render.film import film_file
 from clpt.render.renderer import Renderer
 from clpt.spectra import read_sensor

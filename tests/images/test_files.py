@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from clpt import images, spectral_exr
+from clpt import images
 from clpt.errors import SceneError
-from clpt.images import sizes
+from clpt.images import sizes, spectral_exr
 from clpt.images.pillow import from_pillow
 from clpt.spectra import spaces
 

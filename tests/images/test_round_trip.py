@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from clpt import images, spectral_exr
+from clpt import images
+from clpt.images import spectral_exr
 from clpt.spectra import spaces
 
 # Of each format: the options, and how far off a value may be: relative, absolute.

@@ -9,9 +9,10 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
+from clpt.render.flow.check import check
+
 from ... import device as dev
 from ...device import share_compilers
-from ...render.analysis.checks import check
 from ...scene import Scene
 from ..options.applied import changed
 from ..options.scene_options import SceneOptions

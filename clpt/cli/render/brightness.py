@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
+from clpt.render.lights import power as light_power
+from clpt.render.lights.find import emissions_of
+from clpt.render.spectra.look import Look
+
 from ... import images
 from ...arrays import Floats32
 from ...geometry import analytic
 from ...geometry.lamps import plainly_lit
-from ...render.analysis.lights import light_power
-from ...render.analysis.lights.sources import emissions_of
-from ...render.analysis.look import Look
 from ...render.pictures import DevicePictures
 from ...scene import Scene
 from ...scene.lights import Light, PoweredLamp

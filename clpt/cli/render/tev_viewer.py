@@ -23,7 +23,7 @@ def showing(
     if address is None:
         yield lambda: None
         return
-    from ... import tev  # here: most renders show nothing
+    from clpt.images import tev  # here: most renders show nothing
 
     viewer = tev.Viewer(name, *address, tell=note)
     try:

@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import images, input_files, spectra, text
+from clpt import images, spectra
 from clpt.choices import Missing
 from clpt.errors import SceneError
+from clpt.files import input_files, text
 from clpt.formats.meshes.named_files import find
 from clpt.formats.missing import EVEN, GREY, grey_for
 from clpt.scene.lights import Area

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from clpt import budget
-from clpt import text as text_files
 from clpt.errors import SceneError, UnusedParameterError
+from clpt.files import budget
+from clpt.files import text as text_files
 from clpt.formats.located import Located
 from clpt.scalars import is_number
 

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from clpt import budget, measured
+from clpt import measured
 from clpt.choices import Missing
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
+from clpt.files import budget
 from clpt.formats import volumes
 from clpt.formats.missing import EVEN, GREY, grey_for
 from clpt.formats.native import forms, shape_files

@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from clpt import output_files, spectra
+from clpt import spectra
+from clpt.files import output_files
 from clpt.formats.native import forms
 from clpt.formats.native.reradiation import RERADIATIONS
 from clpt.formats.native.shape_files import FILES

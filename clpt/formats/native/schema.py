@@ -10,7 +10,8 @@ import json
 import sys
 from pathlib import Path
 
-from clpt import output_files, spectra
+from clpt import spectra
+from clpt.files import output_files
 from clpt.formats.native import forms, motion
 from clpt.formats.native.json_schema import (
     INDEX_FILE_OBJECT,

@@ -11,8 +11,9 @@ import dataclasses
 from collections.abc import Collection
 from typing import Any
 
-from clpt import input_files, spectra
+from clpt import spectra
 from clpt.errors import UnknownKindError
+from clpt.files import input_files
 from clpt.formats.colour import colour
 from clpt.formats.native.cursor import Cursor
 from clpt.images.transfer import from_hex

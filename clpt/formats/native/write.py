@@ -15,14 +15,16 @@ from typing import Any
 
 import numpy as np
 
-from clpt import images, measured, output_files, spectral_exr
+from clpt import images, measured
 from clpt.arrays import on_host
 from clpt.errors import SceneError
+from clpt.files import output_files
 from clpt.formats.meshes import particles, strands
 from clpt.formats.meshes.triangles import TANGENT_COLUMNS
 from clpt.formats.native import forms, motion
 from clpt.formats.native.read import VERSION
 from clpt.formats.native.shape_files import MESH_ARRAYS, in_file
+from clpt.images import spectral_exr
 from clpt.scene import Scene, kinds, materials, shapes
 from clpt.scene.media import Medium
 from clpt.scene.motion import Deformation

@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Image, Words
 from clpt.errors import SceneError
-from clpt.render.contract.features import SUM_WORDS
 from clpt.render.film.layers import layers_of
 from clpt.render.film.picture_form import PictureForm
 from clpt.render.film.pictures import Still
-from clpt.render.wavefront.film_state import (
+from clpt.render.film.state import (
     FILM_WORDS,
     SAMPLES_WORD,
     FilmState,
@@ -23,6 +22,7 @@ from clpt.render.wavefront.film_state import (
     light_group,
     numbers,
 )
+from clpt.render.records import SUM_WORDS
 
 
 class Developed(Still):

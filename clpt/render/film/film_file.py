@@ -22,13 +22,13 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
-from clpt import input_files, output_files
 from clpt.errors import SceneError
+from clpt.files import input_files, output_files
 from clpt.images import exr_files
-from clpt.render.contract.layer_names import LayerNames
 from clpt.render.film.picture_form import PictureForm
 from clpt.render.film.saved_film import Origin, SavedFilm, Session
-from clpt.render.wavefront.film_state import FilmState
+from clpt.render.film.state import FilmState
+from clpt.render.records.layer_names import LayerNames
 from clpt.scene.fingerprint import Fingerprint
 from clpt.spectra.spaces import chromaticities
 

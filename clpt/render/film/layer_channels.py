@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from clpt import images, spectral_exr
+from clpt import images
 from clpt.arrays import Image
 from clpt.choices import Exposure
-from clpt.colour.view import View
-from clpt.images import exr_files
+from clpt.images import exr_files, spectral_exr
+from clpt.images.colour.view import View
 from clpt.render.film import cryptomatte
 from clpt.render.film.denoised_picture import DenoisedPicture
 from clpt.render.film.layers import GROUP, matte_names

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from clpt.arrays import Image
 from clpt.errors import SceneError
+from clpt.images.spectral_exr import SpectralImage
 from clpt.render.film.picture_form import PictureForm
-from clpt.spectral_exr import SpectralImage
 
 if TYPE_CHECKING:
     from typing_extensions import Self

@@ -13,7 +13,7 @@ these samples do not go into the picture.
 Light paths, where the scene has them, reach all pixels: see clpt.render.wavefront.light_rounds.
 
 For a picture that is denoised what is left after that decides, see
-clpt.render.film.denoised_noise. That falls slower than noise does while samples are added, so
+clpt.render.wavefront.denoised_noise. That falls slower than noise does while samples are added, so
 nothing is decided ahead.
 """
 
@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
-from clpt.render.contract.features import Features
+from clpt.render.records import Features
 from clpt.render.wavefront.light_rounds import LightRounds
 from clpt.render.wavefront.noise_meter import NoiseMeter, divide
 from clpt.render.wavefront.tracer import OnBatch, Selection, Tracer

@@ -11,14 +11,14 @@ from clpt import bvh, device
 from clpt.arrays import on_host
 from clpt.device.buffers import Buffers
 from clpt.records import TABLES
-from clpt.render.lowering.device_grids import POINT_WORDS, CloudDensity, Values
-from clpt.render.lowering.scene import Lowered
-from clpt.render.lowering.textures.noise import PERMUTATION
+from clpt.render.flow.scene_to_tables import Lowered
+from clpt.render.media.device_grids import POINT_WORDS, CloudDensity, Values
+from clpt.render.textures.noise import PERMUTATION
 from clpt.render.wavefront import trees
 from clpt.render.wavefront.strategy import Strategy
 
-_BRICKS = "motion/brick_density.cl"
-_CLOUD = "motion/cloud_density.cl"
+_BRICKS = "stage/brick_density.cl"
+_CLOUD = "stage/cloud_density.cl"
 UPLOADED = tuple(name for name in TABLES if name != "instances")  # that one is of the trees
 
 

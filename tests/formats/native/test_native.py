@@ -14,7 +14,7 @@ from clpt import spectra
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
 from clpt.formats import load, native
 from clpt.formats.native import schema
-from clpt.render.lowering.scene import lower
+from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import KINDS, Scene, cameras, integrators, lights, materials, shapes, textures
 
 ROOT = Path(__file__).parents[3]

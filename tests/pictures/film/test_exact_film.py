@@ -17,7 +17,7 @@ from clpt.__main__ import run
 from clpt.cli.render.refused import refusals
 from clpt.errors import SceneError
 from clpt.images import exr_files
-from clpt.render.wavefront.film_state import FILM_WORDS, SAMPLES_WORD, SUM_WORDS, FilmState
+from clpt.render.film.state import FILM_WORDS, SAMPLES_WORD, SUM_WORDS, FilmState
 from clpt.render.wavefront.wavefront import Counts
 from clpt.scene import Film, Scene, lights
 from clpt.scene.cameras import Perspective

@@ -15,8 +15,8 @@ import clpt
 from clpt import spectra
 from clpt import transforms as tf
 from clpt.geometry.triangles import triangulate
-from clpt.render.analysis import glow
-from clpt.render.analysis.bricks import Glow
+from clpt.render.lights import glow
+from clpt.render.lights.bricks import Glow
 from clpt.scene import Film, Scene, media
 from clpt.scene.cameras import Orthographic, Perspective
 from clpt.scene.integrators import Box, Direct, Whitted

@@ -12,8 +12,8 @@ import pytest
 
 import clpt
 from clpt.errors import SceneError
-from clpt.render.analysis import guides, worth
-from clpt.render.lowering.scene import Lowered, lower
+from clpt.render.flow.scene_to_tables import Lowered, lower
+from clpt.render.transport import guides, worth
 from clpt.render.trials import cost, trial
 from clpt.scene import Scene
 from clpt.scene.integrators import Auto, Integrator, Path
