@@ -21,22 +21,49 @@ OFFLINE := "make: pip could not install clpt; the lines above tell why (is there
 # scene files that others made: see bench/assets.py
 ASSETS ?= ../shared/assets
 
-.PHONY: help demo test test-all bench assets-report lint docs clean
+# the lowest versions that pyproject.toml allows, in an environment of their own
+LOWEST := .venv-lowest
+LOWEST_TESTS := tests/test_lowest.py tests/test_public.py tests/files/test_input_files.py tests/images \
+	tests/formats/test_fuzz_formats.py tests/formats/test_files_that_change.py \
+	tests/formats/meshes/test_mesh.py tests/formats/gltf/test_draco.py tests/formats/test_vdb.py \
+	tests/formats/test_volumes.py tests/device/test_program.py tests/pictures/film/test_resume.py
+LOWEST_SCENES := cornell_box wine_and_jade cloud prism color_checker oil_film mist
+
+.PHONY: help demo test test-all test-lowest bench assets-report lint docs clean
 help:
 	@echo "make demo      render a scene to demo.exr and demo.png"
 	@echo "make test      the tests;  make test-all  the slow ones too"
+	@echo "make test-lowest  some of them with the lowest versions of all that clpt needs"
 	@echo "make assets-report  which of the scenes in ASSETS=$(ASSETS) render, and how fast"
 	@echo "make docs      the documentation as a site, in site/"
 	@echo "make bench     measure;  make lint  ruff and mypy;  make clean  remove .venv"
 
 demo: $(VENV)/.run
 	$(BIN)/clpt render scenes/three_spheres -o demo.exr -o demo.png
+	@echo "make: demo.png is there. Go on by typing:"
+	@echo "          . $(VENV)/bin/activate"
+	@echo "          clpt scenes"
 
 test: $(VENV)/.dev
 	$(BIN)/python -m pytest -q $(SHARED)
 
 test-all: $(VENV)/.dev
 	$(BIN)/python -m pytest -q $(SHARED) -m ""
+
+# These versions have wheels for Python 3.10 and 3.11 alone.
+test-lowest: $(VENV)/.run
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] > (3, 11))' \
+		|| { echo "make: the lowest versions are for Python 3.10 or 3.11; make PYTHON=python3.11 $@"; exit 1; }
+	$(PYTHON) -m venv --clear $(LOWEST)
+	$(LOWEST)/bin/python -m pip --disable-pip-version-check install --quiet --prefer-binary \
+		$$($(PYTHON) tests/lowest.py) hypothesis pytest pytest-rerunfailures scipy
+	$(LOWEST)/bin/python -m pip --disable-pip-version-check install --quiet --no-deps --editable .
+	$(LOWEST)/bin/python -m pip --disable-pip-version-check list
+	$(LOWEST)/bin/python -m pytest -q $(LOWEST_TESTS)
+	for scene in $(LOWEST_SCENES); do \
+		$(LOWEST)/bin/clpt render scenes/$$scene --size 32x24 --spp 2 --quiet -o $(LOWEST)/$$scene.png \
+			|| exit 1; \
+	done
 
 bench: $(VENV)/.dev
 	ASSETS=$(ASSETS) $(BIN)/python -m bench
@@ -54,7 +81,7 @@ docs: $(VENV)/.docs
 	@echo "make: see site/index.html"
 
 clean:
-	rm -rf $(VENV)
+	rm -rf $(VENV) $(LOWEST)
 
 $(BIN)/python:
 	@command -v $(PYTHON) >/dev/null || $(call apt,python3) \

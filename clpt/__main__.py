@@ -20,6 +20,7 @@ def main() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # numpy's threads take .04 s to start
     try:
         stopping.raise_at_signals()
+        stopping.end_at_second()
         status = run(sys.argv[1:])
     except KeyboardInterrupt as error:  # before `run` heeds it, or a second one after it did
         status = stopping.ended_by(error)

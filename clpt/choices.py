@@ -13,6 +13,7 @@ SAMPLERS = ("sobol", "zsobol", "independent")
 AUTO = "auto"  # light paths as suits the scene
 MOST_LIGHT_PATHS = 64  # for a sample of the camera
 MOST_SAMPLES = 2**31 - 1  # of a pixel
+MOST_SEED = 2**32 - 1  # of random numbers
 LAYERS = (
     "albedo", "shading_normal", "geometric_normal", "depth", "z", "position", "uv", "motion",
     "shape_id", "primitive_id", "material_id", "denoising_albedo", "denoising_normal", "direct",

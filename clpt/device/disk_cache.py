@@ -17,14 +17,14 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import platformdirs
 
-from clpt import output_files
 from clpt.device import forking
+from clpt.files import output_files, ownership
 
 from .source import Source
 
@@ -35,6 +35,13 @@ log = logging.getLogger(__name__)
 
 LIMIT = 2**30  # bytes
 _PARTS = ("programs", "failed")  # the folders that are kept within LIMIT
+_TEMPORARY = () if os.name != "posix" else (Path("/tmp"), Path("/var/tmp"))  # beside Python's own
+# Folders in the user's cache folder whose files drivers and libraries run: of PyOpenCL, of PoCL,
+# Intel, Mesa, AMD and NVIDIA.
+_OF_OTHERS = (
+    "pytools", "pyopencl", "pocl", "neo_compiler_cache", "mesa_shader_cache",
+    "mesa_shader_cache_db", "rusticl", "comgr", "nvidia",
+)  # fmt: skip
 WAIT = 300.0  # [s] for what another process makes
 _STEP = LIMIT // 16  # bytes that a process writes before it looks at the folder's size again
 
@@ -54,12 +61,29 @@ def folder() -> Path:
 def user_folder(name: str | None = None) -> Path:
     """Return the user's folder for caches, or that of a program in it.
 
-    It is a temporary one, with one warning, for a user without a home.
+    It is a temporary one, with one warning, for a user without a home, and where other users could
+    put something into it: drivers and PyOpenCL run what they find there. XDG_CACHE_HOME, by which
+    they find it, is set so then.
     """
     try:
-        return platformdirs.user_cache_path(name, appauthor=False)
+        wanted = platformdirs.user_cache_path(appauthor=False)
+        chosen = _safe_home(wanted)
     except RuntimeError:  # HOME is not set, and the system has no entry for the user
         return _without_home() / (name or "")
+    if chosen != wanted:
+        os.environ["XDG_CACHE_HOME"] = str(chosen)
+    return platformdirs.user_cache_path(name, appauthor=False)
+
+
+@functools.cache
+def _safe_home(wanted: Path) -> Path:
+    """Return the user's folder for caches, or a temporary one if it cannot be used."""
+    reason = unfit(wanted, _OF_OTHERS)
+    if reason is None:
+        return wanted
+    other = temporary_folder() / "xdg"
+    log.warning("the cache folder %s %s; %s is used instead", wanted, reason, other)
+    return other
 
 
 def has_home() -> bool:
@@ -81,7 +105,7 @@ def _without_home() -> Path:
 @functools.cache
 def private_folder(wanted: Path) -> Path:
     """Return `wanted`, made where it is missing, or a temporary folder if it cannot be used."""
-    reason = _unfit(wanted)
+    reason = unfit(wanted)
     if reason is None:
         return wanted
     other = temporary_folder() / wanted.name
@@ -93,21 +117,39 @@ def private_folder(wanted: Path) -> Path:
 def temporary_folder() -> Path:
     """Return a temporary folder for caches, which only this user can write."""
     user = os.getuid() if hasattr(os, "getuid") else "user"
-    wanted = Path(tempfile.gettempdir()) / f"clpt-{user}"
-    return wanted if _unfit(wanted) is None else Path(tempfile.mkdtemp(prefix="clpt-"))
+    first = Path(tempfile.gettempdir())
+    for root in (first, *_TEMPORARY):
+        if unfit(root / f"clpt-{user}") is None:
+            return root / f"clpt-{user}"
+    safe = (root for root in (first, *_TEMPORARY) if _why_unsafe(root / "new") is None)
+    return Path(tempfile.mkdtemp(prefix="clpt-", dir=next(safe, first)))
 
 
-def _unfit(path: Path) -> str | None:
-    """Return why a folder cannot hold a cache; None if it can. It is made where it is missing."""
+def _why_unsafe(path: Path) -> str | None:
+    """Return how other users could put something in the place of a folder, or why none can tell."""
     try:
+        return ownership.fault(path)
+    except OSError as error:
+        return f"cannot be read ({error.strerror or error})"
+
+
+def unfit(path: Path, parts: Collection[str] | None = None) -> str | None:
+    """Return why a folder cannot hold a cache; None if it can. It is made where it is missing.
+
+    Folders in it are to be safe too: all of them, or those of the names in `parts`.
+    """
+    try:
+        if reason := ownership.fault(path):
+            return reason
         path.mkdir(mode=0o700, parents=True, exist_ok=True)
         output_files.check_folder(path)
         if os.name != "posix":
             return None
-        for part in (path, *(one for one in path.iterdir() if one.is_dir())):
+        inside = path.iterdir() if parts is None else (path / name for name in parts)
+        for part in (path, *(one for one in inside if one.is_dir())):
             if {part.lstat().st_uid, part.stat().st_uid} != {os.getuid()}:
                 return "belongs to another user"
-            if part.stat().st_mode & 0o022:
+            if ownership.others_write(part.stat()):
                 return f"can be written by others (see: chmod go-w {part})"
     except OSError as error:
         return f"cannot be written ({error.strerror or error})"

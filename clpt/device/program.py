@@ -48,13 +48,26 @@ class Argument:
         return self.space == "private" and not self.type.endswith("*")
 
     def value(self, value: Any) -> Any:
-        """Return a value as the driver takes it: scalars and vectors in the argument's type."""
-        if not self.by_value or isinstance(value, (np.void, np.ndarray)):
+        """Return a value as the driver takes it: scalars and vectors in the argument's type.
+
+        Raises TypeError for a number in the place of a pointer.
+        """
+        if not self.by_value:
+            if isinstance(value, (int, float, np.number)):  # older versions of PyOpenCL take it
+                raise TypeError("a pointer takes a buffer, or None")
+            return value
+        if isinstance(value, (np.void, np.ndarray)):
             return value
         vector = _VECTOR.match(self.type)
         base = _SCALARS.get(vector[1] if vector else self.type)
         if base is None:  # a struct, an image or a sampler
             return value
+        kind: np.dtype[Any] = np.dtype(base)
+        if kind.kind in "iu":  # NumPy before 2 cuts what does not fit
+            limits = np.iinfo(kind.str)
+            given = value if vector else (value,)
+            if not all(limits.min <= number <= limits.max for number in given):
+                raise OverflowError(f"it goes from {limits.min} to {limits.max}")
         if vector is None:
             return base(value)
         length = int(vector[2])

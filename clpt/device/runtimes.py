@@ -9,8 +9,11 @@ that names the library where it is, repeats every ICD file of the system, and po
 OCL_ICD_VENDORS there while the loader reads it. Where the user has set OCL_ICD_VENDORS, it stays as
 it is: whoever sets it wants exactly those drivers.
 
-Where the user's caches cannot be written, or the user has no home, PoCL lists no device, and
-PyOpenCL runs no kernel. clpt then gives its process a temporary folder for caches.
+Drivers and PyOpenCL run what their caches hold. So one rule is for all of them, clpt's own too: no
+other user can write the folder, nor put something in its place (`disk_cache.unfit`). Where that
+does not hold, where a cache cannot be written (PoCL lists no device then, and PyOpenCL runs no
+kernel), and for a user without a home, clpt gives its process another folder. PoCL's cache is
+within clpt's own, unless the user has set a safe one.
 """
 
 from __future__ import annotations
@@ -21,14 +24,14 @@ import importlib.metadata
 import logging
 import os
 import sys
-import tempfile
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 
 import pyopencl as cl
 
-from clpt import output_files
 from clpt.device import disk_cache
+from clpt.files import output_files, ownership
 
 log = logging.getLogger(__name__)
 
@@ -37,6 +40,12 @@ ADVICE = (
     'or a CPU runtime with pip install "clpt[cpu]"'
 )
 VARIABLE = "OCL_ICD_VENDORS"
+# Variables by which users tell drivers where caches are: PoCL, NVIDIA, Intel's two, Mesa, AMD.
+CACHES = (
+    "POCL_CACHE_DIR", "CUDA_CACHE_PATH", "NEO_CACHE_DIR", "cl_cache_dir", "MESA_SHADER_CACHE_DIR",
+    "AMD_COMGR_CACHE_DIR",
+)  # fmt: skip
+_NVIDIA = "~/.nv/ComputeCache"  # where its driver has it else
 _SYSTEM = Path("/etc/OpenCL/vendors")
 _WHEEL, _LIBRARY = "intel-opencl-rt", "libintelocl.so"
 
@@ -92,18 +101,29 @@ def _make_caches_writable() -> None:
     """Set the variables by which runtimes find their caches, once a process."""
     if not disk_cache.has_home():
         os.environ["XDG_CACHE_HOME"] = str(disk_cache.user_folder())
-    for variable, wanted in (
-        ("XDG_CACHE_HOME", disk_cache.user_folder()),
-        ("POCL_CACHE_DIR", Path(os.environ.get("POCL_CACHE_DIR", tempfile.gettempdir()))),
-    ):
-        nearest = next(path for path in (wanted, *wanted.parents) if path.exists())
-        try:
-            output_files.check_folder(nearest)
-        except OSError as error:
-            other = disk_cache.temporary_folder() / variable.partition("_")[0].lower()
-            os.environ[variable] = str(other)
-            message = "the cache folder %s cannot be written (%s); %s is used instead"
-            log.warning(message, wanted, error, other)
+    own = disk_cache.folder()
+    for variable in CACHES:
+        if given := os.environ.get(variable):
+            os.environ[variable] = str(disk_cache.private_folder(Path(given)))
+    if not os.environ.get("POCL_CACHE_DIR"):
+        os.environ["POCL_CACHE_DIR"] = str(_made(own / "pocl"))
+    if not os.environ.get("CUDA_CACHE_PATH") and not _is_safe(_NVIDIA):
+        os.environ["CUDA_CACHE_PATH"] = str(_made(own / "nvidia"))
+
+
+def _made(folder: Path) -> Path:
+    """Return a folder in clpt's own, made where it is missing and can be."""
+    with suppress(OSError):
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    return folder
+
+
+def _is_safe(path: str) -> bool:
+    """Return whether a folder in the user's home is this user's alone."""
+    try:
+        return ownership.fault(Path(path).expanduser()) is None
+    except (OSError, RuntimeError):  # RuntimeError: a user without a home
+        return False
 
 
 def wheel_library() -> Path | None:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Floats, Integers, on_host
 from clpt.errors import SceneError
+from clpt.files import budget
 from clpt.scene.shapes import SdfGrid
 
 MOST_PIECES = 16
@@ -148,6 +149,7 @@ def _tetrahedra(
     Their corners (n, 4, 3) on the fine grid; the cell of each, counted from `first`; where its
     corners are in it (n, 4, 3); the distances there (n, 4).
     """
+    budget.check_time()
     side = pieces + 1
     lattice = np.indices((side,) * 3).reshape(3, -1).T
     points = cells[:, None] * pieces + lattice

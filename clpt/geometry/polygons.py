@@ -16,7 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.arrays import Floats, Integers
+from clpt.errors import SceneError
+from clpt.files import budget
 
+MOST_CORNERS = 24_000  # of a polygon whose ears are clipped: time may grow with their square
 CHUNK = 1 << 18  # corners that are tested at a time: in float64 they take 200 bytes each
 CANCELLED = 1e-9  # of a polygon's triangles: a sum of their areas that has no direction
 ROUNDING = 1e-7  # of a polygon's area: a triangle that is turned over by less is a line
@@ -31,6 +34,9 @@ def triangulate(
     their vertices, one polygon after the other. A polygon of n corners gives n - 2 triangles, one
     of fewer than 3 none; triangles turn as their polygon does. A polygon whose corners name no
     vertex, or one that is not finite, is a fan.
+
+    Raises SceneError for a polygon of more than MOST_CORNERS corners that no fan fits, and where
+    the load has no more time.
     """
     counts = np.asarray(counts, np.int64)
     starts = np.cumsum(counts) - counts
@@ -127,6 +133,10 @@ def _mend(
     wrong = np.logical_or.reduceat(turned, first) & np.isfinite(square)
     wrong &= square > (CANCELLED * whole) ** 2
     for i in np.flatnonzero(wrong & np.logical_and.reduceat(usable, begins)):
+        if counts[i] > MOST_CORNERS:
+            message = f"a polygon that is not convex has {counts[i]:,} corners, at most "
+            raise SceneError(f"{message}{MOST_CORNERS:,} are read: save it as triangles")
+        budget.check_time()
         ears = _clip(outline[begins[i] : begins[i] + counts[i]], normals[i])
         if ears is not None:
             triangles[rows[i] : rows[i] + counts[i] - 2] = starts[i] + ears

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
+from clpt.files import budget
 from clpt.geometry.shapes import where
 from clpt.scene import subdivision
 from clpt.scene.pixels import pixels
@@ -23,6 +24,7 @@ from clpt.scene.textures import Bitmap
 Parts = tuple[Any, Any, Any, Any]
 DEEPEST = 10
 MOST_TRIANGLES = 1 << 25
+PER_TRIANGLE = 350  # bytes of memory for each displaced one, while they are made
 
 
 def is_refined(mesh: Mesh) -> bool:
@@ -140,10 +142,12 @@ def _displaced(mesh: Mesh, parts: Parts, name: str) -> Parts:
     if len(faces) * 4.0**levels > MOST_TRIANGLES:
         message = f"edges of {mesh.displacement_edge:g} m make more than {MOST_TRIANGLES:,} "
         raise SceneError(message + "triangles; raise displacement_edge", where=name)
+    budget.check(PER_TRIANGLE * len(faces) * 4**levels, f"{name}: its displacement")
     if normals is None:
         places, welded, own = _welded(points, faces)
         normals = _smooth(places, welded)[own]
     for _ in range(levels):
+        budget.check_time()
         edges, faces = _halved(faces, len(points))
         points, normals, uvs = (_grown(one, edges) for one in (points, normals, uvs))
     length = np.linalg.norm(normals, axis=1, keepdims=True)
@@ -170,7 +174,7 @@ def _smooth(points: Floats, faces: Integers) -> Floats:
 
 
 def heights(image: Bitmap, uvs: Floats) -> Floats:
-    """Return what an image says at uvs (n, 2), as kernels/texture/bitmap.cl reads numbers: (n,)."""
+    """Return what an image says at uvs (n, 2), as textures/kinds/bitmap.cl reads numbers: (n,)."""
     values = pixels(image, REAL)[..., 0].astype(np.float64)
     to_uv = np.asarray(image.to_uv, np.float64)
     x, y = ((np.c_[uvs, np.ones(len(uvs))] @ to_uv.T)[:, :2] * [1.0, -1.0] + [0.0, 1.0]).T

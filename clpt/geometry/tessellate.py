@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from clpt.errors import SceneError
+from clpt.files import budget
 from clpt.geometry.analytic import across, row
 from clpt.scene.shapes import Cylinder, Mesh, Shape, Sphere
 
@@ -42,6 +43,8 @@ def tessellate(shape: Sphere | Cylinder) -> Tessellated:
         normals = circle @ np.stack(across(axis / np.linalg.norm(axis)))
         vertices = np.asarray(shape.p0) + uvs[:, 1:] * axis + shape.radius * normals
     faces = _quads(along)
+    budget.take_made((vertices, normals, uvs, faces), f"{shape.kind} {shape.name}, in triangles")
+    budget.check_time()
     if isinstance(shape, Sphere):  # v runs down; at the poles one half of a quad has no area
         centre = faces[1:-1].reshape(-1, 3)
         faces = np.concatenate([faces[0, :, 1], centre, faces[-1, :, 0]])

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from clpt import transforms
 from clpt.arrays import Faces, Points, Words, on_host, single
 from clpt.errors import SceneError
+from clpt.files import budget
 from clpt.geometry import distance_grids, refining
 from clpt.geometry.shape_records import ONE_OF
 from clpt.geometry.shapes import placement, where
@@ -29,6 +30,7 @@ SUMMED = 1 << 20  # triangles whose normals are summed at a time
 
 FAR = 2.0**61  # from where on the product of two edges may be beyond float32
 LEAST_CROSS = 2.0**-75  # up to which a square is zero in float32
+PER_KEY = 32  # bytes of a vertex at each time: place, normal, uv
 CHUNK = 1 << 16  # rows that are looked at at a time: what is made of them stays in the cache
 
 # Corners of the cube's sides in the order of _CORNER_UVS, as Mitsuba has them.
@@ -99,7 +101,8 @@ def keyed(
     else:
         alike = [at_time(shape, time) for time in times]
         at_all = [_in_world(one, alike) for one in alike]
-    _, faces, _, uvs = at_all[0]
+    vertices, faces, _, uvs = at_all[0]
+    budget.check(PER_KEY * count * len(vertices), f"{where(shape)} at {count:,} times")
     if any(not np.array_equal(one[1], faces) for one in at_all):
         raise SceneError("its triangles are others at other times", where=where(shape))
     solid = np.any([_solid(one[0], faces) for one in at_all], axis=0)

@@ -14,8 +14,8 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
-from clpt import budget, output_files
 from clpt.errors import SceneError
+from clpt.files import budget, input_files, output_files
 from clpt.images import sizes
 
 Channels = Mapping[str, NDArray[Any]]
@@ -34,8 +34,10 @@ def exr_name(path: str | Path) -> str:
 def opened(path: Path, header_only: bool = False) -> Iterator[Sequence[Any]]:
     """The parts of a file, whose `header` and `channels` are those of the library.
 
-    Raises what the library does, from RuntimeError to MemoryError.
+    Raises SceneError for what is no regular file, else what the library does, from RuntimeError to
+    MemoryError.
     """
+    input_files.regular(path)
     with OpenEXR.File(exr_name(path), separate_channels=True, header_only=header_only) as file:
         yield file.parts
 
@@ -75,6 +77,21 @@ def window(header: Header, name: str) -> Window:
     """The "dataWindow" or the "displayWindow" of a part."""
     (x0, y0), (x1, y1) = header[name]
     return int(x0), int(y0), int(x1) + 1, int(y1) + 1
+
+
+def windows(
+    shape: tuple[int, ...], place: tuple[int, int, int, int] | None
+) -> dict[str, tuple[float, ...]]:
+    """The attributes that say where a part (h, w, ..) of a whole picture lies: first and last x, y.
+
+    place: the column and the row where it begins, and the size of the whole, (x, y, width, height);
+    None: it is the whole, which needs no attributes.
+    """
+    if place is None:
+        return {}
+    x, y, width, height = place
+    data = (x, y, x + shape[1] - 1, y + shape[0] - 1)
+    return {"dataWindow": data, "displayWindow": (0, 0, width - 1, height - 1)}
 
 
 def check(path: Path, header: Header) -> None:
@@ -125,6 +142,7 @@ def _some(path: Path, header: Header, names: Sequence[str]) -> Channels:
     """
     budget.check(_size(header, names), _WHAT, path)
     x0, y0, x1, y1 = window(header, "dataWindow")
+    input_files.regular(path)
     file = OpenEXR.InputFile(exr_name(path))
     try:
         about = file.header()["channels"]
@@ -201,8 +219,12 @@ def _unpacked(form: str, file: BinaryIO) -> tuple[Any, ...]:
 
 
 def write_channels(path: Path, metadata: Mapping[str, Any], channels: Channels) -> None:
-    """Write channels (h, w) by name, and attributes, as an .exr."""
+    """Write channels (h, w) by name, and attributes, as an .exr; windows are as of `windows`."""
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    for name in ("dataWindow", "displayWindow"):
+        if name in metadata:
+            first, last = np.array(metadata[name], np.int32).reshape(2, 2)
+            header[name] = first, last
     with output_files.replacing(path) as partial:
         OpenEXR.File({**metadata, **header}, dict(channels)).write(exr_name(partial))
         _check_whole(partial)

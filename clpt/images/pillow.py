@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import budget
 from clpt.errors import SceneError
+from clpt.files import budget, input_files
 from clpt.images import png_files, sizes
 from clpt.images.stored import Stored
 
@@ -34,6 +34,8 @@ SUFFIXES = (".png", ".jpg", ".jpeg", ".tga", ".bmp", ".webp", ".gif", ".tif", ".
 NAMES = {"WEBP": "WebP"}  # of formats, where people write them in another way
 ORIENTATION = 0x0112  # the tag of Exif
 PHOTOMETRIC, WHITE_IS_ZERO = 262, 0  # a tag of TIFF, and its value
+START_OF_SCAN = b"\xff\xda"  # a marker of JPEG
+SCANS, SCANNED_PIXELS = 20, 1 << 31  # what a JPEG may have of the one or of the other
 LEFT_OUT = "is left out: its pixels are taken as they are stored"
 
 Source = Path | bytes
@@ -58,6 +60,7 @@ def decoded(
     """
     with _opened(source, formats) as image:
         (admit or partial(sizes.check_size, _file(source)))(image.width, image.height)
+        _check_scans(source, image)
         with budget.lending(_bytes(image), "its pixels", _file(source)):
             made = _pixels(source, formats, image)
         # Only now: Pillow decodes an image to find its Exif.
@@ -75,6 +78,17 @@ def decoded(
         notes=notes,
         colour_notes=(*said.notes, *colour_notes),
     )
+
+
+def _check_scans(source: Source, image: ImageFile) -> None:
+    """Raise SceneError for a JPEG whose scans, each of all its pixels, would take long."""
+    if not image.info.get("progressive"):
+        return
+    data = source if isinstance(source, bytes) else input_files.read_bytes(source)
+    scans = data.count(START_OF_SCAN)
+    if scans > SCANS and scans * image.width * image.height > SCANNED_PIXELS:
+        message = f"has {scans} scans of {image.width}x{image.height} pixels; at most {SCANS} are "
+        raise SceneError(message + "read of so many: save it anew", file=_file(source))
 
 
 def _pixels(source: Source, formats: Sequence[str], image: ImageFile) -> Stored:
@@ -206,9 +220,8 @@ def _bytes_as(image: ImageFile, raw: str) -> NDArray[np.uint8]:
 def _notes(image: ImageFile) -> tuple[str, ...]:
     """Return notes on pictures and orientations of a file that are left out."""
     made = []
-    frames = getattr(image, "n_frames", 1) if image.format != "MPO" else 1
-    if frames > 1:
-        made.append(f"its first picture of {frames} is taken")
+    if image.format != "MPO" and getattr(image, "is_animated", False):  # n_frames reads them all
+        made.append("its first picture of several is taken")
     turned = image.getexif().get(ORIENTATION, 1) if image.format != "TIFF" else 1
     if turned not in (0, 1):
         made.append(f"its Exif orientation {turned} {LEFT_OUT}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import numbers
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import FunctionType, ModuleType
@@ -11,7 +10,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from clpt import scalars
+from clpt.choices import MOST_SEED
 from clpt.errors import SceneError
+from clpt.files.budget import Account
 from clpt.scene import (
     cameras,
     integrators,
@@ -94,7 +96,8 @@ class Scene:
     from; film: size, mode, filter and colours of the picture. spp: samples of a pixel, for
     `clpt.render`; noise: below which it gets no more, None for all, see
     clpt.render.wavefront.adaptive; seed: of the random numbers. name: for messages and files.
-    warnings: what a loader had to pass over; extra: what else it found, for people.
+    warnings: what a loader had to pass over; extra: what else it found, for people;
+    account: of what loading it has taken, from which making it ready draws too.
 
     Raises SceneError for `spp` that is no whole number above zero, and `noise` likewise.
     """
@@ -111,6 +114,7 @@ class Scene:
     name: str = ""
     warnings: list[str] = field(default_factory=list)
     extra: dict[str, Any] = field(default_factory=dict)
+    account: Account | None = field(default=None, repr=False, compare=False)
 
     # Makes the picture that a notebook shows: given by clpt/__init__, as scenes know no renderer.
     _picture: ClassVar[Callable[[Scene], bytes] | None] = None
@@ -211,10 +215,15 @@ class Scene:
     def __post_init__(self) -> None:
         self.shapes, self.lights = _listed(self.shapes, "shapes"), _listed(self.lights, "lights")
         check_parts(self)
-        if isinstance(self.spp, bool) or not isinstance(self.spp, int) or self.spp < 1:
-            raise SceneError(f"must be a whole number above zero, not {self.spp!r}", where="spp")
+        self.spp = scalars.whole(self.spp, 1, where="spp")
+        self.seed = checked_seed(self.seed)
         if self.noise is not None:
-            check_noise(self.noise)
+            self.noise = checked_noise(self.noise)
+
+
+def checked_seed(seed: object) -> int:
+    """Return a seed. Raises SceneError for no whole number of 32 bits: kernels know no others."""
+    return scalars.whole(seed, 0, MOST_SEED, where="seed")
 
 
 def check_parts(scene: Scene) -> None:
@@ -250,9 +259,9 @@ def _check_kind(value: object, base: type[Kind], where: str) -> None:
         raise SceneError(message, where=where)
 
 
-def check_noise(noise: Any) -> None:
-    """Raise SceneError for what is no limit of noise."""
-    number = isinstance(noise, numbers.Real) and not isinstance(noise, bool)
-    if not number or not 0.0 < noise < math.inf:
+def checked_noise(noise: object) -> float:
+    """Return a limit of noise. Raises SceneError for what is none."""
+    if not scalars.is_number(noise) or not 0.0 < noise < math.inf:
         message = f"must be a number above zero, such as 0.02, not {noise!r}"
         raise SceneError(message, where="noise")
+    return float(noise)

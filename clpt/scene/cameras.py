@@ -25,7 +25,9 @@ def _looking(
 ) -> dict[str, Any]:
     """Return the placement of a camera at `origin` that looks at `target`."""
     if origin is None or target is None:
-        raise SceneError("give origin and target, both", where="target" if origin else "origin")
+        raise SceneError(
+            "give origin and target, both", where="origin" if origin is None else "target"
+        )
     return {"to_world": transforms.look_at(origin, target, up)}
 
 
@@ -116,8 +118,6 @@ class Lens(Camera):
     unit: float = real(1e-3, "a millimetre of the lens in the scene", "m", low=1e-12)
 
     def check(self) -> None:
-        if isinstance(self.blades, bool) or not isinstance(self.blades, int):
-            raise SceneError("must be a whole number", where="lens.blades")
         if not (self.blades == 0 or 3 <= self.blades <= MOST_BLADES):
             raise SceneError(
                 f"must be 0 or 3 to {MOST_BLADES}, not {self.blades}", where="lens.blades"
@@ -148,7 +148,12 @@ class Orthographic(Camera):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Spherical(Camera):
-    """All directions: the film is a map in latitude and longitude, +y up, +z in its middle."""
+    """All directions: the film is a map in latitude and longitude, +y up, +z in its middle.
+
+    The middle of row i of h rows lies at pi (i + 1/2) / h from +y. Rows of an `envmap` lie at
+    pi i / (h - 1), from pole to pole: a film of few rows that becomes one is stretched by half a
+    row at the poles, by 3 % of the height with 16 rows and nothing to see with 1024.
+    """
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -16,8 +16,9 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from clpt import input_files
+from clpt.arrays import on_device, on_host
 from clpt.errors import SceneError
+from clpt.files import input_files
 from clpt.scene import Scene
 from clpt.scene.materials import Material
 from clpt.scene.params import Kind, fields_of, params
@@ -30,7 +31,14 @@ DIGEST = "sha256:"  # begins a value that stands for many
 SHORT = 4  # numbers of a list up to which it is shown
 MOST_LISTED = 64  # members of a list up to which each is shown in full
 MOST_DIGESTS = 4096  # up to which each has a digest; more have one together
-WITHOUT_SAMPLES = ("spp", "noise", "name", "warnings", "extra")  # of a scene: they change no sample
+WITHOUT_SAMPLES = (
+    "spp",
+    "noise",
+    "name",
+    "warnings",
+    "extra",
+    "account",
+)  # of a scene: they change no sample
 ARRAYS: dict[str, DTypeLike] = {  # how the lowering reads what a host parameter holds, by its form
     "rows2": np.float32, "rows3": np.float32, "rows4": np.float32, "normals": np.float32,
     "attributes": np.float32, "grid": np.float32, "triangles": np.uint32, "lengths": np.int64,
@@ -124,7 +132,8 @@ class _Walk:
                 raise SceneError(
                     "is a buffer on a device; an Array of PyOpenCL is read", where=where
                 )
-            return {"": _array(np.asarray(thing.get()), form)}
+            read = on_host(thing) if on_device(thing) else thing.get()
+            return {"": _array(np.asarray(read), form)}
         if isinstance(thing, Sequence):
             numbers = _numbers(thing)
             if numbers is not None:

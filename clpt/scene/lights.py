@@ -294,7 +294,9 @@ class Constant(Lamp):
 class Envmap(Light):
     """Radiance from an image in latitude and longitude around the scene.
 
-    In the light's own space +y is up, and the middle of the image is in the direction +z.
+    In the light's own space +y is up, and the middle of the image is in the direction +z. Row i of
+    h rows lies at pi i / (h - 1) from +y, as in Mitsuba: the first and the last row are the poles.
+    Pixels of the camera `spherical` have their middles at pi (i + 1/2) / h.
     """
 
     reach = "infinite"

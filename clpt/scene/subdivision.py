@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import budget
 from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
+from clpt.files import budget
 
 PER_TRIANGLE = 512  # bytes of memory for each of the finest, while they are made
 
@@ -25,6 +25,7 @@ def loop(points: Floats, faces: Integers, levels: int) -> tuple[Floats, Integers
     """
     budget.check(PER_TRIANGLE * len(faces) * 4**levels, f"{levels} levels of subdivision")
     for _ in range(levels):
+        budget.check_time()
         points, faces = _finer(points, faces)
     edges = _Edges(faces, len(points))
     return _limit(points, edges), faces, _normals(points, faces, edges)

@@ -1,7 +1,7 @@
 """Images of a sky: the dome and the ground below it, and the sun's disc, at LAMBDAS.
 
-How they lie around the observer: kernels/light/sky.cl. Limb darkening of the sun: a power of the
-cosine at its surface, Hestroffer and Magnan 1998.
+How they lie around the observer: kernels/lights/kinds/sky.cl. Limb darkening of the sun: a power of
+the cosine at its surface, Hestroffer and Magnan 1998.
 """
 
 from __future__ import annotations

@@ -15,6 +15,7 @@ inline void flight_grids(Scene scene, Slab path, uint at, mask flies, integer na
         *collides = sel_i(gridded, own.collides, *collides);
         *t = sel(gridded, own.t, *t);
         store_path_ratio(path, at, gridded, own.ratio);
+        if (any(own.endless)) store_path_radiance(path, at, gridded & own.endless, spectrum_of(INFINITY));
         m->phase = sel_i(gridded, own.phase, m->phase);
     }
 }

@@ -3,11 +3,11 @@
  *
  * Where some grids emit, a flight gathers light at one point of each way that it goes without a collision within a
  * brick: chosen evenly, and weighed as if the flight had come just there. Light is also sought by next-event estimation
- * (light/emissive_brick.cl), and both are weighed. */
-/* Where a flight ends, and what its sample weighs; `ratio` as in path/hero.cl. */
+ * (lights/kinds/emissive_brick.cl), and both are weighed. */
+/* Where a flight ends, and what its sample weighs; `ratio` as in spectra/hero.cl. */
 typedef struct {
-    mask collides;
-    real t; /* [m] */
+    mask collides, endless; /* endless: it has had MOST_NULL_COLLISIONS, and weighs nothing */
+    real t;                 /* [m] */
     Spectrum weight, ratio;
     Spectrum light; /* that it gathers, where some grids emit */
     integer phase;  /* material word of the part that it collides with */
@@ -26,7 +26,7 @@ typedef struct {
 inline GridFlight grid_flight(Scene scene, integer name, Medium m, vec3 o, vec3 d, real t, Spectrum ratio, vec2 u,
                               natural key, mask active, Wavelengths lambdas, GridOrigin origin)
 {
-    GridFlight f = {mask_of(0), t, spectrum_of(1.0f), ratio, spectrum_of(0.0f), m.phase};
+    GridFlight f = {mask_of(0), mask_of(0), t, spectrum_of(1.0f), ratio, spectrum_of(0.0f), m.phase};
     natural ways = 0u;
     GridWalk w;
     mask all = active;
@@ -59,9 +59,12 @@ inline GridFlight grid_flight(Scene scene, integer name, Medium m, vec3 o, vec3 
             sigma = sel(dims, most, max_r(spectrum_pick(m.sigma_t, f.ratio, grid_hero(more)), (real)(1e-30f)));
             left = sel(meets, grid_length(bits) / sigma, left);
             count += sel_n(meets, (natural)(1u), (natural)(0u));
+            f.endless = f.endless | (active & (count >= MOST_NULL_COLLISIONS));
+            active = active & !f.endless;
         }
         active = sel_i(meets, active, grid_next(&w, b, active & !meets));
     }
     grid_weigh_end(m, passed, all & !f.collides, &f);
+    f.weight = spectrum_sel(f.endless, spectrum_of(0.0f), f.weight);
     return f;
 }

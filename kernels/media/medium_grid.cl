@@ -10,6 +10,9 @@
  * first word on, and its highest density. A medium with MEDIUM_BYTES in its name has 8 bits for each number. */
 #include "generated/brick_cells.cl"
 #define GRID_ROULETTE 0.05f /* what passes below this is at stake */
+/* Collisions of one way through a grid. A density of 1 beside empty cells, under a large coefficient, makes as many
+ * null collisions as a file likes. A way with more makes its sample infinite, which the film rejects and counts. */
+#define MOST_NULL_COLLISIONS 262144u
 
 /* A ray in the lattice, and the brick where it is. */
 typedef struct {
@@ -194,6 +197,9 @@ inline Spectrum grid_transmittance(Scene scene, integer name, Medium m, vec3 o, 
             active = active & (spectrum_max(passes) > 0.0f);
             left = sel(meets, grid_length(bits) * inverse, left);
             count += sel_n(meets, (natural)(1u), (natural)(0u));
+            mask endless = active & (count > MOST_NULL_COLLISIONS);
+            passes = spectrum_sel(endless, spectrum_of(INFINITY), passes);
+            active = active & !endless;
         }
         active = sel_i(meets, active, grid_next(&w, b, active & !meets));
     }

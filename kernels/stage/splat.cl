@@ -1,7 +1,7 @@
 /* Tests the rays that wait to reach the camera, and adds what arrives of what they carry to the pixels whose
  * filters hold the point where it is seen. No sample is counted here: stage/emit.cl counts paths. */
 #include "core/base.cl"
-#include "interface/stage.cl"
+#include "stage/stage.cl"
 #include "generated/join_args.cl"
 #include "generated/shadow_ray.cl"
 #include "film/spread.cl"
@@ -30,7 +30,7 @@ STAGE(splat)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)
         seen.y = sel(accepted, seen.y, (real)(0.0f));
         vec2 offset = {seen.x - floor(seen.x) - 0.5f, seen.y - floor(seen.y) - 0.5f};
         Spread spread = spread_point(scene, to_integer(floor(seen.x)), to_integer(floor(seen.y)), offset);
-        Light light = {colour, 0, accepted, value, lambdas, scale};
+        Light light = {colour, 0, (real)(1.0f), value, lambdas, scale};
 #if LIGHT_LAYERS
         integer surfaces = (load_path_state(path, at) & PATH_DEPTH) - 1, row = load_path_light(path, at);
         for (int i = 0; i < SPREAD_PIXELS; i++) {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from clpt import host_memory
+from clpt.files import host_memory
 
 GIB = 2**30
 
@@ -26,3 +26,26 @@ def test_pages_of_files_do_not_count_as_used(tmp_path, monkeypatch, limit, usage
     assert host_memory.available(tmp_path) == 100 + 2**20
     (tmp_path / limit).write_text("max\n")
     assert host_memory.available(tmp_path) == host_memory.available(tmp_path / "none")
+
+
+@pytest.mark.parametrize("held_by", ["", "job", "job/step"])
+@pytest.mark.parametrize(
+    ("rows", "tree", "limit", "usage", "inactive"),
+    [
+        ("0::/job/step/task", "", "memory.max", "memory.current", "inactive_file"),
+        ("12:pids:/\n3:memory:/job/step/task\n0::/", "memory", "memory.limit_in_bytes",
+         "memory.usage_in_bytes", "total_inactive_file"),
+        ("3:cpu,memory:/job/step/task", "cpu,memory", "memory.limit_in_bytes",
+         "memory.usage_in_bytes", "total_inactive_file"),
+    ],
+)  # fmt: skip
+def test_limits_of_all_groups_that_hold_the_process_count(
+    tmp_path, held_by, rows, tree, limit, usage, inactive
+):
+    """As of a job of Slurm, or a unit of systemd, without a namespace of its own."""
+    (tmp_path / "own").write_text(rows + "\n")
+    group = tmp_path / "groups" / tree / held_by
+    group.mkdir(parents=True)
+    for name, content in ((limit, GIB), (usage, GIB - 500), ("memory.stat", f"{inactive} 100")):
+        (group / name).write_text(f"{content}\n")
+    assert host_memory.available(tmp_path / "groups", tmp_path / "own") == 600

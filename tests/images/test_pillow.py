@@ -139,8 +139,8 @@ def test_primaries_of_png(tmp_path, space):
 
 def test_profiles_of_a_texture(tmp_path):
     """A bitmap is lowered as what the file means, and as stored where it is raw."""
-    from clpt.render.lowering.tables import TableStore
-    from clpt.render.lowering.textures.bitmaps import Images
+    from clpt.render.records.tables import TableStore
+    from clpt.render.textures.bitmaps import Images
     from clpt.scene.roles import EMISSION
     from clpt.scene.textures import Bitmap
 
@@ -203,7 +203,7 @@ def test_what_files_say_of_colours_and_is_left_out(tmp_path, caplog):
         "other.jpg": (0, "colour profile is left out"),
         "turned.jpg": (1, "its Exif orientation 6 is left out"),
         "cmyk.jpg": (0, "CMYK"),
-        "two.gif": (1, "its first picture of 2 is taken"),
+        "two.gif": (1, "its first picture of several is taken"),
         "other.png": (0, "colour profile is left out"),
         "pq.png": (0, "cICP chunk is left out"),
     }.items():

@@ -77,6 +77,24 @@ def stops() -> Iterator[list[int]]:
         restore()
 
 
+def end_at_second() -> None:
+    """From now on a second signal ends the process soon, whatever a kernel on a device does.
+
+    Python raises KeyboardInterrupt when a call of C returns, and a kernel may take hours. GRACE
+    after the second signal a thread ends the process.
+    """
+    if sys.platform == "win32" or threading.current_thread() is not threading.main_thread():
+        return
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    threading.Thread(target=_watch, args=(reader, _nothing, 2), daemon=True).start()
+    signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
+
+
+def _nothing() -> None:
+    pass
+
+
 @contextmanager
 def prompt(last: Callable[[], None]) -> Iterator[None]:
     """Meanwhile a signal ends the process soon, though a driver compiles: nothing may be lost.
@@ -89,7 +107,7 @@ def prompt(last: Callable[[], None]) -> Iterator[None]:
         return
     reader, writer = os.pipe()
     os.set_blocking(writer, False)
-    threading.Thread(target=_watch, args=(reader, last), daemon=True).start()
+    threading.Thread(target=_watch, args=(reader, last, 1), daemon=True).start()
     before = signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
     try:
         yield
@@ -98,18 +116,21 @@ def prompt(last: Callable[[], None]) -> Iterator[None]:
         os.close(writer)
 
 
-def _watch(reader: int, last: Callable[[], None]) -> None:
-    """Read the numbers of signals until the pipe is closed; end the process if that takes long."""
-    number = 0
-    while select.select([reader], [], [], GRACE if number else None)[0]:
+def _watch(reader: int, last: Callable[[], None], bound: int) -> None:
+    """Read the numbers of signals until the pipe is closed; end the process if that takes long.
+
+    bound: how many signals there must be; GRACE after them, or at one more, the process ends.
+    """
+    number, count = 0, 0
+    while select.select([reader], [], [], GRACE if count >= bound else None)[0]:
         read = os.read(reader, 1)
         if not read:
             os.close(reader)
             return
         if read[0] in (signal.SIGINT, *ENDING):
-            if number:
+            number, count = read[0], count + 1
+            if count > bound:
                 break
-            number = read[0]
     last()
     tell()
     os._exit(STATUS + number)

@@ -9,7 +9,10 @@ def refusals(renderer: DevicePictures) -> list[str]:
     """Return a sentence for each way in which samples of a render, or pixels, are wrong."""
     told = []
     if rejected := renderer.counts.rejected:
-        told.append(f"{rejected} samples were not finite, or too bright, and count as black")
+        told.append(
+            f"{rejected} samples were not finite, too bright, or in a medium that is far too dense "
+            "beside empty cells, and count as black"
+        )
     if renderer.counts.full:
         told.append("pixels are too bright for the film: lower film.exposure")
     return told

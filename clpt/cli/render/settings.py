@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ...choices import MOST_SAMPLES, VIEWER
+from ...choices import MOST_SAMPLES, MOST_SEED, VIEWER
 from ..files.standard_output import FORMATS
 from ..files.targets import default
 from ..options.changes import Sampling
@@ -75,7 +75,7 @@ class Address(click.ParamType):
     ) -> Any:
         if not isinstance(value, str):
             return value
-        from ... import tev  # here: help needs no numpy
+        from clpt.images import tev  # here: help needs no numpy
 
         try:
             return tev.address(value)
@@ -274,7 +274,7 @@ _ANIMATION = (
     ),
 )  # fmt: skip
 _SEED = click.option(
-    "--seed", type=click.IntRange(0, 2**31 - 1), help="Seed of the random numbers."
+    "--seed", type=click.IntRange(0, MOST_SEED), help="Seed of the random numbers."
 )
 
 

@@ -6,11 +6,13 @@ from pathlib import Path
 
 import click
 
+from ...choices import MOST_SEED
 from ...formats import locate
 from ..options.grading import grading_options
 from ..options.headings import grouped
 from ..options.records import with_records
 from ..options.scene_options import scene_options
+from ..options.scene_path import ScenePath
 from ..options.values import Count, Noise
 from ..options.verbosity import verbose_option
 from ..options.workers import worker_options
@@ -24,7 +26,7 @@ EXAMPLES = (
 
 
 @click.command(cls=grouped(EXAMPLES))
-@click.argument("scene", type=click.Path(path_type=Path))
+@click.argument("scene", type=ScenePath())
 @click.option("--port", type=click.IntRange(0, 65535), default=0, help="0: any that is free.")
 @click.option(
     "--host", default="127.0.0.1", show_default=True,
@@ -43,7 +45,7 @@ EXAMPLES = (
 @worker_options("Render on workers, as of `clpt render`.")
 @click.option("--spp", type=Count(), help="Samples per pixel: 256, 1k, 1M.")
 @click.option("--noise", type=Noise(), help="As of `clpt render`.")
-@click.option("--seed", type=click.IntRange(0, 2**31 - 1), help="Seed of the random numbers.")
+@click.option("--seed", type=click.IntRange(0, MOST_SEED), help="Seed of the random numbers.")
 @scene_options
 @grading_options
 @verbose_option("Log more, twice for everything.")

@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import budget, images, transforms
+from clpt import images, transforms
 from clpt.choices import Missing
 from clpt.errors import SceneError
+from clpt.files import budget
 from clpt.formats.meshes import corners, mtl, obj, off, ply, stl
 from clpt.formats.meshes.named_files import find
 from clpt.formats.meshes.triangles import TANGENTS, Triangles, attributes
@@ -53,11 +54,14 @@ def read_mesh(path: Path, *, materials: bool = True, missing: Missing = "error")
     not finite and for faces that name vertices which are not there.
     """
     warnings: list[str] = []
-    if path.suffix.lower() == ".obj":
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise SceneError(f"unknown mesh suffix {suffix!r}; known: {', '.join(SUFFIXES)}", file=path)
+    if suffix == ".obj":
         library = mtl.Library(path.parent, missing) if materials else None
         made = _obj(path, library, warnings)
     else:
-        found = READERS[path.suffix.lower()](path)
+        found = READERS[suffix](path)
         made = [mesh for part in found for mesh in _meshes(path, part, materials, warnings)]
     if not made:
         raise SceneError("holds no triangles", file=path)

@@ -7,8 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from clpt import images, spectral_exr
+from clpt import images
 from clpt.arrays import Image
+from clpt.choices import Exposure
+from clpt.images import exr_files, spectral_exr
+from clpt.images.colour.view import View
 from clpt.render.film import cryptomatte
 from clpt.render.film.denoised_picture import DenoisedPicture
 from clpt.render.film.layers import GROUP, matte_names
@@ -34,7 +37,8 @@ def write_layers(
 
     path: of the file. source: has the picture. names: a set of SETS; "blender" gives names such as
     ViewLayer.Combined.R. metadata: further attributes of the file. The picture is in half floats,
-    or its bands in float32, layers in float32. Raises SceneError.
+    or its bands in float32, layers in float32. A crop has its place in the whole picture as the
+    data window. Raises SceneError.
     """
     source = source._developed()
     layers, form = source.layers(), source._form
@@ -43,7 +47,10 @@ def write_layers(
     channels = channels_of(layers, names)
     if isinstance(source, DenoisedPicture):
         channels |= _beside(source, names)
-    stated = {**(metadata or {}), **attributes_of(form, names)}
+    if form.bands and form.alpha:
+        channels["A"] = source.picture()[..., 3]
+    place = exr_files.windows(source.colours().shape, form.place)
+    stated = {**(metadata or {}), **attributes_of(form, names), **place}
     if form.bands:
         said = {**stated, "chromaticities": chromaticities(form.output_space)}
         spectral = source.spectral_image()
@@ -53,6 +60,33 @@ def write_layers(
         images.write(
             path, source.image(), metadata=stated, layers=channels, space=form.output_space,
             prefix=PICTURE[names],
+        )  # fmt: skip
+
+
+def write_picture(
+    path: Path,
+    source: Pictures,
+    *,
+    names: str = "clpt",
+    metadata: Mapping[str, str | int | float] | None = None,
+    exposure: Exposure = 0.0,
+    tone: str = "none",
+    view: View | None = None,
+) -> None:
+    """Write the picture of a renderer or film in the format of a path's suffix.
+
+    An .exr has its layers and bands, an .npy its numbers: bands where it has those. The rest: see
+    `write_layers` and `clpt.write_image`. Raises SceneError.
+    """
+    suffix, form = path.suffix.lower(), source._form
+    if form.bands and suffix == ".npy":
+        images.write_npy(path, source.image())
+    elif suffix == ".exr":
+        write_layers(path, source, names=names, metadata=metadata)
+    else:
+        images.write(
+            path, source.picture(), metadata=metadata, space=form.output_space, tone=tone,
+            view=view, exposure=images.raised(exposure, form.display_exposure),
         )  # fmt: skip
 
 

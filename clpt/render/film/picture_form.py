@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.render.contract.layer_names import LayerNames
+from clpt.render.records.layer_names import LayerNames
 from clpt.scene import Film
 
 
@@ -20,7 +20,8 @@ class PictureForm:
     paper: the matrix (3, 3) from sums of layers that are colours to the output space, see
     `clpt.render.film.layers.white_paper`; names: what layers tell of; adaptive: whether pixels may
     differ in their numbers of samples; octaves: that of the sampler where octaves of samples are
-    kept apart, else 0; the others are those of `clpt.scene.Film`.
+    kept apart, else 0; place: of a crop the column and the row where it begins and the size of the
+    whole film, (x, y, width, height); the others are those of `clpt.scene.Film`.
     """
 
     to_output: tuple[tuple[float, ...], ...]
@@ -39,6 +40,7 @@ class PictureForm:
     names: LayerNames = LayerNames()
     adaptive: bool = False
     octaves: float = 0.0
+    place: tuple[int, int, int, int] | None = None
 
     @property
     def band_centres(self) -> NDArray[np.float64]:

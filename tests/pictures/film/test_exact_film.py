@@ -12,9 +12,12 @@ import numpy as np
 import pytest
 
 import clpt
+from clpt import images
+from clpt.__main__ import run
 from clpt.cli.render.refused import refusals
 from clpt.errors import SceneError
-from clpt.render.wavefront.film_state import FILM_WORDS, SAMPLES_WORD, SUM_WORDS, FilmState
+from clpt.images import exr_files
+from clpt.render.film.state import FILM_WORDS, SAMPLES_WORD, SUM_WORDS, FilmState
 from clpt.render.wavefront.wavefront import Counts
 from clpt.scene import Film, Scene, lights
 from clpt.scene.cameras import Perspective
@@ -26,12 +29,15 @@ from clpt.scene.integrators import (
     Tent,
     Zsobol,
 )
-from clpt.scene.shapes import Mesh
+from clpt.scene.shapes import Mesh, Sphere
 from clpt.scene.textures import MeshAttribute
 from tests.pictures.support import with_film
 
 SPP = 12
 SIZE = {"width": 26, "height": 18}
+
+
+CLOSE = Perspective(origin=(0, 0, 4), target=(0, 0, 0), fov=40)
 
 
 def box(scenes: Path, kind: str) -> Scene:
@@ -107,6 +113,29 @@ def test_a_crop_is_part_of_the_picture(scenes: Path, sampler):
         np.testing.assert_array_equal(part.image(), one.image()[y : y + height, x : x + width])
 
 
+@pytest.mark.parametrize("layers", [(), ("depth", "shape_id")], ids=["plain", "layers"])
+def test_crops_put_themselves_together(tmp_path: Path, layers: tuple[str, ...]) -> None:
+    """An .exr of a crop has its place as the data window, so that readers add tiles up."""
+    film = Film(width=12, height=8, mode="rgb", layers=layers)
+    scene = Scene(shapes=[Sphere()], lights=[lights.Constant()], film=film, camera=CLOSE, spp=2)
+    with clpt.Renderer(scene) as whole:
+        whole.run(2)
+        whole.save(tmp_path / "whole.exr")
+    sum_ = 0.0
+    for x, y, width, height in ((0, 0, 5, 8), (5, 0, 7, 3), (5, 3, 7, 5)):
+        with clpt.Renderer(with_film(scene, crop=(x, y, width, height))) as part:
+            part.run(2)
+            part.save(tmp_path / "part.exr")
+            part.save_state(tmp_path / "part.film")
+        assert run(["merge", str(tmp_path / "part.film"), "-o", str(tmp_path / "again.exr")]) == 0
+        for name in ("part.exr", "again.exr"):
+            header = exr_files.attributes(tmp_path / name)
+            assert exr_files.window(header, "dataWindow") == (x, y, x + width, y + height)
+            assert exr_files.window(header, "displayWindow") == (0, 0, 12, 8)
+        sum_ = sum_ + images.read(tmp_path / "part.exr")
+    np.testing.assert_array_equal(sum_, images.read(tmp_path / "whole.exr"))
+
+
 def test_light_paths_repeat(scenes: Path):
     """Paths from lights add to any pixel, from any thread, and yet give the same bits."""
     scene = with_film(box(scenes, "light"), width=8, height=8)
@@ -156,9 +185,9 @@ def test_numbers_of_a_stopped_run_are_not_used_again():
 
 
 def test_what_stops_a_run():
-    """Only False, and `cancel`, also before the run."""
+    """Only what is false, and `cancel`, also before the run."""
     with clpt.Renderer(sky()) as renderer:
-        assert renderer.run(3, lambda progress: None) and renderer.run(3, lambda progress: 0)
+        assert renderer.run(3, lambda progress: None) and renderer.run(3, lambda progress: 1)
         renderer.cancel()
         assert not renderer.run(3) and renderer.samples == 6
         assert renderer.run(3) and renderer.samples == 9

@@ -18,7 +18,8 @@ from clpt import spectra
 from clpt import transforms as tf
 from clpt.errors import SceneError
 from clpt.formats.volumes import vol
-from clpt.render.lowering import device_grids, grids
+from clpt.render.media import device_grids
+from clpt.render.media import encode_grids as grids
 from clpt.scene import Film, Scene, media
 from clpt.scene.cameras import Orthographic
 from clpt.scene.integrators import Box
@@ -301,3 +302,39 @@ def test_against_mitsuba(tmp_path: Path, mode: str) -> None:
     path = tmp_path / "scene.xml"
     path.write_text(MITSUBA)
     compare(path, mode, 24, 64, 0.01)
+
+
+def holed(sigma_t: float) -> media.Grid:
+    """A density of one high point in each brick beside empty cells: collisions there are null."""
+    values = np.zeros((16, 16, 16), np.float32)
+    values[::4, ::4, ::4] = 1e-6
+    values[5::8, 5::8, 5::8] = 1.0
+    return media.Grid(density=values, sigma_t=sigma_t, albedo=0.99, to_world=TURNED)
+
+
+@pytest.mark.parametrize("sigma_t", [1e9, 3e38])
+@pytest.mark.parametrize("seen", ["flight", "transmittance"])
+def test_null_collisions_have_an_end(sigma_t: float, seen: str) -> None:
+    """A file cannot keep a kernel busy for hours: the samples of such ways count as rejected."""
+    scene = scene_of(holed(sigma_t))
+    if seen == "transmittance":  # of rays to a light behind the medium, from a surface beside it
+        floor = Rectangle(
+            material=Diffuse(), to_world=tf.translate([0, 0, 3]) @ tf.rotate([0, 1, 0], 180)
+        )
+        behind = Directional(direction=(0.01, 0.02, 1.0), irradiance=1.0)
+        scene = dataclasses.replace(
+            scene, shapes=[scene.shapes[0], floor], lights=[behind],
+            camera=Orthographic(
+                to_world=tf.look_at([0.1, 0.1, 2.5], [0.1, 0.1, 3.0], [0, 1, 0]) @ tf.scale(1e-2)
+            ),
+        )  # fmt: skip
+    with clpt.Renderer(with_film(scene, width=2, height=2)) as renderer:
+        renderer.run(1)
+        assert renderer.counts.rejected == renderer.counts.samples == 4
+        assert not renderer.image().any()
+
+
+def test_a_dense_grid_with_holes_is_right_below_the_bound() -> None:
+    with clpt.Renderer(with_film(scene_of(holed(3e4)), width=8, height=8)) as renderer:
+        renderer.run(1)
+        assert renderer.counts.rejected == 0 and renderer.image().any()
