@@ -83,7 +83,7 @@ def features(root: Path) -> Iterator[Figure]:
     records = [
         (count, f"{place} {name}")
         for place, file in _python(root)
-        if re.search(r"(^|/)features(/\w+)?\.py$", place)
+        if re.search(r"^clpt/render/records/\w+\.py$", place)
         for name, count in file.fields.items()
     ]
     yield _most("fields of a record of features, most", records)

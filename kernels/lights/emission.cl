@@ -12,7 +12,7 @@
  *
  * u: a point of the unit square for the position; v: for the direction. Light from infinity needs no more
  * than the <kind>_sample of lights/light.cl, see `distant_emit`. LightRay and SurfacePoint are Records in
- * clpt/render/contract.
+ * clpt/render/records.
  */
 #include "generated/light_ray.cl"
 #include "generated/surface_point.cl"

@@ -1,5 +1,4 @@
-/* The contract of a material kind, kernels/materials/kinds/<kind>.cl, and of a phase function,
- * kernels/media/kinds/<kind>.cl:
+/* The contract of a material kind, materials/kinds/<kind>.cl, and of a phase function, media/kinds/<kind>.cl:
  *
  *   BsdfSample <kind>_sample(<Kind> m, vec3 wo, vec3 u);     u.z chooses a lobe, u.x and u.y a direction
  *   Spectrum   <kind>_eval  (<Kind> m, vec3 wo, vec3 wi);    f |cos|, of the lobes that are not delta

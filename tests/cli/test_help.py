@@ -23,7 +23,7 @@ from clpt.spectra import sensors, spaces
 
 # Parts of clpt, and other packages, that a command's help may import.
 PARTS = {
-    "__main__", "budget", "choices", "cli", "errors", "formats", "host_memory", "output_files",
+    "__main__", "choices", "clean_logs", "cli", "errors", "files", "formats",
     "render",  # its records of progress
     "version",
 }  # fmt: skip

@@ -110,7 +110,7 @@ WRITES = {
 }  # fmt: skip
 MODULES = {"np", "shutil", "os", "tempfile"}  # whose functions of these names write
 ELSEWHERE = {
-    ("benchmark/apart.py", "fdopen"),  # to a pipe
+    ("bench/apart.py", "fdopen"),  # to a pipe
     ("cli/files/standard_output.py", "copyfileobj"),  # to the standard output
     ("cluster/bundle.py", "copyfile"),  # into a folder of its own, in the place of a link
     ("cluster/keys.py", "mkstemp"),  # which nobody else may read, not even in part
@@ -118,7 +118,7 @@ ELSEWHERE = {
     ("device/compiler_process.py", "fdopen"),  # to a pipe
     ("device/disk_cache.py", "open"),  # of locks, which are empty
     ("images/exr_files.py", "write"),  # of films, in their `replacing`
-    ("render/codegen/rough_coat_table.py", "savez_compressed"),  # its table, made by maintainers
+    ("render/materials/rough_coat_table.py", "savez_compressed"),  # its table, made by maintainers
     ("view/saving.py", "write_bytes"),  # of new files, in their `replacing`
     ("view/saving.py", "write_text"),
 }

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from clpt.render.flow.look import Look
 from clpt.render.lights import power as light_power
 from clpt.render.lights.find import emissions_of
+from clpt.render.spectra.look import Look
 
 from ... import images
 from ...arrays import Floats32

@@ -1,4 +1,4 @@
-"""Cameras on their way to the device: the uniform records that kernels/cameras/kinds/<kind>.cl read."""
+"""Cameras as uniform records, which kernels/cameras/kinds/<kind>.cl read."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Cameras: what each sees, and the members of the record that kernels/cameras/kinds/<kind>.cl read."""
+"""Cameras: what each sees, and members of its record for kernels/cameras/kinds/<kind>.cl."""
 
 from __future__ import annotations
 

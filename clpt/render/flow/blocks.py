@@ -1,4 +1,4 @@
-"""Blocks: which words of a slot's state shading reads and changes, see kernels/transport/queue.cl."""
+"""Blocks: which words of a slot's state shading reads and writes: kernels/transport/queue.cl."""
 
 from __future__ import annotations
 

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from clpt.geometry.lamps import plainly_lit
 from clpt.geometry.motion import at_rest
 from clpt.render.flow.check import check_at_rest
-from clpt.render.flow.look import Look
 from clpt.render.geometry import open_boundaries
 from clpt.render.geometry.find import Geometry, assembled
 from clpt.render.geometry.surroundings import (
@@ -33,6 +32,7 @@ from clpt.render.media.light_media import NOWHERE, LightMedia, light_media
 from clpt.render.media.sealed import sealed_media
 from clpt.render.records.lowering_cache import LoweringCache
 from clpt.render.scene_index import SceneIndex
+from clpt.render.spectra.look import Look
 from clpt.render.transport.hard_light import Lit, decided
 from clpt.scene import Scene
 from clpt.scene.integrators import Integrator

@@ -14,7 +14,6 @@ from clpt.arrays import Faces, Points
 from clpt.errors import SceneError
 from clpt.geometry import analytic, shape_records, shapes, triangles
 from clpt.geometry.motion import corners, swept
-from clpt.render.flow.look import Look
 from clpt.render.geometry.find import Emitter, Geometry
 from clpt.render.lights import bounds as light_bounds
 from clpt.render.lights import images as image_lights
@@ -26,6 +25,7 @@ from clpt.render.lights.glow import GlowingBody, glows
 from clpt.render.lights.triangle_means import triangle_means
 from clpt.render.records.light_rows import INFINITE
 from clpt.render.scene_index import SceneIndex
+from clpt.render.spectra.look import Look
 from clpt.scene import lights
 from clpt.scene.lights import Area, DirectionalArea, Light
 from clpt.scene.media import Medium

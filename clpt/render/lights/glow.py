@@ -13,11 +13,11 @@ from clpt.arrays import Floats, on_device
 from clpt.geometry import analytic, shapes
 from clpt.geometry.tessellate import keeps_its_kind
 from clpt.geometry.winding import box
-from clpt.render.flow.look import Look
 from clpt.render.geometry.open_boundaries import HOLE, hole_around
 from clpt.render.geometry.surroundings import every
 from clpt.render.lights.bricks import Glow, black_bodies, glow
 from clpt.render.scene_index import SceneIndex, leaves_of
+from clpt.render.spectra.look import Look
 from clpt.scene.media import Grid, Lattice, Medium
 from clpt.scene.shapes import Cube, Cylinder, Disk, Mesh, Rectangle, SdfGrid, Shape, Sphere
 from clpt.spectra import Spectrum

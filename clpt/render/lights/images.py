@@ -20,9 +20,9 @@ from clpt.arrays import Floats32, fits_single
 from clpt.errors import SceneError
 from clpt.images import spectral_exr
 from clpt.images.spectral_exr import SpectralImage
-from clpt.render.flow.look import Look
 from clpt.render.lights import block_grids
 from clpt.render.records.lowering_cache import version
+from clpt.render.spectra.look import Look
 from clpt.render.textures.texels import bands, texels
 from clpt.scene.lights import CubeMap, Envmap, Sky
 from clpt.scene.roles import EMISSION

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.render.flow.look import Look
 from clpt.render.lights.bounds import concatenated
 from clpt.render.lights.encode import LightRows
 from clpt.render.lights.power import brightness
 from clpt.render.scene_index import SceneIndex
+from clpt.render.spectra.look import Look
 
 
 def light_level(

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from clpt import transforms
 from clpt.arrays import fits_single
 from clpt.errors import SceneError
-from clpt.render.flow.look import Look
+from clpt.render.spectra.look import Look
 from clpt.scene import lights
 from clpt.scene.lights import Light, Projector
 from clpt.scene.pixels import pixels

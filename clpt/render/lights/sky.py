@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from clpt.arrays import Floats
 from clpt.device import kept_arrays
 from clpt.images.spectral_exr import SpectralImage
-from clpt.render.flow.look import Look
 from clpt.render.lights import block_grids
 from clpt.render.lights import images as image_lights
+from clpt.render.spectra.look import Look
 from clpt.render.textures.texels import bands, texels
 from clpt.scene.lights import Sky
 from clpt.scene.roles import EMISSION

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.arrays import Floats
-from clpt.render.flow.look import Look
 from clpt.render.lights.power import brightness
+from clpt.render.spectra.look import Look
 from clpt.scene.textures import Bitmap, Checkerboard, MeshAttribute, Mix, Product, Texture
 
 LOOKS = 1 << 18  # at a texture, all triangles together

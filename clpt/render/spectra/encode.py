@@ -42,7 +42,7 @@ def _uplifted(value: RGB) -> tuple[float, ...]:
 
 
 def angular_values(cosines: NDArray, rows: NDArray) -> NDArray[np.float64]:
-    """Return what kernels/materials/angular_table.cl reads, of cosines (n,) and densities (m, n)."""
+    """Return what materials/angular_table.cl reads, of cosines (n,) and densities (m, n)."""
     cells = np.pi * np.diff(cosines) * (rows[:, 1:] + rows[:, :-1])
     running = np.hstack([np.zeros((len(rows), 1)), np.cumsum(cells, axis=1)])
     return np.concatenate([cosines, np.hstack([rows, running]).ravel()])

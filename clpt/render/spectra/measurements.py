@@ -82,7 +82,7 @@ def _pairs(spectra: NDArray[Any]) -> Floats32:
 
 
 def merl_rows(value: MerlTable | None) -> Rows:
-    """Return what stands in `distributions` for a table of MERL, see kernels/materials/merl_table.cl.
+    """Return what stands in `distributions` for a table of MERL, see materials/merl_table.cl.
 
     None is a matt grey.
     """

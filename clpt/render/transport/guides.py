@@ -1,4 +1,4 @@
-"""Fineness of a guide, see kernels/transport/guiding/guide.cl, and how much it learns before a film."""
+"""Fineness of a guide (transport/guiding/guide.cl), and how much it learns before a film."""
 
 from clpt.scene.integrators import MOST_GUIDE_PATHS
 

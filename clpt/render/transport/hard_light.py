@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from clpt.geometry import analytic, shape_records, shapes, triangles
 from clpt.render.camera import find as cameras
-from clpt.render.flow.look import Look
 from clpt.render.geometry import surroundings
 from clpt.render.geometry.find import Emitter, Geometry
 from clpt.render.lights import bounds as light_bounds
@@ -27,6 +26,7 @@ from clpt.render.lights.aims import is_sharp, sharp_pieces
 from clpt.render.lights.find import Sources
 from clpt.render.records.lowering_cache import LoweringCache
 from clpt.render.scene_index import SceneIndex
+from clpt.render.spectra.look import Look
 from clpt.render.transport import guides, worth
 from clpt.scene import materials as mt
 from clpt.scene.integrators import Auto, Integrator, Path, Vcm, shared
@@ -50,7 +50,7 @@ CLEAR = 0.05  # roughness alpha of what is clear: light paths can be joined to w
 RAYS = 256  # of the camera, that look for what is clear
 
 LEAST = 0.25  # of the power of all lights: where small ones in media have less, they do not count
-THIN, DENSE = 0.3, 5.0  # optical depths from a light to the camera, see bench/NOTES.md
+THIN, DENSE = 0.3, 5.0  # optical depths from a light to the camera, see bench/notes/media.md
 ALL_AROUND = 0.49 * np.pi  # [rad] from a light's axis: what shines so far is no spot
 
 Ball = tuple[NDArray[np.float64], float]  # centre and radius

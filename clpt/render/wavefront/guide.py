@@ -1,4 +1,4 @@
-"""A guide on the device: it learns where light comes from, see kernels/transport/guiding/guide.cl."""
+"""A guide on the device: it learns where light comes from (transport/guiding/guide.cl)."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ def test_a_gbuffer_has_layers(scene):
 
 
 def ours(scene, x, y):
-    """Origin and direction through a place on the film, as kernels/camera has them."""
+    """Origin and direction through a place on the film, as kernels/cameras has them."""
     camera, film = scene.camera, scene.film
     aspect = film.height / film.width
     if isinstance(camera, cameras.Orthographic):

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from clpt.render.flow.look import Look
 from clpt.render.lights import encode as lights
 from clpt.render.lights import find as sources
 from clpt.render.lights.triangle_means import LEAST, triangle_means
 from clpt.render.materials.encoder import Encoder
+from clpt.render.spectra.look import Look
 from clpt.scene.lights import Area
 from clpt.scene.shapes import Mesh
 from clpt.scene.textures import Bitmap, Checkerboard, Mix, Product
