@@ -17,7 +17,7 @@ from .text_rows import Row, rows_of
 
 _GENERATED = "generated/"  # begins the names of files that are made for a scene
 TWIN = "#none"  # ends the name of a half of a file: the step that does nothing
-_TWIN = "\n/* Twin, "  # begins that half
+_STEP, _TWIN = "\n/* Step. */", "\n/* Twin, "  # begin the halves
 _QUOTED = re.compile(r'"([^"]+)"$')
 _LINE = re.compile(r'\s*#\s*line (\d+)(?: "([^"]+)")?')
 _PRIVATE = re.compile(  # at the beginning of a line: a constant, or a function with an argument
@@ -147,14 +147,19 @@ def _text(folder: Path, name: str) -> str:
 
 
 def _half(folder: Path, name: str) -> Part:
-    """A file up to its twin; or, where the name ends with TWIN, the twin. Raises OSError."""
+    """A file up to its twin; or, where the name ends with TWIN, without the step. Raises OSError.
+
+    What stands above the step belongs to both halves. Blank rows stand for the step.
+    """
     file = name.removesuffix(TWIN)
-    step, _, twin = _text(folder, file).partition(_TWIN)
+    text, _, twin = _text(folder, file).partition(_TWIN)
     if file == name:
-        return Part(step, f"kernels/{file}")
+        return Part(text, f"kernels/{file}")
     if not twin:
         raise FileNotFoundError(name)
-    return Part(f"{_TWIN[1:]}{twin}", f"kernels/{file}", step.count("\n") + 2)
+    shared = text.partition(_STEP)[0] if _STEP in text else ""
+    blank = "\n" * text.count("\n", len(shared))
+    return Part(f"{shared}{blank}{_TWIN}{twin}", f"kernels/{file}")
 
 
 class _BadRow(Exception):

@@ -66,20 +66,20 @@ inline void layers_put_first(Scene scene, Slab path, uint at, integer *words, ma
 }
 
 /* Adds what the `first` paths see first. */
-inline void layers_see(Scene scene, Slab path, uint at, LAYER_ARGS, mask first, Vertex v, Scattering scatter)
+inline void layers_see(Scene scene, Slab path, uint at, mask first, Vertex v, Scattering scatter LAYER_ARGS)
 {
     first = layers_want(path, at, first);
     integer words[LAYER_MOST_WORDS], pixel_index = load_path_pixel_index(path, at);
     int before = scene.settings->layer_denoising; /* theirs come last */
     layers_put_first(scene, path, at, words, first, v, scatter, layer_weight(path, at));
     layers_add(scene, layers, first, pixel_index, words, before ? before : scene.settings->layer_words);
-    mattes_record(scene, mattes, first, pixel_index, v);
+    mattes_record(scene, first, pixel_index, v LAYER_PASSED);
 }
 
 /* Adds what the `met` paths see here, but what they see first where other paths scout for that. Returns the paths'
  * state, which says whether denoisers have got theirs. */
-inline integer layers_record(Scene scene, Slab path, uint at, LAYER_ARGS, mask met, Vertex v, Scattering scatter,
-                             integer state)
+inline integer layers_record(Scene scene, Slab path, uint at, mask met, Vertex v, Scattering scatter,
+                             integer state LAYER_ARGS)
 {
     global const Settings *settings = scene.settings;
     mask wanted = layers_want(path, at, met), first = wanted & (v.depth == 0), adds = first;
@@ -88,7 +88,7 @@ inline integer layers_record(Scene scene, Slab path, uint at, LAYER_ARGS, mask m
         state |= sel_i(met, (integer)(PATH_SEEN), (integer)(0));
     }
     if (!any(adds)) return state;
-    if (!LAYERS_SCOUT && any(first)) layers_see(scene, path, at, LAYER_PASSED, first, v, scatter);
+    if (!LAYERS_SCOUT && any(first)) layers_see(scene, path, at, first, v, scatter LAYER_PASSED);
     if (!DENOISERS_SEE) return state;
     integer words[LAYER_MOST_WORDS];
     int before = settings->layer_denoising, albedo = settings->layer_denoising_albedo - before;
@@ -101,4 +101,8 @@ inline integer layers_record(Scene scene, Slab path, uint at, LAYER_ARGS, mask m
 }
 
 /* Twin, where there are none beside the picture. */
-#define layers_record(scene, path, at, layers, met, v, scatter, state) (state)
+inline integer layers_record(Scene scene, Slab path, uint at, mask met, Vertex v, Scattering scatter,
+                             integer state LAYER_ARGS)
+{
+    return state;
+}

@@ -26,7 +26,7 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
     if (BSDF_IS_PHASE) rival = rival_chosen(scene, path, at, v, rival, vertex_receiver(scene, v, scatter, neg3(v.d)));
 
     CameraJoint joint = join_camera_seek(scene, v, scatter);
-    bsdf_ask(scene, scatter, join_camera_to(joint, scatter), 1);
+    bsdf_ask(scene, scatter, joint.to, 1);
     v.state += join_camera(scene, shadow, at, active, v, scatter, rival, joint, arrives);
 
     vec2 uv = sampler_pair(sampler, scatter.dimension + DIMENSION_BSDF);

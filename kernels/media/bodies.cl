@@ -4,8 +4,10 @@
  * kept. `media` holds two words for each shape, the number of its body first; behind them two for each number: the name
  * of its medium, and where its index stands in `materials`, 0 where it has none. Number 0 has the material word of a
  * null surface in their place. What stands before: media/medium.cl. */
-#define camera_through(settings) ((integer)((settings)->camera_bodies)) /* what a ray to a light begins in */
-#define light_through(scene, row) light_bodies(scene, row)
+
+/* What a ray to a light begins in, at the camera and at a light. */
+inline integer camera_through(Scene scene) { return (integer)(scene.settings->camera_bodies); }
+inline integer light_through(Scene scene, integer row) { return light_bodies(scene, row); }
 
 inline integer bodies_top(integer bodies)
 {
@@ -61,5 +63,5 @@ inline integer bodies_beyond(BodyBoundary b, mask inward)
 }
 
 /* Twin, where bodies do not overlap: a ray to a light knows its medium by name. */
-#define camera_through(settings) ((integer)((settings)->camera_medium))
-#define light_through(scene, row) light_medium(scene, row)
+inline integer camera_through(Scene scene) { return (integer)(scene.settings->camera_medium); }
+inline integer light_through(Scene scene, integer row) { return light_medium(scene, row); }

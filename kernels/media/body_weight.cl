@@ -13,4 +13,4 @@ inline Spectrum body_weighed(Scene scene, Slab path, uint at, mask flies, Spectr
 }
 
 /* Twin, where no homogeneous medium is a light. */
-#define body_weighed(scene, path, at, flies, light) (light)
+inline Spectrum body_weighed(Scene scene, Slab path, uint at, mask flies, Spectrum light) { return light; }

@@ -7,6 +7,8 @@ typedef struct {
     real by_dye; /* and its distance [m] */
 } FlightDye;
 
+/* Step. */
+
 /* Chooses whether a flight is one by u, of which the rest is as good as new. */
 inline FlightDye flight_dye(integer name, Medium m, real end, mask scatters, real *u)
 {
@@ -25,7 +27,11 @@ inline Spectrum flight_dye_pdf(FlightDye f, real t, mask collides, Spectrum pdf)
 }
 
 /* Twin, where no medium has a dye. */
-typedef integer FlightDye;
-#define flight_dye(name, m, end, scatters, u) ((integer)(0))
-#define flight_dye_end(f, t) (t)
-#define flight_dye_pdf(f, t, collides, pdf) (pdf)
+inline FlightDye flight_dye(integer name, Medium m, real end, mask scatters, real *u)
+{
+    FlightDye f;
+    f.glows = mask_of(0);
+    return f;
+}
+inline real flight_dye_end(FlightDye f, real t) { return t; }
+inline Spectrum flight_dye_pdf(FlightDye f, real t, mask collides, Spectrum pdf) { return pdf; }

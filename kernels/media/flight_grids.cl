@@ -21,4 +21,5 @@ inline void flight_grids(Scene scene, Slab path, uint at, mask flies, integer na
 }
 
 /* Twin, where there are no grids. */
-#define flight_grids(scene, path, at, flies, name, r, ratio, lambdas, light, weight, collides, t, m)
+inline void flight_grids(Scene scene, Slab path, uint at, mask flies, integer name, FlightRay r, Spectrum ratio,
+                         Wavelengths lambdas, Spectrum *light, Spectrum *weight, mask *collides, real *t, Medium *m) {}

@@ -7,6 +7,8 @@ typedef struct {
     real left, by_angle; /* share of other flights; the distance of this one [m] */
 } FlightNear;
 
+/* Step. */
+
 /* Chooses whether a flight is one by u, of which the rest is as good as new. */
 inline FlightNear flight_near(Scene scene, Sampler sampler, integer vertex, integer name, vec3 o, vec3 d, real end,
                               Medium m, mask scatters, real *u)
@@ -29,7 +31,12 @@ inline Spectrum flight_near_pdf(FlightNear n, real t, mask collides, Spectrum pd
 }
 
 /* Twin, without lamps in media, and for paths from lamps, which have no reason to stay. */
-typedef integer FlightNear;
-#define flight_near(scene, sampler, vertex, name, o, d, end, m, scatters, u) ((integer)(0))
-#define flight_near_end(n, t) (t)
-#define flight_near_pdf(n, t, collides, pdf) (pdf)
+inline FlightNear flight_near(Scene scene, Sampler sampler, integer vertex, integer name, vec3 o, vec3 d, real end,
+                              Medium m, mask scatters, real *u)
+{
+    FlightNear n;
+    n.aims = mask_of(0);
+    return n;
+}
+inline real flight_near_end(FlightNear n, real t) { return t; }
+inline Spectrum flight_near_pdf(FlightNear n, real t, mask collides, Spectrum pdf) { return pdf; }

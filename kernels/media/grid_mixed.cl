@@ -42,4 +42,6 @@ inline void grid_mixed(Scene scene, integer name, GridWalk w, mask active, natur
 }
 
 /* Twin, where all grids are of one part. */
-#define grid_mixed(scene, name, w, active, bits, lambdas, m)
+inline void grid_mixed(Scene scene, integer name, GridWalk w, mask active, natural bits, Wavelengths lambdas, Medium *m)
+{
+}

@@ -21,5 +21,9 @@ inline Spectrum grid_way(Scene scene, integer medium, vec3 o, vec3 d, real way, 
 }
 
 /* Twin, where there are no grids. */
-#define grid_way_key(scene, path, at) ((natural)(0u))
-#define grid_way(scene, medium, o, d, way, key, active, lambdas, dims) (dims)
+inline natural grid_way_key(Scene scene, Slab path, uint at) { return (natural)(0u); }
+inline Spectrum grid_way(Scene scene, integer medium, vec3 o, vec3 d, real way, natural key, mask active,
+                         Wavelengths lambdas, Spectrum dims)
+{
+    return dims;
+}

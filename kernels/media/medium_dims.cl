@@ -5,4 +5,4 @@ inline Spectrum medium_dims(Scene scene, integer medium, real t, Wavelengths lam
 }
 
 /* Twin, where a ray may go through several media: it is dimmed as it is traced, see tracing/transmittance_media.cl. */
-#define medium_dims(scene, medium, t, lambdas, value) (value)
+inline Spectrum medium_dims(Scene scene, integer medium, real t, Wavelengths lambdas, Spectrum value) { return value; }

@@ -1,5 +1,8 @@
 /* Of flights in grids none ends near lamps. */
-#define flight_near_share(name, share) sel(((name) & MEDIUM_GRID) != 0, (real)(0.0f), share)
+inline real flight_near_share(integer name, real share)
+{
+    return sel((name & MEDIUM_GRID) != 0, (real)(0.0f), share);
+}
 
 /* Twin, where there are no grids. */
-#define flight_near_share(name, share) (share)
+inline real flight_near_share(integer name, real share) { return share; }

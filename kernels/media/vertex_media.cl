@@ -7,6 +7,8 @@ typedef struct {
     mask absorbs;    /* such a body is met here, which names no media */
 } VertexMedia;
 
+/* Step. */
+
 inline VertexMedia vertex_media(Scene scene, Slab path, Slab hit, uint at, mask active, integer row, mask front)
 {
     VertexMedia m;
@@ -25,5 +27,8 @@ inline VertexMedia vertex_media(Scene scene, Slab path, Slab hit, uint at, mask 
 }
 
 /* Twin, where there are no media. */
-typedef integer VertexMedia;
-#define vertex_media(scene, path, hit, at, active, row, front) ((integer)(0))
+inline VertexMedia vertex_media(Scene scene, Slab path, Slab hit, uint at, mask active, integer row, mask front)
+{
+    VertexMedia m = {(integer)(0), (integer)(0), (integer)(0), (integer)(0), mask_of(0)};
+    return m;
+}

@@ -50,4 +50,5 @@ inline void bounce_walk(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, uint which, global uin
 }
 
 /* Twin, where no path from the camera is in a medium. */
-#define bounce_walk(slabs, scene, loop, which, queue, starts, first, end)
+inline void bounce_walk(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, uint which, global uint *queue, uint *starts, uint first,
+                        uint end) {}

@@ -1,5 +1,5 @@
 /* Over what aiming gains, see lights/aiming.cl. */
-#define aimed_rival(rival, r) ((rival) / (r).gain)
+inline real aimed_rival(real rival, LightRay r) { return rival / r.gain; }
 
 /* Twin, where no light path is aimed. */
-#define aimed_rival(rival, r) (rival)
+inline real aimed_rival(real rival, LightRay r) { return rival; }

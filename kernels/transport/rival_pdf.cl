@@ -2,4 +2,4 @@
 inline real rival_pdf(Bsdf m, vec3 wo, vec3 wi) { return spectrum_mean(bsdf_pdfs(m, wo, wi)); }
 
 /* Twin, where it is the same for all wavelengths. */
-#define rival_pdf(m, wo, wi) bsdf_pdf(m, wo, wi)
+inline real rival_pdf(Bsdf m, vec3 wo, vec3 wi) { return bsdf_pdf(m, wo, wi); }

@@ -61,15 +61,6 @@
  *
  * What is sharp depends on the densities of both ways alone, and so is the same for both sides: a delta lobe, or a
  * density above SHARP_PDF (transport/photons/weight.cl). */
-#define RIVAL_MOST 1e18f /* so that its square is finite */
-
-inline real rival_limited(real rival) { return min_r(rival, (real)(RIVAL_MOST)); }
-
-/* Whether light paths end at a vertex: what happens there is not the same for light that comes the other way. */
-inline mask rival_ends(Scene scene, Vertex v)
-{
-    return BSDF_ENDS_LIGHT_PATHS ? mask_of(1) : shading_frame_turns(scene, v.row);
-}
 
 /* What a vertex knows of the rival of its path. */
 typedef struct {
@@ -80,6 +71,17 @@ typedef struct {
     real pending; /* what joins `arrives` where the vertex is sharp; of a light path, at the joint alone */
     real merges;  /* what merging here has over the path's density: 0 where there is none */
 } Rival;
+
+/* Step. */
+#define RIVAL_MOST 1e18f /* so that its square is finite */
+
+inline real rival_limited(real rival) { return min_r(rival, (real)(RIVAL_MOST)); }
+
+/* Whether light paths end at a vertex: what happens there is not the same for light that comes the other way. */
+inline mask rival_ends(Scene scene, Vertex v)
+{
+    return BSDF_ENDS_LIGHT_PATHS ? mask_of(1) : shading_frame_turns(scene, v.row);
+}
 
 #include "generated/rival_dull.cl"
 #include "generated/rival_steps.cl"
@@ -174,8 +176,7 @@ inline real rival_of_joint(Scene scene, Rival r, Surface s, CameraPoint c, real 
 }
 
 /* What a point of a light counts that next-event estimation has chosen; p: guide's and material's density of it. */
-#define event_weight(scene, rival, s, ls, begins, pair, p) rival_event_weight(scene, rival, s, ls, begins, pair)
-inline real rival_event_weight(Scene scene, Rival r, Surface s, LightSample ls, real begins, BsdfPair pair)
+inline real event_weight(Scene scene, Rival r, Surface s, LightSample ls, real begins, BsdfPair pair, real p)
 {
     real third = rival_of_light_sample(scene, r, s, ls, begins, pair.p, pair.p_back);
     return mis_weight_of_three(ls.pdf, pair.p, third);
@@ -211,12 +212,33 @@ inline real rival_joint(Scene scene, Rival r, Vertex v, BsdfPair pair, CameraPoi
 }
 
 /* Twin, where paths are not weighed against light paths. */
-typedef integer Rival;
-#define rival_of_camera(scene, path, at, v, sampler) ((integer)(0))
-#define rival_of_emission(scene, path, at, v, receiver) ((integer)(0))
-#define event_begins(scene, s, ls) ((real)(0.0f))
-#define event_weight(scene, rival, s, ls, begins, pair, p) \
-    sel((ls).pdf < 0.0f, (real)(1.0f), mis_weight((ls).pdf, p))
-#define rival_goes_to_light(path, at, scatters, rival, v, onward, delta, bs) ((bs).pdf)
-#define rival_goes_to_camera(scene, path, at, next, null, rival, v, onward, bs) (next)
-#define rival_joint(scene, rival, v, pair, c, shine) ((real)(1.0f))
+inline Rival rival_nothing(void)
+{
+    real zero = (real)(0.0f);
+    Rival r = {zero, zero, mask_of(0), mask_of(0), zero, zero};
+    return r;
+}
+inline Rival rival_of_camera(Scene scene, Slab path, uint at, Vertex v, Sampler sampler) { return rival_nothing(); }
+inline Rival rival_of_emission(Scene scene, Slab path, uint at, Vertex v, Receiver receiver)
+{
+    return rival_nothing();
+}
+inline real event_begins(Scene scene, Surface s, LightSample ls) { return (real)(0.0f); }
+inline real event_weight(Scene scene, Rival r, Surface s, LightSample ls, real begins, BsdfPair pair, real p)
+{
+    return sel(ls.pdf < 0.0f, (real)(1.0f), mis_weight(ls.pdf, p));
+}
+inline real rival_goes_to_light(Slab path, uint at, mask scatters, Rival r, Vertex *v, vec3 onward, mask delta,
+                                BsdfSample bs)
+{
+    return bs.pdf;
+}
+inline mask rival_goes_to_camera(Scene scene, Slab path, uint at, mask next, mask null, Rival r, Vertex *v, vec3 onward,
+                                 BsdfSample bs)
+{
+    return next;
+}
+inline real rival_joint(Scene scene, Rival r, Vertex v, BsdfPair pair, CameraPoint c, mask *shine)
+{
+    return (real)(1.0f);
+}

@@ -7,4 +7,4 @@ inline real rival_seen(Scene scene, Vertex v, Sampler sampler, real rival)
 }
 
 /* Twin, where no light path is joined to the camera. */
-#define rival_seen(scene, v, sampler, rival) ((real)(0.0f))
+inline real rival_seen(Scene scene, Vertex v, Sampler sampler, real rival) { return (real)(0.0f); }

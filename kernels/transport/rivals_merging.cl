@@ -62,9 +62,14 @@ inline void rival_pends_to_camera(Slab path, uint at, mask m, mask null, Rival r
 }
 
 /* Twin, where no photons are merged. */
-#define rival_arrives(r, delta, p, p_back) ((r).arrives)
-#define rival_merges_here(scene, path, at, v) ((real)(0.0f))
-#define rival_left_here(scene, path, at, v) ((real)(0.0f))
-#define rival_merged_square(r, s, d, importance, p, p_back) ((real)(0.0f))
-#define rival_pends_to_light(path, at, m, r, v, onward, delta, p, p_back)
-#define rival_pends_to_camera(path, at, m, null, r, v, onward, delta, p, p_back)
+inline real rival_arrives(Rival r, mask delta, real p, real p_back) { return r.arrives; }
+inline real rival_merges_here(Scene scene, Slab path, uint at, Vertex v) { return (real)(0.0f); }
+inline real rival_left_here(Scene scene, Slab path, uint at, Vertex v) { return (real)(0.0f); }
+inline real rival_merged_square(Rival r, Surface s, vec3 d, real importance, real p, real p_back)
+{
+    return (real)(0.0f);
+}
+inline void rival_pends_to_light(Slab path, uint at, mask m, Rival r, Vertex *v, vec3 onward, mask delta, real p,
+                                 real p_back) {}
+inline void rival_pends_to_camera(Slab path, uint at, mask m, mask null, Rival r, Vertex *v, vec3 onward, mask delta,
+                                  real p, real p_back) {}

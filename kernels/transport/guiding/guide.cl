@@ -50,15 +50,8 @@ inline integer guide_bin(vec3 d)
 }
 
 #if BSDF_GUIDED
-/* What the guide knows where a camera's path is. */
-typedef struct {
-    integer row;
-    real light; /* all that has come there; 0: nothing is known */
-    real even;  /* light from everywhere that is expected beside it, over it */
-} Guided;
-
 /* d: the direction in which the path arrives. */
-inline Guided guide_at(Scene scene, global const uint *guide, Surface s, vec3 d)
+inline Guided guide_at(Scene scene, Surface s, vec3 d MERGE_ARGS)
 {
     Guided g;
     g.row = 0;
