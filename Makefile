@@ -23,7 +23,7 @@ ASSETS ?= ../shared/assets
 
 # the lowest versions that pyproject.toml allows, in an environment of their own
 LOWEST := .venv-lowest
-LOWEST_TESTS := tests/test_lowest.py tests/test_public.py tests/test_input_files.py tests/images \
+LOWEST_TESTS := tests/test_lowest.py tests/test_public.py tests/files/test_input_files.py tests/images \
 	tests/formats/test_fuzz_formats.py tests/formats/test_files_that_change.py \
 	tests/formats/meshes/test_mesh.py tests/formats/gltf/test_draco.py tests/formats/test_vdb.py \
 	tests/formats/test_volumes.py tests/device/test_program.py tests/pictures/film/test_resume.py
@@ -40,6 +40,9 @@ help:
 
 demo: $(VENV)/.run
 	$(BIN)/clpt render scenes/three_spheres -o demo.exr -o demo.png
+	@echo "make: demo.png is there. Go on by typing:"
+	@echo "          . $(VENV)/bin/activate"
+	@echo "          clpt scenes"
 
 test: $(VENV)/.dev
 	$(BIN)/python -m pytest -q $(SHARED)

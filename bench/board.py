@@ -18,10 +18,10 @@ from typing import Any
 
 import click
 
-from clpt import output_files
-from clpt.benchmark import comparing, pictures, records
-from clpt.benchmark.picture_scenes import PICTURES, SIZES
+from clpt.bench import comparing, pictures, records
+from clpt.bench.picture_scenes import PICTURES, SIZES
 from clpt.errors import SceneError
+from clpt.files import output_files
 
 Row = dict[str, Any]
 WHO = ("device", "driver", "processor", "clpt", "commit")  # whose figures stand in one line

@@ -18,7 +18,7 @@ import click
 from rich.table import Table
 
 from bench import machine
-from clpt.benchmark.starting import run
+from clpt.bench.starting import run
 
 INTEGRATORS = {
     "path": "Path(light_paths=0)",

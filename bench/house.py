@@ -77,13 +77,13 @@ def kernels(root: Path) -> Iterator[Figure]:
 
 def features(root: Path) -> Iterator[Figure]:
     """What the compiled text of a scene depends on."""
-    from clpt.render.codegen import flags
+    from clpt.render.flow import flags
 
     yield Figure("compile-time flags of a scene", len(flags.SCENE))
     records = [
         (count, f"{place} {name}")
         for place, file in _python(root)
-        if re.search(r"(^|/)features(/\w+)?\.py$", place)
+        if re.search(r"^clpt/render/records/\w+\.py$", place)
         for name, count in file.fields.items()
     ]
     yield _most("fields of a record of features, most", records)

@@ -19,11 +19,11 @@ import pyopencl as cl
 from bench import machine
 from clpt import device
 from clpt.records import SETTINGS, TABLES
-from clpt.render.analysis.lens import glasses
-from clpt.render.codegen import stages
-from clpt.render.codegen.signatures import scene_text
-from clpt.render.contract.features import CameraFeatures
-from clpt.render.lowering.camera.cameras import lower_camera
+from clpt.render.camera.encode import lower_camera
+from clpt.render.camera.lens import glasses
+from clpt.render.flow import stages
+from clpt.render.flow.signatures import scene_text
+from clpt.render.records import CameraFeatures
 from clpt.scene.cameras import Lens
 
 RAYS, ROUNDS = 1 << 20, 7
@@ -35,7 +35,7 @@ CASES = {
     "a fifth are ghosts": Lens(ghosts=0.2, coating="single"),
 }
 MAIN = """#include "core/base.cl"
-#include "interface/camera.cl"
+#include "cameras/camera.cl"
 #include "generated/camera.cl"
 kernel void trace(SCENE_ARGS, global const float *given, global float *made, uint n)
 {
@@ -57,8 +57,8 @@ def rate(on: device.Device, lens: Lens, lanes: int) -> float:
     camera = CameraFeatures("lens", disperses=True, losses=lens.reflects)
     files = {
         "generated/scene.cl": scene_text(),
-        "generated/spectrum.cl": '#include "spectrum/spectral.cl"\n',
-        "generated/spectrum_read.cl": '#include "spectrum/spectral_read.cl"\n',
+        "generated/spectrum.cl": '#include "spectra/spectral.cl"\n',
+        "generated/spectrum_read.cl": '#include "spectra/spectral_read.cl"\n',
         "generated/camera.cl": stages.camera_text(camera),
         "bench": MAIN,
     }

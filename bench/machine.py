@@ -10,8 +10,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from clpt.benchmark import records
-from clpt.benchmark.records import ROOT, circumstances, processor, vectors
+from clpt.bench import records
+from clpt.bench.records import ROOT, circumstances, processor, vectors
 
 __all__ = [
     "ROOT",

@@ -33,7 +33,7 @@ from bench import machine
 from bench.peer_scenes import write_atrium, write_cornell, write_glass
 from bench.workers import find_llvm
 from clpt import device
-from clpt.benchmark.starting import CACHES
+from clpt.bench.starting import CACHES
 
 MITSUBA = """
 import sys

@@ -19,8 +19,8 @@ import click
 
 import clpt
 from bench import picture_hashes
-from clpt.render.codegen import programs, stages
-from clpt.render.lowering.scene import Lowered, lower
+from clpt.render.flow import programs, stages
+from clpt.render.flow.scene_to_tables import Lowered, lower
 from clpt.scene import Scene, materials, shapes
 from clpt.scene.lights import Constant
 

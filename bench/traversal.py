@@ -45,7 +45,7 @@ MISS = 0xFFFFFFFF
 
 def atrium() -> tuple[np.ndarray, np.ndarray]:
     """The vertices and faces that scenes/atrium is made of."""
-    from clpt.benchmark import atrium as court
+    from clpt.bench import atrium as court
 
     vertices, faces, _ = court.atrium()
     return vertices, faces

@@ -35,7 +35,7 @@ from websockets.sync.client import ClientConnection, connect
 
 import clpt
 from bench import machine
-from clpt.benchmark.starting import CACHES
+from clpt.bench.starting import CACHES
 from clpt.render.renderer import Renderer
 from clpt.scene import Scene
 from clpt.view.session import Session

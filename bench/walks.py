@@ -14,7 +14,7 @@ from pathlib import Path
 
 from bench.imports import modules
 
-START = "clpt.one_call.render"
+START = "clpt.render.one_call.render"
 SCENE = re.compile(r"\bScene\b")
 FOUND = "index"  # the name of what was found in a scene
 

@@ -18,9 +18,7 @@ if sys.argv[:1] == ["-m"] and "clpt" in sys.orig_argv:  # python -m clpt: Python
     sys.path[:1] = [path for path in sys.path[:1] if path == _home]
 
 if TYPE_CHECKING:
-    from clpt.budget import Budget
     from clpt.cluster.multi_renderer import MultiRenderer
-    from clpt.colour.view import View
     from clpt.errors import (
         ClptError,
         ClusterError,
@@ -31,31 +29,33 @@ if TYPE_CHECKING:
         UnknownKindError,
         UnusedParameterError,
     )
+    from clpt.files.budget import Budget
     from clpt.formats import load, save
     from clpt.images import read as read_image
     from clpt.images import write as write_image
-    from clpt.one_call import render
+    from clpt.images.colour.view import View
+    from clpt.images.spectral_exr import SpectralImage
+    from clpt.images.spectral_exr import read as read_spectral
+    from clpt.images.spectral_exr import write as write_spectral
     from clpt.rays import Accel, AllHits, Hits, InstancedAccel
-    from clpt.render.codegen.library import kernel_source
     from clpt.render.film.denoised_picture import DenoisedPicture
     from clpt.render.film.layer_channels import write_layers
+    from clpt.render.film.state import FilmState
+    from clpt.render.flow.library import kernel_source
+    from clpt.render.one_call import render
     from clpt.render.options import RenderOptions
     from clpt.render.progress import Progress
     from clpt.render.renderer import Renderer
-    from clpt.render.wavefront.film_state import FilmState
     from clpt.scene import Film, Scene
-    from clpt.spectral_exr import SpectralImage
-    from clpt.spectral_exr import read as read_spectral
-    from clpt.spectral_exr import write as write_spectral
     from clpt.version import VERSION as __version__
 
 _Cleaning = importlib.import_module("clpt.clean_logs").Cleaning
 logging.getLogger("clpt").addHandler(_Cleaning())  # quiet until the program asks
 
 _HOMES = {  # the module of each name, and what it is called there
-    "Budget": ("budget", "Budget"),
+    "Budget": ("files.budget", "Budget"),
     "MultiRenderer": ("cluster.multi_renderer", "MultiRenderer"),
-    "View": ("colour.view", "View"),
+    "View": ("images.colour.view", "View"),
     "ClptError": ("errors", "ClptError"),
     "ClusterError": ("errors", "ClusterError"),
     "DeviceError": ("errors", "DeviceError"),
@@ -68,23 +68,23 @@ _HOMES = {  # the module of each name, and what it is called there
     "save": ("formats", "save"),
     "read_image": ("images", "read"),
     "write_image": ("images", "write"),
-    "render": ("one_call", "render"),
+    "render": ("render.one_call", "render"),
     "Accel": ("rays", "Accel"),
     "AllHits": ("rays", "AllHits"),
     "Hits": ("rays", "Hits"),
     "InstancedAccel": ("rays", "InstancedAccel"),
-    "kernel_source": ("render.codegen.library", "kernel_source"),
+    "kernel_source": ("render.flow.library", "kernel_source"),
     "DenoisedPicture": ("render.film.denoised_picture", "DenoisedPicture"),
     "write_layers": ("render.film.layer_channels", "write_layers"),
     "RenderOptions": ("render.options", "RenderOptions"),
     "Progress": ("render.progress", "Progress"),
     "Renderer": ("render.renderer", "Renderer"),
-    "FilmState": ("render.wavefront.film_state", "FilmState"),
+    "FilmState": ("render.film.state", "FilmState"),
     "Film": ("scene", "Film"),
     "Scene": ("scene", "Scene"),
-    "SpectralImage": ("spectral_exr", "SpectralImage"),
-    "read_spectral": ("spectral_exr", "read"),
-    "write_spectral": ("spectral_exr", "write"),
+    "SpectralImage": ("images.spectral_exr", "SpectralImage"),
+    "read_spectral": ("images.spectral_exr", "read"),
+    "write_spectral": ("images.spectral_exr", "write"),
     "__version__": ("version", "VERSION"),
 }
 _SHOWN = ("MultiRenderer", "Renderer")  # renderers, whose pictures a notebook shows
@@ -129,7 +129,7 @@ def _give_pictures() -> None:
     from clpt.scene import Scene as Shown
 
     def picture(scene: Shown) -> bytes:
-        from clpt.one_call import small_picture
+        from clpt.render.one_call import small_picture
 
         return small_picture(scene)
 

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from clpt.errors import SceneError
+
 Array = NDArray[Any]
 Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
@@ -25,9 +27,41 @@ Balls = NDArray[np.float32]  # (n, 4): centre and radius
 
 
 def on_host(values: object) -> Any:
-    """Return values in host memory; of an array on a device a copy, for which it waits."""
+    """Return values in host memory; of an array on a device a copy, for which it waits.
+
+    Raises SceneError for a masked array, and for an array on a device whose rows it cannot follow.
+    """
     module = sys.modules.get("pyopencl.array")  # whoever has such an array has imported it
-    return values.get() if module and isinstance(values, module.Array) else values
+    if not module or not isinstance(values, module.Array):
+        check_unmasked(values)
+        return values
+    flags = values.flags
+    return values.get() if flags.c_contiguous or flags.f_contiguous else _strided(values)
+
+
+def _strided(array: Any) -> Array:
+    """Return a pyopencl array whose rows do not follow each other in memory, in host memory.
+
+    The bytes from its first element to its last are copied, and the gaps are left out here.
+    """
+    reach = [(count - 1) * stride for count, stride in zip(array.shape, array.strides, strict=True)]
+    first = array.offset + sum(min(far, 0) for far in reach)
+    end = array.offset + sum(max(far, 0) for far in reach) + array.dtype.itemsize
+    opencl, memory = sys.modules["pyopencl"], array.base_data
+    if not isinstance(memory, opencl.MemoryObjectHolder) or array.queue is None:
+        raise SceneError(f"its rows are not contiguous: {array.strides}; copy it")
+    copied = np.empty(end - first, np.uint8)
+    for event in array.events:
+        event.wait()
+    opencl.enqueue_copy(array.queue, copied, memory, src_offset=first)
+    held = np.ndarray(array.shape, array.dtype, copied, array.offset - first, array.strides)
+    return held.copy()
+
+
+def check_unmasked(values: object, where: str | None = None) -> None:
+    """Raise SceneError for an array of NumPy with elements that are masked, which have no value."""
+    if isinstance(values, np.ma.MaskedArray) and np.ma.getmaskarray(values).any():
+        raise SceneError("has masked numbers: fill them, as by array.filled(0)", where=where)
 
 
 def in_memory(value: object) -> Any:

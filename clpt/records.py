@@ -28,7 +28,7 @@ PATH = Record(
         "normal of the hemisphere that d was chosen from; 0: the whole sphere",
     ),
     sampled_wo=("natural", "to where that surface sends light, see kernels/core/octahedral.cl"),
-    sampled_gloss=("natural", "its gloss, see kernels/lighting/receiver.cl"),
+    sampled_gloss=("natural", "its gloss, see kernels/lights/receiver.cl"),
     null_distance=(
         "real",
         "distance from the point where d was chosen to o, through null surfaces [m]",
@@ -42,13 +42,14 @@ PATH = Record(
     eta=("real", "product of the relative indices so far, for Russian roulette"),
     weight=("real", "sample's weight by the pixel filter; from a light, 1 over its first beta"),
     medium=("integer", "medium of the ray, see kernels/media/medium.cl; 0: none"),
+    around=("integer", "medium from which the ray went into a body that absorbs; 0: none"),
     bodies=("integer", "bodies around the ray, see kernels/media/bodies.cl"),
     lead=("real", "how far before o the ray's medium begins: o lies off the surface [m]"),
     rival=(
         "real",
-        "density of what the other side does over the path's own, see kernels/lighting/rivals.cl",
+        "density of what the other side does over the path's own, see kernels/transport/rivals.cl",
     ),
-    pending=("real", "what joins it if the next surface is sharp, see kernels/lighting/rivals.cl"),
+    pending=("real", "what joins it if the next surface is sharp, see kernels/transport/rivals.cl"),
     expected=("real", "light that a guide knows where the path met it first, times throughput"),
     escape=("real", "density of rays out of a sealed medium, over that of d; below 0: it is left"),
     escape_axis=("vec3", "of the cone into which they are sent, see kernels/media/escape.cl"),
@@ -57,7 +58,7 @@ PATH = Record(
     escape_depth=("real", "escape_plane . p for points p of the boundary"),
     light=("integer", "row in `lights` of the light where the path began"),
     time=("real", "when the path's light comes to the film, see clpt.scene.motion [s]"),
-    state=("integer", "PATH_ bits and depth, see kernels/path/path_state.cl"),
+    state=("integer", "PATH_ bits and depth, see kernels/transport/path_state.cl"),
     pixel_index=("integer", "where the film stores the path's pixel, see kernels/film/pixel.cl"),
     pixel_key=("natural", "number by which the sampler knows that pixel of the whole film"),
     sample=("integer", "number of the path's sample in its pixel"),
@@ -66,7 +67,10 @@ PATH = Record(
     high=("natural3", "highest words of these sums"),
     covered=("fixed", "weights of those samples that met a surface; of a film with alpha"),
     samples=("natural", "number of samples in these sums"),
-    cone=("integer", "cone around the ray, see kernels/path/cone.cl; of a scene with mip levels"),
+    cone=(
+        "integer",
+        "cone around the ray, see kernels/textures/cone.cl; of a scene with mip levels",
+    ),
 )
 
 HIT = Record(
@@ -80,7 +84,7 @@ HIT = Record(
     side=("real", "of a triangle: length that counts for what float32 rounds at the hit [m]"),
     prim=("integer", "primitive; -1: nothing was hit"),
     shape=("integer", "row of the shape in `shapes`"),
-    material=("integer", "material word of the hit side, see kernels/path/surface_flags.cl"),
+    material=("integer", "material word of the hit side, see kernels/shapes/surface_flags.cl"),
     instance=("integer", "1 + row in `instances`; 0: none"),
 )
 
@@ -102,7 +106,7 @@ SHADOW = Record(
     ),
 )
 
-# layers of the first samples of a pixel, as kernels/path/layers.cl puts them
+# layers of the first samples of a pixel, as kernels/film/layers_record.cl puts them
 LAYER_PLACES = (
     "albedo", "shading_normal", "geometric_normal", "depth", "z", "position", "uv", "motion",
     "shape_id", "primitive_id", "material_id", "denoising_albedo", "denoising_normal",
@@ -143,17 +147,22 @@ SETTINGS = Record(
     photon_pixels=("integer", "light paths whose index is below this leave photons"),
     photon_paths=("real", "how many these are in a pass, for each group of wavelengths"),
     photon_cells=("integer", "cells that are told apart, a power of two"),
-    guide_side=("real", "of the cells of a guide, see kernels/guiding/guide.cl [m]"),
+    guide_side=("real", "of the cells of a guide, see kernels/transport/guiding/guide.cl [m]"),
     guide_paths=("integer", "light paths from which it learns"),
     wavelength_groups=("integer", "groups of paths that have the same wavelengths, in a pass"),
-    rival_area=("real", "unit of areas in kernels/lighting/rivals.cl, a power of two [m^2]"),
+    rival_area=("real", "unit of areas in kernels/transport/rivals.cl, a power of two [m^2]"),
     aims=(
         "integer",
         "first float in `distributions` of the spheres at which light paths aim",
     ),
-    aim_count=("integer", "number of these spheres, see kernels/lighting/aiming.cl"),
+    aim_count=("integer", "number of these spheres, see kernels/lights/aiming.cl"),
     camera_medium=("integer", "medium around the camera, see kernels/media/medium.cl"),
     camera_bodies=("integer", "bodies around it, see kernels/media/bodies.cl"),
+    second_u=(
+        "integer",
+        "number of the attribute vertex_u1 among those of meshes; -1: no map asks",
+    ),
+    second_v=("integer", "number of vertex_v1"),
     light_count=("integer", "rows in `lights`"),
     ambient=(
         "integer",
@@ -237,7 +246,7 @@ LIGHT = Record(
     alias=("integer", "row that the alias table takes otherwise"),
     shape=("integer", "row of its shape in `shapes`; -1: not on a shape"),
     radiance=("integer", "first word of its emission parameter in `light_params`"),
-    emission_mode=("integer", "where a shape's light leaves it, see kernels/light/area.cl"),
+    emission_mode=("integer", "where a shape's light leaves it, see kernels/lights/area.cl"),
 )
 
 PHOTON = Record(
@@ -248,7 +257,7 @@ PHOTON = Record(
     ratio=("spectrum", "density of the path at each wavelength, over the mean of the four"),
     to_light=("natural", "direction to where it came from, see kernels/core/octahedral.cl"),
     normal=("natural", "geometric normal, likewise; in a medium its name"),
-    rival=("real", "of its light path, over the cosine there, see kernels/lighting/rivals.cl"),
+    rival=("real", "of its light path, over the cosine there, see kernels/transport/rivals.cl"),
     depth=("integer", "surfaces that the light path has met; its group from bit 16 up"),
 )
 
@@ -262,7 +271,7 @@ TABLES: dict[str, tuple[str, str]] = {
     "faces": ("uint", "three vertices per triangle"),
     "attributes": (
         "uint",
-        "values of meshes per vertex or face, see clpt.render.lowering.textures.attributes",
+        "values of meshes per vertex or face, see clpt.render.geometry.encode_attributes",
     ),
     "shapes": ("uint", "ShapeRow per shape"),
     "instances": ("uint", "InstanceRow per instance"),
@@ -275,7 +284,7 @@ TABLES: dict[str, tuple[str, str]] = {
     "light_params": ("uint", "parameters of the lights that are not shapes, and emissions"),
     "spectra": ("float", "tabulated spectra on the common grid"),
     "textures": ("uint", "parameters of the textures, a row each"),
-    "images": ("uint", "texels of bitmaps, see clpt.render.lowering.textures.bitmaps"),
+    "images": ("uint", "texels of bitmaps, see clpt.render.textures.bitmaps"),
     "texels": ("float", "texels of environment maps, and of bitmaps of spectra"),
     "distributions": (
         "float",

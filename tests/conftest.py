@@ -15,7 +15,8 @@ from typing import Any
 import pyopencl as cl
 import pytest
 
-from clpt import child_processes, device
+from clpt import device
+from clpt.files import child_processes
 
 # the processes that tests start take a second each to parse all sources, where none keeps bytecode
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)

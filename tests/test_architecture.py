@@ -24,9 +24,8 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, KERNELS = ROOT / "clpt", ROOT / "kernels"
 
 BASE = {
-    "arrays", "budget", "child_processes", "choices", "clean_logs", "colour", "errors",
-    "host_memory", "images", "input_files", "layout", "measured", "numpy_files", "output_files",
-    "ownership", "records", "spectra", "spectral_exr", "tev", "text", "transforms", "version",
+    "arrays", "choices", "clean_logs", "errors", "files", "images", "layout", "measured", "records",
+    "scalars", "spectra", "transforms", "version",
 }  # fmt: skip
 RENDERS = BASE | {"scene", "device", "denoise", "render", "formats"}
 # What a part may import of the others; itself always. Every part has a row.
@@ -40,54 +39,52 @@ MAY_IMPORT = {
     "bvh": BASE | {"device"},
     "denoise": BASE | {"scene", "device"},
     "rays": BASE | {"device", "bvh"},
-    "trimesh_ray": BASE | {"device", "rays"},
-    "render": BASE | {"lenses", "scene", "geometry", "sky", "device", "bvh", "denoise"},
+    "render": RENDERS | {"lenses", "geometry", "sky", "bvh"},
     "formats": BASE | {"lenses", "geometry", "scene"},
     "mie": BASE | {"scene"},
-    "one_call": BASE | {"scene", "device", "render", "formats"},
     "testing": BASE | {"scene", "device", "render"},
     "view": RENDERS,
     "cluster": RENDERS,
-    "benchmark": BASE | {"scene", "device", "bvh", "rays", "render", "formats"},
-    "cli": RENDERS | {"lenses", "geometry", "mie", "bvh", "view", "cluster", "benchmark"},
+    "bench": BASE | {"scene", "device", "bvh", "rays", "render", "formats"},
+    "cli": RENDERS | {"lenses", "geometry", "mie", "bvh", "view", "cluster", "bench"},
     "__main__": {"cli"},
 }
 OPENCL = {"device", "bvh", "denoise", "rays", "render"}  # only these import pyopencl
 # clpt/render/<room>: arrows point down; rooms of one floor do not know each other.
 FLOORS = (
-    {"contract"},
-    {"analysis"},
-    {"lowering", "codegen"},
-    {"wavefront"},
-    {"editing", "film", "trials"},
-)
+    {"records", "options"}, {"camera", "film", "motion"}, {"scene_index"}, {"spectra"},
+    {"textures"}, {"materials"}, {"geometry"}, {"lights"}, {"media"}, {"transport"}, {"flow"},
+    {"wavefront"}, {"edit", "trials"}, {"makers"},
+)  # fmt: skip
 # clpt/cli/<room>: the same; commands stand on top of all.
 FLOORS_OF_COMMANDS = (
     {"process"}, {"printing", "options"}, {"opening"}, {"files"}, {"plots"}, {"render", "view"},
 )  # fmt: skip
 # What kinds share, by what a reader looks for.
 SHARED = {
-    "colour", "core", "denoising", "film", "guiding", "interface", "lighting", "media", "merging",
-    "optics", "path", "spectrum", "steps", "surface", "texturing", "tracing",
+    "cameras", "core", "film", "integrator/steps", "lights", "materials", "media", "motion",
+    "samplers", "shapes", "spectra", "textures", "tracing", "transport", "transport/guiding",
+    "transport/photons",
 }  # fmt: skip
-KINDS = {"bsdf", "phase", "camera", "emission", "light", "medium", "sampler", "shape", "texture"}
+KINDS = {
+    "cameras/kinds", "lights/emission", "lights/kinds", "materials/kinds", "media/kinds",
+    "samplers/kinds", "shapes/kinds", "textures/kinds",
+}  # fmt: skip
 # kernels/<folder>: the folders that its files may include; generated text stands between them.
 MAY_INCLUDE = {
     **dict.fromkeys(SHARED, SHARED | {"generated", "bvh"}),
     **dict.fromkeys(KINDS, SHARED),
     "integrator": SHARED | {"generated"},
     "bvh": {"bvh", "core", "generated", "tracing"},
-    "motion": {"core", "generated", "bvh"},
     "stage": SHARED | {"generated", "bvh", "stage"},  # the loop is made of bounces
 }
-HAVE_KERNELS = {"stage", "bvh", "motion"}
+HAVE_KERNELS = {"stage", "bvh"}
 NOT_IN_MEMORY = {"float3", "int3", "uint3", "bool", "size_t"}
 # Names of kernel files, of other files of the repository, and of modules.
 NAMED = r"(?<![\w/<>*])[\w/]+\.cl\b|\b(?:clpt|tests|bench|docs)/[\w/]+\.\w+|\bclpt(?:\.\w+)+"
 # Modules from whose imports, at whatever distance, none leads to pyopencl.
 PLAIN = (
     "scene", "lenses", "geometry", "sky", "formats", "spectra", "layout", "transforms", "images",
-    "spectral_exr",
 )  # fmt: skip
 
 
@@ -117,13 +114,19 @@ def kernels(broken: Callable[[str, str], Iterable[tuple[int, str]]]) -> Iterator
     """Ask each kernel file, by its folder and text, for positions of what is wrong, and what."""
     for path in kernel_files():
         text = path.read_text(encoding="utf-8")
-        for position, wrong in broken(path.relative_to(KERNELS).parts[0], text):
+        for position, wrong in broken(folder_of(path.relative_to(KERNELS).as_posix()), text):
             line = text.count("\n", 0, position) + 1
             yield f"{path.relative_to(ROOT)}:{line}: {wrong}"
 
 
+def folder_of(name: str) -> str:
+    """The folder of a kernel file: "lights/kinds" of lights/kinds/spot.cl; "generated" has one."""
+    folder = name.rpartition("/")[0]
+    return "generated" if folder.startswith("generated") else folder
+
+
 def part_of(name: str) -> str | None:
-    """The part of clpt that a full name belongs to: "render" of clpt.render.lowering.scene."""
+    """The part of clpt that a full name belongs to: "render" of clpt.render.flow.programs."""
     parts = name.split(".")
     return parts[1] if parts[0] == "clpt" and len(parts) > 1 else None
 
@@ -286,7 +289,7 @@ def test_kernel_files_include_in_their_direction() -> None:
 
     def broken(folder: str, text: str) -> Iterator[tuple[int, str]]:
         for found in re.finditer(r'#include "([^"]+)"', text):
-            if found[1].split("/")[0] not in MAY_INCLUDE[folder] and found[1] not in numbers:
+            if folder_of(found[1]) not in MAY_INCLUDE[folder] and found[1] not in numbers:
                 yield found.start(), f"{folder}/ includes {found[1]}"
 
     keep("a kernel file includes only folders that MAY_INCLUDE lists", kernels(broken))

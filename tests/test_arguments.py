@@ -9,7 +9,7 @@ import pytest
 
 import clpt
 from clpt.errors import SceneError, UnknownKindError
-from clpt.render.lowering.scene import lower
+from clpt.render.flow.scene_to_tables import lower
 from clpt.render.options import RenderOptions
 from clpt.scene import Film, Scene, cameras, integrators, lights, materials, shapes
 from clpt.spectra import illuminant
@@ -55,8 +55,8 @@ def test_what_is_no_scene(function: Any, scene: Any, message: str) -> None:
         ({"cancel_seconds": 0}, SceneError, "seconds above 0"),
         ({"tree_quality": "best"}, UnknownKindError, "unknown quality 'best'"),
         ({"queued": "no"}, SceneError, "queued: must be true or false, not 'no'"),
-        ({"slots": 0}, SceneError, "slots: must be a whole number from 1, not 0"),
-        ({"slots": 1.5}, SceneError, "slots: must be a whole number from 1"),
+        ({"slots": 0}, SceneError, "slots: must be a whole number above zero, not 0"),
+        ({"slots": 1.5}, SceneError, "slots: must be a whole number above zero"),
         ({"texture_budget": -1}, SceneError, "texture_budget: must be a whole number from 0"),
     ],
 )
@@ -69,7 +69,7 @@ def test_options(function: Any, options: dict[str, Any], error: type, message: s
     ("given", "message"),
     [
         ({"size": 4}, r"^film\.size: must be \(width, height\), not 4$"),
-        ({"size": (0, 4)}, r"^film\.width: must be 1 to 65536, not 0$"),
+        ({"size": (0, 4)}, r"^film\.width: must be a whole number from 1 to 65536, not 0$"),
         ({"mode": "rbg"}, r"^film\.mode: 'rbg' is none of spectral, rgb"),
         ({"camera": "front"}, r"^camera: must be a camera or \(azimuth, elevation\).* not 'front'"),
         ({"camera": (1, 2, 3, 4)}, r"^camera: must be a camera or \(azimuth, elevation\)"),

@@ -333,23 +333,24 @@ def test_the_code_of_layers(run: Run, capsys: pytest.CaptureFixture):
 
 def test_the_code_of_limits(run: Run):
     messages = run("limits.md")["messages"]
-    assert "must be 1 to 65536" in messages[0] and "are more than 64 Mi pixels" in messages[1]
+    assert "must be a whole number from 1 to 65536" in messages[0]
+    assert "are more than 64 Mi pixels" in messages[1]
 
 
 LIMITS = (  # on the page, and where the code has them
     ("65 536 pixels", "clpt.cli.options.values", "LARGEST", 65536),
-    ("67 108 864 pixels", "clpt.render.analysis.checks.film", "LARGEST", 67108864),
+    ("67 108 864 pixels", "clpt.render.film.check", "LARGEST", 67108864),
     ("| 1024 |", "clpt.scene.integrators", "MOST_BANDS", 1024),
     ("| 4000 |", "clpt.scene.integrators", "DEEPEST", 4000),
     ("715 827 882", "clpt.bvh.build", "MOST", 715827882),
-    ("| 255 |", "clpt.render.contract.custom_materials", "MOST", 255),
+    ("| 255 |", "clpt.render.records.custom_materials", "MOST", 255),
     ("| 32 |", "clpt.scene.textures", "MOST_OCTAVES", 32),
-    ("768 MiB", "clpt.budget", "FREE", 768 << 20),
-    ("256 bytes for each byte of its files", "clpt.budget", "RATIO", 256),
-    ("a part for each 256 bytes", "clpt.budget", "PER_REPEAT", 256),
-    ("| 600 s,", "clpt.budget", "SECONDS", 600.0),
-    ("| 50 000, and one", "clpt.budget", "PARTS", 50_000),
-    ("one for each 4 bytes", "clpt.budget", "PER_PART", 4),
+    ("768 MiB", "clpt.files.budget", "FREE", 768 << 20),
+    ("256 bytes for each byte of its files", "clpt.files.budget", "RATIO", 256),
+    ("a part for each 256 bytes", "clpt.files.budget", "PER_REPEAT", 256),
+    ("| 600 s,", "clpt.files.budget", "SECONDS", 600.0),
+    ("| 50 000, and one", "clpt.files.budget", "PARTS", 50_000),
+    ("one for each 4 bytes", "clpt.files.budget", "PER_PART", 4),
     ("at most 300 characters", "clpt.errors", "LONGEST", 300),
     ("| 65 536 bytes |", "clpt.formats.meshes.ply_tables", "LONGEST_HEADER", 65536),
     ("| 65 536 corners |", "clpt.formats.meshes.ply", "MOST_CORNERS", 65536),

@@ -12,8 +12,8 @@ from clpt import device
 from clpt.device import kernels_folder
 from clpt.layout import SLAB_BLOCK, TYPES, Constants, Record, bits
 from clpt.records import CONSTANTS, LIGHT, PATH, SETTINGS, SHAPE, SLABS
-from clpt.render.codegen.signatures import scene_text
-from clpt.render.contract import camera_records
+from clpt.render.flow.signatures import scene_text
+from clpt.render.records import camera_rows as camera_records
 
 UNIFORM = [SETTINGS, *camera_records.RECORDS.values()]
 
@@ -29,8 +29,8 @@ def run(on: device.Device, text: str, lanes: int, *arrays: np.ndarray) -> None:
     virtual = {
         "probe.cl": text,
         "generated/scene.cl": scene_text(),
-        "generated/spectrum.cl": '#include "spectrum/spectral.cl"\n',
-        "generated/spectrum_read.cl": '#include "spectrum/spectral_read.cl"\n',
+        "generated/spectrum.cl": '#include "spectra/spectral.cl"\n',
+        "generated/spectrum_read.cl": '#include "spectra/spectral_read.cl"\n',
     }
     defines = {"LANES": lanes, "SPECTRA_SIZE": 471, "SPECTRA_STEP": "1.0f"}
     defines["SLAB_BLOCK"] = SLAB_BLOCK if lanes == 1 else 0

@@ -15,7 +15,7 @@ import pytest
 
 import clpt
 from clpt import bvh, device
-from clpt.render.lowering.scene import Lowered, lower
+from clpt.render.flow.scene_to_tables import Lowered, lower
 from clpt.scene import Film, Scene, lights, materials, shapes
 from clpt.scene.cameras import Perspective
 from tests.front_end import CLANG, TARGETS, errors

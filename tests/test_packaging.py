@@ -67,7 +67,8 @@ def test_workflows_can_be_read(path):
 def test_own_scenes_are_found_from_anywhere(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert (
-        formats.locate("scenes/cornell_box") == formats.scenes_folder() / "cornell_box/scene.json"
+        formats.locate("scenes/cornell_box")
+        == formats.own_scenes.scenes_folder() / "cornell_box/scene.json"
     )
     own = tmp_path / "scenes" / "cornell_box" / "scene.json"
     own.parent.mkdir(parents=True)

@@ -14,11 +14,13 @@ from unittest import mock
 import numpy as np
 
 import clpt
-from clpt import images, measured, output_files, scene, spectral_exr
+from clpt import images, measured, scene
 from clpt.cli.files import checkpoints
 from clpt.cli.render import video
+from clpt.files import output_files
 from clpt.formats.meshes import particles, strands
 from clpt.formats.native import motion
+from clpt.images import spectral_exr
 from clpt.measured import tensor_file
 from clpt.render.film import film_file
 from clpt.scene.motion import Deformation

@@ -15,9 +15,9 @@ import clpt
 from bench import machine
 from clpt import device
 from clpt.errors import SceneError
-from clpt.render.codegen import programs
-from clpt.render.contract.features import Features
-from clpt.render.lowering.scene import lower
+from clpt.render.flow import programs
+from clpt.render.flow.scene_to_tables import lower
+from clpt.render.records import Features
 from clpt.scene import Scene
 from clpt.scene.integrators import Path
 
@@ -89,7 +89,10 @@ def longest(given: Iterable[Program], count: int) -> list[Program]:
 
 def _sources(features: Features, layout: str) -> Iterator[tuple[str, device.Source]]:
     """The texts of a picture, by the names of their stages."""
-    for name, root in (("guide", "guiding/sum.cl"), ("photons", "merging/sort.cl")):
+    for name, root in (
+        ("guide", "transport/guiding/sum.cl"),
+        ("photons", "transport/photons/sort.cl"),
+    ):
         yield name, device.assemble(root)
     for own in features.passes:
         yield from programs.sources(own, layout, 1, queued=True).items()

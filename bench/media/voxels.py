@@ -16,8 +16,8 @@ import numpy as np
 
 from bench import machine
 from clpt.formats import volumes
-from clpt.render.analysis.bricks import CELLS, Windows
-from clpt.render.lowering import grids
+from clpt.render.lights.bricks import CELLS, Windows
+from clpt.render.media import encode_grids as grids
 
 CLOUD = "volumes/teapot_cloud/teapot_cloud.nvdb"
 

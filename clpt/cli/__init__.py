@@ -22,13 +22,14 @@ COMMANDS = {  # with the first words of their help, for which nothing is importe
     "worker": "Render for the scheduler at ADDRESS, such as tls://192.168.1.5:8786, until it ends.",
     "cluster": "Render on several machines; see also `clpt worker`.",
     "devices": "List the OpenCL devices, with the one that would be used and why.",
+    "scenes": "List the scenes that come with clpt: path, size in pixels, what each shows.",
     "info": "Show what the file or folder SCENE holds, without rendering it.",
     "inspect": "Show what the image or film FILE holds, and the values of its pixels.",
     "convert": "Write the image or film SOURCE as TARGET, in another format or for a screen.",
     "compare": "Measure how the image or film A differs from B.",
     "kernels": "Write the OpenCL programs that render SCENE, one file each.",
     "mie": "Make the medium of spheres of RADIUS micrometres: fog, mist, milk.",
-    "lens": "Tell of LENS: a file (.dat, .zmx, .txt) or a name of the library.",
+    "lens": "Describe LENS: a file (.dat, .zmx, .txt) or a name of the library.",
     "completion": "Let the TAB key of a SHELL complete clpt's commands, options and values.",
     "bench": "Measure pictures, rays, stages of rendering, builds and starts of an OpenCL device.",
 }
@@ -79,7 +80,7 @@ def _tell_version(ctx: click.Context, _: click.Parameter, asked: bool) -> None:
 @verbose_option("Log more; twice for everything.")
 @click.option(
     "--version", is_flag=True, is_eager=True, expose_value=False, callback=_tell_version,
-    help="Tell the version, and the commit that it was made from.",
+    help="Print the version, and the commit that it was made from.",
 )  # fmt: skip
 @click.pass_context
 def cli(ctx: click.Context, verbose: int) -> None:

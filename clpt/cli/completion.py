@@ -8,7 +8,8 @@ from pathlib import Path
 import click
 from click.shell_completion import get_completion_class
 
-from .. import output_files
+from clpt.files import output_files
+
 from ..errors import ClptError
 from .options.values import Choice
 from .process import terminal

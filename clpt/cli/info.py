@@ -10,11 +10,12 @@ import click
 
 from ..formats import locate
 from .options.loading_options import loading_options
+from .options.scene_path import ScenePath
 from .process import terminal
 
 
 @click.command()
-@click.argument("scene", type=click.Path(path_type=Path))
+@click.argument("scene", type=ScenePath())
 @loading_options
 @click.option("--json", "as_json", is_flag=True, help="Write JSON instead of a table.")
 def info(scene: Path, variables: dict[str, Any], as_json: bool) -> None:

@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .. import output_files
+from clpt.files import output_files
+
 from ..choices import LAYOUTS, MODES, PICTURE_SCENES
 from ..errors import SceneError
 from ..formats import load, locate
 from .options.loading_options import loading_options
 from .options.records import with_records
+from .options.scene_path import ScenePath
 from .options.values import Choice
 from .process import terminal
 
@@ -40,7 +42,7 @@ class Reproduction:
 
 
 @click.command()
-@click.argument("scene", type=click.Path(path_type=Path))
+@click.argument("scene", type=ScenePath())
 @click.option(
     "-o", "--output", "folder", type=click.Path(path_type=Path), required=True,
     help="Folder for the files; created if missing.",
@@ -84,8 +86,8 @@ def kernels(
 
 def _write_texts(plan: Scene, folder: Path, texts: Texts) -> None:
     """Write the programs of a scene, one file each."""
-    from ..render.codegen.programs import film_sources, sources  # here: help needs no OpenCL
-    from ..render.lowering.scene import lower
+    from clpt.render.flow.programs import film_sources, sources  # here: help needs no OpenCL
+    from clpt.render.flow.scene_to_tables import lower
 
     features = lower(plan).features
     queued = len(features.materials.kinds) > 1
@@ -110,8 +112,8 @@ def _opened(scene: Path, mode: str | None, variables: dict[str, Any]) -> Scene:
     own = str(scene) in PICTURE_SCENES and not scene.exists()
     if not own:
         locate(scene)
-    from ..benchmark.picture_scenes import PICTURES  # here: help needs no OpenCL
-    from ..benchmark.scenes import in_mode, made
+    from clpt.bench.picture_scenes import PICTURES  # here: help needs no OpenCL
+    from clpt.bench.scenes import in_mode, made
 
     if own:
         return in_mode(made(str(scene)), mode or PICTURES[str(scene)].mode)
@@ -120,8 +122,9 @@ def _opened(scene: Path, mode: str | None, variables: dict[str, Any]) -> Scene:
 
 def _reproduce(plan: Scene, scene: Path, folder: Path, stage: str, which: str | None) -> None:
     """Write a program that shows whether a device runs a stage right."""
+    from clpt.bench import agreement, repro
+
     from .. import device
-    from ..benchmark import agreement, repro
 
     on = device.choose(which)
     witness = agreement.witness_of(on)

@@ -29,7 +29,7 @@ from .process.extras import extra
 def lens(
     lens: str, wavelengths: str, fields: str, f_number: float | None, plot: Path | None
 ) -> None:
-    """Tell of LENS: a file (.dat, .zmx, .txt) or a name of the library.
+    """Describe LENS: a file (.dat, .zmx, .txt) or a name of the library.
 
     Lengths are in millimetres; pupils stand behind the first and the last surface. A spot's size is
     the root of its mean squared radius.

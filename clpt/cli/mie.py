@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .. import output_files
+from clpt.files import output_files
+
 from ..choices import DROP_SIZES
 from ..errors import SceneError
 from .options.records import with_records

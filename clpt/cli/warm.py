@@ -12,12 +12,13 @@ from ..formats import locate
 from .options.headings import Grouped
 from .options.records import with_records
 from .options.scene_options import SceneOptions, denoise_option, scene_options
+from .options.scene_path import ScenePath
 from .options.verbosity import verbose_option
 from .process import terminal
 
 
 @click.command(cls=Grouped)
-@click.argument("scenes", type=click.Path(path_type=Path), nargs=-1, required=True)
+@click.argument("scenes", type=ScenePath(), nargs=-1, required=True)
 @scene_options
 @denoise_option
 @verbose_option("Log more; twice for everything.")

@@ -10,7 +10,7 @@ from collections.abc import Hashable
 from dataclasses import dataclass
 
 from clpt.cluster.sample_ranges import gaps, with_range
-from clpt.render.wavefront.film_state import Ranges
+from clpt.render.film.state import Ranges
 
 GROWTH = 3  # times the size of a worker's last block
 LEAST = 0.1  # of the seconds that a block should take: a smaller one costs more than it helps

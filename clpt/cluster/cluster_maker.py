@@ -17,11 +17,11 @@ from clpt.cluster.farm import Farm, Film
 from clpt.cluster.host_maker import HostMaker
 from clpt.denoise import needs
 from clpt.errors import SceneError
-from clpt.render.contents import Contents
-from clpt.render.device_film import Apply, Changes, DeviceFilm, open_device
-from clpt.render.maker import Call, Held, Settle
+from clpt.render.film.state import FilmState, Ranges
+from clpt.render.makers.contents import Contents
+from clpt.render.makers.device_film import Apply, Changes, DeviceFilm, open_device
+from clpt.render.makers.maker import Call, Held, Settle
 from clpt.render.wavefront.adaptive import Adaptive
-from clpt.render.wavefront.film_state import FilmState, Ranges
 from clpt.render.wavefront.tracer import Selection
 from clpt.render.wavefront.wavefront import Counts
 from clpt.scene import Scene

@@ -19,8 +19,8 @@ from clpt.cluster.device_worker import DeviceWorker
 from clpt.cluster.sample_ranges import gaps
 from clpt.cluster.threads import TICK, Threads
 from clpt.errors import ClusterError
-from clpt.render.maker import Held
-from clpt.render.wavefront.film_state import FilmState, Ranges, join_ranges
+from clpt.render.film.state import FilmState, Ranges, join_ranges
+from clpt.render.makers.maker import Held
 from clpt.render.wavefront.tracer import Selection
 from clpt.render.wavefront.wavefront import Counts
 

@@ -9,8 +9,8 @@ from typing import Any, TypeVar
 from clpt.cluster.threads import on_all
 from clpt.device import Device
 from clpt.errors import SceneError
-from clpt.render.device_film import DeviceFilm
-from clpt.render.wavefront.film_state import FilmState, Ranges, join_ranges
+from clpt.render.film.state import FilmState, Ranges, join_ranges
+from clpt.render.makers.device_film import DeviceFilm
 from clpt.render.wavefront.tracer import OnBatch, Selection, use_all_pixels
 from clpt.render.wavefront.wavefront import Counts, Wavefront
 

@@ -14,12 +14,12 @@ from clpt.cluster.crew import Crew
 from clpt.cluster.device_worker import DeviceWorker, Once, device_names, where_it_works
 from clpt.cluster.host_maker import HostMaker
 from clpt.errors import SceneError
-from clpt.render.contents import Contents
-from clpt.render.device_film import Apply, Changes, DeviceFilm, texture_budget_of
-from clpt.render.maker import Call, Held, Settle
+from clpt.render.film.state import FilmState, Ranges
+from clpt.render.makers.contents import Contents
+from clpt.render.makers.device_film import Apply, Changes, DeviceFilm, texture_budget_of
+from clpt.render.makers.maker import Call, Held, Settle
 from clpt.render.options import RenderOptions
 from clpt.render.wavefront.adaptive import Adaptive
-from clpt.render.wavefront.film_state import FilmState, Ranges
 from clpt.render.wavefront.tracer import Selection
 from clpt.render.wavefront.wavefront import Counts, Wavefront
 from clpt.scene import Scene

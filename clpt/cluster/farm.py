@@ -20,7 +20,7 @@ from clpt.cluster.admission import Admission, Job, Known
 from clpt.cluster.calls import Call, Calls, reply_of
 from clpt.cluster.sample_ranges import gaps
 from clpt.errors import ClusterError
-from clpt.render.wavefront.film_state import FilmState, Ranges
+from clpt.render.film.state import FilmState, Ranges
 from clpt.render.wavefront.tracer import Selection
 from clpt.render.wavefront.wavefront import Counts
 

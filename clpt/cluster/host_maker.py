@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 from clpt import device as dev
 from clpt.errors import ClusterError
-from clpt.render.maker import Maker
-from clpt.render.wavefront.film_state import FilmState
+from clpt.render.film.state import FilmState
+from clpt.render.makers.maker import Maker
 from clpt.render.wavefront.tracer import OnBatch, Selection, Tracer
 
 

@@ -23,9 +23,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from clpt import child_processes
 from clpt.cluster import keys
 from clpt.errors import ClusterError
+from clpt.files import child_processes
 
 if TYPE_CHECKING:
     from distributed import Client, Scheduler, Worker

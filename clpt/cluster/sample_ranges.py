@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect
 
-from clpt.render.wavefront.film_state import Ranges
+from clpt.render.film.state import Ranges
 
 
 def with_range(taken: Ranges, first: int, end: int) -> Ranges:

@@ -22,10 +22,10 @@ from clpt import device as dev
 from clpt.cluster.bundle import Bundle, Store, canonical
 from clpt.cluster.multi_renderer import MultiRenderer
 from clpt.errors import ClptError, ClusterError, MemoryBudgetError, SceneError
-from clpt.render.device_film import kernels_digest
+from clpt.render.film.state import DIMENSIONS, FilmState
 from clpt.render.film_renderer import maker_of
+from clpt.render.makers.device_film import kernels_digest
 from clpt.render.renderer import Renderer
-from clpt.render.wavefront.film_state import DIMENSIONS, FilmState
 from clpt.render.wavefront.tracer import Paths, Selection
 from clpt.scene import Scene
 from clpt.version import VERSION as VERSION_OF_CLPT

@@ -59,18 +59,18 @@ def remarks(
     integrator: that renders it; splats: whether samples serve several pixels; noise_before: whether
     a limit of noise is for the picture before it is denoised.
     """
-    advice = "denoisers take what noise they share for detail"
+    advice = "denoisers keep noise that neighbouring pixels share"
     found = []
     if splats:
         found.append(
-            f"the film splats, so neighbouring pixels share samples, and {advice}: set "
+            f"the film splats, so neighbouring pixels share samples; {advice}: set "
             "film.filtering to importance"
         )
     if isinstance(integrator, Vcm) and integrator.merging:
         found.append("the noise of vcm is blotchy, and may stay; try the integrator path")
     if not isinstance(sampler, PIXELWISE):
         found.append(
-            f"with the sampler {sampler.kind} neighbouring pixels err together, and {advice}: "
+            f"with the sampler {sampler.kind} neighbouring pixels err together; {advice}: "
             "choose sobol"
         )
     if noise_before:

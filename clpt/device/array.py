@@ -58,7 +58,7 @@ class DeviceArray(Array):
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         """Return a copy on the host; wait for it. Raises ValueError if no copy may be made."""
-        if copy is False:
+        if copy is not None and not copy:
             raise ValueError("an array on an OpenCL device becomes one of numpy only by a copy")
         host = self.get()
         return host if dtype is None else host.astype(dtype, copy=False)
@@ -85,7 +85,7 @@ class DeviceArray(Array):
         """
         wanted = tuple(dl_device or self.__dlpack_device__())
         if wanted == (dlpack.CPU, 0):
-            host = self._mapped() if copy is False else self.get()
+            host = self._mapped() if copy is not None and not copy else self.get()
             versions: dict[str, Any] = {} if max_version is None else {"max_version": max_version}
             return host.__dlpack__(**versions)
         if wanted != self._opencl_device:

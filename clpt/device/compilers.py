@@ -20,8 +20,8 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from clpt import child_processes
 from clpt.device import compile_limits, runtimes
+from clpt.files import child_processes
 
 log = logging.getLogger(__name__)
 

@@ -27,6 +27,7 @@ from clpt.device import (
 )
 
 from ..errors import DeviceError
+from ..scalars import is_whole
 from .compilers import Compilers, spare_cores
 
 log = logging.getLogger(__name__)
@@ -408,11 +409,11 @@ def _key(info: DeviceInfo) -> tuple[int, DeviceInfo]:
 
 def _limited(info: DeviceInfo, threads: int) -> DeviceInfo:
     """A part of a CPU that has so many cores, or all of it. Raises DeviceError."""
-    if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
+    if not is_whole(threads) or threads < 1:
         raise DeviceError(f"threads must be a whole number above zero, not {threads!r}")
     if not info.is_cpu:
         raise DeviceError(f"threads are of a CPU, and {info.label} is none")
-    return info if threads >= info.compute_units else _part(info, threads)
+    return info if threads >= info.compute_units else _part(info, int(threads))
 
 
 @functools.cache

@@ -23,8 +23,8 @@ from pathlib import Path
 
 import platformdirs
 
-from clpt import output_files, ownership
 from clpt.device import forking
+from clpt.files import output_files, ownership
 
 from .source import Source
 

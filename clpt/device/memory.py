@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pyopencl as cl
 
-from clpt import host_memory
+from clpt.files import host_memory
 
 _GPU_SHARE = 0.85  # a desktop and other programs keep some of a GPU's memory
 

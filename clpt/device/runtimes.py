@@ -30,8 +30,8 @@ from pathlib import Path
 
 import pyopencl as cl
 
-from clpt import output_files, ownership
 from clpt.device import disk_cache
+from clpt.files import output_files, ownership
 
 log = logging.getLogger(__name__)
 

@@ -10,10 +10,11 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
-from clpt import budget as budgets
-from clpt.budget import Budget
 from clpt.choices import Missing
 from clpt.errors import LONGEST_WARNING, SceneError, nearest, one_line
+from clpt.files import budget as budgets
+from clpt.files.budget import Budget
+from clpt.formats import own_scenes
 
 if TYPE_CHECKING:  # a name of a file is looked up without the kinds of scenes
     from clpt.scene import Scene
@@ -164,7 +165,7 @@ def locate(path: str | Path, /) -> Path:
 def brought(path: str | os.PathLike[str], /) -> Path:
     """Return the path; of one that begins with `scenes` and is not there, clpt's own if any."""
     path = Path(path)
-    own = scenes_folder().parent / path
+    own = own_scenes.scenes_folder().parent / path
     mine = path.parts[:1] == ("scenes",) and ".." not in path.parts and os.path.exists(own)
     return own if mine and not os.path.exists(path) else path
 
@@ -174,6 +175,7 @@ def _nearest_file(path: Path) -> str:
 
     Of a path whose folder is not there, folders near the first one that is missing.
     """
+    whole = path
     while not path.parent.is_dir() and path.parent != path:
         path = path.parent
     try:
@@ -183,18 +185,21 @@ def _nearest_file(path: Path) -> str:
             if one.is_dir() or one.name.lower().endswith(tuple(FORMATS))
         ]
     except OSError:
-        return ""
-    near = difflib.get_close_matches(path.name, names, n=2, cutoff=CLOSE)
-    return (
-        f"; did you mean {' or '.join(str(path.parent / name) for name in near)}?" if near else ""
-    )
+        names = []
+    return _meant([str(path.parent / name) for name in _near(path.name, names)], whole)
 
 
-def scenes_folder() -> Path:
-    """Return the folder of clpt's own scenes: in the installed package, or of the checkout."""
-    package = Path(__file__).resolve().parent.parent
-    installed = package / "scenes"
-    return installed if installed.is_dir() else package.parent / "scenes"
+def _near(name: str, names: list[str]) -> list[str]:
+    return difflib.get_close_matches(name, names, n=2, cutoff=CLOSE)
+
+
+def _meant(here: list[str], path: Path) -> str:
+    """Return the end of a message: paths that are `here`, else those of clpt's own scenes."""
+    meant = here or own_scenes.nearest_paths(path)
+    if meant:
+        return f"; did you mean {' or '.join(meant)}?"
+    of_own = path.parts[:1] == (own_scenes.SCENES,)
+    return "; clpt scenes lists those that come with clpt" if of_own else ""
 
 
 def _inside(folder: Path) -> Path:
@@ -206,7 +211,10 @@ def _inside(folder: Path) -> Path:
         if len(files) == 1:
             return files[0]
     if not scenes:
-        raise SceneError(f"this folder holds no scene.json and no {' '.join(SCENES)}", file=folder)
+        message = f"this folder holds no scene.json and no {' '.join(SCENES)}"
+        if folder.resolve() == own_scenes.scenes_folder().resolve():
+            message = "name one of the scenes in this folder, which clpt scenes lists"
+        raise SceneError(message, file=folder)
     names = ", ".join(file.name for file in scenes[:MOST_NAMED])
     more = f" and {len(scenes) - MOST_NAMED} more" if len(scenes) > MOST_NAMED else ""
     raise SceneError(f"this folder holds several scenes, name one: {names}{more}", file=folder)

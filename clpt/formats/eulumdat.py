@@ -13,8 +13,8 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import text as text_files
 from clpt.errors import SceneError
+from clpt.files import text as text_files
 from clpt.formats.ies import MOST_VALUES, Photometry
 
 SYMMETRY, PLANES, ANGLES, FACTOR, SETS = 2, 3, 5, 23, 25  # lines, counted from 0

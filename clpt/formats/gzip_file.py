@@ -7,8 +7,8 @@ import os
 import zlib
 from pathlib import Path
 
-from clpt import budget, input_files
 from clpt.errors import SceneError
+from clpt.files import budget, input_files
 
 CHUNK = 1 << 22
 WHAT = "unpacking it"

@@ -13,9 +13,9 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt import text as text_files
 from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
+from clpt.files import text as text_files
 from clpt.scene.textures import Bitmap
 
 ROWS, COLUMNS = 360, 720  # of the image: half degrees

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import budget
 from clpt.arrays import Floats, Integers, on_host
 from clpt.errors import SceneError
+from clpt.files import budget
 from clpt.scene.shapes import SdfGrid
 
 MOST_PIECES = 16

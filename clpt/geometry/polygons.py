@@ -15,9 +15,9 @@ import mapbox_earcut
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import budget
 from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
+from clpt.files import budget
 
 MOST_CORNERS = 24_000  # of a polygon whose ears are clipped: time may grow with their square
 CHUNK = 1 << 18  # corners that are tested at a time: in float64 they take 200 bytes each

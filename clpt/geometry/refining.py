@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import budget
 from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
+from clpt.files import budget
 from clpt.geometry.shapes import where
 from clpt.scene import subdivision
 from clpt.scene.pixels import pixels
@@ -174,7 +174,7 @@ def _smooth(points: Floats, faces: Integers) -> Floats:
 
 
 def heights(image: Bitmap, uvs: Floats) -> Floats:
-    """Return what an image says at uvs (n, 2), as kernels/texture/bitmap.cl reads numbers: (n,)."""
+    """Return what an image says at uvs (n, 2), as textures/kinds/bitmap.cl reads numbers: (n,)."""
     values = pixels(image, REAL)[..., 0].astype(np.float64)
     to_uv = np.asarray(image.to_uv, np.float64)
     x, y = ((np.c_[uvs, np.ones(len(uvs))] @ to_uv.T)[:, :2] * [1.0, -1.0] + [0.0, 1.0]).T

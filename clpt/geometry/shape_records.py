@@ -69,7 +69,7 @@ CURVE = Record(
 )
 ROWS = {**RECORDS, "curve": CURVE}  # of all kinds, lights or not
 
-# What the functions of shapes return, see kernels/interface/shape.cl and emission.cl.
+# What the functions of shapes return, see kernels/shapes/shape.cl and emission.cl.
 SHAPE_SAMPLE = Record(
     "ShapeSample",
     "A point of a shape, chosen as seen from some point p.",

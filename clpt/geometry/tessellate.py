@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clpt import budget
 from clpt.errors import SceneError
+from clpt.files import budget
 from clpt.geometry.analytic import across, row
 from clpt.scene.shapes import Cylinder, Mesh, Shape, Sphere
 

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt import budget, transforms
+from clpt import transforms
 from clpt.arrays import Faces, Points, Words, on_host, single
 from clpt.errors import SceneError
+from clpt.files import budget
 from clpt.geometry import distance_grids, refining
 from clpt.geometry.shape_records import ONE_OF
 from clpt.geometry.shapes import placement, where

@@ -6,6 +6,7 @@ its bytes stand in another file. What a file says of its numbers is heeded: colo
 """
 
 from clpt.choices import FOR_SCREENS, WRITABLE
+from clpt.images.arrays import from_array
 from clpt.images.brightness import auto_exposure, levels, raised, stops
 from clpt.images.exr import STOPS, matrix_of
 from clpt.images.exr_files import attributes, part_names, write_channels
@@ -14,10 +15,11 @@ from clpt.images.npy import write as write_npy
 from clpt.images.pillow import decoded
 from clpt.images.pillow import texts as png_text
 from clpt.images.png_files import png
-from clpt.images.reading import READERS, check_input, log_notes, read, read_stored
+from clpt.images.reading import READERS, STRAIGHT, check_input, log_notes, read, read_stored
 from clpt.images.stored import Stored
 from clpt.images.transfer import (
     linear_to_srgb,
+    multiplied,
     srgb8_steps,
     srgb_to_linear,
     straight,
@@ -31,6 +33,7 @@ __all__ = [
     "FOR_SCREENS",
     "READERS",
     "STOPS",
+    "STRAIGHT",
     "WRITABLE",
     "Stored",
     "attributes",
@@ -38,10 +41,12 @@ __all__ = [
     "check_input",
     "check_output",
     "decoded",
+    "from_array",
     "levels",
     "linear_to_srgb",
     "log_notes",
     "matrix_of",
+    "multiplied",
     "part_names",
     "png",
     "png_text",

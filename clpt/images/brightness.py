@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Floats32
 from clpt.choices import Exposure
-from clpt.colour.tones import LUMINANCE
-from clpt.colour.view import View
+from clpt.images.colour.tones import LUMINANCE
+from clpt.images.colour.view import View
 from clpt.images.transfer import to_codes
 
 GREY = 0.18  # reflectance of the middle grey that photographers expose for

@@ -14,8 +14,8 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
-from clpt import budget, input_files, output_files
 from clpt.errors import SceneError
+from clpt.files import budget, input_files, output_files
 from clpt.images import sizes
 
 Channels = Mapping[str, NDArray[Any]]

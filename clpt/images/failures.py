@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from clpt import input_files
 from clpt.errors import SceneError
+from clpt.files import input_files
 
 
 def check_there(path: Path) -> None:

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from clpt import budget, output_files
 from clpt.arrays import Bytes, Floats32, Matrix
 from clpt.errors import SceneError
+from clpt.files import budget, output_files
 from clpt.images import sizes
 from clpt.images.stored import Stored
 from clpt.spectra import spaces

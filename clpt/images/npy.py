@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import budget, numpy_files, output_files
 from clpt.errors import SceneError
+from clpt.files import budget, numpy_files, output_files
 from clpt.images import sizes
 from clpt.images.stored import Stored
 
 
 def read(path: Path) -> Stored:
-    """Read (h, w) or (h, w, c) of any number. Raises SceneError for other arrays."""
+    """Read (h, w) or (h, w, c) of any number, bytes as in a .png. Raises SceneError for others."""
     array = numpy_files.array(path)
     if array.ndim > 1:
         sizes.check_size(path, *array.shape[1::-1])
@@ -23,8 +23,13 @@ def read(path: Path) -> Stored:
         message = f"not an image: an array of {array.dtype}, shape {array.shape}"
         raise SceneError(message, file=path)
     budget.check(4 * array.size, "its array", path)
-    values = np.array(array if array.ndim == 3 else array[..., None], np.float32)
-    return Stored(values, encoded=False)
+    shaped = array if array.ndim == 3 else array[..., None]
+    if array.dtype == np.uint8:
+        return Stored(np.array(shaped), encoded=True)
+    notes: tuple[str, ...] = ()
+    if array.dtype.kind in "iu":
+        notes = (f"its numbers of type {array.dtype} are taken as they are: divide them by white",)
+    return Stored(np.array(shaped, np.float32), encoded=False, colour_notes=notes)
 
 
 def write(path: Path, array: NDArray[Any]) -> None:

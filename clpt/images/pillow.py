@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import budget, input_files
 from clpt.errors import SceneError
+from clpt.files import budget, input_files
 from clpt.images import png_files, sizes
 from clpt.images.stored import Stored
 

@@ -6,9 +6,9 @@ import logging
 from collections.abc import Callable
 from pathlib import Path
 
-from clpt import budget
 from clpt.arrays import Floats32
 from clpt.errors import SceneError
+from clpt.files import budget
 from clpt.images import exr, hdr, npy, pfm, pillow
 from clpt.images.failures import check_there, reading
 from clpt.images.stored import Stored
@@ -24,6 +24,9 @@ READERS: dict[str, Callable[[Path], Stored]] = {
     ".npy": npy.read,
     **dict.fromkeys(pillow.SUFFIXES, pillow.read),
 }
+
+
+STRAIGHT = pillow.SUFFIXES  # of files whose colours are not multiplied by alpha
 
 
 def read(path: str | Path, *, linear: bool = True) -> Floats32:

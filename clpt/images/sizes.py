@@ -1,7 +1,7 @@
 """A limit on the size of an image, checked before memory is taken for its pixels.
 
 A file of a few kilobytes can announce gigabytes of pixels, so what its header says is enough to
-refuse it. What reading takes is asked of `clpt.budget`.
+refuse it. What reading takes is asked of `clpt.files.budget`.
 """
 
 from __future__ import annotations

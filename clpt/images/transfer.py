@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from typing import Any
 
@@ -9,9 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.arrays import Floats32
-from clpt.colour import tones
-from clpt.colour.view import View
+from clpt.errors import SceneError
+from clpt.images.colour import tones
+from clpt.images.colour.view import View
 from clpt.spectra.spaces import between
+
+HEX = r"#([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})"
 
 
 def srgb_to_linear(x: Floats32) -> Floats32:
@@ -30,6 +34,16 @@ def srgb8_steps() -> Floats32:
     steps = exact.astype(np.float32)
     steps = np.where(steps < exact, np.nextafter(steps, np.float32(1.0)), steps)
     return np.concatenate([[-np.inf], steps, [np.inf]]).astype(np.float32)
+
+
+def from_hex(text: str) -> tuple[float, float, float]:
+    """Return #rrggbb, sRGB as colour pickers have it, as linear Rec. 709. Raises SceneError."""
+    match = re.fullmatch(HEX, text)
+    if match is None:
+        raise SceneError(f'{text!r} is no colour such as "#aa2020"')
+    codes = np.array([int(code, 16) for code in match.groups()], np.float32)
+    red, green, blue = srgb_to_linear(codes / np.float32(255.0)).tolist()
+    return red, green, blue
 
 
 def linear_to_srgb(x: Floats32) -> Floats32:
@@ -56,7 +70,8 @@ def to_codes(
 ) -> NDArray[np.uint8]:
     """Linear Rec. 709 (h, w, c), scaled by 2^exposure, as 8-bit codes of a display.
 
-    tone: see clpt.colour.tones, then sRGB; view: in the place of both. Raises UnknownKindError.
+    tone: see clpt.images.colour.tones, then sRGB; view: in the place of both. Raises
+    UnknownKindError.
     """
     if view is None and tone == "none":
         return to_srgb8(image, exposure)
@@ -78,6 +93,13 @@ def straight(image: Floats32) -> Floats32:
         return image
     alpha = image[..., 3:]
     return np.concatenate([image[..., :3] / np.where(alpha > 0, alpha, 1), alpha], axis=2)
+
+
+def multiplied(image: Floats32) -> Floats32:
+    """Colours (h, w, 4) of what covers as those over nothing: what `straight` undoes."""
+    if image.shape[2] != 4:
+        return image
+    return np.concatenate([image[..., :3] * image[..., 3:], image[..., 3:]], axis=2)
 
 
 def to_rec709(pixels: Floats32, space: str) -> Floats32:

@@ -8,15 +8,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt import output_files
 from clpt.arrays import Floats32
 from clpt.choices import FOR_SCREENS, WRITABLE, Exposure
-from clpt.colour.view import View
 from clpt.errors import SceneError
+from clpt.files import output_files
 from clpt.images import exr, hdr, npy, pfm, screen_files
+from clpt.images.arrays import from_array
 from clpt.images.brightness import stops
+from clpt.images.colour.view import View
 from clpt.images.png_files import Metadata, png
-from clpt.images.transfer import to_codes, to_rec709
+from clpt.images.transfer import multiplied, straight, to_codes, to_rec709
 from clpt.spectra.spaces import chromaticities
 
 WITH_ALPHA = (".png", ".webp")  # of FOR_SCREENS
@@ -35,9 +36,12 @@ def write(
     view: View | None = None,
     prefix: str = "",
 ) -> None:
-    """Write a linear (h, w), (h, w, 1), (h, w, 3) or (h, w, 4) image; the suffix says how.
+    """Write an image (h, w), (h, w, 1), (h, w, 3) or (h, w, 4); the suffix says how.
 
-    path: of the file, with the suffix of its format.
+    path: of the file, with the suffix of its format. image: linear floats, colours multiplied by
+    alpha, as `Renderer.image` has them; or bytes as of `Renderer.resolve` or a .png: sRGB, not
+    multiplied. In a .png and a .webp colours are divided by alpha; a .jpg, an .hdr and a .pfm have
+    no alpha, and are black there.
     .exr: half, or float where `half` is False or half numbers do not reach the brightest pixel,
     with attributes from `metadata` and further `layers` in float, name -> (h, w) as the channel of
     that name, or (h, w, 3) as its .R, .G, .B; prefix: before R, G and B of the image, such as
@@ -47,19 +51,14 @@ def write(
     space: of the colours, see clpt.spectra.spaces; an .exr states it by its chromaticities, an .hdr
     by its primaries. Files for screens are converted to sRGB and a .pfm to Rec. 709, white to
     white, which is what they mean; an .npy is not converted.
-    tone: of files for screens, see clpt.colour.tones; view: of them, a `clpt.View` of OpenColorIO,
-    in the place of tone and sRGB transfer.
+    tone: of files for screens, see clpt.images.colour.tones; view: of them, a `clpt.View` of
+    OpenColorIO, in the place of tone and sRGB transfer.
 
     Raises SceneError if the suffix, the space or the tone is unknown, the shape does not fit or the
     file cannot be made.
     """
     path = check_output(path)
-    pixels = np.asarray(image, np.float32)
-    pixels = pixels[..., None] if pixels.ndim == 2 else pixels
-    if pixels.ndim != 3 or pixels.shape[2] not in (1, 3, 4) or pixels.size == 0:
-        advice = "(h, w, 1, 3 or 4) is needed; bands are for clpt.write_spectral"
-        message = f"cannot write an image of shape {pixels.shape}; {advice}"
-        raise SceneError(message, file=path)
+    pixels = _pixels(path, image)
     stated: Metadata = {"chromaticities": chromaticities(space)} if pixels.shape[2] > 1 else {}
     try:
         suffix = path.suffix.lower()
@@ -80,6 +79,16 @@ def write(
         raise SceneError(f"cannot be written: {error}", file=path) from error
 
 
+def _pixels(path: Path, image: ArrayLike) -> Floats32:
+    """Return an image as linear floats (h, w, 1, 3 or 4), colours multiplied by alpha."""
+    try:
+        stored = from_array(image)
+    except SceneError as error:
+        bands = "; bands are for clpt.write_spectral" if np.ndim(image) == 3 else ""
+        raise SceneError(f"image: {error.message}{bands}", file=path) from None
+    return multiplied(stored.decoded()) if stored.encoded else stored.decoded()
+
+
 def _write_for_screens(
     path: Path,
     pixels: Floats32,
@@ -88,11 +97,11 @@ def _write_for_screens(
     view: View | None,
     metadata: Metadata | None,
 ) -> None:
-    """Write linear Rec. 709 as codes of a screen. Raises as `write`."""
+    """Write linear Rec. 709, multiplied by alpha, as codes of a screen. Raises as `write`."""
     suffix = path.suffix.lower()
-    if pixels.shape[2] == 4 and suffix not in WITH_ALPHA:
-        pixels = pixels[..., :3] * pixels[..., 3:]
-    codes = to_codes(pixels, stops(exposure, pixels), tone, view)
+    covering = straight(pixels)
+    shown = covering if suffix in WITH_ALPHA else pixels[..., :3]
+    codes = to_codes(shown, stops(exposure, covering), tone, view)
     output_files.write(path, screen_files.encode(suffix, codes, metadata))
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
-from clpt import input_files, text
 from clpt.errors import SceneError, UnknownKindError
+from clpt.files import input_files, text
 from clpt.lenses import optical_bench, zemax
 from clpt.lenses.glasses import AIR, by_number
 from clpt.lenses.lines import Line, Row, assembled

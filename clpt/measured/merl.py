@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import input_files, output_files
 from clpt.arrays import Floats, in_memory
 from clpt.errors import SceneError
+from clpt.files import input_files, output_files
 from clpt.measured.fit import Reflection, area, direction, grid, spherical
 from clpt.measured.warp import sample, warp
 

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from clpt import input_files, output_files
 from clpt.errors import SceneError
+from clpt.files import input_files, output_files
 
 MAGIC, VERSION = b"tensor_file\0", (1, 0)
 TYPES = (

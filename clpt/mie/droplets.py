@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt import spectra
+from clpt import scalars, spectra
 from clpt.choices import DROP_SIZES
 from clpt.errors import SceneError
 from clpt.mie.sphere import spheres
@@ -190,10 +190,10 @@ def droplets(
 def _index(value: float | str | Spectrum, at: NDArray[np.float64]) -> NDArray[np.float64]:
     if isinstance(value, str) and value == WATER:
         return water_index(at)
-    return _values(spectra.index(value) if not isinstance(value, (int, float)) else value, at)
+    return _values(spectra.index(value) if isinstance(value, (str, Spectrum)) else value, at)
 
 
 def _values(value: float | Spectrum, at: NDArray[np.float64]) -> NDArray[np.float64]:
-    if isinstance(value, (int, float)):
-        return np.full(len(at), float(value))
-    return np.asarray(value.sample(at), np.float64)
+    if isinstance(value, Spectrum):
+        return np.asarray(value.sample(at), np.float64)
+    return np.full(len(at), scalars.number(value))

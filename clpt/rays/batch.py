@@ -11,6 +11,7 @@ import pyopencl as cl
 from numpy.typing import NDArray
 from pyopencl.array import Array
 
+from .. import scalars
 from ..device import host_buffer
 from ..errors import SceneError
 from .arrays import ArrayInput, DeviceArg, device_arg, on_device, vectors
@@ -67,7 +68,10 @@ def rays(
     for name, limit in (("t_min", t_min), ("t_max", t_max)):
         each = _limits(context, name, limit, count, from_host and shares)
         arrays[name] = each or DeviceArg(None, count)
-        arguments |= {f"{name}s": arrays[name].buffer, name: 0.0 if each else limit}
+        arguments |= {
+            f"{name}s": arrays[name].buffer,
+            name: 0.0 if each else scalars.real(limit, name),
+        }
     return Rays(count, from_host, arguments, tuple(arrays.values()))
 
 
@@ -77,7 +81,7 @@ def _limits(
     """Where each ray begins or ends; None if one number holds for all."""
     if on_device(limit):
         each = device_arg(context, name, limit, 0, np.float32)
-    elif isinstance(limit, (int, float)) or np.ndim(limit) == 0:
+    elif np.ndim(limit) == 0:
         return None
     else:
         each = wrap_host(context, np.ascontiguousarray(limit, np.float32).ravel(), shared)

@@ -12,37 +12,34 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from clpt import device as dev
-from clpt import images
+from clpt import images, scalars
 from clpt.arrays import Image
 from clpt.choices import MOST_SAMPLES, Exposure
-from clpt.colour.view import View
 from clpt.denoise import needs
 from clpt.errors import LONGEST_WARNING, ClptError, DeviceError, SceneError, one_line
-from clpt.images import exr_files
-from clpt.render.contents import Change, Contents, FilmOwner
-from clpt.render.device_film import Changes
-from clpt.render.editing.scene_edit import MaterialKey, ShapeKey
+from clpt.images.colour.view import View
+from clpt.render.edit.scene_edit import MaterialKey, ShapeKey
 from clpt.render.film.denoised_picture import DenoisedPicture
 from clpt.render.film.developed import Developed
-from clpt.render.film.layer_channels import write_layers
+from clpt.render.film.layer_channels import write_picture
 from clpt.render.film.picture_form import PictureForm
 from clpt.render.film.pictures import Pictures
 from clpt.render.film.saved_film import (
     classes_text,
     other_devices,
 )
-from clpt.render.locking import Stop, healing, synchronized
-from clpt.render.maker import Call, Discarded, Maker, Settle
+from clpt.render.film.state import join_ranges
+from clpt.render.makers.contents import Change, Contents, FilmOwner
+from clpt.render.makers.device_film import Changes
+from clpt.render.makers.locking import Stop, healing, synchronized
+from clpt.render.makers.maker import Call, Discarded, Maker, Settle
 from clpt.render.options import check_changes, check_scene
 from clpt.render.progress import Progress
 from clpt.render.stats import RenderStats, collect
 from clpt.render.wavefront import adaptive
-from clpt.render.wavefront.film_state import join_ranges
 from clpt.render.wavefront.wavefront import Counts, Wavefront
-from clpt.scene import Scene, check_seed
+from clpt.scene import Scene, checked_seed
 from clpt.scene.cameras import Camera
 from clpt.scene.materials import Material
 
@@ -183,9 +180,10 @@ class FilmRenderer(FilmOwner, Pictures):
         noise: leave pixels as soon as the noise around them is as low, relative to the picture,
         such as 0.02; `samples` is then the most that a pixel gets, see
         clpt.render.wavefront.adaptive. A renderer with `denoise` counts what is left after that.
-        progress: called every few milliseconds to seconds; if it returns False the run stops soon,
-        as after `cancel`. Returns whether it came to its end. What progress raises, or Ctrl+C at
-        any line, is raised when the paths in flight have ended. The film is whole after a stop too:
+        progress: called every few milliseconds to seconds; if it returns something false, but not
+        None, the run stops soon, as after `cancel`. Returns whether it came to its end. What
+        progress raises, or Ctrl+C at any line, is raised when the paths in flight have ended. The
+        film is whole after a stop too:
         its pixels have fewer samples, and the numbers of those left out are not used again.
 
         Raises SceneError for noise that makes no sense with the scene, and for more than 2^31 - 1
@@ -311,7 +309,7 @@ class FilmRenderer(FilmOwner, Pictures):
         if first_sample is not None:
             first_sample = checked_number(first_sample)
         if seed is not None:
-            check_seed(seed)
+            seed = checked_seed(seed)
         broken = isinstance(self._contents, Change)
         self._maker.after(wait_for)
         with self._healing("reset", lambda _: self._emptied(recover=True)):
@@ -355,7 +353,7 @@ class FilmRenderer(FilmOwner, Pictures):
         The first of three ways that is possible is taken:
 
         1. Shapes that only move do so on the device, where trees are refitted to them; nothing is
-           waited for. See clpt.render.editing.moving.
+           waited for. See clpt.render.edit.moving.
         2. A camera of the same kind, and values of materials, take a few written words.
         3. Else the scene is lowered again: tables are written where they differ, trees are built
            where triangles do, kernels where others are needed.
@@ -453,26 +451,16 @@ class FilmRenderer(FilmOwner, Pictures):
     ) -> None:
         """Write the picture so far to a file, in the format of the path's suffix; wait for it.
 
-        An .exr has the film's layers, and as its data window the place of a crop. A renderer with
-        `denoise` writes what is denoised.
+        An .exr has the film's layers and bands, and as its data window the place of a crop. A
+        renderer with `denoise` writes what is denoised. A film with alpha: see `clpt.write_image`.
         exposure [stops] over the film's `display_exposure`, tone, view: of files for screens, see
         `clpt.write_image`.
 
         Raises SceneError for an unknown suffix, and for a file that cannot be written.
         """
-        path, film = Path(path), self.scene.film
-        if film.layers and path.suffix.lower() == ".exr" and self.denoise is None:
-            write_layers(path, self)
-            return
-        plain = self.image() if film.bands == 0 else self.colours()
-        picture = plain if self.denoise is None else self.denoised()
-        space = film.output_space
-        stops = images.raised(exposure, film.display_exposure)
-        place = self._form.place if path.suffix.lower() == ".exr" else None
-        images.write(
-            path, picture, exposure=stops, space=space, tone=tone, view=view,
-            metadata=exr_files.windows(picture.shape, place),
-        )  # fmt: skip
+        path = images.check_output(path)
+        source = self if self.denoise is None else DenoisedPicture(self)
+        write_picture(path, source, exposure=exposure, tone=tone, view=view)
 
     # ---- the end
 
@@ -519,7 +507,8 @@ class Watch:
             return not renderer._stop.is_set()
         renderer._telling = True
         try:
-            if self._progress(renderer._so_far(self._end, self.seconds)) is False:
+            answer = self._progress(renderer._so_far(self._end, self.seconds))
+            if answer is not None and not answer:
                 renderer._stop.set()
         except BaseException as error:
             self.raised = error
@@ -541,16 +530,14 @@ def next_range(first: int, samples: int) -> tuple[int, int]:
 
 def checked_number(number: int) -> int:
     """Return a sample's number. Raises SceneError for one below 0, and for one too large."""
-    if isinstance(number, bool) or not isinstance(number, (int, np.integer)) or number < 0:
-        message = f"must be a whole number from 0 to {MOST_SAMPLES}, not {number!r}"
-        raise SceneError(message, where="first_sample")
+    number = scalars.whole(number, 0, where="first_sample")
     if number > MOST_SAMPLES:
         raise SceneError(f"a pixel cannot have more than {MOST_SAMPLES} samples", where="samples")
-    return int(number)
+    return number
 
 
 def checked_samples(samples: int) -> int:
     """Return a number of samples. Raises SceneError for one that is none."""
-    if isinstance(samples, bool) or not isinstance(samples, (int, np.integer)) or samples < 1:
+    if not scalars.is_whole(samples) or samples < 1:
         raise SceneError(f"samples per pixel must be a whole number above zero, not {samples!r}")
     return int(samples)

@@ -9,7 +9,8 @@ from typing import Any, TypedDict, get_args
 
 import pyopencl as cl
 
-from clpt import bvh
+from clpt import bvh, scalars
+from clpt.arrays import check_unmasked
 from clpt.denoise import needs, oidn
 from clpt.errors import SceneError, UnknownKindError, nearest
 from clpt.scene import Scene
@@ -86,17 +87,14 @@ def check_options(scene: Scene, options: Mapping[str, Any]) -> None:
     if quality not in get_args(bvh.Quality):
         raise UnknownKindError("quality", str(quality), get_args(bvh.Quality), where="tree_quality")
     for name in ("queued", "looped", "halves", "profiling"):
-        if options.get(name) not in (None, False, True):
-            raise SceneError(f"must be true or false, not {options[name]!r}", where=name)
+        if options.get(name) is not None:
+            scalars.flag(options[name], name)
     seconds = options.get("cancel_seconds")
-    if seconds is not None and not (isinstance(seconds, (int, float)) and seconds > 0.0):
+    if seconds is not None and not (scalars.is_number(seconds) and seconds > 0.0):
         raise SceneError(f"must be seconds above 0, not {seconds!r}", where="cancel_seconds")
     for name, least in (("slots", 1), ("texture_budget", 0), ("first_sample", 0)):
-        number = options.get(name)
-        whole = isinstance(number, int) and not isinstance(number, bool)
-        if number is not None and not (whole and number >= least):
-            message = f"must be a whole number from {least}, not {number!r}"
-            raise SceneError(message, where=name)
+        if options.get(name) is not None:
+            scalars.whole(options[name], least, where=name)
 
 
 def check_changes(camera: object, **by_key: object) -> None:
@@ -108,6 +106,8 @@ def check_changes(camera: object, **by_key: object) -> None:
         if changes is not None and not isinstance(changes, Mapping):
             message = f"must be a dict by shape, as {name}={{scene.shapes[0]: ..}}, not {changes!r}"
             raise SceneError(message, where=name)
+        for values in (changes or {}).values():
+            check_unmasked(values, name)
 
 
 def check_names(scene: Scene, names: Iterable[str], known: Iterable[str]) -> None:

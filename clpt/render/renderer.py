@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import pyopencl as cl
 
 from clpt import device as dev
-from clpt.render.device_film import DeviceFilm, open_device
-from clpt.render.device_maker import DeviceMaker
 from clpt.render.film_renderer import next_range
-from clpt.render.locking import synchronized
-from clpt.render.maker import Call
+from clpt.render.makers.device_film import DeviceFilm, open_device
+from clpt.render.makers.device_maker import DeviceMaker
+from clpt.render.makers.locking import synchronized
+from clpt.render.makers.maker import Call
 from clpt.render.options import RenderOptions, check_options, check_scene
 from clpt.render.pictures import DevicePictures
 from clpt.render.progress import Progress

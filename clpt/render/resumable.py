@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from clpt.errors import MemoryBudgetError, SceneError
-from clpt.render.contents import Contents
 from clpt.render.film import film_file
 from clpt.render.film.saved_film import Origin, SavedFilm, Session
+from clpt.render.film.state import FilmState
 from clpt.render.film_renderer import FilmRenderer
-from clpt.render.locking import synchronized
-from clpt.render.maker import Held
-from clpt.render.wavefront.film_state import FilmState
+from clpt.render.makers.contents import Contents
+from clpt.render.makers.locking import synchronized
+from clpt.render.makers.maker import Held
 from clpt.render.wavefront.wavefront import Counts
 from clpt.scene.fingerprint import Plain
 from clpt.version import VERSION

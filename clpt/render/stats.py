@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from clpt.render.codegen.flags import ends_light_paths
-from clpt.render.contract.features import Features
+from clpt.render.flow.flags import ends_light_paths
+from clpt.render.records import Features
 from clpt.render.wavefront.wavefront import Wavefront
 
 

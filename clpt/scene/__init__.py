@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import numbers
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import FunctionType, ModuleType
@@ -11,9 +10,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from clpt.budget import Account
+from clpt import scalars
 from clpt.choices import MOST_SEED
 from clpt.errors import SceneError
+from clpt.files.budget import Account
 from clpt.scene import (
     cameras,
     integrators,
@@ -215,18 +215,15 @@ class Scene:
     def __post_init__(self) -> None:
         self.shapes, self.lights = _listed(self.shapes, "shapes"), _listed(self.lights, "lights")
         check_parts(self)
-        if isinstance(self.spp, bool) or not isinstance(self.spp, int) or self.spp < 1:
-            raise SceneError(f"must be a whole number above zero, not {self.spp!r}", where="spp")
-        check_seed(self.seed)
+        self.spp = scalars.whole(self.spp, 1, where="spp")
+        self.seed = checked_seed(self.seed)
         if self.noise is not None:
-            check_noise(self.noise)
+            self.noise = checked_noise(self.noise)
 
 
-def check_seed(seed: object) -> None:
-    """Raise SceneError for a seed that is no whole number of 32 bits: kernels know no others."""
-    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed <= MOST_SEED:
-        message = f"must be a whole number from 0 to {MOST_SEED}, not {seed!r}"
-        raise SceneError(message, where="seed")
+def checked_seed(seed: object) -> int:
+    """Return a seed. Raises SceneError for no whole number of 32 bits: kernels know no others."""
+    return scalars.whole(seed, 0, MOST_SEED, where="seed")
 
 
 def check_parts(scene: Scene) -> None:
@@ -262,9 +259,9 @@ def _check_kind(value: object, base: type[Kind], where: str) -> None:
         raise SceneError(message, where=where)
 
 
-def check_noise(noise: Any) -> None:
-    """Raise SceneError for what is no limit of noise."""
-    number = isinstance(noise, numbers.Real) and not isinstance(noise, bool)
-    if not number or not 0.0 < noise < math.inf:
+def checked_noise(noise: object) -> float:
+    """Return a limit of noise. Raises SceneError for what is none."""
+    if not scalars.is_number(noise) or not 0.0 < noise < math.inf:
         message = f"must be a number above zero, such as 0.02, not {noise!r}"
         raise SceneError(message, where="noise")
+    return float(noise)

@@ -25,7 +25,9 @@ def _looking(
 ) -> dict[str, Any]:
     """Return the placement of a camera at `origin` that looks at `target`."""
     if origin is None or target is None:
-        raise SceneError("give origin and target, both", where="target" if origin else "origin")
+        raise SceneError(
+            "give origin and target, both", where="origin" if origin is None else "target"
+        )
     return {"to_world": transforms.look_at(origin, target, up)}
 
 
@@ -116,8 +118,6 @@ class Lens(Camera):
     unit: float = real(1e-3, "a millimetre of the lens in the scene", "m", low=1e-12)
 
     def check(self) -> None:
-        if isinstance(self.blades, bool) or not isinstance(self.blades, int):
-            raise SceneError("must be a whole number", where="lens.blades")
         if not (self.blades == 0 or 3 <= self.blades <= MOST_BLADES):
             raise SceneError(
                 f"must be 0 or 3 to {MOST_BLADES}, not {self.blades}", where="lens.blades"

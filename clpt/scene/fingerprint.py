@@ -16,8 +16,9 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from clpt import input_files
+from clpt.arrays import on_device, on_host
 from clpt.errors import SceneError
+from clpt.files import input_files
 from clpt.scene import Scene
 from clpt.scene.materials import Material
 from clpt.scene.params import Kind, fields_of, params
@@ -131,7 +132,8 @@ class _Walk:
                 raise SceneError(
                     "is a buffer on a device; an Array of PyOpenCL is read", where=where
                 )
-            return {"": _array(np.asarray(thing.get()), form)}
+            read = on_host(thing) if on_device(thing) else thing.get()
+            return {"": _array(np.asarray(read), form)}
         if isinstance(thing, Sequence):
             numbers = _numbers(thing)
             if numbers is not None:

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from clpt import scalars
 from clpt.choices import AUTO, MOST_LIGHT_PATHS
 from clpt.errors import SceneError, UnknownKindError
+from clpt.scalars import is_number, is_whole, plain, whole, wholes
 from clpt.scene import roles
 from clpt.scene.layers import LAYERS
 from clpt.scene.params import Kind, Shorthand, choice, emission, fields_of, flag, host, real
@@ -63,8 +65,7 @@ class Integrator(Kind):
     def check(self) -> None:
         for name, depth in (("max_depth", self.max_depth), ("rr_depth", self.rr_depth)):
             unlimited = name == "max_depth" and depth == -1
-            whole = isinstance(depth, int) and not isinstance(depth, bool)
-            if not whole or (depth < 1 and not unlimited):
+            if not is_whole(depth) or (depth < 1 and not unlimited):
                 least = "1 or more, or -1 for no limit" if name == "max_depth" else "1 or more"
                 raise SceneError(f"must be {least}, not {depth!r}", where=f"{self.kind}.{name}")
 
@@ -89,8 +90,8 @@ class Path(Integrator):
     With `light_paths` paths start at lights too: each vertex is joined to the camera, and weighed
     against what the camera's paths find. Caustics that the camera sees directly converge then. The
     camera must be `perspective` or `thin_lens`. A number below 1 is a share: 0.5 is one for every
-    second sample. With "auto" there are some where something is sharp and a light is small, else
-    none.
+    second sample. With "auto" there are some where something is specular and a light is small,
+    else none.
     """
 
     max_depth: int = host(8, "longest path; -1: no limit")
@@ -111,15 +112,17 @@ class Path(Integrator):
 
     def check(self) -> None:
         super().check()
-        given: Any = self.light_paths
+        given: Any = plain(self.light_paths)
+        object.__setattr__(self, "light_paths", given)
         if self.guiding and given not in (0, AUTO):
             message = "guiding is for paths from the camera alone: ask for no light_paths"
             raise SceneError(message, where=f"{self.kind}.guiding")
-        _check_whole(self.guide_paths, f"{self.kind}.guide_paths", 0, MOST_GUIDE_PATHS)
+        whole(self.guide_paths, 0, MOST_GUIDE_PATHS, where=f"{self.kind}.guide_paths")
         if isinstance(given, str) and given == AUTO:
             return
-        number = isinstance(given, (int, float)) and not isinstance(given, bool)
-        if not number or not (given == 0 or FEWEST_LIGHT_PATHS <= given <= MOST_LIGHT_PATHS):
+        if not is_number(given) or not (
+            given == 0 or FEWEST_LIGHT_PATHS <= given <= MOST_LIGHT_PATHS
+        ):
             fewest = f"{FEWEST_LIGHT_PATHS:g}"
             message = f"must be 0, {fewest} to {MOST_LIGHT_PATHS}, or {AUTO!r}, not {given!r}"
             raise SceneError(message, where=f"{self.kind}.light_paths")
@@ -140,6 +143,7 @@ class Vcm(Integrator):
     max_depth: int = host(8, "longest path, as of `path`; -1: 65")
     rr_depth: int = host(3, "depth from which Russian roulette may end a path")
     hide_lights: bool = flag(False, "the camera sees through lights, also those on shapes")
+    free_panes: bool = flag(True, "as of `path`")
     light_paths: int = host(1, "paths from lights for each sample of the camera")
     light_tracing: bool = host(True, "light paths are joined to the camera")
     merging: bool = host(True, "photons are gathered")
@@ -156,21 +160,14 @@ class Vcm(Integrator):
             ("wavelength_groups", self.wavelength_groups, 0, MOST_GROUPS),
             ("photon_memory", self.photon_memory, 1, MOST_PHOTON_MEMORY),
         ):
-            _check_whole(value, f"{self.kind}.{name}", least, most)
-
-
-def _check_whole(value: object, where: str, least: int, most: int) -> None:
-    """Raise SceneError for a parameter that is no whole number between two."""
-    if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
-        message = f"must be a whole number from {least} to {most}, not {value!r}"
-        raise SceneError(message, where=where)
+            whole(value, least, most, where=f"{self.kind}.{name}")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Auto(Integrator):
     """The integrator that suits the scene: `path`, `path` with light paths, or `vcm`.
 
-    Light paths where something is sharp and a light is small; photons too where the camera sees
+    Light paths where something is specular and a light is small; photons too where the camera sees
     mirrors or clear glass, and the scene asks for no limit of noise and no denoiser.
     """
 
@@ -226,6 +223,7 @@ class ParticleTracer(Integrator):
     max_depth: int = host(8, "longest path, as of `path`; -1: no limit")
     rr_depth: int = host(3, "depth from which Russian roulette may end a path")
     hide_lights: bool = flag(False, "lights shine, but are not seen to shine")
+    free_panes: bool = flag(True, "as of `path`")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -315,9 +313,10 @@ class BlackmanHarris(Filter):
 
 
 def _width_and_height(size: tuple[int, int]) -> dict[str, int]:
-    if not isinstance(size, (tuple, list, np.ndarray)) or len(size) != 2:
+    given = wholes(size, 2)
+    if given is None:
         raise SceneError(f"must be (width, height), not {size!r}", where="size")
-    return {"width": size[0], "height": size[1]}
+    return {"width": given[0], "height": given[1]}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -399,8 +398,7 @@ class Film(Kind):
 
     def check(self) -> None:
         for name, size in (("width", self.width), ("height", self.height)):
-            if isinstance(size, bool) or not isinstance(size, int) or not 1 <= size <= 65536:
-                raise SceneError(f"must be 1 to 65536, not {size!r}", where=f"film.{name}")
+            whole(size, 1, 65536, where=f"film.{name}")
         if self.crop is not None:
             object.__setattr__(self, "crop", self._checked_crop())
         given_filter: object = self.filter
@@ -414,10 +412,7 @@ class Film(Kind):
                 f"must be {NARROWEST:g} nm or more below lambda_max, as wavelengths are float32",
                 where="film.lambda_min",
             )
-        whole = isinstance(self.bands, int) and not isinstance(self.bands, bool)
-        if not whole or not 0 <= self.bands <= MOST_BANDS:
-            message = f"must be a whole number from 0 to {MOST_BANDS}, not {self.bands!r}"
-            raise SceneError(message, where="film.bands")
+        whole(self.bands, 0, MOST_BANDS, where="film.bands")
         named = isinstance(self.sensor, str) and self.sensor in OBSERVERS
         if not named and not isinstance(self.sensor, Sensor):
             known = f"{', '.join(OBSERVERS)}, nor a Sensor"
@@ -431,9 +426,8 @@ class Film(Kind):
 
     def _checked_crop(self) -> tuple[int, int, int, int]:
         """The crop as whole numbers. Raises SceneError where it does not lie in the film."""
-        crop: Any = self.crop
-        given = tuple(crop)
-        if len(given) != 4 or any(isinstance(n, bool) or not isinstance(n, int) for n in given):
+        given = wholes(self.crop, 4)
+        if given is None:
             raise SceneError(f"must be four whole numbers, not {self.crop!r}", where="film.crop")
         x, y, width, height = given
         fits = min(x, y) >= 0 and x + width <= self.width and y + height <= self.height
@@ -450,14 +444,14 @@ def _white_balance(given: Any) -> str | float | tuple[float, float]:
         if given != "none" and given not in illuminants():
             raise UnknownKindError("illuminant", given, ("none", *illuminants()), where=where)
         return given
-    if isinstance(given, (int, float, np.number)) and not isinstance(given, bool):
+    if is_number(given):
         coolest, hottest = TEMPERATURES
         if not coolest <= given <= hottest:
             message = f"a colour temperature is {coolest:g} to {hottest:g} K, not {given:g}"
             raise SceneError(message, where=where)
         return float(given)
     try:
-        x, y = (float(value) for value in given)
+        x, y = (scalars.real(value) for value in given)
     except (TypeError, ValueError):
         message = f"must be none, an illuminant, a temperature [K] or (x, y), not {given!r}"
         raise SceneError(message, where=where) from None

@@ -1,6 +1,7 @@
 """Materials: what a surface does with light. Local frame: z is the shading normal.
 
-A leaf material has a pair kernels/bsdf/<kind>.cl. A composite (`two_sided`, `mask`, `blend`) has
+A leaf material has a pair kernels/materials/kinds/<kind>.cl. A composite (`two_sided`, `mask`,
+`blend`) has
 none: lowering turns it into rules by which a hit chooses its leaf.
 """
 
@@ -128,6 +129,12 @@ class Material(Scatterer):
 
     # of a kind without such parameters
     absorption = cast(SpectrumLike, CLEAR)
+
+    @property
+    def inside_index(self) -> IndexLike:
+        """The index of refraction of what is behind the boundary."""
+        return Constant(1.0)
+
     layers = cast("tuple[Layer, ...]", ())
 
 
@@ -177,6 +184,10 @@ class Dielectric(Material):
     layers: tuple[Layer, ...] = layers(FILMS)
 
     @property
+    def inside_index(self) -> IndexLike:
+        return self.int_ior
+
+    @property
     def transmits(self) -> bool:
         return True
 
@@ -224,6 +235,10 @@ class RoughDielectric(Material):
     specular_transmittance: Textured = _factor("transmission", linear=True)
     absorption: SpectrumLike = coefficient(0.0, "of the inside: exp(-absorption distance) passes")
     layers: tuple[Layer, ...] = layers(FILMS)
+
+    @property
+    def inside_index(self) -> IndexLike:
+        return self.int_ior
 
     @property
     def transmits(self) -> bool:
@@ -481,7 +496,12 @@ class GltfSurface(Material):
         0.0, "how much rougher the tangent's direction is", lobe=True
     )
     anisotropy_rotation: TexturedNumber = real(
-        0.0, "from the tangent to that direction", "degrees", -360.0, 360.0, textured=True
+        0.0,
+        "from u to that direction, on the side of v; an image's own u and v",
+        "degrees",
+        -360.0,
+        360.0,
+        textured=True,
     )
     clearcoat: TexturedNumber = _share(0.0, "strength of a coat of index 1.5 over all", lobe=True)
     clearcoat_roughness: TexturedNumber = _share(0.0, "its roughness")
@@ -493,7 +513,7 @@ class GltfSurface(Material):
         lobe=True,
     )
     clearcoat_normal_x: TexturedNumber = _share(
-        0.5, "normal of such a coat by the surface's, along u: x / 2 + 1/2"
+        0.5, "normal of such a coat by the surface's, along u, an image's own: x / 2 + 1/2"
     )
     clearcoat_normal_y: TexturedNumber = _share(0.5, "along v, likewise")
     clearcoat_normal_z: TexturedNumber = _share(1.0, "along the surface's normal, likewise")
@@ -516,8 +536,16 @@ class GltfSurface(Material):
     )
 
     @property
+    def inside_index(self) -> IndexLike:
+        return Constant(1.0) if self.thin else self.ior
+
+    @property
     def transmits(self) -> bool:
         return self.transmission != 0.0 or self.diffuse_transmission != 0.0
+
+    @property
+    def directing(self) -> tuple[object, ...]:
+        return self.clearcoat_normal_x, self.anisotropy_rotation
 
     @property
     def uses_tangents(self) -> bool:
@@ -717,7 +745,11 @@ class NormalMap(NormalMapped):
         "bitmap, read raw; its colours are (x, y, z) / 2 + 1/2; or None",
         form="texture",
     )
-    along_v: bool = flag(False, "y of the map goes along v even where uv are mirrored, as in glTF")
+    along_v: bool = flag(
+        False,
+        "x and y of the map go along its own u and v, transformed by `to_uv` or mirrored, as in "
+        "glTF; false: x along the u of its set, y at the left of that, as in Mitsuba",
+    )
 
     def check(self) -> None:
         if self.map is not None and not isinstance(self.map, Bitmap):

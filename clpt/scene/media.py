@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt import spectra
+from clpt.arrays import on_host
 from clpt.errors import SceneError
 from clpt.records import CLOUD_OCTAVES
+from clpt.scalars import is_number
 from clpt.scene.params import (
     Kind,
     coefficient,
@@ -126,7 +128,7 @@ class Homogeneous(Medium):
         path: Any = checked.sigma_t
         if any(low <= 0.0 for low, _ in extremes(path)):
             raise SceneError("must be above 0", where="homogeneous.mean_free_path")
-        if not (isinstance(g, int | float) and -1.0 < g < 1.0):
+        if not (is_number(g) and -1.0 < g < 1.0):
             raise SceneError(f"must be between -1 and 1, not {g!r}", where="homogeneous.g")
         parameters.setdefault("phase", HenyeyGreenstein(g=g) if g else Isotropic())
         return cls(
@@ -433,7 +435,7 @@ class Grid(Lattice, Homogeneous):
             return super().light
         dark = self.brightness == 0.0 or _is_zero(self.coefficients(spectral=True)[0])
         found = self.temperature
-        hottest = 0.0 if dark else float(np.max(found.get() if hasattr(found, "get") else found))
+        hottest = 0.0 if dark else float(np.max(on_host(found)))
         return spectra.Blackbody(hottest, self.brightness) if hottest > COLDEST else None
 
 
@@ -615,8 +617,7 @@ class Mixture(Lattice):
         densities: list[Any] = [
             part.density if isinstance(part, Grid) else None for part in self.parts
         ]
-        numbers = [d.get() if hasattr(d, "get") else d for d in densities]
-        return [1.0 if one is None else float(np.max(one)) for one in numbers]
+        return [1.0 if one is None else float(np.max(on_host(one))) for one in densities]
 
 
 KINDS: tuple[type[Medium], ...] = (Homogeneous, Grid, Cloud, Dyed, Soot, Mixture)

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from clpt import transforms
 from clpt.arrays import in_memory
 from clpt.errors import SceneError
+from clpt.scalars import number
 
 SHAPES = {"box": (1.0, 1.0), "triangle": (0.0, 1.0, 0.0)}  # of shutters, by name
 
@@ -217,10 +218,8 @@ class Shutter:
 
     def __post_init__(self) -> None:
         for name, value in (("open", self.open), ("close", self.close)):
-            number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
-            if not number or not math.isfinite(value):
-                raise SceneError(f"must be a time [s], not {value!r}", where=f"shutter.{name}")
-            object.__setattr__(self, name, float(value))
+            time = number(value, f"shutter.{name}", "a time [s]")
+            object.__setattr__(self, name, time)
         if self.close < self.open:
             message = f"{self.close:g} s is before it opens, {self.open:g} s"
             raise SceneError(message, where="shutter.close")

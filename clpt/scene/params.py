@@ -40,7 +40,7 @@ from typing import Any, ClassVar, Literal, cast
 
 import numpy as np
 
-from clpt.arrays import in_memory
+from clpt.arrays import check_unmasked, in_memory
 from clpt.errors import SceneError, UnusedParameterError
 from clpt.scene import roles
 from clpt.scene.roles import HostForm, Param
@@ -255,6 +255,8 @@ def _spelled_out(kind: type[Kind], given: dict[str, object]) -> dict[str, object
     plain = {name: value for name, value in given.items() if name not in short}
     for shorthand in kind.shorthands:
         asked = {name: given[name] for name in shorthand.arguments if given.get(name) is not None}
+        for name, value in asked.items():
+            check_unmasked(value, f"{kind.kind}.{name}")
         for name in shorthand.stands_for if asked else ():
             if name in plain:
                 first = next(iter(asked))
@@ -403,4 +405,6 @@ def _checked(value: object, param: Param, where: str) -> Any:
         if not param.textured:
             raise SceneError("cannot be a texture", where=where)
         return value
+    for held in value.values() if isinstance(value, Mapping) else (value,):
+        check_unmasked(held, where)
     return param.role.check(value, param, where)

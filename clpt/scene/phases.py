@@ -1,6 +1,7 @@
 """Phase functions: how much light a point of a medium sends where.
 
-A phase function has a pair kernels/phase/<kind>.cl. It scatters at a point as a material does at a
+A phase function has a pair kernels/media/kinds/<kind>.cl. It scatters at a point as a material does
+at a
 surface: its local frame has z along the ray back to where light was last.
 """
 
@@ -27,7 +28,7 @@ MOST_ROWS = 512  # of a table by wavelength
 class Phase(Scatterer):
     """Base of all phase functions: how much light a point of a medium sends where, in 1/sr."""
 
-    folder: ClassVar[str] = "phase"
+    folder: ClassVar[str] = "media/kinds"
     is_phase = True
 
     @property

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import images, spectra, spectral_exr
+from clpt import images, spectra
 from clpt.arrays import Floats32, on_host
-from clpt.errors import SceneError
+from clpt.images import spectral_exr
+from clpt.images.spectral_exr import SpectralImage
 from clpt.scene.roles import EMISSION, REAL, Role
 from clpt.scene.textures import Bitmap
-from clpt.spectral_exr import SpectralImage
 
 
 def spectral_image(texture: object, role: Role) -> SpectralImage | None:
@@ -37,18 +37,9 @@ def pixels(texture: Bitmap, role: Role, side: int | None = None) -> Floats32:
         stored = images.read_stored(image)
         some = dataclasses.replace(stored, values=_thinned(stored.values, side))
         image = some.decoded(not texture.raw)
-    image = _thinned(np.asarray(on_host(image)), side)
-    image = image[..., None] if image.ndim == 2 else image
-    if image.dtype == np.uint8 and image.ndim == 3:
-        image = images.Stored(image, encoded=True).decoded(not texture.raw)
-    if image.dtype.kind != "f":
-        wanted = "must be a path or an array of floats or of bytes"
-        raise SceneError(wanted, where="bitmap.image")
-    if image.ndim != 3 or image.shape[2] not in (1, 3, 4) or image.size == 0:
-        wanted = "must be (h, w) or (h, w, 1, 3 or 4) and not empty"
-        raise SceneError(f"{wanted}, not {image.shape}", where="bitmap.image")
-    chosen = channel(image, texture.channel) if role is REAL else image[..., :3]
-    return np.nan_to_num(chosen.astype(np.float32))
+    stored = images.from_array(_thinned(np.asarray(on_host(image)), side), "bitmap.image")
+    plain = stored.decoded(not texture.raw)
+    return np.nan_to_num(channel(plain, texture.channel) if role is REAL else plain[..., :3])
 
 
 def _thinned(image: NDArray[Any], side: int | None) -> NDArray[Any]:

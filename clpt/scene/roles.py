@@ -1,8 +1,8 @@
 """Roles of parameters: what a value may be, and what it means.
 
-A role is an object, and tables have an entry for each: `clpt.render.contract.parameter_words` says
-how a value stands in kernels, `clpt.render.lowering.encoder` how it becomes words,
-`clpt.render.codegen.parameters` how kernels load it, `clpt.formats.native.forms` how it is written
+A role is an object, and tables have an entry for each: `clpt.render.records.parameter_words` says
+how a value stands in kernels, `clpt.render.materials.encoder` how it becomes words,
+`clpt.render.materials.cases` how kernels load it, `clpt.formats.native.forms` how it is written
 in scene.json, and `clpt.testing.settings` draws one for a test.
 """
 
@@ -11,15 +11,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol, cast, runtime_checkable
+from typing import Any, Literal, Protocol, TypeGuard, cast, runtime_checkable
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from clpt import spectra
+from clpt import scalars, spectra
 from clpt.errors import SceneError
+from clpt.images.transfer import from_hex
 from clpt.measured import Measurement, MerlTable
 from clpt.records import GRATING_SIZES
+from clpt.scalars import LARGEST
 from clpt.spectra import (
     RGB,
     Constant,
@@ -34,7 +36,6 @@ from clpt.spectra.spectrum import check_reach, extremes
 
 ORDERS = GRATING_SIZES["orders"]
 ROUNDING = 1e-6  # by which a spectrum may be beyond its limits
-LARGEST = float(np.finfo(np.float32).max)  # number of a parameter: kernels have no larger ones
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ class Role:
 
     def check(self, value: object, param: Param, where: str | None) -> Any:
         """Return what is meant by a value that is no texture. Raises SceneError."""
-        return value
+        return scalars.plain(value)
 
 
 @dataclass(frozen=True)
@@ -78,35 +79,41 @@ class Real(Role):
     """A number within its limits."""
 
     def check(self, value: object, param: Param, where: str | None) -> float:
-        if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
-            raise SceneError(f"must be a number, not {value!r}", where=where)
-        if not math.isfinite(value):
-            raise SceneError(f"must be finite, not {value}", where=where)
-        if abs(value) > LARGEST:
-            raise SceneError(f"{value:g} is beyond {LARGEST:g}, where float32 ends", where=where)
-        if param.positive and value <= 0.0:
+        found = scalars.number(value, where)
+        if param.positive and found <= 0.0:
             raise SceneError(f"must be above 0, not {value}", where=where)
-        if not param.low <= value <= param.high:
-            advice = f"; {param.role.advice}" if param.role.advice and value > param.high else ""
+        if not param.low <= found <= param.high:
+            advice = f"; {param.role.advice}" if param.role.advice and found > param.high else ""
             message = f"{value} is outside [{param.low:g}, {param.high:g}]{advice}"
             raise SceneError(message, where=where)
-        return float(value)
+        return found
+
+
+class Whole(Role):
+    """A whole number; the kind that has it knows its limits."""
+
+    def check(self, value: object, param: Param, where: str | None) -> int:
+        return scalars.whole(value, where=where)
 
 
 class Flag(Role):
     """True or false."""
 
     def check(self, value: object, param: Param, where: str | None) -> bool:
-        if not isinstance(value, (bool, np.bool_)):
-            raise SceneError(f"must be true or false, not {value!r}", where=where)
-        return bool(value)
+        return scalars.flag(value, where)
+
+
+def _is_list(value: object) -> TypeGuard[list[Any] | tuple[Any, ...] | NDArray[Any]]:
+    """Return whether a value is a list, or an array with an axis."""
+    return isinstance(value, (list, tuple)) or (isinstance(value, np.ndarray) and value.ndim > 0)
 
 
 class Choice(Role):
     """One of the names that the parameter lists."""
 
     def check(self, value: object, param: Param, where: str | None) -> Any:
-        if value not in param.choices and not (param.optional and value is None):
+        known = isinstance(value, str) and value in param.choices
+        if not known and not (param.optional and value is None):
             raise SceneError(f"{value!r} is none of {', '.join(param.choices)}", where=where)
         return value
 
@@ -115,7 +122,7 @@ class Orders(Role):
     """A number for each order of diffraction from -n to n."""
 
     def check(self, value: object, param: Param, where: str | None) -> tuple[float, ...]:
-        if not isinstance(value, (list, tuple, np.ndarray)):
+        if not _is_list(value):
             raise SceneError(f"must be a list of numbers, not {value!r}", where=where)
         if len(value) % 2 == 0 or len(value) > 2 * ORDERS + 1:
             raise SceneError(
@@ -164,32 +171,42 @@ class Spectral(Role):
     """A spectrum, or what stands for one: a number, three numbers, perhaps a name.
 
     meaning: how it is turned to rgb, see `clpt.spectra.spectrum`. colour: what three numbers in a
-    file are, None where they stay three numbers. names: finds the spectrum of a name. measured: it
+    file are, None where they stay three numbers. codes: "#rrggbb" is a colour too, in sRGB. names:
+    finds the spectrum of a name. measured: it
     is a quantity of matter, whose tables go on beyond their ends. grey: kernels are told where it
     has no colour.
     """
 
     meaning: Meaning = "unbounded"
     colour: type[RGB] | type[RGBUnbounded] | None = RGBUnbounded
+    codes: bool = False
     names: Callable[[str], Spectrum] | None = None
     measured: bool = False
     grey: bool = False
 
     def check(self, value: object, param: Param, where: str | None) -> Any:
+        if isinstance(value, str) and self.codes and value.startswith("#"):
+            return self._colour(self._decoded(value, where), param, where)
         if isinstance(value, str) and self.names is not None:
             return self._named(value, where)
         if isinstance(value, Spectrum):
             self._check_limits(value, param, where)
             return value
-        if isinstance(value, (list, tuple, np.ndarray)) and len(value) == 3:
-            return self._colour([REAL.check(v, param, where) for v in value], param, where)
-        if isinstance(value, (int, float, np.number)):
+        if scalars.is_number(value):
             return self._constant(REAL.check(value, param, where))
-        names = ", a name" if self.names else ""
+        if _is_list(value) and len(value) == 3:
+            return self._colour([REAL.check(v, param, where) for v in value], param, where)
+        names = (', "#rrggbb"' if self.codes else "") + (", a name" if self.names else "")
         raise SceneError(
             f"must be a number, three numbers{names} or a spectrum of clpt.spectra, not {value!r}",
             where=where,
         )
+
+    def _decoded(self, code: str, where: str | None) -> list[float]:
+        try:
+            return list(from_hex(code))
+        except SceneError as error:
+            raise SceneError(error.message, where=where) from None
 
     def _named(self, name: str, where: str | None) -> Spectrum | str:
         assert self.names is not None
@@ -254,6 +271,15 @@ class Factor(Spectral):
         return RGBUnbounded(*rgb)
 
 
+class Coefficient(Spectral):
+    """A coefficient of the inside of a body; one that is 0 at all wavelengths is the number 0."""
+
+    def check(self, value: object, param: Param, where: str | None) -> Any:
+        made = super().check(value, param, where)
+        none = isinstance(made, Spectrum) and all(found == 0.0 for found, _ in extremes(made))
+        return Constant(0.0) if none else made
+
+
 class Quantity(Factor):
     """A number that may depend on the wavelength and is no colour."""
 
@@ -276,12 +302,18 @@ RERADIATION = Data("reradiation", cls=Reradiation, words="a re-radiation matrix"
 MEASUREMENT = Data("measurement", cls=Measurement, words="a Measurement of clpt.measured")
 MERL = Data("merl", cls=MerlTable, words="a MerlTable of clpt.measured")
 REFLECTANCE = Spectral(
-    "reflectance", advice="colours are 0 to 1, linear", meaning="reflectance", colour=RGB
+    "reflectance",
+    advice="colours are 0 to 1, linear",
+    meaning="reflectance",
+    colour=RGB,
+    codes=True,
 )
-EMISSION = Emission("emission", meaning="emission", colour=RGBIlluminant, names=spectra.illuminant)
+EMISSION = Emission(
+    "emission", meaning="emission", colour=RGBIlluminant, codes=True, names=spectra.illuminant
+)
 INDEX = Index("index", names=spectra.index, measured=True, grey=True)
-FACTOR = Factor("factor")
-COEFFICIENT = Spectral("coefficient", "inside", measured=True)
+FACTOR = Factor("factor", codes=True)
+COEFFICIENT = Coefficient("coefficient", "inside", measured=True)
 QUANTITY = Quantity("quantity", measured=True, grey=True)
 SPECTRA = (REFLECTANCE, EMISSION, INDEX, FACTOR, COEFFICIENT, QUANTITY)
 DEVICE = (
@@ -334,8 +366,8 @@ class Matrix(Role):
 
 
 _HOSTS: dict[str, type[Role]] = {
-    "number": Real, "optional_number": OptionalReal, "vector": Vector, "direction": Vector,
-    "matrix3": Matrix, "matrix4": Matrix,
+    "boolean": Flag, "integer": Whole, "number": Real, "optional_number": OptionalReal,
+    "vector": Vector, "direction": Vector, "matrix3": Matrix, "matrix4": Matrix,
 }  # fmt: skip
 # What a host parameter holds. clpt/formats/native/forms.py reads, writes and describes each form.
 HostForm = Literal[

@@ -13,7 +13,7 @@ from clpt.scene.params import Kind, fields_of
 class Scatterer(Kind):
     """Base of materials and phase functions, with what kernels ask of a kind."""
 
-    folder: ClassVar[str] = "bsdf"  # of its file in the kernels folder
+    folder: ClassVar[str] = "materials/kinds"  # of its file in the kernels folder
     is_phase: ClassVar[bool] = False  # it scatters in a medium, not at a surface
     source: ClassVar[str | Path | None] = None
     delta: ClassVar[bool] = False  # every lobe is one: a light cannot be sampled through it
@@ -33,6 +33,11 @@ class Scatterer(Kind):
     def transmits(self) -> bool:
         """Whether light goes through it."""
         return False
+
+    @property
+    def directing(self) -> tuple[object, ...]:
+        """The values or textures that tell a coat's normals, and directions along the surface."""
+        return ()
 
     @property
     def uses_tangents(self) -> bool:

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import budget
 from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
+from clpt.files import budget
 
 PER_TRIANGLE = 512  # bytes of memory for each of the finest, while they are made
 

@@ -189,6 +189,22 @@ def attributes_in(value: object) -> set[str]:
     return names
 
 
+def placed_in(value: object) -> Placed | None:
+    """Return the first texture on a set of uv that a value is made of; None where there is none."""
+    found = (one for one in textures_in(value) if isinstance(one, Placed))
+    return next((one for one in found if one.mapping in ("uv", "uv1")), None)
+
+
+def turned(value: object) -> bool:
+    """Return whether u and v of a value's texture have other directions than the main ones."""
+    placed = placed_in(value) if isinstance(value, Texture) else None
+    if placed is None:
+        return False
+    matrix = placed.to_uv[:2, :2] / placed.to_uv[2, 2]
+    straight = matrix[0, 1] == matrix[1, 0] == 0.0 and matrix.diagonal().min() > 0.0
+    return placed.mapping == "uv1" or not straight
+
+
 def textures_in(value: object) -> Iterator[Texture]:
     """Yield the textures that a kind's parameters hold, and those in what these hold, and so on."""
     if isinstance(value, (list, tuple)):

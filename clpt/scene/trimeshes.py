@@ -83,7 +83,7 @@ def _physical(given: object, name: str) -> tuple[Material, Light | None]:
     )
     bent = _image(given, "normalTexture", raw=True)
     if bent is not None:
-        front = NormalMap(material=front, map=bent)
+        front = NormalMap(material=front, map=bent, along_v=True)
     made: Material = TwoSided(front=front)
     if base is not None and _of(given, "alphaMode", str) in ("MASK", "BLEND"):
         opacity = _image(given, "baseColorTexture", raw=True, channel="a")

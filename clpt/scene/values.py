@@ -12,9 +12,9 @@ from typing import Any, Protocol, TypeAlias
 
 from numpy.typing import NDArray
 
+from clpt.images.spectral_exr import SpectralImage
 from clpt.scene.params import Texture
 from clpt.spectra import Spectrum
-from clpt.spectral_exr import SpectralImage
 
 
 class OnDevice(Protocol):

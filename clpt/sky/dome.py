@@ -1,7 +1,7 @@
 """Images of a sky: the dome and the ground below it, and the sun's disc, at LAMBDAS.
 
-kernels/light/sky.cl says how they lie around the observer. Limb darkening of the sun is a power of
-the cosine at its surface (Hestroffer and Magnan 1998).
+kernels/lights/kinds/sky.cl says how they lie around the observer. Limb darkening of the sun is a
+power of the cosine at its surface (Hestroffer and Magnan 1998).
 """
 
 from __future__ import annotations

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from clpt import text as text_files
 from clpt.arrays import Floats
 from clpt.errors import SceneError
+from clpt.files import text as text_files
 from clpt.spectra.files import fields_of
 from clpt.spectra.reradiation import Donaldson
 from clpt.spectra.spectrum import Tabulated, _floats

@@ -44,6 +44,7 @@ class Blackbody(Spectrum):
     normalised: bool = False
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not 0.0 < self.kelvin < np.inf:
             raise SceneError(f"a black body's temperature must be positive, found {self.kelvin} K")
         _check_scale(self.scale)
@@ -118,6 +119,7 @@ class LED(Spectrum):
     scale: float = 1.0
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not (0.0 < self.peak < np.inf and 0.0 < self.width < np.inf):
             raise SceneError(f"an LED's peak and width must be positive: {self.peak}, {self.width}")
         _check_scale(self.scale)
@@ -135,6 +137,7 @@ class Illuminant(Spectrum):
     scale: float = 1.0
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.name not in illuminants():
             raise UnknownKindError("illuminant", self.name, illuminants())
         _check_scale(self.scale)

@@ -9,8 +9,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import text as text_files
 from clpt.errors import SceneError
+from clpt.files import text as text_files
 from clpt.spectra.dispersion import MICROMETRE, from_formula
 from clpt.spectra.spectrum import (
     Constant,

@@ -7,6 +7,7 @@ D65 and clamped from below at 0, an "emission" is integrated as it is.
 
 from __future__ import annotations
 
+import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt.arrays import Floats
 from clpt.errors import SceneError
+from clpt.scalars import real
 from clpt.spectra import cie, data, upsampling
 
 Role = Literal["reflectance", "unbounded", "emission"]
@@ -28,7 +30,13 @@ WIDEST = np.arange(SHORTEST, LONGEST + 0.5)  # that range, whole nanometres
 
 
 class Spectrum(ABC):
-    """A function of the wavelength."""
+    """A function of the wavelength, a dataclass whose fields of type float are numbers."""
+
+    def __post_init__(self) -> None:
+        for name in _numbers_of(type(self)):
+            value = vars(self)[name]
+            if type(value) is not float:
+                object.__setattr__(self, name, real(value, f"{type(self).__name__}.{name}"))
 
     @abstractmethod
     def sample(self, lambdas: ArrayLike) -> Floats:
@@ -163,6 +171,7 @@ class Sellmeier(Spectrum):
     a: float = 1.0
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         object.__setattr__(self, "b", _floats(self.b))
         object.__setattr__(self, "c", _floats(self.c))
         if len(self.b) != len(self.c):
@@ -231,6 +240,13 @@ def extremes(
         (float(values[least]), float(lambdas[least])),
         (float(values[largest]), float(lambdas[largest])),
     )
+
+
+@cache
+def _numbers_of(cls: type[Spectrum]) -> tuple[str, ...]:
+    """Return the names of a dataclass's fields of type float."""
+    fields = dataclasses.fields(cls)  # type: ignore[arg-type]
+    return tuple(field.name for field in fields if field.type == "float")
 
 
 @cache
@@ -307,4 +323,4 @@ def hat_means(at: Floats, values: Floats, grid: Floats) -> Floats:
 
 
 def _floats(values: Iterable[float]) -> tuple[float, ...]:
-    return tuple(float(value) for value in values)
+    return tuple(real(value) for value in values)

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import device
-from clpt.render.codegen import rough_coat_table
-from clpt.render.codegen.library import BSDF
-from clpt.render.codegen.parameters import struct_text
-from clpt.render.contract import custom_materials
-from clpt.render.contract.parameter_words import FILM_COSINES, array_size, lane_type
-from clpt.render.lowering.spectra import measurements
-from clpt.render.lowering.spectra.spectra_table import angular_values
-from clpt.render.lowering.spectra.thin_films import film_colours
+from clpt.render.flow.library import BSDF
+from clpt.render.materials import rough_coat_table
+from clpt.render.materials.cases import struct_text
+from clpt.render.materials.thin_films import film_colours
+from clpt.render.records import custom_materials
+from clpt.render.records.parameter_words import FILM_COSINES, array_size, lane_type
+from clpt.render.spectra import measurements
+from clpt.render.spectra.encode import angular_values
 from clpt.scene import roles
 from clpt.scene.materials import Layer, Material
 from clpt.scene.params import device_params
@@ -33,7 +33,7 @@ RESULTS = ("wi", "weight", "sampled_pdf", "eta", "lobe", "eval", "pdf", "eval_ag
 def root_text(mode: str, files: tuple[str, ...] = ()) -> str:
     """Return the includes of shading code in a mode ("rgb" or "spectral"), then of `files`."""
     text = "\n".join(f'#include "{name}"' for name in (*BSDF, *files)) + "\n"
-    return text.replace("generated/spectrum.cl", f"spectrum/{mode}.cl")
+    return text.replace("generated/spectrum.cl", f"spectra/{mode}.cl")
 
 
 def run(
@@ -138,7 +138,7 @@ class Probe:
         counts = f"(integer)({len(cosines)}), (integer)({len(values)})"
         initialiser = f"{{in + {rows} * n, (integer)(0), {counts}, {{{row}}}}}"
         return [
-            '#include "optics/angular_table.cl"',
+            '#include "materials/angular_table.cl"',
             f"    AngularTable table = {initialiser};\n    m.{self._named(roles.ANGULAR)} = table;",
         ]
 
@@ -154,7 +154,7 @@ class Probe:
         initialiser = f"{{in + {rows} * n, (integer)(1), {{{row}}}}}"
         name = self._named(roles.MEASUREMENT)
         return [
-            '#include "optics/measurement.cl"',
+            '#include "materials/measurement.cl"',
             f"    Measurement data = {initialiser};\n    m.{name} = data;",
         ]
 
@@ -169,7 +169,7 @@ class Probe:
         )
         name = self._named(roles.MERL)
         return [
-            '#include "optics/merl_table.cl"',
+            '#include "materials/merl_table.cl"',
             f"    MerlTable data = {initialiser};\n    m.{name} = data;",
         ]
 
@@ -205,7 +205,7 @@ class Probe:
         if "layers" not in device_params(self.cls):
             return ["", ""]
         if not count:
-            return ['#include "optics/boundary_bare.cl"', "    m.layers = layers_none();"]
+            return ['#include "materials/boundary_bare.cl"', "    m.layers = layers_none();"]
         if self.mode == "spectral":
             lambdas = ", ".join(f"(real)({v}f)" for v in LAMBDAS)
             return [
@@ -214,14 +214,14 @@ class Probe:
                 "inline Layer layer_at(Layers l, integer i)\n{\n    i *= 4;\n"
                 "    Layer r = {spectrum_of(gather(l.at, i)), spectrum_of(gather(l.at, i + 1)),\n"
                 "               gather(l.at, i + 2), gather(l.at, i + 3)};\n    return r;\n}\n"
-                '#include "optics/boundary_film.cl"',
+                '#include "materials/boundary_film.cl"',
                 f"    Layers layers = {{in + {rows} * n, {count}, {{{lambdas}}}}};\n"
                 "    m.layers = layers;",
             ]
         return [
             "typedef struct { global const float *spectra; } Tables;\n"
             "typedef struct { Tables scene; integer count, table, rows; real profile; } Layers;\n"
-            f'#define FILM_COSINES {FILM_COSINES}\n#include "optics/boundary_table.cl"',
+            f'#define FILM_COSINES {FILM_COSINES}\n#include "materials/boundary_table.cl"',
             f"    Layers layers = {{{{in + {rows} * n}}, {count}, 0, 1, 1.0f}};\n"
             "    m.layers = layers;",
         ]

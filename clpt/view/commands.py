@@ -8,8 +8,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from clpt.colour.tones import TONES
 from clpt.errors import ClptError
+from clpt.images.colour.tones import TONES
+from clpt.scalars import is_flag, is_number, is_whole
 from clpt.spectra import illuminants
 
 OF_VIEW = "view"  # of OpenColorIO, in the place of a tone curve
@@ -38,7 +39,7 @@ class Number:
     high: float
 
     def check(self, value: object) -> float:
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
+        if not is_number(value):
             raise CommandError(f"must be a number, not {_shown(value)}")
         if not self.low <= value <= self.high:  # a NaN is neither
             raise CommandError(f"must be {self.low:g} to {self.high:g}, not {_shown(value)}")
@@ -53,7 +54,7 @@ class Whole:
     high: int
 
     def check(self, value: object) -> int:
-        if isinstance(value, bool) or not isinstance(value, int):
+        if not is_whole(value):
             raise CommandError(f"must be a whole number, not {_shown(value)}")
         if not self.low <= value <= self.high:
             raise CommandError(f"must be {self.low} to {self.high}, not {_shown(value)}")
@@ -65,7 +66,7 @@ class Flag:
     """True or false."""
 
     def check(self, value: object) -> bool:
-        if not isinstance(value, bool):
+        if not is_flag(value):
             raise CommandError(f"must be true or false, not {_shown(value)}")
         return value
 

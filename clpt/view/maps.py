@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from clpt import images
 from clpt.arrays import Bytes, Image
-from clpt.colour.false_colours import SCALE, false_colours
 from clpt.denoise import oidn
+from clpt.images.colour.false_colours import SCALE, false_colours
 from clpt.render.film.layer_preview import viewable
 from clpt.scene.layers import LAYERS
 

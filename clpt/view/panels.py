@@ -11,11 +11,11 @@ from typing import Any, NoReturn
 import numpy as np
 
 from clpt import spectra
-from clpt.colour.tones import TONES
 from clpt.errors import SceneError
 from clpt.formats.native import forms
 from clpt.formats.native.cursor import Cursor
-from clpt.render.editing.scene_edit import Successors, edit_scene
+from clpt.images.colour.tones import TONES
+from clpt.render.edit.scene_edit import Successors, edit_scene
 from clpt.scene import Scene
 from clpt.scene.materials import LEAVES, Material, parts
 from clpt.scene.params import Kind, defaults, fields_of, params
@@ -43,6 +43,7 @@ CONTROLS = {
     "sensor": "choice",
     "number_or_auto": "number_or_auto",
 }
+METAL = "metal"  # a name in place of `eta` and `k`
 KIND = "type"  # of a material, as scene.json calls it
 MOST_OBJECTS = 500  # that a page lists
 MOST_PANELS = 300
@@ -58,8 +59,8 @@ def panels(scene: Scene) -> list[dict[str, Any]]:
     """Return a description of a panel for each thing that can be edited.
 
     target, index: what `edited` takes; title, kind, doc: for people; kinds: those that it can
-    become, by KIND as the key; shapes: indices of those that have a material or an emission;
-    parameters: see `_parameter`.
+    become, by KIND as the key; metals: those that METAL as the key takes; shapes: indices of those
+    that have a material or an emission; parameters: see `_parameter`.
     """
     found: list[dict[str, Any]] = []
     for target, things in _targets(scene).items():
@@ -71,6 +72,7 @@ def panels(scene: Scene) -> list[dict[str, Any]]:
                     "title": _title(target, thing, owners, scene),
                     "kind": thing.kind,
                     "kinds": list(_material_kinds()) if target == "material" else [],
+                    "metals": list(spectra.metals()) if _is_metal(thing) else [],
                     "doc": (type(thing).__doc__ or "").strip().splitlines()[0],
                     "shapes": owners[:MOST_OBJECTS],
                     "parameters": _parameters(target, thing),
@@ -134,6 +136,8 @@ def edited(scene: Scene, target: str, index: int, key: str, value: object) -> tu
     thing = things[index][0]
     if key == KIND and target == "material":
         return _replaced(scene, target, thing, _of_kind(thing, value))
+    if key == METAL and target == "material" and _is_metal(thing):
+        return _replaced(scene, target, thing, _of_metal(thing, value))
     param = params(type(thing)).get(key)
     if param is None or not _editable(target, key, param):
         raise CommandError(f"{thing.kind}.{key} cannot be edited")
@@ -150,6 +154,19 @@ def _material_kinds() -> dict[str, type[Material]]:
         for cls in LEAVES
         if not measured & {param.role for param in params(cls).values()}
     }
+
+
+def _is_metal(thing: Kind) -> bool:
+    return any(METAL in shorthand.arguments for shorthand in thing.shorthands)
+
+
+def _of_metal(material: Material, metal: object) -> Material:
+    """Return a material with the optical constants of a metal by its name. Raises SceneError."""
+    if not isinstance(metal, str):
+        raise CommandError("a metal is given by its name")
+    known = fields_of(material)
+    plain = {name: value for name, value in known.items() if name not in ("eta", "k")}
+    return type(material)(**plain, **{METAL: metal})
 
 
 def _of_kind(material: Material, kind: object) -> Material:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import output_files
+from clpt.files import output_files
 from clpt.formats import save as save_scene
 from clpt.render.renderer import Renderer
 from clpt.scene import Scene

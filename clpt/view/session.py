@@ -360,7 +360,7 @@ class Session(CameraWork):
             self._move(scene.camera)
             return
         self._show(scene, change)
-        if key == panels.KIND:  # which has other parameters
+        if key in (panels.KIND, panels.METAL):  # the panel has other values
             self._tell_state()
 
     def _do_undo(self, reply: Reply) -> None:

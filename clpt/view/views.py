@@ -6,8 +6,8 @@ import json
 from pathlib import Path
 from typing import Any, cast
 
-from clpt import text
 from clpt.errors import SceneError, UnknownKindError
+from clpt.files import text
 from clpt.scene import Scene, kinds
 from clpt.scene.cameras import Camera
 from clpt.scene.params import fields_of, params

@@ -49,19 +49,19 @@ MODULES = {
     "clpt.scene.values": "values",
     "clpt.spectra": "spectra",
     "clpt.transforms": "transforms",
-    "clpt.colour": "colour",
+    "clpt.images.colour": "colour",
     "clpt.denoise": "denoise",
     "clpt.lenses": "lenses",
     "clpt.mie": "mie",
     "clpt.measured": "measured",
     "clpt.device": "device",
     "clpt.bvh": "bvh",
-    "clpt.benchmark": "benchmark",
+    "clpt.bench": "benchmark",
     "clpt.testing": "testing",
-    "clpt.trimesh_ray": "trimesh_ray",
+    "clpt.rays.trimesh_ray": "trimesh_ray",
 }
 PARTS = {  # modules on the page of their package, which exports no names itself
-    "clpt.colour": ("tones", "view"),
+    "clpt.images.colour": ("tones", "view"),
     "clpt.denoise": ("oidn", "statistical", "needs"),
 }
 SHOWN = {*MODULES, *(f"{package}.{part}" for package, parts in PARTS.items() for part in parts)}

@@ -1,5 +1,5 @@
 /* Layers beside the picture, in memory: sums over the first LAYER_SAMPLES samples of each pixel, so that they cost
- * little; whole numbers, which add in any order. What is summed is in path/layers.cl.
+ * little; whole numbers, which add in any order. What is summed is in film/layers_record.cl.
  *
  * `layers` has Settings.layer_words words for each pixel, side by side, as its samples then touch one line of a cache:
  * how many samples; a word for each number that is near 1, in units of 2^-22; four for others, in units of 2^18, 2^-6,

@@ -1,4 +1,4 @@
-/* Where on the film a point is, for the functions <kind>_screen of cameras: see interface/camera.cl. */
+/* Where on the film a point is, for the functions <kind>_screen of cameras: see cameras/camera.cl. */
 
 /* A vector of the world in the camera's space: by the inverse of the first three columns of a matrix. */
 inline vec3 screen_back(global const float *m, vec3 v)

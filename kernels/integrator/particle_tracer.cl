@@ -6,12 +6,12 @@
  * lacks, where light is refracted, eta^2, and where normals are smoothed, the quotient
  * |wo . ns| |wi . n| / (|wo . n| |wi . ns|), wo being the side where the light came from.
  *
- * As the light paths of `path` they are weighed against those from the camera (lighting/rivals.cl). */
-#include "interface/camera.cl"
+ * As the light paths of `path` they are weighed against those from the camera (transport/rivals.cl). */
+#include "cameras/camera.cl"
 #include "generated/camera.cl"
 #include "film/connect.cl"
 #include "generated/connect.cl"
-#include "lighting/light_path.cl"
+#include "transport/light_path.cl"
 #include "generated/rivals.cl"
 #include "generated/light_path_steps.cl"
 

@@ -1,8 +1,8 @@
 /* One vertex of a path from the camera: the light that is met, next-event estimation, and the direction to go on.
  * Light is found both by meeting it and by choosing it; the two are weighted by the power heuristic (Veach 1997,
- * 9.2.4), and against paths from lights where there are some (lighting/rivals.cl). Steps that a scene or a material
+ * 9.2.4), and against paths from lights where there are some (transport/rivals.cl). Steps that a scene or a material
  * does not have do nothing. */
-#include "path/met_light.cl"
+#include "lights/met_light.cl"
 #include "generated/ghosts.cl"
 #include "generated/light_layers.cl"
 #include "generated/layers.cl"

@@ -3,8 +3,8 @@
  *
  * Where some grids emit, a flight gathers light at one point of each way that it goes without a collision within a
  * brick: chosen evenly, and weighed as if the flight had come just there. Light is also sought by next-event estimation
- * (light/emissive_brick.cl), and both are weighed. */
-/* Where a flight ends, and what its sample weighs; `ratio` as in path/hero.cl. */
+ * (lights/kinds/emissive_brick.cl), and both are weighed. */
+/* Where a flight ends, and what its sample weighs; `ratio` as in spectra/hero.cl. */
 typedef struct {
     mask collides, endless; /* endless: it has had MOST_NULL_COLLISIONS, and weighs nothing */
     real t;                 /* [m] */

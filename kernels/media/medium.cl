@@ -2,8 +2,9 @@
  * medium is named by 1 + the first word of that row; 0 is none.
  *
  * The inside of a dielectric that absorbs is one: exp(-a t) of the light is left after t metres (Bouguer 1729, Lambert
- * 1760, Beer 1852). A path is in the medium of the dielectric that it went into last, and in none once it has left one:
- * bodies may touch what is no dielectric, but not hold each other. Its coefficient alone is in the row.
+ * 1760, Beer 1852). A path is in the medium of the dielectric that it went into last, and in what it came from once it
+ * has left that: bodies may touch what is no dielectric, but not hold each other. Its coefficient alone is in the row.
+ * What names no media and absorbs nothing leaves a path in the medium where it is.
  *
  * Media that shapes have inside and outside, or the camera around it, have MEDIUM_FLIES in their names: stage/flight.cl
  * dims what rays bring through them. Their rows hold sigma_a and sigma_s, and before them the word of their phase
@@ -13,6 +14,14 @@
 #define MEDIUM_ROW(name) (((name) & 0xffffff) - 1)
 
 #include "generated/medium_steps.cl"
+
+/* The inside of a material, whose absorption stands in the row that it names; 0 where that is 0. */
+inline integer medium_that_absorbs(Scene scene, integer name)
+{
+    integer first = max_i(name - 1, (integer)(0));
+    mask clear = spectrum_constant_none(row4(scene.materials, first)) & (gather_i(scene.materials, first + 4) == 0);
+    return sel_i(clear, (integer)(0), name);
+}
 
 /* What is left of light after t metres, t up to FAR; medium_absorption and medium_scattering are generated. */
 inline Spectrum medium_transmittance(Scene scene, integer medium, real t, Wavelengths lambdas)

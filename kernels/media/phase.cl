@@ -1,5 +1,5 @@
 /* What phase functions that depend on the wavelength share. Each has a density over the cosine of the angle by which
- * light turns, for each wavelength. In spectral mode the hero's is sampled, and path/hero.cl weighs all four. In RGB
+ * light turns, for each wavelength. In spectral mode the hero's is sampled, and spectra/hero.cl weighs all four. In RGB
  * mode one of the three is chosen, and the density is their mean; where the three are the same nothing is chosen. */
 #if SPECTRUM_SIZE == 4
 inline mask phase_same(Spectrum s) { return mask_of(1); }

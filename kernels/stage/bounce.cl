@@ -4,7 +4,7 @@
  * slots are sorted by material, so that a block of LANES slots has one kind; where nearly all wait for one kind they
  * are shaded as they lie. */
 #include "generated/loop_args.cl"
-#include "path/queue.cl"
+#include "transport/queue.cl"
 #include "generated/bounce_stages.cl"
 
 #define BLOCK (settings->slots + get_global_id(0) * LANES) /* the first slot of the work-item's block */

@@ -1,14 +1,14 @@
 /* What shading has in common for several kinds of materials, as a part of the loop (stage/loop.cl) that is compiled
- * once for all of them: clpt/render/codegen/common.py. No kind's flags reach it. */
+ * once for all of them: clpt/render/flow/common.py. No kind's flags reach it. */
 #include "core/base.cl"
 #include "generated/sampler.cl"
-#include "interface/shape.cl"
-#include "interface/light.cl"
+#include "shapes/shape.cl"
+#include "lights/light.cl"
 #include "generated/textures.cl"
 #include "generated/shapes.cl"
 #include "generated/lights.cl"
-#include "surface/surface.cl"
-#include "lighting/light_begins.cl"
+#include "shapes/surface.cl"
+#include "lights/light_begins.cl"
 
 #define COMMON(type, name) __attribute__((noinline)) type loop_##name
 #include "generated/common_part.cl"

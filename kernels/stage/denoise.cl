@@ -2,7 +2,7 @@
  * four floats a pixel, of which the fourth is padding but where it is named. */
 #include "core/lanes.cl"
 #include "core/math.cl"
-#include "denoising/likeness.cl"
+#include "film/likeness.cl"
 
 #define RADIUS 10      /* pixels, of the disk over which a pixel is averaged */
 #define BORDER (RADIUS + PATCH) /* pixels of planes beside the picture */

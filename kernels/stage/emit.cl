@@ -2,25 +2,25 @@
  * stage/generate.cl. The work list only counts paths here: what a path leaves on the film is added by
  * stage/splat.cl to the pixel where the camera sees it. */
 #include "core/base.cl"
-#include "interface/stage.cl"
+#include "stage/stage.cl"
 #include "generated/begin_args.cl"
 #include "generated/sampler.cl"
-#include "interface/camera.cl"
+#include "cameras/camera.cl"
 #include "generated/camera.cl"
 #include "film/connect.cl"
 #include "generated/connect.cl"
 #include "film/film.cl"
 #include "film/work_list.cl"
-#include "interface/shape.cl"
-#include "interface/light.cl"
+#include "shapes/shape.cl"
+#include "lights/light.cl"
 #include "generated/lights.cl"
 #include "generated/emission.cl"
 #include "generated/shapes.cl"
-#include "surface/surface.cl"
-#include "path/path_end.cl"
-#include "path/next_light_path.cl"
-#include "lighting/next_event.cl"
-#include "lighting/light_path.cl"
+#include "shapes/surface.cl"
+#include "transport/path_end.cl"
+#include "transport/next_light_path.cl"
+#include "lights/next_event.cl"
+#include "transport/light_path.cl"
 #include "generated/light_medium.cl"
 #include "generated/merging.cl"
 #include "generated/motion.cl"
@@ -39,7 +39,7 @@ inline LightRay first_light_ray(Scene *scene, Sampler sampler, integer sample, W
                       sampler_pair(sampler, (natural)(DIMENSION_LENS)), *lambdas);
 }
 
-/* The rival of a light path that begins, see lighting/rivals.cl. */
+/* The rival of a light path that begins, see transport/rivals.cl. */
 inline real first_rival(Scene scene, LightRay r)
 {
     return aimed_rival((real)(1.0f / scene.settings->light_paths), r);
@@ -75,6 +75,7 @@ inline integer begin_light_path(Scene scene, Slab path, Slab shadow, uint at, ma
     store_path_null_distance(path, at, go, (real)(0.0f));
     store_path_medium(path, at, go, light_medium(scene, lit));
     store_path_bodies(path, at, go, light_bodies(scene, lit));
+    store_path_around(path, at, go, (integer)(0));
     store_path_lead(path, at, go, (real)(0.0f));
     store_path_ratio(path, at, go, spectrum_of(1.0f));
     store_path_pending(path, at, go, (real)(0.0f));

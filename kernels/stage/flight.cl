@@ -1,12 +1,12 @@
 /* Takes rays through media: a ray either comes to where it ends, or meets the medium before. Then that is where it
  * ends, and the medium's phase function is its material. Both are chosen by the extinction at the hero wavelength, and
  * weighed over all of the path's wavelengths (Miller, Georgiev and Jarosz 2019, with one sample): `ratio` does it as
- * for directions, see path/hero.cl. Light that is absorbed is a weight, never an end. Some flights end near lamps, see
- * media/equiangular.cl; both ways to choose are weighed by their sum. */
+ * for directions, see spectra/hero.cl. Light that is absorbed is a weight, never an end. Some flights end near lamps,
+ * see media/equiangular.cl; both ways to choose are weighed by their sum. */
 #include "core/base.cl"
-#include "interface/stage.cl"
+#include "stage/stage.cl"
 #include "generated/sampler.cl"
-#include "path/path_state.cl"
+#include "transport/path_state.cl"
 #include "generated/scouts.cl"
 #include "generated/textures.cl"
 #include "generated/medium.cl"

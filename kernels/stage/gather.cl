@@ -1,24 +1,24 @@
 /* Gathers photons along rays from the camera through media, for those whose phase function is of one kind: before
  * stage/flight.cl chooses where they collide. */
 #include "core/base.cl"
-#include "interface/stage.cl"
+#include "stage/stage.cl"
 #include "generated/merge_args.cl"
 #include "generated/gather_args.cl"
 #include "generated/sampler.cl"
-#include "path/path_state.cl"
+#include "transport/path_state.cl"
 #include "generated/scouts.cl"
-#include "path/surface_flags.cl"
+#include "shapes/surface_flags.cl"
 #include "generated/textures.cl"
-#include "interface/bsdf.cl"
+#include "materials/bsdf.cl"
 #include "generated/bsdf.cl"
 #include "generated/medium.cl"
 #include "generated/hero_steps.cl"
-#include "path/pair.cl"
+#include "materials/pair.cl"
 #include "generated/light_layers.cl"
 #include "generated/flight_medium.cl"
-#include "merging/area.cl"
+#include "transport/photons/area.cl"
 #include "generated/photon.cl"
-#include "merging/along.cl"
+#include "transport/photons/along.cl"
 
 STAGE(gather_along)(SLAB_ARGS, SCENE_ARGS GATHER_ARGS STAGE_AT_ARG)
 {

@@ -2,28 +2,28 @@
  * lights, a finished path is added to its pixel, and its slot starts the next sample of its work list with a ray
  * from the camera. */
 #include "core/base.cl"
-#include "interface/stage.cl"
+#include "stage/stage.cl"
 #include "generated/begin_args.cl"
 #include "generated/sampler.cl"
-#include "interface/camera.cl"
+#include "cameras/camera.cl"
 #include "generated/camera.cl"
 #include "film/work_list.cl"
 #include "generated/motion.cl"
 #include "generated/exposure.cl"
-#include "interface/shape.cl"
-#include "interface/light.cl"
+#include "shapes/shape.cl"
+#include "lights/light.cl"
 #include "generated/lights.cl"
 #include "generated/medium.cl"
 #include "generated/merging.cl"
-#include "path/path_end.cl"
+#include "transport/path_end.cl"
 #include "generated/seen_wavelengths.cl"
 #include "generated/ghosts.cl"
 #include "generated/sky.cl"
 #include "generated/path_covers.cl"
 #include "generated/first_ray.cl"
-#include "path/first_cone.cl"
+#include "textures/first_cone.cl"
 #include "generated/layer_sums.cl"
-#include "path/path_state.cl"
+#include "transport/path_state.cl"
 #include "generated/scouts_begin.cl"
 
 /* What a sample begins with. */
@@ -106,7 +106,9 @@ inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_i
     store_path_nulls(path, at, go, (integer)(0));
     store_path_null_distance(path, at, go, (real)(0.0f));
     store_path_medium(path, at, go, (integer)(settings->camera_medium));
+    store_path_around(path, at, go, (integer)(0));
     store_path_lead(path, at, go, (real)(0.0f));
+    store_path_escape_width(path, at, go, (real)(0.0f));
     store_path_bodies(path, at, go, (integer)(settings->camera_bodies));
     store_path_ratio(path, at, go, camera_start());
 }

@@ -2,10 +2,10 @@
  * rays a work-item as it likes; analytic shapes through a tree of their own, one ray at a time. The hit takes
  * along what shading needs first: the normal and the material of the side that was met. */
 #include "core/base.cl"
-#include "interface/shape.cl"
-#include "path/surface_flags.cl"
+#include "shapes/shape.cl"
+#include "shapes/surface_flags.cl"
 #include "generated/trace.cl"
-#include "interface/stage.cl"
+#include "stage/stage.cl"
 
 STAGE(intersect)(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS STAGE_AT_ARG)
 {

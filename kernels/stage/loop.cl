@@ -4,10 +4,10 @@
  * of what is left, so it can enqueue a whole exposure at once; `restart` begins the lists. `which` says what kind of
  * paths is traced, where a scene has paths from lights (0) and from the camera (1). The host raises `leave` while the
  * loop runs, if the paths are of no use any more; a null pointer is never raised. The stages are those of the other
- * files here, each compiled by itself as a function (interface/stage.cl), in its own number of lanes, and linked.
+ * files here, each compiled by itself as a function (stage/stage.cl), in its own number of lanes, and linked.
  */
 #include "core/base.cl"
-#include "interface/stage.cl"
+#include "stage/stage.cl"
 #include "stage/bounce.cl"
 
 kernel NO_VECTORIZE void loop(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, global uint *queue, uint share, uint bounces,

@@ -1,15 +1,15 @@
 /* What a kind of material has of its own, as a part of the loop (stage/loop.cl) for a vertex that several kinds share:
- * path/material_apart.cl. */
+ * materials/material_apart.cl. */
 #include "core/base.cl"
-#include "interface/shape.cl"
-#include "interface/light.cl"
+#include "shapes/shape.cl"
+#include "lights/light.cl"
 #include "generated/textures.cl"
-#include "optics/fresnel.cl"
-#include "optics/microfacet.cl"
-#include "interface/bsdf.cl"
+#include "materials/fresnel.cl"
+#include "materials/microfacet.cl"
+#include "materials/bsdf.cl"
 #include "generated/bsdf.cl"
 #include "generated/hero_steps.cl"
-#include "path/pair.cl"
+#include "materials/pair.cl"
 
 /* What a vertex asks for, of LANES paths. */
 inline BsdfAnswer material_answer(Bsdf m, vec3 wo, vec3 wi, vec3 u, int adjoint)

@@ -2,14 +2,14 @@
  * follows shades one material. A row of `mixtures`: the weight (a number and 1 + its texture), and the
  * material words taken where a random number is above and below it; these may be mixtures again. */
 #include "core/base.cl"
-#include "interface/stage.cl"
+#include "stage/stage.cl"
 #include "generated/sampler.cl"
-#include "interface/shape.cl"
+#include "shapes/shape.cl"
 #include "generated/textures.cl"
 #include "generated/mixture.cl"
 #include "generated/scout_choice.cl"
 #include "generated/shapes.cl"
-#include "surface/surface.cl"
+#include "shapes/surface.cl"
 
 STAGE(mix_materials)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
 {

@@ -1,6 +1,6 @@
 /* Tests the rays that wait to reach a light, and adds to their paths' radiance what arrives of what they carry. */
 #include "core/base.cl"
-#include "interface/stage.cl"
+#include "stage/stage.cl"
 #include "generated/join_args.cl"
 #include "generated/shadow_ray.cl"
 #include "generated/light_layers.cl"

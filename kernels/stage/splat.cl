@@ -1,7 +1,7 @@
 /* Tests the rays that wait to reach the camera, and adds what arrives of what they carry to the pixels whose
  * filters hold the point where it is seen. No sample is counted here: stage/emit.cl counts paths. */
 #include "core/base.cl"
-#include "interface/stage.cl"
+#include "stage/stage.cl"
 #include "generated/join_args.cl"
 #include "generated/shadow_ray.cl"
 #include "film/spread.cl"

@@ -1,12 +1,12 @@
 /* Adds what light paths carry to the guide where they meet a surface, or collide. In whole
  * numbers, whose sums do not depend on the order. */
 #include "core/base.cl"
-#include "interface/stage.cl"
+#include "stage/stage.cl"
 #include "generated/deposit_args.cl"
-#include "interface/shape.cl"
+#include "shapes/shape.cl"
 #include "generated/shapes.cl"
-#include "surface/surface.cl"
-#include "guiding/guide.cl"
+#include "shapes/surface.cl"
+#include "transport/guiding/guide.cl"
 #include "generated/train_steps.cl"
 
 #define TRAIN_UNIT 256.0f /* of what a light path begins with */

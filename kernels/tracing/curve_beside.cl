@@ -1,6 +1,6 @@
 /* Whether one ray passes beside a piece of a curve: all its control points are farther on one side than its radius.
  * Most pieces whose boxes a ray enters are left here, four points at a time. `piece`: its words, see
- * kernels/shape/curves.cl. */
+ * kernels/shapes/kinds/curves.cl. */
 inline int curve_beside(global const float *piece, float3 o, float3 d)
 {
     float4 x = vload4(0, piece) - o.x, y = vload4(1, piece) - o.y, z = vload4(2, piece) - o.z;

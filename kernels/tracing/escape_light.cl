@@ -1,10 +1,10 @@
 /* Light of lamps that comes to where a sealed medium is left, see media/escape.cl. */
 #include "generated/textures.cl"
 #include "generated/shapes.cl"
-#include "surface/surface.cl"
+#include "shapes/surface.cl"
 #include "generated/medium.cl"
 #include "generated/lights.cl"
-#include "interface/bsdf.cl"
+#include "materials/bsdf.cl"
 #include "generated/smooth_boundary.cl"
 
 #define escape_waits(t) ((t) > 2.0f * FAR) /* a ray in the shadow slab is of this kind */

@@ -1,10 +1,10 @@
 /* How much of the light between two points passes, 0 to 1, where some surfaces transmit a part of it as if nothing
  * were there: masks, and null boundaries. Each is met in turn, and its transmittance multiplied. */
-#include "interface/shape.cl"
+#include "shapes/shape.cl"
 #include "generated/textures.cl"
 #include "generated/mixture.cl"
 #include "generated/shapes.cl"
-#include "surface/surface.cl"
+#include "shapes/surface.cl"
 #include "tracing/passage.cl"
 #include "generated/null_transmittance.cl"
 

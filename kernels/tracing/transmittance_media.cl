@@ -1,11 +1,11 @@
 /* How much of the light between two points passes, where some surfaces transmit a part of it as if nothing were there,
  * and media dim it between them. Each surface is met in turn; it may be where one medium ends and another begins.
  * key: of the random numbers in media on grids; into: the medium where it must end, 0 for any. */
-#include "interface/shape.cl"
+#include "shapes/shape.cl"
 #include "generated/textures.cl"
 #include "generated/mixture.cl"
 #include "generated/shapes.cl"
-#include "surface/surface.cl"
+#include "shapes/surface.cl"
 #include "generated/medium.cl"
 #include "tracing/passage.cl"
 #include "generated/null_transmittance.cl"

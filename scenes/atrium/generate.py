@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-
 from clpt.benchmark.atrium import atrium
 
 

@@ -25,7 +25,7 @@ from pathlib import Path
 
 from clpt import images
 from clpt.errors import SceneError
-from clpt.output_files import PARTIAL
+from clpt.files.output_files import PARTIAL
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENE = str(ROOT / "scenes" / "cornell_box")

@@ -20,7 +20,7 @@ import numpy as np
 
 from clpt.cli.files import checkpoints
 from clpt.cli.files.targets import CHECKPOINT
-from clpt.output_files import PARTIAL
+from clpt.files.output_files import PARTIAL
 from clpt.render.film import film_file
 from clpt.render.film.saved_film import SavedFilm
 

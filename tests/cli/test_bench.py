@@ -11,10 +11,11 @@ from xml.etree import ElementTree
 
 import pytest
 
-from clpt import benchmark, device
+from clpt import bench as benchmark
+from clpt import device
 from clpt.__main__ import run
-from clpt.benchmark import apart, pictures, records
-from clpt.benchmark.figures import Figure
+from clpt.bench import apart, pictures, records
+from clpt.bench.figures import Figure
 from clpt.choices import PICTURE_SIZES
 from clpt.errors import DeviceError
 from clpt.images import read

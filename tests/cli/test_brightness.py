@@ -92,6 +92,6 @@ def test_options_for_screens_of_light_alone(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     path = scene(tmp_path, 20.0)
     assert run(["render", path, "-o", "a.exr", "--exposure", "-5"]) == 0
-    assert "--exposure without effect: of .png .jpg .jpeg .webp only" in told(capsys)
+    assert "--exposure ignored: for .png .jpg .jpeg .webp only" in told(capsys)
     assert run(["render", path, "-o", "a.exr", "-o", "a.jpg", "--exposure", "-5"]) == 0
-    assert "without effect" not in told(capsys)
+    assert "ignored" not in told(capsys)

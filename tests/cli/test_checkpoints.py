@@ -12,12 +12,13 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from clpt import images, output_files
+from clpt import images
 from clpt.__main__ import run
 from clpt.cli.files import checkpoints, outputs
 from clpt.cli.render import passes
 from clpt.errors import MemoryBudgetError, SceneError
-from clpt.output_files import PARTIAL
+from clpt.files import output_files
+from clpt.files.output_files import PARTIAL
 from clpt.render.film import film_file
 from clpt.render.renderer import Renderer
 from tests.cli import killing

@@ -7,10 +7,11 @@ import json
 import numpy as np
 import pytest
 
-from clpt import images, spectral_exr
+from clpt import images
 from clpt.__main__ import run
+from clpt.images import spectral_exr
 from clpt.images.differences import EPSILON, differences
-from clpt.spectral_exr import SpectralImage
+from clpt.images.spectral_exr import SpectralImage
 
 RNG = np.random.default_rng(4)
 B = RNG.random((6, 8, 3)).astype(np.float32)

@@ -49,6 +49,8 @@ def test_a_folder_that_cannot_be_written(home, capsys):
     ("line", "found", "left_out"),
     [
         ("clpt comp", {"compare", "completion"}, "render"),
+        ("clpt info scenes/cor", {"scenes/cornell_box"}, "scenes/prism"),
+        ("clpt warm scenes/pri", {"scenes/prism", "scenes/prism_mirror"}, "scenes/pool"),
         ("clpt render --no", {"--noise", "--no-resume"}, "--spp"),
         ("clpt render --tone a", {"agx", "aces"}, "neutral"),
     ],

@@ -15,7 +15,7 @@ from clpt import choices
 from clpt.bvh import layouts
 from clpt.cli import COMMANDS, cli
 from clpt.cli.options.headings import HEADINGS, OTHER, Grouped
-from clpt.colour import tones
+from clpt.images.colour import tones
 from clpt.render.film import layer_channels
 from clpt.scene import kinds
 from clpt.scene.layers import LAYERS
@@ -23,7 +23,7 @@ from clpt.spectra import sensors, spaces
 
 # Parts of clpt, and other packages, that a command's help may import.
 PARTS = {
-    "__main__", "budget", "choices", "cli", "errors", "formats", "host_memory", "output_files",
+    "__main__", "choices", "clean_logs", "cli", "errors", "files", "formats",
     "render",  # its records of progress
     "version",
 }  # fmt: skip

@@ -10,14 +10,15 @@ import OpenEXR
 import pytest
 from PIL import Image
 
-from clpt import images, spectral_exr
+from clpt import images
 from clpt.__main__ import run
 from clpt.cli.plots.pixels import strip
+from clpt.images import spectral_exr
+from clpt.images.spectral_exr import SpectralImage
 from clpt.render.renderer import Renderer
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Perspective
 from clpt.scene.shapes import Sphere
-from clpt.spectral_exr import SpectralImage
 
 NM = np.linspace(400.0, 700.0, 7)
 VALUES = np.random.default_rng(2).random((4, 6, 7)).astype(np.float32)

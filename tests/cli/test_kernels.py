@@ -9,8 +9,8 @@ import pytest
 
 from clpt import device
 from clpt.__main__ import run
-from clpt.benchmark import agreement
-from clpt.benchmark.picture_scenes import PICTURES
+from clpt.bench import agreement
+from clpt.bench.picture_scenes import PICTURES
 from clpt.choices import PICTURE_SCENES
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"

@@ -15,7 +15,7 @@ from clpt.cli.options.values import MOST_SAMPLES, Count, Noise
 from clpt.cli.options.verbosity import Handler
 from clpt.device import context
 from clpt.errors import SceneError
-from clpt.render.lowering.scene import lower
+from clpt.render.flow.scene_to_tables import lower
 
 ROOT = Path(__file__).resolve().parents[2]
 CORNELL = str(ROOT / "scenes" / "cornell_box")

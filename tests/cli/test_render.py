@@ -18,7 +18,7 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from clpt import __version__, device, images, spectral_exr
+from clpt import __version__, device, images
 from clpt.__main__ import run
 from clpt.cli.files import outputs
 from clpt.cli.files import targets as names
@@ -27,10 +27,10 @@ from clpt.cli.options.changes import SceneChanges
 from clpt.cli.process import stopping
 from clpt.cli.render import picture
 from clpt.cli.render.passes import render_samples
-from clpt.colour.view import View
 from clpt.errors import DeviceError, SceneError
 from clpt.formats import load
-from clpt.images import exr_files
+from clpt.images import exr_files, spectral_exr
+from clpt.images.colour.view import View
 from clpt.render.film import film_file
 from clpt.render.renderer import Renderer
 from clpt.spectra import read_sensor
@@ -302,7 +302,7 @@ def test_verbose_tells_of_tables_and_stages(tmp_path, capsys):
     told = capsys.readouterr().err
     expected = ("36 triangles", "tree triangles", "table vertices", "from clpt's cache",
                 "time to read the file", "time until it is ready", "time to the first sample",
-                "path: nothing is sharp",
+                "path: nothing is specular",
                 "stage loop" if device.choose().info.is_cpu else "stage shade_diffuse")  # fmt: skip
     for words in expected:
         assert words in told

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from clpt import child_processes
 from clpt.cli import COMMANDS
+from clpt.files import child_processes
 
 ROOT = Path(__file__).resolve().parents[2]
 LONGEST = 120.0  # seconds
@@ -75,6 +75,7 @@ def test_commands_that_end(folder: Path) -> None:
         ("merge", "out/a.film", "-o", "out/b.exr"),
         ("warm", "scene", "--size", "4x4"),
         ("devices",),
+        ("scenes",),
         ("info", "scene"),
         ("inspect", "out/a.exr", "--json"),
         ("convert", "out/a.exr", "out/c.png"),
@@ -166,4 +167,4 @@ def test_python_is_started_in_one_place() -> None:
         for path in sorted((ROOT / "clpt").rglob("*.py"))
         if starts.search(path.read_text())
     ]
-    assert named == ["clpt/child_processes.py"]
+    assert named == ["clpt/files/child_processes.py"]

@@ -13,7 +13,7 @@ import pytest
 import clpt
 from clpt import device as dev
 from clpt.device import declarations, native_programs
-from clpt.render.lowering.scene import Lowered, lower
+from clpt.render.flow.scene_to_tables import Lowered, lower
 from clpt.render.wavefront import guide, photons
 from clpt.scene import Film
 from tests.front_end import CLANG, OURS, errors

@@ -12,7 +12,7 @@ import pytest
 from clpt import device
 from clpt.device import disk_cache, runtimes
 from clpt.errors import DeviceError
-from clpt.output_files import PARTIAL
+from clpt.files.output_files import PARTIAL
 
 posix = pytest.mark.skipif(os.name != "posix", reason="of users and permissions")
 

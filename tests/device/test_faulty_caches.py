@@ -15,12 +15,13 @@ from pathlib import Path
 import pytest
 
 import clpt
-from clpt import device, output_files
+from clpt import device
 from clpt.cluster.bundle import Bundle, Store
 from clpt.device import disk_cache, runtimes
 from clpt.device.building import has_own_cache
 from clpt.device.source import Source
 from clpt.errors import ClusterError, SceneError
+from clpt.files import output_files
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="of users, links and pipes")
 

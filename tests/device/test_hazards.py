@@ -14,7 +14,7 @@ import pytest
 
 import clpt
 from clpt import device
-from clpt.benchmark import bandwidth
+from clpt.bench import bandwidth
 from clpt.device import building, compile_limits, native_programs, program
 from clpt.render.wavefront import bounce_loop
 from clpt.render.wavefront.bounce_loop import LEAST_ITEMS

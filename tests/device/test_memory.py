@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from clpt import host_memory
+from clpt.files import host_memory
 
 GIB = 2**30
 

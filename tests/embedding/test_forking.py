@@ -18,7 +18,7 @@ import pytest
 import clpt
 from clpt import device as dev
 from clpt.errors import DeviceError
-from clpt.render.lowering.scene import lower
+from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import Scene, cameras, materials, shapes, textures
 
 

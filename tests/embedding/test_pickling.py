@@ -12,7 +12,7 @@ import pyopencl as cl
 import pytest
 
 import clpt
-from clpt.render.lowering.scene import Lowered, lower
+from clpt.render.flow.scene_to_tables import Lowered, lower
 from clpt.scene import KINDS, Scene, shapes
 from clpt.scene.params import Kind
 from tests.embedding.conftest import SLOTS

@@ -27,7 +27,7 @@ import clpt
 from clpt import device as dev
 from clpt.geometry import shapes as placing
 from clpt.render.film import film_file
-from clpt.render.wavefront.film_state import FilmState, Ranges
+from clpt.render.film.state import FilmState, Ranges
 from tests.pictures.support import with_film
 
 CODE = str(Path(clpt.__file__).parent)

@@ -520,7 +520,7 @@ def _one(path: Path, memory: int, seconds: int) -> dict[str, Any]:
 
 def _result(path: Path, memory: int, seconds: int) -> dict[str, str]:
     import clpt
-    from clpt.render.lowering.scene import lower
+    from clpt.render.flow.scene_to_tables import lower
 
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     have = pages * os.sysconf("SC_PAGE_SIZE")
@@ -540,7 +540,7 @@ def main() -> None:
     import clpt.formats.native
     import clpt.formats.pbrt
     import clpt.formats.volumes.framing
-    import clpt.render.lowering.scene  # noqa: F401
+    import clpt.render.flow.scene_to_tables  # noqa: F401
 
     memory, seconds = map(int, sys.argv[1:3])
     for name in sys.argv[3:]:

@@ -32,10 +32,10 @@ from clpt.formats import eulumdat, ies, load, volumes
 from clpt.formats.meshes import mesh, mtl, particles, strands
 from clpt.formats.mitsuba.serialized import read as read_serialized
 from clpt.images import read_stored
+from clpt.images.spectral_exr import SpectralImage
+from clpt.images.spectral_exr import read as read_spectral
+from clpt.images.spectral_exr import write as write_spectral
 from clpt.render.film import film_file
-from clpt.spectral_exr import SpectralImage
-from clpt.spectral_exr import read as read_spectral
-from clpt.spectral_exr import write as write_spectral
 
 SCENES = Path(__file__).resolve().parents[1] / "scenes"
 LENSES = Path(lenses.__file__).parent / "library"

@@ -8,9 +8,9 @@ import pytest
 from click.testing import CliRunner
 
 import clpt
-from clpt import budget
 from clpt.cli import cli
 from clpt.errors import LONGEST, SceneError
+from clpt.files import budget
 from tests.formats import bombs
 
 LONG = (  # to make, or to end

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clpt import numpy_files
+from clpt.files import numpy_files
 from clpt.formats import native
 from tests.formats import fuzz_formats
 

@@ -16,12 +16,12 @@ import pytest
 from PIL import Image
 
 import clpt
-from clpt import budget
 from clpt.errors import LONGEST, SceneError
+from clpt.files import budget
 from clpt.formats.native.shape_files import FILES
 from clpt.geometry import polygons
 from clpt.images import pillow
-from clpt.render.lowering.scene import lower
+from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import materials
 from clpt.scene.shapes import Mesh
 

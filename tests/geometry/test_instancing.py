@@ -18,7 +18,7 @@ from clpt.geometry import instancing
 from clpt.geometry.tessellate import tessellate
 from clpt.geometry.triangles import triangulate
 from clpt.records import INSTANCE, SHAPE
-from clpt.render.lowering.scene import lower
+from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import Scene
 from clpt.scene.cameras import Perspective
 from clpt.scene.lights import Area

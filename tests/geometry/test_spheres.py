@@ -17,7 +17,7 @@ from clpt.errors import SceneError
 from clpt.formats.native import load, save
 from clpt.geometry import spheres
 from clpt.records import LIGHT
-from clpt.render.lowering.scene import lower
+from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import Scene, cameras, integrators, lights, materials, shapes
 from clpt.scene.textures import MeshAttribute
 from tests.kernels.harness import opened

@@ -11,8 +11,9 @@ import OpenEXR
 import pytest
 
 import clpt
-from clpt import budget, images
+from clpt import images
 from clpt.errors import SceneError
+from clpt.files import budget
 from clpt.images import stored
 from tests.images import files
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from clpt import images, spectral_exr
+from clpt import images
 from clpt.errors import SceneError
-from clpt.images import sizes
+from clpt.images import sizes, spectral_exr
 from clpt.images.pillow import from_pillow
 from clpt.spectra import spaces
 
@@ -237,7 +237,7 @@ def test_missing_and_unknown(tmp_path):
         images.write(tmp_path / "a.gif", picture())
     with pytest.raises(SceneError, match="folder does not exist"):
         images.write(tmp_path / "no" / "a.png", picture())
-    with pytest.raises(SceneError, match=r"shape \(2, 2, 5\)"):
+    with pytest.raises(SceneError, match=r"not \(2, 2, 5\); bands"):
         images.write(tmp_path / "a.png", np.zeros((2, 2, 5)))
 
 

@@ -139,8 +139,8 @@ def test_primaries_of_png(tmp_path, space):
 
 def test_profiles_of_a_texture(tmp_path):
     """A bitmap is lowered as what the file means, and as stored where it is raw."""
-    from clpt.render.lowering.tables import TableStore
-    from clpt.render.lowering.textures.bitmaps import Images
+    from clpt.render.records.tables import TableStore
+    from clpt.render.textures.bitmaps import Images
     from clpt.scene.roles import EMISSION
     from clpt.scene.textures import Bitmap
 

@@ -31,7 +31,7 @@ def test_grey_and_alpha(tmp_path):
     covered = np.concatenate([RAMP, np.full((64, 64, 1), 0.5, np.float32)], axis=2)
     clpt.write_image(tmp_path / "a.webp", covered)
     assert Image.open(tmp_path / "a.webp").mode == "RGBA"
-    clpt.write_image(tmp_path / "a.jpg", covered)  # over black
+    clpt.write_image(tmp_path / "a.jpg", images.multiplied(covered))  # over black
     clpt.write_image(tmp_path / "half.png", RAMP * 0.5)
     two = [np.asarray(Image.open(tmp_path / name), int) for name in ("a.jpg", "half.png")]
     assert np.abs(two[0] - two[1]).max() <= 3

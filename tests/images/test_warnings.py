@@ -10,7 +10,7 @@ from PIL import Image
 
 import clpt
 from clpt.formats.pbrt.textures import textured
-from clpt.render.lowering.scene import lower
+from clpt.render.flow.scene_to_tables import lower
 from clpt.scene.roles import REAL
 from tests.formats.pbrt.directives import define, params, state
 

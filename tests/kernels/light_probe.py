@@ -12,22 +12,22 @@ import pyopencl as cl
 from clpt import device
 from clpt.geometry import analytic, shape_records, triangles
 from clpt.records import SETTINGS, SHAPE
-from clpt.render.analysis.lights import sources
-from clpt.render.codegen import lights as light_dispatch
-from clpt.render.codegen import parameters
-from clpt.render.codegen import shapes as shape_text
-from clpt.render.codegen import textures as texture_text
-from clpt.render.codegen.signatures import scene_text
-from clpt.render.contract.features import Features, MaterialFeatures
-from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.features import of_lights, of_textures
-from clpt.render.lowering.lights import lights
-from clpt.render.lowering.spectra.spectra_table import STEP
+from clpt.render.flow.features import of_lights, of_textures
+from clpt.render.flow.signatures import scene_text
+from clpt.render.geometry import cases as shape_text
+from clpt.render.lights import cases as light_dispatch
+from clpt.render.lights import encode as lights
+from clpt.render.lights import find as sources
+from clpt.render.materials import cases as parameters
+from clpt.render.materials.encoder import Encoder
+from clpt.render.records import Features, MaterialFeatures
+from clpt.render.spectra.encode import STEP
+from clpt.render.textures import cases as texture_text
 from tests.kernels.harness import opened
 from tests.kernels.scene_harness import PLAIN
 
 LAMBDAS = (450.0, 520.0, 580.0, 640.0)  # of the spectral mode's probes [nm]
-INCLUDES = ("core/base.cl", "interface/shape.cl", "interface/light.cl", "generated/lights.cl")
+INCLUDES = ("core/base.cl", "shapes/shape.cl", "lights/light.cl", "generated/lights.cl")
 
 
 @dataclass
@@ -123,8 +123,8 @@ def _program(
         **light_dispatch.virtual_files(),
         "probe.cl": probe,
         "generated/scene.cl": scene_text(),
-        "generated/spectrum.cl": f'#include "spectrum/{mode}.cl"\n',
-        "generated/spectrum_read.cl": f'#include "spectrum/{mode}_read.cl"\n',
+        "generated/spectrum.cl": f'#include "spectra/{mode}.cl"\n',
+        "generated/spectrum_read.cl": f'#include "spectra/{mode}_read.cl"\n',
         "generated/lights.cl": light_text,
     }
     defines = {"LANES": lanes, "QUEUED": 0, "SPECTRA_STEP": f"{STEP}f"}

@@ -1,4 +1,4 @@
-"""What lighting/rivals.cl asks of a scene, given as numbers, and a vertex of a path from each end.
+"""What transport/rivals.cl asks of a scene, given as numbers, and a vertex of a path from each end.
 
 A vertex here does what kernels/integrator/path.cl and particle_tracer.cl do with the weights.
 """
@@ -10,14 +10,14 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.render.codegen import lights
-from clpt.render.codegen.choices import either
+from clpt.render.flow.choices import either
+from clpt.render.lights import cases as lights
 from tests.kernels.scene_harness import SceneProbe
 
 LIGHT_PATHS = 3  # a sample
 LAMPS = ("infinite", "on a shape", "at a point")  # rows of lights: a ray meets the first two
 
-# The types and functions that the renderer's text has before lighting/rivals.cl, of such numbers.
+# The types and functions that the renderer's text has before transport/rivals.cl, of such numbers.
 WORLD = """
 typedef struct {
     global const Settings *settings;
@@ -67,8 +67,8 @@ inline Lamp lamp(integer row)
 #define load_path_null_distance(path, at) ((real)(0.0f))
 #define store_path_pending(path, at, m, value)
 #define load_path_sampled_hemisphere(path, at) v3(0.0f, 0.0f, 0.0f)
-#include "lighting/receiver_none.cl"
-#include "lighting/rivals.cl"
+#include "lights/receiver_none.cl"
+#include "transport/rivals.cl"
 #undef Scene
 #undef Slab
 """
@@ -164,17 +164,22 @@ class VertexProbe:
             reads + (LIGHT if from_light else CAMERA) + writes,
             len(GIVEN),
             len(self.results),
-            files=("interface/light.cl", "merging/area.cl", "merging/weight.cl", "world.cl"),
+            files=(
+                "lights/light.cl",
+                "transport/photons/area.cl",
+                "transport/photons/weight.cl",
+                "world.cl",
+            ),
             lanes=1,
             virtual={
                 **lights.virtual_files(),
-                "generated/rival_dull.cl": either(dull, "lighting/rival_dull.cl"),
+                "generated/rival_dull.cl": either(dull, "transport/rival_dull.cl"),
                 "generated/rival_steps.cl": (
-                    *either(merged, "lighting/rivals_merging.cl"),
-                    *either(joined, "lighting/rivals_camera.cl"),
-                    "lighting/rival_pdf_none.cl",
+                    *either(merged, "transport/rivals_merging.cl"),
+                    *either(joined, "transport/rivals_camera.cl"),
+                    "transport/rival_pdf_none.cl",
                 ),
-                "generated/rival_area.cl": ("lighting/rival_area.cl",),
+                "generated/rival_area.cl": ("transport/rival_area.cl",),
                 "world.cl": WORLD,
             },
             defines={name: int(holds) for name, holds in flags.items()},

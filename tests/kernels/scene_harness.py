@@ -9,9 +9,9 @@ import pyopencl as cl
 
 from clpt import device
 from clpt.records import SETTINGS, TABLES
-from clpt.render.codegen import choices
-from clpt.render.codegen.signatures import scene_text
-from clpt.render.contract.features import Features
+from clpt.render.flow import choices
+from clpt.render.flow.signatures import scene_text
+from clpt.render.records import Features
 from tests.kernels.harness import opened
 
 BLOCK = 16
@@ -25,8 +25,8 @@ def scene_files(mode: str) -> dict[str, device.Part | str | tuple[str, ...]]:
     return {
         **PLAIN,
         "generated/scene.cl": scene_text(),
-        "generated/spectrum.cl": f'#include "spectrum/{mode}.cl"\n',
-        "generated/spectrum_read.cl": f'#include "spectrum/{mode}_read.cl"\n',
+        "generated/spectrum.cl": f'#include "spectra/{mode}.cl"\n',
+        "generated/spectrum_read.cl": f'#include "spectra/{mode}_read.cl"\n',
     }
 
 

@@ -15,8 +15,12 @@ import pytest
 from numpy.typing import NDArray
 
 from clpt import transforms as tf
-from clpt.render.codegen import emission, flags, lights, shapes, stages, textures
-from clpt.render.lowering.scene import Lowered, lower
+from clpt.render.flow import flags, stages
+from clpt.render.flow.scene_to_tables import Lowered, lower
+from clpt.render.geometry import cases as shapes
+from clpt.render.lights import cases as lights
+from clpt.render.lights import emission_cases as emission
+from clpt.render.textures import cases as textures
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
 from clpt.scene.cameras import Perspective

@@ -9,10 +9,10 @@ import pytest
 
 from clpt import spectra, transforms
 from clpt.errors import SceneError
-from clpt.render.codegen import stages
-from clpt.render.contract import camera_records
-from clpt.render.contract.features import CameraFeatures
-from clpt.render.lowering.camera.cameras import lower_camera
+from clpt.render.camera.encode import lower_camera
+from clpt.render.flow import stages
+from clpt.render.records import CameraFeatures
+from clpt.render.records import camera_rows as camera_records
 from clpt.scene import cameras as scene
 from tests.kernels.scene_harness import SceneProbe
 from tests.rotation import rotating
@@ -45,7 +45,7 @@ def rays(camera, width, height, film, lens=None, lanes=8, index=None):
         BODY,
         5,
         6,
-        files=("interface/camera.cl", "generated/camera.cl"),
+        files=("cameras/camera.cl", "generated/camera.cl"),
         lanes=lanes,
         virtual=_text(kind),
         defines=defines,

@@ -57,7 +57,7 @@ def test_the_example_is_a_light(tmp_path: Path):
     before, after = text.split("\nON_SHAPES = ")
     after = after.replace("KINDS = (", "KINDS = (\n    GradientSky,", 1)
     lights.write_text(f"{before}\n{example('python', 1)}\n\nON_SHAPES = {after}", "utf-8")
-    (tmp_path / "kernels/light/gradient_sky.cl").write_text(example("c", 1), "utf-8")
+    (tmp_path / "kernels/lights/kinds/gradient_sky.cl").write_text(example("c", 1), "utf-8")
     command = [sys.executable, "-c", LIT_GROUND]
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, cwd=tmp_path)

@@ -10,9 +10,9 @@ from scipy.interpolate import BSpline
 
 from clpt import transforms as T
 from clpt.geometry import analytic, strands
-from clpt.render.analysis.lights import sources
-from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.lights import lights
+from clpt.render.lights import encode as lights
+from clpt.render.lights import find as sources
+from clpt.render.materials.encoder import Encoder
 from clpt.scene.shapes import Curves
 from tests.kernels.harness import assert_lanes_agree
 from tests.kernels.light_probe import Lit

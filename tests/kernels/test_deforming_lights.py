@@ -6,8 +6,12 @@ import numpy as np
 
 from clpt import transforms
 from clpt.records import LIGHT
-from clpt.render.codegen import choices, emission, flags, lights, parameters, shapes, stages
-from clpt.render.lowering.scene import Lowered, lower
+from clpt.render.flow import choices, flags, stages
+from clpt.render.flow.scene_to_tables import Lowered, lower
+from clpt.render.geometry import cases as shapes
+from clpt.render.lights import cases as lights
+from clpt.render.lights import emission_cases as emission
+from clpt.render.materials import cases as parameters
 from clpt.scene import Film, Scene, cameras, integrators
 from clpt.scene.lights import Area
 from clpt.scene.motion import Deformation, Shutter
@@ -75,7 +79,7 @@ def test_points_and_densities_of_lamps_that_deform() -> None:
         6,
         16,
         files=(
-            *("interface/shape.cl", "interface/light.cl"),
+            *("shapes/shape.cl", "lights/light.cl"),
             *("generated/lights.cl", "generated/emission.cl"),
         ),
         virtual=virtual,

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from clpt.errors import SceneError
-from clpt.render.analysis.filters import radius, value
-from clpt.render.lowering.camera import filters
+from clpt.render.film import encode_filters as filters
+from clpt.render.film.filters import radius, value
 from clpt.scene import integrators as scene
 from clpt.scene.params import params
 from tests.kernels.scene_harness import SceneProbe

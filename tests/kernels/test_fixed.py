@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from clpt.render.wavefront.film_state import add_sums
+from clpt.render.film.state import add_sums
 from tests.kernels.harness import map_text, run
 
 UNIT = 2**48  # of 1

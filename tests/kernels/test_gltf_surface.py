@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from clpt.render.lowering.spectra.thin_films import film_colours, film_shares
+from clpt.render.materials.thin_films import film_colours, film_shares
 from clpt.scene.materials import Conductor, GltfSurface, Layer
 from clpt.scene.params import device_params
 from clpt.testing.checks import albedos

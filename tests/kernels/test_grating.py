@@ -173,7 +173,7 @@ def test_bessel():
     special = pytest.importorskip("scipy.special")
     x = np.concatenate([[0.0], np.linspace(1e-4, 24.0, 3000)]).astype(np.float32)
     calls = "".join(f"r[{n}] = bessel_r({n}, x[0]); " for n in range(9))
-    text = map_text(calls, 1, 9, files=("optics/diffraction.cl",))
+    text = map_text(calls, 1, 9, files=("materials/diffraction.cl",))
     found = run(text, 16, x[None], 9)
     expected = [special.jv(n, x.astype(float)) for n in range(9)]
     np.testing.assert_allclose(found, expected, atol=6e-6)

@@ -10,11 +10,11 @@ from clpt.errors import SceneError
 from clpt.lenses import Prescription, Surface
 from clpt.lenses.coatings import quarter_wave
 from clpt.lenses.tracing import Rays, trace
-from clpt.render.analysis.lens import glasses
-from clpt.render.codegen import stages
-from clpt.render.contract.features import CameraFeatures
-from clpt.render.lowering.camera.cameras import lower_camera
-from clpt.render.lowering.camera.lens import ghost_pairs
+from clpt.render.camera.encode import lower_camera
+from clpt.render.camera.encode_lens import ghost_pairs
+from clpt.render.camera.lens import glasses
+from clpt.render.flow import stages
+from clpt.render.records import CameraFeatures
 from clpt.scene.cameras import Lens
 from clpt.spectra import Constant
 from tests.kernels.scene_harness import SceneProbe
@@ -43,7 +43,7 @@ def probe(camera: Lens, lanes: int = 8, ghosts: bool = False) -> SceneProbe:
         7,
         mode="spectral",
         lanes=lanes,
-        files=("interface/camera.cl", "generated/camera.cl"),
+        files=("cameras/camera.cl", "generated/camera.cl"),
         virtual={"generated/camera.cl": stages.camera_text(features)},
         defines={
             "CAMERA_DISPERSES": int(bool(rows)),

@@ -12,11 +12,11 @@ from scipy.stats import chi2
 
 from clpt import transforms as T
 from clpt.records import LIGHT
-from clpt.render.analysis.lights import light_bounds
-from clpt.render.contract import light_records
-from clpt.render.contract.light_records import LINE, WIDTH
-from clpt.render.lowering.lights import light_tree
-from clpt.render.lowering.lights.light_lobes import Lobes
+from clpt.render.lights import bounds as light_bounds
+from clpt.render.lights import tree as light_tree
+from clpt.render.lights.lobes import Lobes
+from clpt.render.records import light_rows as light_records
+from clpt.render.records.light_rows import LINE, WIDTH
 from clpt.scene.lights import Area, Constant, Directional, Goniometric, Point, Projector, Spot
 from clpt.scene.shapes import Disk, Mesh, Rectangle, Sphere
 from tests.kernels.harness import assert_lanes_agree

@@ -11,11 +11,11 @@ from scipy.stats import chi2
 from clpt import transforms as T
 from clpt.errors import SceneError
 from clpt.geometry import triangles
-from clpt.render.analysis.checks.lights import check_light
-from clpt.render.analysis.lights import image_lights
-from clpt.render.analysis.lights.image_lights import face_coordinates, face_directions
-from clpt.render.contract import light_records
-from clpt.render.lowering.lights import lights
+from clpt.render.lights import encode as lights
+from clpt.render.lights import images as image_lights
+from clpt.render.lights.check import check_light
+from clpt.render.lights.images import face_coordinates, face_directions
+from clpt.render.records import light_rows as light_records
 from clpt.scene.lights import (
     Area,
     Constant,
@@ -661,10 +661,11 @@ def test_uv_on_a_mesh():
 
 
 def test_brightness_of_a_texture_is_its_mean():
-    from clpt.render.analysis.lights.light_power import brightness
+    from clpt.render.lights.power import brightness
+    from clpt.render.spectra.look import Look
 
     board = Checkerboard(color0=(1.0, 1.0, 1.0), color1=(0.0, 0.5, 1.0))
-    assert brightness(board) == pytest.approx(0.75)
+    assert brightness(board, Look(False, 360.0, 830.0)) == pytest.approx(0.75)
 
 
 @pytest.mark.parametrize(

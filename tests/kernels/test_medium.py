@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from clpt import spectra
-from clpt.render.codegen.parameters import medium_text
-from clpt.render.lowering.encoder import Encoder
+from clpt.render.materials.cases import medium_text
+from clpt.render.materials.encoder import Encoder
 from clpt.scene.roles import COEFFICIENT
 from tests.kernels.scene_harness import SceneProbe
 

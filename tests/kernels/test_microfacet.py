@@ -1,4 +1,4 @@
-"""kernels/optics/fresnel.cl and microfacet.cl against references in double precision."""
+"""kernels/materials/fresnel.cl and microfacet.cl against references in double precision."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from clpt.render.codegen import rough_coat_table as coats
+from clpt.render.materials import rough_coat_table as coats
 from tests.kernels.harness import map_text, run
 
-FILES = ("optics/fresnel.cl", "optics/microfacet.cl", "optics/rough_coat.cl")
+FILES = ("materials/fresnel.cl", "materials/microfacet.cl", "materials/rough_coat.cl")
 NAMES = ("ggx", "beckmann")
 
 
@@ -52,7 +52,7 @@ def test_fresnel_metal_has_its_digits_however_it_is_rounded():
     off = "#define sqrt_r(x) (sqrt(x) * 1.0000002f)\n"
     given = np.stack(np.broadcast_arrays(COSINES, 0.0, 1.0)).astype(np.float32)
     text = map_text("r[0] = fresnel_metal(x[0], x[1], x[2]);", 3, 1, files=FILES)
-    place = text.index('#include "optics/fresnel.cl"')
+    place = text.index('#include "materials/fresnel.cl"')
     (f,) = run(text[:place] + off + text[place:], 16, given, 1)
     np.testing.assert_allclose(f, 1.0, atol=3e-6)
 

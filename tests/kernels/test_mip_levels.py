@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from clpt.images import linear_to_srgb, srgb_to_linear
-from clpt.render.codegen.textures import dispatch_text
-from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.features import of_textures
-from clpt.render.lowering.textures.bitmaps import _level_sizes, _levels
+from clpt.render.flow.features import of_textures
+from clpt.render.materials.encoder import Encoder
+from clpt.render.textures.bitmaps import _level_sizes, _levels
+from clpt.render.textures.cases import dispatch_text
 from clpt.scene.roles import REAL, REFLECTANCE, Param
 from clpt.scene.textures import Bitmap
 from tests.kernels.scene_harness import SceneProbe
@@ -157,7 +157,7 @@ CONE = """
 
 def test_the_cone_of_a_pixel():
     """On a plane seen perpendicular: distance times the pixel's angle, over metres per uv."""
-    probe = SceneProbe(CONE, 6, 3, files=("path/cone.cl",), defines={"USES_MIPS": 1})
+    probe = SceneProbe(CONE, 6, 3, files=("textures/cone.cl",), defines={"USES_MIPS": 1})
     rng = np.random.default_rng(4)
     pixel, t, tilt = rng.uniform(1e-4, 1e-2, 64), 10 ** rng.uniform(-2, 3, 64), np.zeros(64)
     tilt[32:] = rng.uniform(0.2, 1.4, 32)

@@ -8,7 +8,7 @@ from fnmatch import fnmatch
 from pathlib import Path
 
 from clpt.device.source import kernels_folder
-from clpt.render.codegen import flags, programs
+from clpt.render.flow import flags, programs
 from clpt.scene import KINDS
 
 ALTERNATIVES = (  # files, of each row of which a program has one at most
@@ -17,8 +17,8 @@ ALTERNATIVES = (  # files, of each row of which a program has one at most
     ("media/medium_dims*.cl", "media/light_medium_none.cl"),
     ("media/black_body_*.cl",),
     ("media/flight_medium*.cl",),
-    ("lighting/rival_area*.cl",),
-    ("lighting/rival_pdf*.cl",),
+    ("transport/rival_area*.cl",),
+    ("transport/rival_pdf*.cl",),
     ("media/grid_meet*.cl",),
     ("media/way_*.cl",),
     ("bvh/query*.cl",),
@@ -28,27 +28,27 @@ ALTERNATIVES = (  # files, of each row of which a program has one at most
     ("core/spectrum_*.cl",),
     ("core/texels_*.cl",),
     ("film/exposure.cl", "film/splatting.cl"),
-    ("integrator/*.cl",),
-    ("optics/boundary_*.cl",),
-    ("optics/thin_film*.cl",),
-    ("optics/boundary_bare.cl", "optics/layers_*.cl"),
-    ("path/*_frame*.cl",),
-    ("path/kept_*.cl",),
-    ("path/first_ray*.cl",),
-    ("path/vertex_bodies.cl", "path/vertex_media.cl", "path/vertex_media_none.cl"),
-    ("path/vertex_bodies_ways.cl", "path/vertex_media_ways*.cl"),
-    ("path/vertex_dims.cl", "path/vertex_media_ways_none.cl"),
-    ("guiding/guided_vertex.cl", "guiding/guide_none.cl"),
-    ("guiding/at_*.cl",),
-    ("path/pair*.cl",),
-    ("path/pixel_sampler*.cl",),
-    ("path/shadow_ray*.cl",),
-    ("sampler/independent.cl", "core/sobol.cl"),
-    ("steps/escapes*.cl",),
-    ("steps/met_weight*.cl",),
-    ("spectrum/density.cl", "spectrum/visible.cl", "spectrum/rgb_read.cl"),
-    ("spectrum/rgb*.cl", "spectrum/spectral*.cl"),
-    ("surface/corner_rows*.cl",),
+    ("integrator/both.cl", "integrator/p*.cl", "integrator/whitted.cl"),
+    ("materials/boundary_*.cl",),
+    ("materials/thin_film*.cl",),
+    ("materials/boundary_bare.cl", "materials/layers_*.cl"),
+    ("materials/shading_frame*.cl", "media/phase_frame.cl"),
+    ("lights/kept_*.cl",),
+    ("cameras/first_ray*.cl",),
+    ("media/vertex_bodies.cl", "media/vertex_media.cl", "media/vertex_media_none.cl"),
+    ("media/vertex_bodies_ways.cl", "media/vertex_media_ways*.cl"),
+    ("media/vertex_dims.cl", "media/vertex_media_ways_none.cl"),
+    ("transport/guiding/guided_vertex.cl", "transport/guiding/guide_none.cl"),
+    ("transport/guiding/at_*.cl",),
+    ("materials/pair*.cl",),
+    ("samplers/pixel_sampler*.cl",),
+    ("transport/shadow_ray*.cl",),
+    ("samplers/kinds/independent.cl", "core/sobol.cl"),
+    ("integrator/steps/escapes*.cl",),
+    ("integrator/steps/met_weight*.cl",),
+    ("spectra/density.cl", "spectra/visible.cl", "spectra/rgb_read.cl"),
+    ("spectra/rgb*.cl", "spectra/spectral*.cl"),
+    ("shapes/corner_rows*.cl",),
     ("tracing/curve_others*.cl",),
     ("tracing/instances_*.cl",),
     ("tracing/shape_rows_m*.cl", "tracing/shape_rows_single.cl"),
@@ -141,8 +141,8 @@ def test_no_name_is_a_function_and_a_macro() -> None:
 def test_flags_have_names_of_their_own() -> None:
     """None is what a kernel file, or a generated text, calls something else."""
     own = {name for text in files().values() for name in set().union(*defined(text).values())}
-    codegen = Path(programs.__file__).parent.glob("*.py")
-    texts = [path.read_text("utf-8") for path in codegen]
+    hosts = Path(programs.__file__).parents[1].rglob("*.py")
+    texts = [path.read_text("utf-8") for path in hosts]
     generated = {name for text in texts for name in re.findall(r"#define ([A-Z]\w*)[ (]", text)}
     generated |= {f"{cls.kind.upper()}_WORDS" for row in KINDS.values() for cls in row}
     assert "LAYER_WORDS" in generated  # of a thin film

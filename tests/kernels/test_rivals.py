@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from tests.kernels.rival_probe import LAMPS, LIGHT_PATHS, vertex_probe
 
 PATHS = 1 << 15  # of each length
-SHARP = 8.0  # SHARP_PDF of lighting/rivals.cl [1/sr]
-DULL, DULL_SHARE = 1.0, 0.125  # of lighting/rival_dull.cl, DULL_PDF and DULL_SHARE
+SHARP = 8.0  # SHARP_PDF of transport/rivals.cl [1/sr]
+DULL, DULL_SHARE = 1.0, 0.125  # of transport/rival_dull.cl, DULL_PDF and DULL_SHARE
 SHARED = (
     50  # paths that every way that there is must share with others, so that the test can see it
 )

@@ -29,7 +29,7 @@ SIGNIFICANCE = 1e-6
 @cache
 def _probe(kind, seed, lanes):
     return SceneProbe(
-        BODY, 3, 2, files=(f"sampler/{kind}.cl",), lanes=lanes, defines={"SEED": f"{seed}u"}
+        BODY, 3, 2, files=(f"samplers/kinds/{kind}.cl",), lanes=lanes, defines={"SEED": f"{seed}u"}
     )
 
 
@@ -159,7 +159,7 @@ SIDE, BITS = 32, 2  # of the film [pixels], and how many samples a pixel takes, 
 def along_the_curve():
     """Points (n, 2) of zsobol for pixels x, y of a film, samples and dimensions."""
     settings = {"tiles_x": SIDE // 4, "sample_bits": BITS, "seed": 3}
-    files = ("sampler/zsobol.cl", "path/pixel_sampler_z.cl")
+    files = ("samplers/kinds/zsobol.cl", "samplers/pixel_sampler_z.cl")
     probe = SceneProbe(ON_FILM, 3, 2, files=files, settings=settings)
 
     def points(x, y, sample, dimension):

@@ -7,10 +7,10 @@ import pytest
 
 from clpt import spectra
 from clpt.errors import SceneError
-from clpt.render.codegen.textures import dispatch_text
-from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.features import of_textures
-from clpt.render.lowering.textures import noise
+from clpt.render.flow.features import of_textures
+from clpt.render.materials.encoder import Encoder
+from clpt.render.textures import noise
+from clpt.render.textures.cases import dispatch_text
 from clpt.scene import textures as scene
 from clpt.scene.roles import NAMED, Param
 from clpt.spectra.spectrum import d65

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from clpt.errors import SceneError
-from clpt.render.analysis.texels import FAR, bands
-from clpt.render.codegen.textures import dispatch_text
-from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.features import of_textures
+from clpt.images.spectral_exr import SpectralImage
+from clpt.render.flow.features import of_textures
+from clpt.render.materials.encoder import Encoder
+from clpt.render.textures.cases import dispatch_text
+from clpt.render.textures.texels import FAR, bands
 from clpt.scene import roles
 from clpt.scene import textures as scene
 from clpt.scene.lights import Constant, CubeMap, Envmap
 from clpt.spectra import Tabulated, luminance
-from clpt.spectral_exr import SpectralImage
 from tests.kernels.light_probe import lit
 from tests.kernels.test_lights import INFINITE, SIGMAS, TURNED, directions, irradiance
 from tests.kernels.test_textures import LAMBDAS, _uvs, look_up, reference

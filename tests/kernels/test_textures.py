@@ -10,18 +10,18 @@ from PIL import Image
 
 from clpt import images, spectra
 from clpt.errors import SceneError
-from clpt.render.analysis.texels import texels
-from clpt.render.codegen.textures import dispatch_text
-from clpt.render.contract.features import TextureFeatures
-from clpt.render.lowering.encoder import Encoder
-from clpt.render.lowering.textures.bitmaps import NODES, pack
-from clpt.render.lowering.textures.texture_programs import folded
+from clpt.images.spectral_exr import SpectralImage
+from clpt.render.materials.encoder import Encoder
+from clpt.render.records import TextureFeatures
+from clpt.render.textures.bitmaps import NODES, pack
+from clpt.render.textures.cases import dispatch_text
+from clpt.render.textures.programs import folded
+from clpt.render.textures.texels import texels
 from clpt.scene import textures as scene
 from clpt.scene.roles import EMISSION, NAMED, REAL, REFLECTANCE, Param
 from clpt.spectra import cie
 from clpt.spectra.spectrum import d65
 from clpt.spectra.upsampling import evaluate
-from clpt.spectral_exr import SpectralImage
 from tests.kernels.scene_harness import SceneProbe
 
 FILE = "generated/textures.cl"

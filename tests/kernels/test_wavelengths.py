@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from clpt.render.analysis.wavelengths import Density
+from clpt.render.spectra.find import Density
 from tests.kernels.scene_harness import SceneProbe, scene_files
 
 SIGNIFICANCE = 1e-4
@@ -14,7 +14,7 @@ BODY = """
     Wavelengths w = wavelengths_sample(scene, x[0]);
     r[0] = w.x; r[1] = w.y; r[2] = w.z; r[3] = w.w; r[4] = density_pdf(scene, x[1]);
 """
-READ = '#include "spectrum/spectral_read.cl"\n#include "spectrum/density.cl"\n'
+READ = '#include "spectra/spectral_read.cl"\n#include "spectra/density.cl"\n'
 NODES = np.linspace(300.0, 829.5, 531)
 
 

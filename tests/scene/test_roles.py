@@ -10,9 +10,9 @@ import pytest
 import clpt
 from clpt import SceneError
 from clpt.formats.native import forms
-from clpt.render.codegen import parameters
-from clpt.render.contract import parameter_words
-from clpt.render.lowering import encoder
+from clpt.render.materials import cases as parameters
+from clpt.render.materials import encoder
+from clpt.render.records import parameter_words
 from clpt.scene import materials, roles, textures
 from clpt.testing import settings
 

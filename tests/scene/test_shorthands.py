@@ -60,7 +60,10 @@ def test_where_a_camera_looks() -> None:
         ),
         (lambda: materials.RoughPlastic(roughness=2.0), r"^rough_plastic\.roughness: 2\.0 is out"),
         (lambda: Film(size=3), r"^film\.size: must be \(width, height\), not 3$"),
-        (lambda: Film(size=(0, 4)), r"^film\.width: must be 1 to 65536, not 0$"),
+        (
+            lambda: Film(size=(0, 4)),
+            r"^film\.width: must be a whole number from 1 to 65536, not 0$",
+        ),
         (lambda: cameras.Perspective(origin=(0, 0, 1)), r"^perspective\.target: give origin and"),
         (
             lambda: cameras.Perspective(origin=(0, 0, 1), target=(0, 0, 1)),

@@ -87,6 +87,7 @@ def test_a_physical_material_of_trimesh() -> None:
     assert mask.opacity.channel == "a" and isinstance(mask.material, materials.TwoSided)
     bent = mask.material.front
     assert isinstance(bent, materials.NormalMap) and bent.map is not None and bent.map.raw
+    assert bent.along_v
     tin = bent.material
     assert isinstance(tin, materials.GltfSurface) and tin.name == "tin"
     assert isinstance(tin.base_color, textures.Product) and tin.base_color.rgb

@@ -9,7 +9,7 @@ import pytest
 
 import clpt
 from clpt.errors import SceneError
-from clpt.render.analysis.lights import sky_light
+from clpt.render.lights import sky as sky_light
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Perspective
 from clpt.scene.lights import Sky

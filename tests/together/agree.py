@@ -36,9 +36,9 @@ from scipy import stats
 
 import clpt
 from clpt.errors import ClptError
-from clpt.render.analysis import photons
-from clpt.render.analysis.analyse import analyse
-from clpt.render.analysis.lowering_cache import LoweringCache
+from clpt.render.flow.find import analyse
+from clpt.render.records.lowering_cache import LoweringCache
+from clpt.render.transport import photons
 from clpt.scene import Film, Scene, lights
 from clpt.scene import materials as m
 from clpt.scene.integrators import Independent, ParticleTracer, Path, Sobol, Vcm

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from clpt import bvh
-from clpt.render.codegen import programs
-from clpt.render.contract.features import Features
+from clpt.render.flow import programs
+from clpt.render.records import Features
 from clpt.render.wavefront.strategy import can_interleave
 
 FORMS = ("stages", "loop", "queues", "interleaved", "film")

@@ -19,8 +19,8 @@ import clpt
 from clpt import device as dev
 from clpt import spectra
 from clpt.errors import SceneError
-from clpt.render.editing.rebuild import refusal
-from clpt.render.lowering.scene import lower
+from clpt.render.edit.rebuild import refusal
+from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import Scene, integrators, materials, media, shapes, textures
 from clpt.scene.motion import Deformation, Keys, Shutter
 

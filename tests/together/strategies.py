@@ -3,7 +3,7 @@
 A kind is drawn by being listed, and its parameters by their roles (`clpt.scene.roles`);
 a new role or form needs an entry in ROLES or FORMS here. Images and grids are tiny. The first
 choice is always the plainest, so that a scene shrinks to what a failure needs. What the rules of
-`clpt.render.analysis.checks` refuse is left out of parts and of scenes, but of a few.
+`clpt.render.flow.check` refuse is left out of parts and of scenes, but of a few.
 """
 
 from __future__ import annotations
@@ -19,15 +19,16 @@ import numpy as np
 from clpt import bvh, measured, spectra, transforms
 from clpt.errors import SceneError
 from clpt.geometry import shapes as geometry
+from clpt.images.spectral_exr import SpectralImage
 from clpt.lenses import Prescription, Surface
-from clpt.render.analysis.bodies import BENDS, OPEN
-from clpt.render.analysis.cameras import CONNECTED
-from clpt.render.analysis.checks import check
-from clpt.render.analysis.checks.cameras import check_camera
-from clpt.render.analysis.checks.lights import check_light
-from clpt.render.analysis.checks.materials import check_material
-from clpt.render.analysis.checks.shapes import check_shapes
-from clpt.render.analysis.checks.textures import check_textures
+from clpt.render.camera.check import check_camera
+from clpt.render.camera.find import CONNECTED
+from clpt.render.flow.check import check
+from clpt.render.geometry.check import check_shapes
+from clpt.render.lights.check import check_light
+from clpt.render.materials.check import check_material
+from clpt.render.media.bodies import BENDS, OPEN
+from clpt.render.textures.check import check_textures
 from clpt.scene import (
     Scene,
     cameras,
@@ -45,7 +46,6 @@ from clpt.scene.layers import LAYERS
 from clpt.scene.motion import Deformation, Keys, Shutter
 from clpt.scene.params import Kind, defaults, params
 from clpt.scene.roles import Param
-from clpt.spectral_exr import SpectralImage
 from tests.together.builds import FORMS as FORMS_OF_PROGRAMS
 from tests.together.builds import Way
 

@@ -23,8 +23,8 @@ from pathlib import Path
 from typing import Any
 
 from clpt.errors import SceneError
-from clpt.render.analysis.checks import check
-from clpt.render.lowering.scene import lower
+from clpt.render.flow.check import check
+from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import Scene
 from tests.front_end import CLANG, errors
 from tests.together.builds import Way, texts

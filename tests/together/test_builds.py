@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from clpt.errors import SceneError
-from clpt.render.analysis.checks import check
-from clpt.render.lowering.scene import lower
+from clpt.render.flow.check import check
+from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Lens, Perspective
 from clpt.scene.integrators import SAMPLERS, Vcm

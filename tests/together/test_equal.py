@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from clpt.errors import SceneError
-from clpt.render.analysis.checks import check
+from clpt.render.flow.check import check
 from clpt.scene import Scene
 from clpt.scene.materials import Diffuse
 from tests.together import equivalents

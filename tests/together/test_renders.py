@@ -9,7 +9,7 @@ import pytest
 
 from clpt import Renderer
 from clpt.errors import SceneError
-from clpt.render.analysis.checks import check
+from clpt.render.flow.check import check
 from tests.together.strategies import scene_of, shown
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("one_context")]

@@ -390,6 +390,17 @@ def test_a_red_wall_becomes_gold(opened, audience, on) -> None:
     _, gold = audience.rest()
     assert not np.array_equal(gold, first)
     assert np.array_equal(gold, expected(session.scene, on))
+    ask(session, audience, "edit", **which, key="metal", value="gold")
+    audience.rest()
+    metal = session.state()["panels"]
+    wall = next(one for one in metal if one["title"] == "red")
+    eta = next(one for one in wall["parameters"] if one["key"] == "eta")
+    assert eta["curve"][0] > 1.2 > 0.4 > eta["curve"][15]  # gold: 1.6 in blue, 0.2 in red
+    for name in ("nothing", 7):
+        ask(session, audience, "edit", **which, key="metal", value=name)
+        audience.answer("error")
+    ask(session, audience, "undo")
+    audience.rest()
     ask(session, audience, "undo")
     assert np.array_equal(audience.rest()[1], first)
 

@@ -13,7 +13,7 @@ import pytest
 from clpt import device
 from clpt.device.context import Builds
 from clpt.errors import SceneError
-from clpt.render.lowering.scene import lower
+from clpt.render.flow.scene_to_tables import lower
 from clpt.render.renderer import Renderer
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Perspective

@@ -6,8 +6,9 @@ from pathlib import Path
 
 from rich.text import Text
 
-from ... import output_files
-from ...benchmark import first_light
+from clpt.bench import first_light
+from clpt.files import output_files
+
 from ..printing.console import output_console
 from .settings import check_writable
 

@@ -9,16 +9,17 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from ... import benchmark
+from clpt import bench as benchmark
+from clpt.bench import apart, card, comparing, records, scenes
+from clpt.bench.comparing import Ratio
+from clpt.bench.figures import Figure
+
 from ... import device as dev
-from ...benchmark import apart, card, comparing, records, scenes
-from ...benchmark.comparing import Ratio
-from ...benchmark.figures import Figure
 from ...choices import TREES
 from ..printing.console import output_console
 from .settings import STAGES, Report
 
-Which = tuple[str | int | None, str | None]  # see clpt.benchmark.apart.measured
+Which = tuple[str | int | None, str | None]  # see clpt.bench.apart.measured
 SLOWER = 3  # the exit status if a figure was refused, or is below --fail-below
 HEADINGS = ("figure", "", "unit", "±", "GB/s", "of a copy", "")
 

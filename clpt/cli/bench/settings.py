@@ -10,7 +10,8 @@ from typing import Any
 
 import click
 
-from ... import output_files
+from clpt.files import output_files
+
 from ...choices import TREES
 from ...errors import SceneError
 from ..process.extras import extra
@@ -22,7 +23,7 @@ STAGES = (
 
 @dataclass(frozen=True)
 class Subject:
-    """Things to measure, and how often: see `clpt.benchmark.measure`."""
+    """Things to measure, and how often: see `clpt.bench.measure`."""
 
     scene: str | None
     stages: tuple[str, ...]
@@ -33,7 +34,7 @@ class Subject:
     size: str
 
     def settings(self) -> dict[str, Any]:
-        """Return the arguments of `clpt.benchmark.measure`. Raises click.BadParameter."""
+        """Return the arguments of `clpt.bench.measure`. Raises click.BadParameter."""
         parts, only, kinds = _chosen(self.stages)
         return {
             "parts": parts, "only": only, "kinds": kinds, "scene": self.scene,
@@ -58,7 +59,7 @@ class Report:
         if self.fail_below is not None and self.record is None:
             raise click.UsageError("--fail-below compares: give --compare FILE too")
         if self.card is not None:
-            from ...benchmark.card import FORMATS  # here: help needs no OpenCL
+            from clpt.bench.card import FORMATS  # here: help needs no OpenCL
 
             if self.card.suffix.lower() not in FORMATS:
                 raise SceneError(f"a card is written to {' or '.join(FORMATS)}", file=self.card)
@@ -75,7 +76,7 @@ class Report:
         """The figures of the record."""
         if self.record is None:
             return None
-        from ...benchmark import records  # here: help needs no OpenCL
+        from clpt.bench import records  # here: help needs no OpenCL
 
         return records.read(self.record)
 
@@ -90,7 +91,7 @@ def check_writable(path: Path) -> None:
 
 def _chosen(names: Sequence[str]) -> tuple[list[str], list[str], list[str]]:
     """Return parts, and stages and kinds of material if not all. Raises click.BadParameter."""
-    from ... import benchmark  # here: help needs no OpenCL
+    from clpt import bench as benchmark  # here: help needs no OpenCL
 
     parts: list[str] = []
     only: list[str] = []

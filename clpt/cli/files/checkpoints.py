@@ -8,7 +8,8 @@ import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from ... import output_files
+from clpt.files import output_files
+
 from ...errors import MemoryBudgetError, SceneError
 from ...render.film import film_file
 from ...render.film.saved_film import SavedFilm, differences_text, ranges_text

@@ -8,9 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ... import images, output_files
+from clpt import images
+from clpt.files import output_files
+from clpt.images.colour.false_colours import false_colours
+
 from ...choices import FOR_SCREENS
-from ...colour.false_colours import false_colours
 from ...errors import SceneError, one_line
 from ...images import screen_files
 from ...images.differences import Differences, differences, size_of

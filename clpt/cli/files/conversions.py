@@ -30,9 +30,8 @@ def write_converted(
         tell(f"clpt: warning: {text}")
     image = contents(source)
     pixels = _picture(image) if layer is None else _layer(image, layer)
-    multiplied = is_film(source) or source.suffix.lower() == ".exr"
-    if pixels.shape[2] == 4 and multiplied != (target.suffix.lower() == ".exr"):
-        pixels = images.straight(pixels) if multiplied else _multiplied(pixels)
+    if source.suffix.lower() in images.STRAIGHT:
+        pixels = images.multiplied(pixels)
     metadata: dict[str, str | int | float] = {
         "software": f"clpt {VERSION}", "source": source.name
     }  # fmt: skip
@@ -44,7 +43,7 @@ def write_converted(
         tone=grading.tone, view=grading.view,
     )  # fmt: skip
     if grading.exposure == "auto" and for_screens((target,)):
-        tell(f"exposure {images.auto_exposure(pixels) - stops:+.1f} stops")
+        tell(f"exposure {images.auto_exposure(images.straight(pixels)) - stops:+.1f} stops")
     tell(str(target))
 
 
@@ -74,8 +73,3 @@ def _layers(image: ImageContents) -> dict[str, list[int]]:
     for place, label in enumerate(image.labels):
         layers.setdefault(label.rpartition(".")[0] or label, []).append(place)
     return layers
-
-
-def _multiplied(pixels: np.ndarray) -> np.ndarray:
-    """Colours of what covers as those over nothing, as an .exr has them."""
-    return np.concatenate([pixels[..., :3] * pixels[..., 3:], pixels[..., 3:]], axis=2)

@@ -12,7 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from ... import images, spectral_exr
+from clpt import images
+from clpt.images import spectral_exr
+
 from ...errors import SceneError
 from ...spectra.spaces import SPACES, chromaticities
 

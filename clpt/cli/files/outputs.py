@@ -9,7 +9,6 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from ... import images
 from ...device import disk_cache
 from ...errors import ClptError, SceneError
 from ...render.film import film_file, layer_channels
@@ -116,21 +115,13 @@ def write(
     path: Path, source: Source, stats: dict[str, str | int | float], grading: Grading
 ) -> None:
     """Write the picture so far, or the film. Raises SceneError, OSError."""
-    form = source._form
     if path.suffix.lower() == FILM and not isinstance(source, DenoisedPicture):
         saved = source._saved_film(held=True)
         if not saved.film.taken:
             raise SceneError("no pass has come to its end: there is no film yet", file=path)
         film_file.write(path, saved)
-    elif form.bands and path.suffix.lower() == ".npy":
-        images.write_npy(path, source.image())
-    elif path.suffix.lower() == ".exr":
-        layer_channels.write_layers(path, source, names=grading.names, metadata=stats)
     else:
-        picture = source.colours() if form.bands else source.image()
-        if path.suffix.lower() in images.FOR_SCREENS:
-            picture = images.straight(picture)
-        images.write(
-            path, picture, metadata=stats, space=form.output_space, tone=grading.tone,
-            view=grading.view, exposure=images.raised(grading.exposure, form.display_exposure),
+        layer_channels.write_picture(
+            path, source, names=grading.names, metadata=stats, exposure=grading.exposure,
+            tone=grading.tone, view=grading.view,
         )  # fmt: skip

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ... import output_files
+from clpt.files import output_files
+
 from ...errors import SceneError
 
 FILM = ".film"  # suffix of films, which hold all that a picture was made of

@@ -9,9 +9,10 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
+from clpt.render.flow.check import check
+
 from ... import device as dev
 from ...device import share_compilers
-from ...render.analysis.checks import check
 from ...scene import Scene
 from ..options.applied import changed
 from ..options.scene_options import SceneOptions
@@ -49,9 +50,7 @@ def read_scene(
     for warning in scene.warnings:
         shown.note(f"clpt: warning: {warning}")
     if scene.film.filtering != loaded.film.filtering:
-        shown.note(
-            "film.filtering is importance now: for the denoiser each pixel has its own samples"
-        )
+        shown.note("the pixel filter is applied by importance sampling, which denoisers need")
     return scene
 
 

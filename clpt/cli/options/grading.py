@@ -14,14 +14,15 @@ from .records import Command, with_options
 from .values import Choice, Stops
 
 if TYPE_CHECKING:
-    from ...colour.view import View
+    from clpt.images.colour.view import View
 
 
 @dataclass(frozen=True)
 class Grading:
     """The form of pictures in files.
 
-    exposure [stops], or "auto"; tone: a curve of clpt.colour.tones; view: of OpenColorIO, instead;
+    exposure [stops], or "auto"; tone: a curve of clpt.images.colour.tones; view: of OpenColorIO,
+    instead;
     names: of channels of an .exr, a set of clpt.choices.CHANNEL_NAMES.
     """
 
@@ -41,7 +42,9 @@ class Grading:
         if not names or for_screens(targets):
             return None
         suffixes = " ".join(FOR_SCREENS)
-        return f"{' and '.join(names)} without effect: of {suffixes} only, others keep the light"
+        return (
+            f"{' and '.join(names)} ignored: for {suffixes} only; other formats keep linear light"
+        )
 
 
 def for_screens(targets: tuple[Path, ...]) -> list[Path]:
@@ -70,7 +73,7 @@ class GradingOptions:
             return Grading(self.exposure, self.tone or "none", names=self.names)
         if self.tone is not None:
             raise click.UsageError("a view has its own tone curve; leave out --tone")
-        from ...colour.view import View  # here: help needs no numpy
+        from clpt.images.colour.view import View  # here: help needs no numpy
 
         seen = View(self.view, display=self.display, look=self.look, config=self.ocio)
         return Grading(self.exposure, view=seen, names=self.names)

@@ -9,7 +9,8 @@ from typing import Any
 
 import click
 
-from ... import budget
+from clpt.files import budget
+
 from .records import Command, with_options
 from .scene_variables import scene_variables
 

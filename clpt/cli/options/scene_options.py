@@ -124,7 +124,7 @@ _OPTIONS = (
     click.option(
         "--light-paths", type=LightPaths(),
         help="Of path and vcm: paths from lights for each sample, for caustics. Of path, 0: none; "
-        "auto: some where something is sharp and a light is small.",
+        "auto: some where something is specular and a light is small.",
     ),
     click.option(
         "--guiding", is_flag=True, default=None,
@@ -155,7 +155,7 @@ _OPTIONS = (
         help=f"Pictures beside the picture, for .exr: {', '.join(LAYERS)}.",
     ),
     click.option(
-        "--alpha", is_flag=True, default=None, help="Leave the sky out, and write what is covered."
+        "--alpha", is_flag=True, default=None, help="Transparent background (alpha channel)."
     ),
     loading_options,
     click.option(

@@ -9,9 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Sheet
 from matplotlib.lines import Line2D
 
-from ...benchmark import PARTS
-from ...benchmark.figures import SECONDS, Figure
-from ...benchmark.pictures import POINTS
+from clpt.bench import PARTS
+from clpt.bench.figures import SECONDS, Figure
+from clpt.bench.pictures import POINTS
+
 from ...errors import SceneError
 from .pixels import FAINT, FORMATS, INK, LINES, PAPER, save
 

@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.legend_handler import HandlerTuple
 from matplotlib.patches import Patch
 
-from ... import output_files
+from clpt.files import output_files
+
 from ...errors import SceneError
 from ...images import to_srgb8
 from ...spectra import cie_xyz, xyz_to_rgb

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from ... import output_files
+from clpt.files import output_files
+
 from ...clean_logs import traceback_of
 from ...errors import ClptError, one_line
 from . import terminal

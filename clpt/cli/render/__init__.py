@@ -13,6 +13,7 @@ from ..options.grading import grading_options, names_option
 from ..options.headings import grouped
 from ..options.records import with_records
 from ..options.scene_options import denoise_option, scene_options
+from ..options.scene_path import ScenePath
 from ..options.verbosity import verbose_option
 from ..options.workers import worker_options
 from .settings import Job, Settings, picture_options, tev_option
@@ -27,9 +28,7 @@ EXAMPLES = (
 
 
 @click.command(cls=grouped(EXAMPLES))
-@click.argument(
-    "scenes", metavar="SCENE...", nargs=-1, required=True, type=click.Path(path_type=Path)
-)
+@click.argument("scenes", metavar="SCENE...", nargs=-1, required=True, type=ScenePath())
 @picture_options
 @scene_options
 @denoise_option
@@ -44,9 +43,10 @@ def render(scenes: tuple[Path, ...], form: str | None, settings: Settings) -> in
     """Render each SCENE: a scene file, a mesh or a folder.
 
     The scene decides what no option sets. With --time or --noise but no --spp the render goes on
-    until the time is over, or the noise is below the limit. The time counts from the command's
-    start, kernels included. Ctrl-C stops it within a second; the picture so far is written, and the
-    exit status is 130. SIGTERM and SIGHUP do the same, with the statuses 143 and 129.
+    until the time is over, or the noise is below the limit. The time is that of rendering, which
+    begins when the scene is read and its kernels are compiled. Ctrl-C stops it within a second;
+    the picture so far is written, and the exit status is 130. SIGTERM and SIGHUP do the same, with
+    the statuses 143 and 129.
 
     A render with checkpoints goes on where it was saved, to the bit, also with more samples; with
     another scene, setting or version it says what differs, and ends.
@@ -54,11 +54,10 @@ def render(scenes: tuple[Path, ...], form: str | None, settings: Settings) -> in
     With --frames every frame gets files of its own: name.0001.exr, or what #### or %04d in -o says.
     -D values may have {frame}, {time} in seconds, and arithmetic of them such as {360*frame/240};
     SCENE may be scene.####.json. Frames that are complete, and of the same scene and options, are
-    not rendered again. A frame is a device's, or with --cluster of all workers; --time is that of
-    each.
+    not rendered again. Each device renders whole frames, with --cluster all workers render one
+    together; --time is per frame.
 
-    Of several scenes one that fails does not keep the others from being rendered; the exit status
-    tells of it at the end.
+    If one scene of several fails, the others are still rendered; the exit status shows it.
     """
     settings.check()
     from .several_scenes import one_by_one  # here: help needs neither OpenCL nor loaders

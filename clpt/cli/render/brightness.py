@@ -7,12 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
+from clpt.render.lights import power as light_power
+from clpt.render.lights.find import emissions_of
+from clpt.render.spectra.look import Look
+
 from ... import images
 from ...arrays import Floats32
 from ...geometry import analytic
 from ...geometry.lamps import plainly_lit
-from ...render.analysis.lights import light_power
-from ...render.analysis.lights.sources import emissions_of
 from ...render.pictures import DevicePictures
 from ...scene import Scene
 from ...scene.lights import Light, PoweredLamp
@@ -60,15 +62,15 @@ def remarks(renderer: DevicePictures, grading: Grading, targets: tuple[Path, ...
 
 def _pixels(renderer: DevicePictures) -> Floats32:
     """The picture so far in linear Rec. 709, (h, w, c)."""
-    colours = renderer.colours() if renderer._form.bands else renderer.image()
+    colours = renderer.picture()
     return images.to_rec709(images.straight(colours), renderer.scene.film.output_space)
 
 
 def _outshone(scene: Scene) -> Iterator[str]:
     """Yield a sentence where one lamp with a place sends out far more watts than any other lamp."""
-    lit = plainly_lit(scene)
+    lit, look = plainly_lit(scene), Look.of(scene.film)
     powers = [
-        (light_power.power(lamp, _watts(lamp), 1.0), f"lights[{i}] ({lamp.kind})")
+        (light_power.power(lamp, _watts(lamp, look), 1.0, look), f"lights[{i}] ({lamp.kind})")
         for i, lamp in enumerate(lit.lights)
         if lamp.reach == "placed"
     ]
@@ -76,25 +78,25 @@ def _outshone(scene: Scene) -> Iterator[str]:
         return
     best, name = max(powers)
     others = [power for power, other in powers if other != name]
-    others += [_shape_watts(shape) for shape in lit.shapes if shape.emission is not None]
+    others += [_shape_watts(shape, look) for shape in lit.shapes if shape.emission is not None]
     if others and best > OUTSHINING * max(others):
         next_best = max(others)
         times = f"{best / next_best:,.0f} times as strong as" if next_best else "stronger than"
         yield f"{name} is {times} any other lamp: little is seen of what the others light"
 
 
-def _watts(lamp: Light) -> float:
+def _watts(lamp: Light, look: Look) -> float:
     """The emission of a lamp from 360 to 830 nm, such as its intensity [W/sr]."""
     values = [
-        watts(value) if isinstance(value, Spectrum) else WHITE * light_power.brightness(value)
+        watts(value) if isinstance(value, Spectrum) else WHITE * light_power.brightness(value, look)
         for value in emissions_of(lamp).values()
     ]
     return float(np.mean(values)) if values else 0.0
 
 
-def _shape_watts(shape: Shape) -> float:
+def _shape_watts(shape: Shape, look: Look) -> float:
     """The power of a shape's light [W]."""
     emission = shape.emission
     if not isinstance(emission, PoweredLamp):
         return 0.0
-    return _watts(emission) * emission.extent(analytic.area(shape))
+    return _watts(emission, look) * emission.extent(analytic.area(shape))

@@ -17,10 +17,11 @@ from typing import Any
 
 import click
 
+from clpt.render.flow.check import check
+
 from ... import images
 from ...device import share_compilers
 from ...errors import ClusterError, SceneError
-from ...render.analysis.checks import check
 from ...render.pictures import DevicePictures
 from ...scene import Scene
 from ...scene.fingerprint import fingerprint

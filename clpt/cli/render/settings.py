@@ -75,7 +75,7 @@ class Address(click.ParamType):
     ) -> Any:
         if not isinstance(value, str):
             return value
-        from ... import tev  # here: help needs no numpy
+        from clpt.images import tev  # here: help needs no numpy
 
         try:
             return tev.address(value)

@@ -14,8 +14,8 @@ from ..options.grading import Grading
 class PictureSoFar:
     """Writes the picture of a render that goes on, at the ends of its passes.
 
-    A reader sees a whole picture at any time, see clpt.output_files. What cannot be written is told
-    once, and tried again; the render goes on.
+    A reader sees a whole picture at any time, see clpt.files.output_files. What cannot be written
+    is told once, and tried again; the render goes on.
 
     period: seconds from one picture to the next, None: never; stats: returns the metadata of the
     picture so far; note: prints a line.

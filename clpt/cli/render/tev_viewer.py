@@ -23,7 +23,7 @@ def showing(
     if address is None:
         yield lambda: None
         return
-    from ... import tev  # here: most renders show nothing
+    from clpt.images import tev  # here: most renders show nothing
 
     viewer = tev.Viewer(name, *address, tell=note)
     try:
@@ -34,7 +34,7 @@ def showing(
 
 def shown(source: Film) -> dict[str, NDArray[np.float32]]:
     """Return all channels of the picture so far, (h, w) by name: colours, layers, bands."""
-    picture = source.colours() if source._form.bands else source.image()
+    picture = source.picture()
     made = {letter: picture[..., i] for i, letter in enumerate("RGBA"[: picture.shape[2]])}
     made |= channels_of(source.layers())
     if source._form.adaptive:

@@ -18,7 +18,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from ... import images, output_files
+from clpt import images
+from clpt.files import output_files
+
 from ...errors import SceneError
 from ..process.extras import extra
 from ..process.stopping import stops

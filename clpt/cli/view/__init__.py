@@ -12,6 +12,7 @@ from ..options.grading import grading_options
 from ..options.headings import grouped
 from ..options.records import with_records
 from ..options.scene_options import scene_options
+from ..options.scene_path import ScenePath
 from ..options.values import Count, Noise
 from ..options.verbosity import verbose_option
 from ..options.workers import worker_options
@@ -25,7 +26,7 @@ EXAMPLES = (
 
 
 @click.command(cls=grouped(EXAMPLES))
-@click.argument("scene", type=click.Path(path_type=Path))
+@click.argument("scene", type=ScenePath())
 @click.option("--port", type=click.IntRange(0, 65535), default=0, help="0: any that is free.")
 @click.option(
     "--host", default="127.0.0.1", show_default=True,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import budget
+from clpt.files import budget
 from clpt.formats.gltf import meshopt
 from clpt.formats.gltf.document import Document, Element
 

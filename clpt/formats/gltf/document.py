@@ -17,9 +17,10 @@ from pathlib import Path, PurePosixPath
 from typing import Any, NoReturn, TypeVar
 from urllib.parse import unquote, unquote_to_bytes
 
-from clpt import budget, input_files, text
 from clpt.choices import Missing
 from clpt.errors import SceneError
+from clpt.files import budget, input_files, text
+from clpt.scalars import is_flag, is_number, is_whole
 
 T = TypeVar("T")
 REQUIRED: Any = object()
@@ -64,7 +65,7 @@ class Element:
             return default
         if isinstance(value, float) and value.is_integer():
             value = int(value)  # JSON's 3.0
-        if isinstance(value, bool) or not isinstance(value, int):
+        if not is_whole(value):
             raise self.error(f"must be a whole number, not {_shown(value)}", key)
         if not low <= value <= high:
             raise self.error(f"{_shown(value)} is outside {low} to {high}", key)
@@ -107,7 +108,7 @@ class Element:
     def flag(self, key: str, default: bool = False) -> bool:
         """Return a yes or no."""
         value = self._get(key, default)
-        if not isinstance(value, bool):
+        if not is_flag(value):
             raise self.error(f"must be true or false, not {_shown(value)}", key)
         return value
 
@@ -152,7 +153,7 @@ class Element:
         self.count(key)
         indices = []
         for i, value in enumerate(self.value.get(key, [])):
-            if isinstance(value, bool) or not isinstance(value, int):
+            if not is_whole(value):
                 raise self.error(f"must be a whole number, not {_shown(value)}", f"{key}[{i}]")
             indices.append(self._in_table(value, f"{key}[{i}]", table))
         return indices
@@ -174,7 +175,7 @@ class Element:
         return value
 
     def _number(self, value: object, key: str, low: float, high: float) -> float:
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
+        if not is_number(value):
             raise self.error(f"must be a number, not {_shown(value)}", key)
         if abs(value) > 1e38:  # beyond what single precision holds; JSON's 1e999 is infinity
             raise self.error(f"{_shown(value)} is too large", key)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from clpt import budget
+from clpt.files import budget
 from clpt.formats.gltf import accessors
 from clpt.formats.gltf.document import Element
 from clpt.formats.gltf.geometry import Geometry, attribute, types, warn_of_whole_numbers

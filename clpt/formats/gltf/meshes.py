@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import budget, transforms
+from clpt import transforms
 from clpt.arrays import Matrix
+from clpt.files import budget
 from clpt.formats.gltf import materials, skins, variants, volume
 from clpt.formats.gltf.accessors import floats
 from clpt.formats.gltf.document import Element

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import budget
 from clpt.arrays import Array, Bytes
+from clpt.files import budget
 from clpt.formats.gltf import meshopt_filters, meshopt_indices
 from clpt.formats.gltf.document import Element
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import budget
+from clpt.files import budget
 from clpt.formats.gltf.accessors import floats
 from clpt.formats.gltf.document import Element
 from clpt.formats.gltf.geometry import Geometry

@@ -15,7 +15,7 @@ from clpt.formats.gltf import volume
 from clpt.formats.gltf.document import Element
 from clpt.formats.gltf.textures import texture
 from clpt.scene.materials import GltfSurface
-from clpt.scene.textures import Bitmap, MeshAttribute, Mix, Product
+from clpt.scene.textures import Bitmap, MeshAttribute, Mix, Product, turned
 from clpt.scene.values import TexturedNumber
 from clpt.spectra import Cauchy, RGBUnbounded
 
@@ -40,6 +40,7 @@ def surface(element: Element, colours: bool) -> GltfSurface:
             values |= read(extension)
     _body(element, values)
     _specular_color(element, values)
+    _directions_of_normals(element, values)
     if values.get("clearcoat", 0.0) != 0.0 and "normalTexture" in element:
         values["clearcoat_apart"] = 1.0  # a coat without a map of its own is smooth
     if element.document.multiple_scattering:
@@ -208,6 +209,17 @@ def _directions(image: Bitmap, turn: float) -> Any:
     x, y = (2.0 * pixels[..., i] / scale - 1.0 for i in range(2))
     angles = (np.degrees(np.arctan2(y, x)) + turn).astype(np.float32)
     return dataclasses.replace(image, image=angles, filter="nearest")
+
+
+def _directions_of_normals(element: Element, values: dict[str, Any]) -> None:
+    """Count a turn that no image tells from where the normal map's coordinates run."""
+    info, turn = element.child("normalTexture"), values.get("anisotropy_rotation")
+    if info is None or not isinstance(turn, float) or values["anisotropy"] == 0.0:
+        return
+    normals = texture(info, raw=True)
+    if turned(normals):
+        image = np.full((1, 1), turn, np.float32)
+        values["anisotropy_rotation"] = dataclasses.replace(normals, image=image, filter="nearest")
 
 
 EXTENSIONS = {

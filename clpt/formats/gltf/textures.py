@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import budget, images
+from clpt import images
 from clpt.errors import SceneError
+from clpt.files import budget
 from clpt.formats.gltf import accessors
 from clpt.formats.gltf.document import Document, Element
 from clpt.formats.missing import EVEN, GREY, grey_for

@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import budget, images, transforms
+from clpt import images, transforms
 from clpt.choices import Missing
 from clpt.errors import SceneError
+from clpt.files import budget
 from clpt.formats.meshes import corners, mtl, obj, off, ply, stl
 from clpt.formats.meshes.named_files import find
 from clpt.formats.meshes.triangles import TANGENTS, Triangles, attributes

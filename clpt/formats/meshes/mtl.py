@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import images, input_files, spectra, text
+from clpt import images, spectra
 from clpt.choices import Missing
 from clpt.errors import SceneError
+from clpt.files import input_files, text
 from clpt.formats.meshes.named_files import find
 from clpt.formats.missing import EVEN, GREY, grey_for
 from clpt.scene.lights import Area
@@ -345,7 +346,8 @@ class _Maker:
         if (statement := self.take("norm")) is not None:
             map_, options = self.bitmap(statement, raw=True, even=True)
             self.used.add("bump")
-            return NormalMap(material=surface, map=map_, scale=options.get("-bm", (1.0,))[0])
+            scale = options.get("-bm", (1.0,))[0]
+            return NormalMap(material=surface, map=map_, scale=scale, along_v=True)
         if (statement := self.take("bump")) is None:
             return surface
         map_, options = self.bitmap(statement, raw=True)
@@ -354,7 +356,7 @@ class _Maker:
             return surface
         if "-imfchan" not in options and _is_normal_map(_pixels(map_)):
             self.remark(f"{statement.key} looks like a normal map, and is read as one")
-            return NormalMap(material=surface, map=map_, scale=scale)
+            return NormalMap(material=surface, map=map_, scale=scale, along_v=True)
         return BumpMap(material=surface, height=map_, scale=scale)
 
     def opacity(self, surface: Material) -> Any:

@@ -6,7 +6,7 @@ import os
 import unicodedata
 from pathlib import Path
 
-from clpt import input_files
+from clpt.files import input_files
 
 
 def find(folder: Path, name: str) -> Path | None:

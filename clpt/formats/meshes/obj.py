@@ -15,9 +15,9 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from clpt import budget, input_files, text
 from clpt.arrays import Bytes, Floats32, Integers
 from clpt.errors import SceneError
+from clpt.files import budget, input_files, text
 
 PER_BYTE = 8  # bytes of memory for each of the file, while it is read
 PIECE = 1 << 19  # bytes that are parsed at a time: they and their arrays fit a processor's cache

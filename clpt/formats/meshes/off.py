@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import budget, text
 from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
+from clpt.files import budget, text
 from clpt.formats.gzip_file import read_bytes
 from clpt.formats.meshes.triangles import Triangles, indices, see_through
 from clpt.geometry.polygons import triangulate

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from clpt import numpy_files, output_files
 from clpt.errors import SceneError
+from clpt.files import numpy_files, output_files
 from clpt.scene.shapes import Spheres
 from clpt.scene.textures import ATTRIBUTES
 

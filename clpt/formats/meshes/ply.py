@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import budget, text
 from clpt.errors import SceneError
+from clpt.files import budget, text
 from clpt.formats.gzip_file import read_bytes
 from clpt.formats.meshes.ply_tables import Columns, Header, read_tables
 from clpt.formats.meshes.triangles import Triangles, indices, see_through

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import text
 from clpt.errors import SceneError
+from clpt.files import text
 
 Columns = dict[str, dict[str, Any]]  # of each table, by its name and theirs
 TYPES = {

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import budget, text
 from clpt.errors import SceneError
+from clpt.files import budget, text
 from clpt.formats.gzip_file import read_bytes
 from clpt.formats.meshes.triangles import Triangles
 from clpt.geometry.polygons import triangulate

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from clpt import budget, input_files, output_files, text
 from clpt.errors import SceneError
+from clpt.files import budget, input_files, output_files, text
 
 PER_BYTE = 64  # bytes of memory for each of the file, while it is read
 

@@ -377,7 +377,9 @@ def _direct(props: Properties) -> Integrator:
 
 
 def _particle_tracer(props: Properties) -> Integrator:
-    return integrators.ParticleTracer(**_depths(props))
+    depths = _depths(props)
+    free = integrators.is_long(depths["max_depth"])
+    return integrators.ParticleTracer(**depths, free_panes=free)
 
 
 def _volume_path(props: Properties) -> Integrator:

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 from xml.parsers import expat
 
-from clpt import budget, input_files
 from clpt.errors import SceneError, nearest
+from clpt.files import budget, input_files
 from clpt.formats.located import Located
 
 MAX_NESTING = 64

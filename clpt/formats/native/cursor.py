@@ -14,10 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from clpt import budget
-from clpt import text as text_files
 from clpt.errors import SceneError, UnusedParameterError
+from clpt.files import budget
+from clpt.files import text as text_files
 from clpt.formats.located import Located
+from clpt.scalars import is_number
 
 LARGEST_INTEGER = 2**31 - 1
 PER_LETTER = 16  # bytes of memory for each letter of JSON, while it is read
@@ -97,7 +98,7 @@ class Cursor(Located):
 
     def number(self) -> float:
         """Return a finite number."""
-        if isinstance(self.value, bool) or not isinstance(self.value, (int, float)):
+        if not is_number(self.value):
             self.expect(str if isinstance(self.value, DuplicateKey) else float, "a number")
             raise self.error("must be a number, not true or false")
         try:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from clpt import numpy_files, output_files
+from clpt.files import numpy_files, output_files
 from clpt.formats.native.cursor import Cursor
 from clpt.formats.native.json_schema import NUMBER, NUMBERS, STRING, Schema, object_of, ref
 from clpt.formats.native.spectra import find_file

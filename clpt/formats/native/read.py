@@ -9,15 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from clpt import budget, measured
+from clpt import measured
 from clpt.choices import Missing
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
+from clpt.files import budget
 from clpt.formats import volumes
 from clpt.formats.missing import EVEN, GREY, grey_for
 from clpt.formats.native import forms, shape_files
 from clpt.formats.native.cursor import Cursor, parse
 from clpt.formats.native.spectra import find_file, kind_name
-from clpt.scene import Scene, check_noise, integrators, kinds, lights, materials, media, shapes
+from clpt.scene import Scene, checked_noise, integrators, kinds, lights, materials, media, shapes
 from clpt.scene.params import Kind, params, shorthands
 from clpt.scene.volumes import Volume
 
@@ -326,5 +327,5 @@ def _version(root: Cursor) -> int | None:
 def _noise(cursor: Cursor) -> float:
     noise = cursor.number()
     with cursor.locating():
-        check_noise(noise)
+        checked_noise(noise)
     return noise

@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from clpt import output_files, spectra
+from clpt import spectra
+from clpt.files import output_files
 from clpt.formats.native import forms
 from clpt.formats.native.reradiation import RERADIATIONS
 from clpt.formats.native.shape_files import FILES
@@ -26,7 +27,8 @@ from clpt.scene.params import Kind, defaults, params
 INTRODUCTION = """# scene.json
 
 A scene is a JSON file, or the same in Python: each `type` here is a dataclass of `clpt.scene`, and
-each parameter is one of its fields. Begin a file with `"$schema": "../schema.json"`; your editor
+each parameter is one of its fields. Begin a file with `"$schema": ADDRESS`, where ADDRESS is what
+`clpt scenes --schema` prints; your editor
 then knows all names and limits.
 
 ```json

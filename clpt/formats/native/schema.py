@@ -10,7 +10,8 @@ import json
 import sys
 from pathlib import Path
 
-from clpt import output_files, spectra
+from clpt import spectra
+from clpt.files import output_files
 from clpt.formats.native import forms, motion
 from clpt.formats.native.json_schema import (
     INDEX_FILE_OBJECT,
@@ -25,10 +26,11 @@ from clpt.formats.native.json_schema import (
 )
 from clpt.formats.native.reradiation import RERADIATIONS
 from clpt.formats.native.shape_files import FILES
-from clpt.formats.native.spectra import HEX, HEX_ROLES, SPECTRA
+from clpt.formats.native.spectra import SPECTRA
+from clpt.images.transfer import HEX
 from clpt.scene import KINDS, integrators, materials, roles
 from clpt.scene.params import Kind, defaults, params
-from clpt.scene.roles import Param, Role
+from clpt.scene.roles import Param, Role, Spectral
 
 ANY_OF_SCALE = {"anyOf": [NUMBER, TRIPLE]}
 
@@ -147,7 +149,7 @@ NAMES: dict[Role, Schema] = {
 def _spectrum(role: Role) -> Schema:
     number: Schema = {**NUMBER, **LIMITS.get(role, {"minimum": 0})}
     one_of = [number, {**TRIPLE, "description": "linear Rec. 709"}, ref("spectrum")]
-    if role in HEX_ROLES:
+    if isinstance(role, Spectral) and role.codes:
         one_of.append({**STRING, "pattern": f"^{HEX}$", "description": "a colour in sRGB"})
     return {"anyOf": [*one_of, *([NAMES[role]] if role in NAMES else [])]}
 

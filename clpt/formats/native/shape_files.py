@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from clpt import budget, numpy_files
 from clpt.choices import Missing
+from clpt.files import budget, numpy_files
 from clpt.formats import luminaires
 from clpt.formats.meshes import mesh, particles, strands
 from clpt.formats.meshes.triangles import TANGENTS

@@ -8,23 +8,21 @@ has a `type` from SPECTRA and its fields, or `values` [[nm, value], ...], or a `
 from __future__ import annotations
 
 import dataclasses
-import re
 from collections.abc import Collection
 from typing import Any
 
-import numpy as np
-
-from clpt import images, input_files, spectra
+from clpt import spectra
 from clpt.errors import UnknownKindError
+from clpt.files import input_files
 from clpt.formats.colour import colour
 from clpt.formats.native.cursor import Cursor
+from clpt.images.transfer import from_hex
+from clpt.scalars import is_number
 from clpt.scene.integrators import NO_AOV
-from clpt.scene.roles import COEFFICIENT, EMISSION, FACTOR, INDEX, REFLECTANCE, Spectral
+from clpt.scene.roles import COEFFICIENT, EMISSION, INDEX, Spectral
 from clpt.spectra import Spectrum
 from clpt.spectra.spectrum import Outside
 
-HEX = r"#([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})"
-HEX_ROLES = (REFLECTANCE, EMISSION, FACTOR)  # those of colours
 SPECTRA: dict[str, type[Spectrum]] = {
     "constant": spectra.Constant,
     "tabulated": spectra.Tabulated,
@@ -48,8 +46,8 @@ def read(cursor: Cursor, role: Spectral) -> Any:
 
 def _read(cursor: Cursor, role: Spectral) -> Any:
     value = cursor.value
-    if isinstance(value, str) and value.startswith("#") and role in HEX_ROLES:
-        return colour(role, _hex(cursor))
+    if isinstance(value, str) and value.startswith("#") and role.codes:
+        return colour(role, from_hex(value))
     if isinstance(value, str) and role is INDEX:
         if value.lower() not in spectra.glasses():
             raise UnknownKindError("glass", value, spectra.glasses(), **cursor.location())
@@ -58,7 +56,7 @@ def _read(cursor: Cursor, role: Spectral) -> Any:
         return spectra.illuminant(value)
     if isinstance(value, list) and role.colour is not None:
         return colour(role, cursor.numbers(3))
-    if isinstance(value, (int, float)) and not isinstance(value, bool):
+    if is_number(value):
         return cursor.number()
     cursor.expect(dict, "a number, [r, g, b] or a spectrum")
     outside: Outside = "hold" if role.measured else "zero"
@@ -72,15 +70,6 @@ def _read(cursor: Cursor, role: Spectral) -> Any:
         lambdas, samples = zip(*rows, strict=True)
         return spectra.Tabulated(lambdas, samples, outside)
     return _typed(cursor)
-
-
-def _hex(cursor: Cursor) -> tuple[float, ...]:
-    """Return #rrggbb, sRGB as colour pickers have it, as linear Rec. 709."""
-    match = re.fullmatch(HEX, cursor.value)
-    if match is None:
-        raise cursor.error(f'{cursor.value!r} is no colour such as "#aa2020"')
-    codes = np.array([int(code, 16) for code in match.groups()], np.float32)
-    return tuple(float(part) for part in images.srgb_to_linear(codes / np.float32(255.0)))
 
 
 def _from_file(cursor: Cursor, role: Spectral, outside: Outside) -> Spectrum:

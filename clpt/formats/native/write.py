@@ -15,13 +15,16 @@ from typing import Any
 
 import numpy as np
 
-from clpt import images, measured, output_files, spectral_exr
+from clpt import images, measured
+from clpt.arrays import on_host
 from clpt.errors import SceneError
+from clpt.files import output_files
 from clpt.formats.meshes import particles, strands
 from clpt.formats.meshes.triangles import TANGENT_COLUMNS
 from clpt.formats.native import forms, motion
 from clpt.formats.native.read import VERSION
 from clpt.formats.native.shape_files import MESH_ARRAYS, in_file
+from clpt.images import spectral_exr
 from clpt.scene import Scene, kinds, materials, shapes
 from clpt.scene.media import Medium
 from clpt.scene.motion import Deformation
@@ -329,7 +332,7 @@ def _on_host(thing: Kind) -> Kind:
         if not hasattr(value, "get"):
             message = "a buffer has no shape: give a pyopencl.array.Array"
             raise SceneError(message, where=f"{thing.kind}.{name}")
-        on_device[name] = value.get()
+        on_device[name] = on_host(value)
     return dataclasses.replace(thing, **on_device) if on_device else thing
 
 

@@ -10,8 +10,9 @@ from typing import Any, cast
 
 import numpy as np
 
-from clpt import budget, transforms
+from clpt import transforms
 from clpt.errors import did_you_mean
+from clpt.files import budget
 from clpt.formats.pbrt.curves import joined
 from clpt.formats.pbrt.files import Contents
 from clpt.formats.pbrt.layered import body

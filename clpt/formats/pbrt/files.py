@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from clpt import budget
+from clpt.files import budget
 from clpt.formats.located import Located
 from clpt.formats.pbrt.lexer import Lexer
 from clpt.formats.pbrt.state import Definition, Shared, State

@@ -222,7 +222,7 @@ def integrator(definition: Definition | None, film: Film) -> Integrator:
     if definition.kind != "sppm":
         return integrators.Path(max_depth=longest, free_panes=free)
     state.warn(params, PHOTONS)
-    return integrators.Vcm(max_depth=longest, **_photons(params, film))
+    return integrators.Vcm(max_depth=longest, free_panes=free, **_photons(params, film))
 
 
 def _photons(params: Parameters, film: Film) -> dict[str, Any]:

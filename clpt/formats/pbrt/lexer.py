@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import budget, text
 from clpt.errors import SceneError, did_you_mean
+from clpt.files import budget, text
 from clpt.formats.gzip_file import read_bytes
 from clpt.formats.pbrt.params import ALIASES, TYPES, Parameter
 

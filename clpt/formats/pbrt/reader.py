@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from clpt import text, transforms
+from clpt import transforms
 from clpt.errors import SceneError, UnknownKindError, did_you_mean
+from clpt.files import text
 from clpt.formats.pbrt.files import Contents
 from clpt.formats.pbrt.lexer import UPGRADE
 from clpt.formats.pbrt.params import Parameters

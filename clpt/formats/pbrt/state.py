@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from clpt import input_files, transforms
+from clpt import transforms
 from clpt.choices import Missing
 from clpt.errors import SceneError, did_you_mean
+from clpt.files import input_files
 from clpt.formats.missing import grey_for
 from clpt.formats.pbrt.params import Parameter, Parameters
 from clpt.scene.materials import Material

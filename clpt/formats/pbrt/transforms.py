@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from clpt import text, transforms
+from clpt import transforms
 from clpt.errors import SceneError, did_you_mean
+from clpt.files import text
 from clpt.formats.pbrt.files import Files
 
 

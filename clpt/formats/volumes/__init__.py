@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import budget, numpy_files
 from clpt.errors import SceneError
+from clpt.files import budget, numpy_files
 from clpt.formats.volumes import nvdb, vdb, vol
 from clpt.scene.volumes import Volume, check_density
 from clpt.spectra import RGBUnbounded

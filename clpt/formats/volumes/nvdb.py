@@ -17,8 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import budget, input_files
 from clpt.errors import SceneError
+from clpt.files import budget, input_files
 from clpt.formats.volumes import packing, sparse
 from clpt.scene.volumes import Volume
 

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import budget
 from clpt.errors import SceneError
+from clpt.files import budget
 from clpt.scene.volumes import Volume
 
 SIDE = 8  # of a leaf

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from clpt import budget, input_files, transforms
+from clpt import transforms
 from clpt.errors import SceneError
+from clpt.files import budget, input_files
 from clpt.scene.volumes import Volume
 
 HEADER = struct.Struct("<3sB5i6f")

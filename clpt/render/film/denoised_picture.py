@@ -48,8 +48,9 @@ class DenoisedPicture(Still):
             self._made = made = Statistical(on, self._halves(), *surfaces)
             self._colours = made.colours
             bands = made.bands(self._image) if self._form.bands else None
-        alpha = self._image[..., 3:] if self._form.alpha else self._image[..., :0]
-        self._denoised = np.concatenate([self._colours, alpha], axis=2) if bands is None else bands
+        alpha = self._source.picture()[..., 3:]
+        self._picture = np.concatenate([self._colours, alpha], axis=2)
+        self._denoised = self._picture if bands is None else bands
         self.text = name + (f" with {', '.join(with_layers)}" if with_layers else "")
 
     def _halves(self) -> tuple[Image, Image]:
@@ -77,6 +78,10 @@ class DenoisedPicture(Still):
     def colours(self) -> Image:
         """The picture in three colours, (h, w, 3) float32, also of a film with bands."""
         return self._colours
+
+    def picture(self) -> Image:
+        """The picture in three colours, with alpha where the film has it, also with bands."""
+        return self._picture
 
     def image(self) -> Image:
         """The picture, as `Renderer.image` returns it; alpha is as it was."""

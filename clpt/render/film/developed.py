@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Image, Words
 from clpt.errors import SceneError
-from clpt.render.contract.features import SUM_WORDS
 from clpt.render.film.layers import layers_of
 from clpt.render.film.picture_form import PictureForm
 from clpt.render.film.pictures import Still
-from clpt.render.wavefront.film_state import (
+from clpt.render.film.state import (
     FILM_WORDS,
     SAMPLES_WORD,
     FilmState,
@@ -23,6 +22,7 @@ from clpt.render.wavefront.film_state import (
     light_group,
     numbers,
 )
+from clpt.render.records import SUM_WORDS
 
 
 class Developed(Still):
@@ -40,9 +40,12 @@ class Developed(Still):
         """The picture: colours, with alpha where the film has it, or the film's bands."""
         if self._form.bands:
             return self._mean_bands() * np.float32(self._form.exposure)
-        if self._form.alpha:
-            return np.dstack([self.colours(), self._alpha()])
-        return self.colours()
+        return self.picture()
+
+    def picture(self) -> Image:
+        """The picture in three colours, with alpha where the film has it, also with bands."""
+        colours = self.colours()
+        return np.dstack([colours, self._alpha()]) if self._form.alpha else colours
 
     def colours(self) -> Image:
         """The picture in three colours, (h, w, 3) float32, also of a film with bands."""

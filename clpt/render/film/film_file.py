@@ -22,13 +22,13 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
-from clpt import input_files, output_files
 from clpt.errors import SceneError
+from clpt.files import input_files, output_files
 from clpt.images import exr_files
-from clpt.render.contract.layer_names import LayerNames
 from clpt.render.film.picture_form import PictureForm
 from clpt.render.film.saved_film import Origin, SavedFilm, Session
-from clpt.render.wavefront.film_state import FilmState
+from clpt.render.film.state import FilmState
+from clpt.render.records.layer_names import LayerNames
 from clpt.scene.fingerprint import Fingerprint
 from clpt.spectra.spaces import chromaticities
 
@@ -155,7 +155,7 @@ def _header(path: Path, text: object) -> dict[str, Any]:
 def _picture(saved: SavedFilm) -> Any:
     """The picture so far, with the header: what viewers show."""
     form, made = saved.form, saved._developed()
-    pixels = made.colours() if form.bands else made.image()
+    pixels = made.picture()
     letters = "RGBA"[: pixels.shape[2]]
     stored = np.clip(np.nan_to_num(pixels), -HALF_MAX, HALF_MAX).astype(np.float16)
     channels = {n: np.ascontiguousarray(stored[..., i]) for i, n in enumerate(letters)}

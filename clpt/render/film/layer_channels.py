@@ -7,9 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from clpt import images, spectral_exr
+from clpt import images
 from clpt.arrays import Image
-from clpt.images import exr_files
+from clpt.choices import Exposure
+from clpt.images import exr_files, spectral_exr
+from clpt.images.colour.view import View
 from clpt.render.film import cryptomatte
 from clpt.render.film.denoised_picture import DenoisedPicture
 from clpt.render.film.layers import GROUP, matte_names
@@ -45,6 +47,8 @@ def write_layers(
     channels = channels_of(layers, names)
     if isinstance(source, DenoisedPicture):
         channels |= _beside(source, names)
+    if form.bands and form.alpha:
+        channels["A"] = source.picture()[..., 3]
     place = exr_files.windows(source.colours().shape, form.place)
     stated = {**(metadata or {}), **attributes_of(form, names), **place}
     if form.bands:
@@ -56,6 +60,33 @@ def write_layers(
         images.write(
             path, source.image(), metadata=stated, layers=channels, space=form.output_space,
             prefix=PICTURE[names],
+        )  # fmt: skip
+
+
+def write_picture(
+    path: Path,
+    source: Pictures,
+    *,
+    names: str = "clpt",
+    metadata: Mapping[str, str | int | float] | None = None,
+    exposure: Exposure = 0.0,
+    tone: str = "none",
+    view: View | None = None,
+) -> None:
+    """Write the picture of a renderer or film in the format of a path's suffix.
+
+    An .exr has its layers and bands, an .npy its numbers: bands where it has those. The rest: see
+    `write_layers` and `clpt.write_image`. Raises SceneError.
+    """
+    suffix, form = path.suffix.lower(), source._form
+    if form.bands and suffix == ".npy":
+        images.write_npy(path, source.image())
+    elif suffix == ".exr":
+        write_layers(path, source, names=names, metadata=metadata)
+    else:
+        images.write(
+            path, source.picture(), metadata=metadata, space=form.output_space, tone=tone,
+            view=view, exposure=images.raised(exposure, form.display_exposure),
         )  # fmt: skip
 
 

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.arrays import Image, Words
-from clpt.render.analysis.colour import output_matrix, sensor
-from clpt.render.contract.features.film import layer_places
+from clpt.render.film.colour import output_matrix, sensor
 from clpt.render.film.cryptomatte import pairs_of
 from clpt.render.film.picture_form import PictureForm
 from clpt.render.film.pictures import Pictures
-from clpt.render.wavefront.film_state import numbers
+from clpt.render.film.state import numbers
+from clpt.render.records.film import layer_places
 from clpt.scene.integrators import Film
 from clpt.scene.layers import LAYERS
 from clpt.spectra import cie

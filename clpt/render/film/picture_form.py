@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.render.contract.layer_names import LayerNames
+from clpt.render.records.layer_names import LayerNames
 from clpt.scene import Film
 
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from clpt.arrays import Image
 from clpt.errors import SceneError
+from clpt.images.spectral_exr import SpectralImage
 from clpt.render.film.picture_form import PictureForm
-from clpt.spectral_exr import SpectralImage
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -49,6 +49,13 @@ class Pictures(ABC):
     def colours(self) -> Image:
         """The picture so far in three colours, (h, w, 3) float32, also of a film with bands."""
         return self._developed("words").colours()
+
+    def picture(self) -> Image:
+        """The picture so far in three colours, (h, w, 3) float32; (h, w, 4) of a film with alpha.
+
+        Also of a film with bands.
+        """
+        return self._developed("words").picture()
 
     def spectral_image(self) -> SpectralImage:
         """The picture so far of a film with bands, at their centres. Raises SceneError without."""

@@ -12,14 +12,14 @@ from numpy.typing import DTypeLike
 from pyopencl.array import Array
 
 from clpt import device
-from clpt.colour.tones import TONES, check_tone
-from clpt.colour.view import View
 from clpt.device import DeviceArray
 from clpt.errors import DeviceError
 from clpt.images import srgb8_steps
+from clpt.images.colour.tones import TONES, check_tone
+from clpt.images.colour.view import View
 from clpt.spectra.spaces import between
 
-TONE_NUMBERS = {name: number for number, name in enumerate(TONES)}  # kernels/colour/tone.cl
+TONE_NUMBERS = {name: number for number, name in enumerate(TONES)}  # kernels/film/tone.cl
 NO_TABLE = np.zeros(4, np.float32)
 BYTES, FLOATS = np.dtype(np.uint8), np.dtype(np.float32)
 _ORDERS = (cl.channel_order.RGBA, cl.channel_order.BGRA)

@@ -13,7 +13,7 @@ from clpt.errors import SceneError
 from clpt.render.film.developed import Developed
 from clpt.render.film.picture_form import PictureForm
 from clpt.render.film.pictures import Pictures
-from clpt.render.wavefront.film_state import FilmState, Ranges
+from clpt.render.film.state import FilmState, Ranges
 from clpt.scene.fingerprint import Fingerprint, Plain
 from clpt.scene.integrators import Integrator, Path, Vcm
 

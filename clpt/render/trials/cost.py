@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.arrays import Floats
-from clpt.render.analysis import worth
+from clpt.render.transport import worth
 
 FEWEST, PIXELS = 512, 2048  # of the small film, about
 ROUNDS = 8  # pictures of each way, each of another seed

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from clpt import device
-from clpt.render.analysis import worth
-from clpt.render.lowering.scene import Lowered
+from clpt.render.flow.scene_to_tables import Lowered
+from clpt.render.transport import worth
 from clpt.render.trials import cost
 from clpt.render.trials.cost import GUIDED_RAY, LIGHT_RAY, PHOTON_RAY, ROUNDS, SAMPLES, Trial
 from clpt.render.wavefront.device_scene import DeviceScene

@@ -13,7 +13,7 @@ these samples do not go into the picture.
 Light paths, where the scene has them, reach all pixels: see clpt.render.wavefront.light_rounds.
 
 For a picture that is denoised what is left after that decides, see
-clpt.render.film.denoised_noise. That falls slower than noise does while samples are added, so
+clpt.render.wavefront.denoised_noise. That falls slower than noise does while samples are added, so
 nothing is decided ahead.
 """
 
@@ -28,13 +28,13 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
-from clpt.render.contract.features import Features
+from clpt.render.records import Features
 from clpt.render.wavefront.light_rounds import LightRounds
 from clpt.render.wavefront.noise_meter import NoiseMeter, divide
 from clpt.render.wavefront.tracer import OnBatch, Selection, Tracer
 from clpt.render.wavefront.wavefront import Wavefront
 from clpt.render.wavefront.work_list import FOREVER
-from clpt.scene import check_noise
+from clpt.scene import checked_noise
 from clpt.scene.integrators import PIXELWISE
 
 LEAST = 8  # samples of a pixel at the first look at the film; the second look tells the noise
@@ -45,7 +45,7 @@ OPEN = FOREVER  # of a cell whose number of samples is not decided
 
 def checked(noise: float, features: Features) -> float:
     """Return a limit of noise. Raises SceneError where it makes no sense."""
-    check_noise(noise)
+    noise = checked_noise(noise)
     if features.transport.light_paths:
         message = "the integrator particle_tracer cannot choose which pixels its paths reach"
         raise SceneError(f"{message}; leave it out, or choose path", where="noise")

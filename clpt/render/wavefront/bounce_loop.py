@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from clpt import device
 from clpt.device.timing import Timings
-from clpt.render.codegen import bounce, programs, signatures
-from clpt.render.contract.features import Features
-from clpt.render.lowering.scene import Lowered
+from clpt.render.flow import bounce, programs, signatures
+from clpt.render.flow.scene_to_tables import Lowered
+from clpt.render.records import Features
 from clpt.render.wavefront import queues, strategy
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.render.wavefront.path_buffers import GROUP, PathBuffers

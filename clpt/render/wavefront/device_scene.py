@@ -8,16 +8,17 @@ import numpy as np
 import pyopencl as cl
 
 from clpt import bvh, device
+from clpt.arrays import on_host
 from clpt.device.buffers import Buffers
 from clpt.records import TABLES
-from clpt.render.lowering.device_grids import POINT_WORDS, CloudDensity, Values
-from clpt.render.lowering.scene import Lowered
-from clpt.render.lowering.textures.noise import PERMUTATION
+from clpt.render.flow.scene_to_tables import Lowered
+from clpt.render.media.device_grids import POINT_WORDS, CloudDensity, Values
+from clpt.render.textures.noise import PERMUTATION
 from clpt.render.wavefront import trees
 from clpt.render.wavefront.strategy import Strategy
 
-_BRICKS = "motion/brick_density.cl"
-_CLOUD = "motion/cloud_density.cl"
+_BRICKS = "stage/brick_density.cl"
+_CLOUD = "stage/cloud_density.cl"
 UPLOADED = tuple(name for name in TABLES if name != "instances")  # that one is of the trees
 
 
@@ -98,7 +99,7 @@ class DeviceScene:
         if values.context == self.device.context:
             self.stream.after(values.events)
             return values.base_data, values.offset // 4
-        return self.upload("densities", values.get()), 0
+        return self.upload("densities", on_host(values)), 0
 
     def upload(self, name: str, table: np.ndarray) -> cl.Buffer:
         """Return a new buffer that holds a table. Raises MemoryBudgetError."""

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from clpt import device
 from clpt.arrays import Words
 from clpt.device.buffers import Buffers
-from clpt.render.contract.features import GROUP_WORDS, SUM_WORDS, Features
+from clpt.render.film.state import NO_LAYERS, NO_LIGHT_LAYERS, NO_MATTES, SAMPLES_WORD
+from clpt.render.records import GROUP_WORDS, SUM_WORDS, Features
 from clpt.render.wavefront import work_list
-from clpt.render.wavefront.film_state import NO_LAYERS, NO_LIGHT_LAYERS, NO_MATTES, SAMPLES_WORD
 from clpt.scene.layers import MATTE_SLOTS
 
 NONE = {"layers": NO_LAYERS, "light_layers": NO_LIGHT_LAYERS, "mattes": NO_MATTES}

@@ -1,15 +1,15 @@
-"""A guide on the device: it learns where light comes from, see kernels/guiding/guide.cl."""
+"""A guide on the device: it learns where light comes from (transport/guiding/guide.cl)."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from clpt import device
-from clpt.render.analysis import guides
+from clpt.render.transport import guides
 from clpt.render.wavefront.bounce_loop import Kernels
 from clpt.render.wavefront.path_buffers import PathBuffers
 
-PROGRAM, ROOT, KERNEL = "guide", "guiding/sum.cl", "guide_sum"
+PROGRAM, ROOT, KERNEL = "guide", "transport/guiding/sum.cl", "guide_sum"
 GROUP = 8  # work-items of a group
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt.arrays import Floats
-from clpt.render.codegen import programs
+from clpt.render.flow import programs
 from clpt.render.wavefront.cells import SIDE
 from clpt.render.wavefront.wavefront import Wavefront
 

@@ -16,7 +16,7 @@ from clpt.device.buffers import Buffers
 from clpt.errors import MemoryBudgetError
 from clpt.layout import SLAB_BLOCK, Record
 from clpt.records import COUNTER_NUMBERS, PATH, PATH_BITS, SLABS
-from clpt.render.lowering.scene import Lowered
+from clpt.render.flow.scene_to_tables import Lowered
 from clpt.render.wavefront import queues, work_list
 from clpt.render.wavefront.cells import CellGrid
 
@@ -108,7 +108,7 @@ class PathBuffers:
 
     settings: a copy of those of the lowered scene, with the numbers of slots and planes and the
     seed of the samples; pixels: how many have samples, with those around the picture; blocks: slots
-    beyond those of the paths, see kernels/path/queue.cl; in_blocks: whether slabs are, see
+    beyond those of the paths, see kernels/transport/queue.cl; in_blocks: whether slabs are, see
     kernels/core/slab.cl.
 
     Raises MemoryBudgetError.

@@ -15,7 +15,7 @@ from clpt.render.wavefront.bounce_loop import Kernels, Step
 NONE, RUN = (PHOTON_NUMBERS[name] for name in ("none", "run"))
 GROUP = 8  # work-items of a group
 ADVICE = "lower photon_memory"
-PROGRAM, ROOT = "photons", "merging/sort.cl"
+PROGRAM, ROOT = "photons", "transport/photons/sort.cl"
 
 
 class Photons:

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 from clpt import bvh, device
 from clpt.errors import SceneError
-from clpt.render.contract.features import Features
-from clpt.render.lowering.scene import Lowered
+from clpt.render.flow.scene_to_tables import Lowered
+from clpt.render.records import Features
 
 BRUTE_SHAPES = 32  # analytic shapes up to which a ray tests all of them
 INTERLEAVED_TRIANGLES = 1 << 20  # from which interleaved rays pay; measured, see bench/NOTES.md

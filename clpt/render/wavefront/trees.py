@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from clpt import bvh
 from clpt.device.buffers import Buffers
-from clpt.render.lowering.scene import Lowered
+from clpt.render.flow.scene_to_tables import Lowered
 
 
 @dataclass(frozen=True)

@@ -19,14 +19,14 @@ from numpy.typing import NDArray
 from clpt import bvh, device
 from clpt.arrays import Words
 from clpt.device.timing import Timings
-from clpt.render.codegen import programs
-from clpt.render.contract.features import Features
-from clpt.render.lowering.scene import Lowered
+from clpt.render.film.state import SAMPLES_WORD
+from clpt.render.flow import programs
+from clpt.render.flow.scene_to_tables import Lowered
+from clpt.render.records import Features
 from clpt.render.wavefront import strategy
 from clpt.render.wavefront.bounce_loop import BounceLoop, Ending, Kernels, Step
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.render.wavefront.film import Film
-from clpt.render.wavefront.film_state import SAMPLES_WORD
 from clpt.render.wavefront.guide import Guide
 from clpt.render.wavefront.path_buffers import COUNTERS, PathBuffers, divide_film
 from clpt.render.wavefront.photons import Photons

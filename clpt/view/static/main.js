@@ -192,6 +192,7 @@ function help() {
       h("div", {}, h("h2", {}, "Keys"), rows(actions.map(({ keys, text }) => [keys.map(key), text])))),
     h("button", { class: "wide", onclick: () => dialog.close() }, "close"));
   dialog.showModal();
+  dialog.scrollTop = 0; // the button below has the focus
 }
 
 function hint(text) {

@@ -103,12 +103,15 @@ function panelOf(panel, state, connection, open, folded) {
   const kinds = panel.kinds.length
     ? row("kind", "of the material; parameters that both kinds have stay", choice([...new Set([panel.kind, ...panel.kinds])], panel.kind, (value) => connection.send("edit", { target: panel.target, index: panel.index, key: "type", value }), "kind"))
     : null;
+  const metals = panel.metals.length
+    ? row("metal", "its optical constants, in eta and k", choice([["choose", ""], ...panel.metals.map((name) => [name, name])], "", (value) => value && connection.send("edit", { target: panel.target, index: panel.index, key: "metal", value }), "metal"))
+    : null;
   const place = panel.target === "camera"
     ? h("button", { class: "link", title: "origin, target and up, as Python", onclick: () => connection.send("look_at") }, "copy look_at") : null;
-  if (!folded) return [h("p", { class: "kind" }, panel.kind.replaceAll("_", " ")), h("p", { class: "doc" }, panel.doc), kinds, rows(), place];
+  if (!folded) return [h("p", { class: "kind" }, panel.kind.replaceAll("_", " ")), h("p", { class: "doc" }, panel.doc), kinds, metals, rows(), place];
   const details = h("details", { class: "inner", open: open.has(key) },
     h("summary", {}, panel.title, panel.title === panel.kind.replaceAll("_", " ") ? "" : h("span", { class: "dim" }, panel.kind.replaceAll("_", " "))), body);
-  const fill = () => { if (details.open && body.children.length === 1) body.append(...[kinds, ...rows()].filter(Boolean)); };
+  const fill = () => { if (details.open && body.children.length === 1) body.append(...[kinds, metals, ...rows()].filter(Boolean)); };
   details.addEventListener("toggle", (event) => {
     event.stopPropagation();
     if (details.open) open.add(key); else open.delete(key);

@@ -182,6 +182,29 @@ def test_directions_of_anisotropy(shape):
     np.testing.assert_allclose(angles.image, [expected], atol=1e-3)
 
 
+def test_a_turn_without_an_image_is_counted_from_the_normal_map(shape):
+    """KHR_materials_anisotropy: tangents are those of `normalTexture` where there is no TANGENT."""
+    given = _extension("anisotropy", anisotropyStrength=1, anisotropyRotation=0.5)
+    for more, (mapping, linear) in {
+        (0, 0.0): ("uv", None),
+        (1, 0.0): ("uv1", np.eye(2)),
+        (0, np.pi / 2): ("uv", np.array([[0, -1], [1, 0]])),
+    }.items():
+        where = {"KHR_texture_transform": {"rotation": more[1], "texCoord": more[0]}}
+        base = {"baseColorTexture": {"index": 0}}
+        mapped = {
+            "normalTexture": {"index": 0, "extensions": where},
+            "pbrMetallicRoughness": base,
+        }
+        front = _front(shape({**given, **mapped}))
+        turn = front.material.anisotropy_rotation
+        if linear is None:
+            assert turn == pytest.approx(np.degrees(0.5))
+            continue
+        assert turn.mapping == mapping and np.ravel(turn.image) == pytest.approx(np.degrees(0.5))
+        np.testing.assert_allclose(turn.to_uv[:2, :2], linear, atol=1e-7)
+
+
 def test_specular(shape):
     strong = _front(shape(_extension("specular", specularColorFactor=[2, 1, 0])))
     f0 = ((strong.ior.value - 1) / (strong.ior.value + 1)) ** 2

@@ -370,9 +370,11 @@ def test_normals_from_images(read):
         assert leaf(one).height.raw and leaf(one).height.channel == "r" and warnings == []
     one, warnings = read("map_Bump -bm .5 normals.png")
     assert leaf(one).kind == "normal_map" and leaf(one).scale == 0.5 and leaf(one).map.raw
+    assert leaf(one).along_v
     assert warnings == ["material 'a': map_Bump looks like a normal map, and is read as one"]
     one, warnings = read("norm normals.png\nmap_Bump grey.png\nd .5")
     assert leaf(one).material.kind == "normal_map" and warnings == []
+    assert leaf(one).material.along_v
 
 
 def test_images_of_physical_materials(read):

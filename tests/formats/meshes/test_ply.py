@@ -8,8 +8,8 @@ import struct
 import numpy as np
 import pytest
 
-from clpt import budget
 from clpt.errors import SceneError
+from clpt.files import budget
 from clpt.formats.meshes import ply
 from clpt.formats.meshes.triangles import attributes
 

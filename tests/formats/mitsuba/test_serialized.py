@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import clpt
-from clpt import budget
 from clpt.errors import SceneError
+from clpt.files import budget
 from clpt.formats.mitsuba import serialized
 
 VERTICES = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0.5), (0, 1, 0)])

@@ -14,7 +14,7 @@ from clpt import spectra
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
 from clpt.formats import load, native
 from clpt.formats.native import schema
-from clpt.render.lowering.scene import lower
+from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import KINDS, Scene, cameras, integrators, lights, materials, shapes, textures
 
 ROOT = Path(__file__).parents[3]
@@ -214,7 +214,7 @@ ERRORS = [
     ({"spp": 0}, "spp", "above zero"),
     ({"spp": 1.5}, "spp", "whole number"),
     ({"seed": "x"}, "seed", "must be a number, not a string"),
-    ({"film": {"width": 0}}, "film.width", "must be 1 to 65536"),
+    ({"film": {"width": 0}}, "film.width", "must be a whole number from 1 to 65536"),
     ({"film": {"width": 1e12}}, "film.width", "below 2^31"),
     ({"film": {"mode": "cmyk"}}, "film.mode", "is none of spectral, rgb"),
     ({"camera": {**CAMERA, "fov": float("nan")}}, "camera.fov", "finite"),

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 import clpt
-from clpt.render.lowering.scene import lower
+from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import Scene, materials, media
 from clpt.scene.cameras import Perspective
 from clpt.scene.lights import CubeMap, Envmap

@@ -31,7 +31,7 @@ def test_a_gbuffer_has_layers(scene):
 
 
 def ours(scene, x, y):
-    """Origin and direction through a place on the film, as kernels/camera has them."""
+    """Origin and direction through a place on the film, as kernels/cameras has them."""
     camera, film = scene.camera, scene.film
     aspect = film.height / film.width
     if isinstance(camera, cameras.Orthographic):
@@ -186,7 +186,8 @@ def test_photons_are_those_of_vcm(scene, photons, light_paths):
     made = scene(f'{film}Integrator "sppm" "float radius" 0.25 "integer maxdepth" 7 {given}')
     (warning,) = made.warnings
     assert "sppm" in warning and "passes" in warning
-    expected = integrators.Vcm(max_depth=8, radius=0.25, light_paths=light_paths)
+    own = {"max_depth": 8, "free_panes": False, "radius": 0.25, "light_paths": light_paths}
+    expected = integrators.Vcm(**own)
     assert type(made.integrator) is integrators.Vcm
     assert vars(made.integrator) == vars(expected)
 
@@ -237,7 +238,7 @@ def test_samplers_and_integrators(scene):
         ('Camera "perspective" "float shutterclose" 0', "does not open"),
         ('Camera "fisheye"', "unknown camera"),
         ('Film "image"', "version 3"),
-        ('Film "rgb" "integer xresolution" 0', "must be 1 to 65536"),
+        ('Film "rgb" "integer xresolution" 0', "must be a whole number from 1 to 65536"),
         ('PixelFilter "boks"', "did you mean 'box'"),
         ('Sampler "random"', "unknown sampler"),
         ('Integrator "ao"', "use 'path'"),

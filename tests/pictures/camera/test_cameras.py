@@ -9,7 +9,7 @@ import pytest
 
 import clpt
 from clpt import transforms as tf
-from clpt.render.analysis.filters import FUNCTIONS
+from clpt.render.film.filters import FUNCTIONS
 from clpt.scene import Film, Scene, cameras
 from clpt.scene.integrators import (
     BlackmanHarris,

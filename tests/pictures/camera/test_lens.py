@@ -10,7 +10,7 @@ import pytest
 import clpt
 from clpt import spectra
 from clpt import transforms as tf
-from clpt.render.lowering.scene import lower
+from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import ThinLens
 from clpt.scene.integrators import Box

@@ -14,8 +14,8 @@ from clpt import transforms as tf
 from clpt.errors import SceneError
 from clpt.formats import load, native
 from clpt.lenses import Coat, Prescription, Surface
-from clpt.render.analysis.index import SceneIndex
-from clpt.render.lowering.scene import lower
+from clpt.render.flow.scene_to_tables import lower
+from clpt.render.scene_index import SceneIndex
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Lens, Perspective
 from clpt.scene.integrators import Box, Path

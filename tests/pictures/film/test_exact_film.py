@@ -17,7 +17,7 @@ from clpt.__main__ import run
 from clpt.cli.render.refused import refusals
 from clpt.errors import SceneError
 from clpt.images import exr_files
-from clpt.render.wavefront.film_state import FILM_WORDS, SAMPLES_WORD, SUM_WORDS, FilmState
+from clpt.render.film.state import FILM_WORDS, SAMPLES_WORD, SUM_WORDS, FilmState
 from clpt.render.wavefront.wavefront import Counts
 from clpt.scene import Film, Scene, lights
 from clpt.scene.cameras import Perspective
@@ -185,9 +185,9 @@ def test_numbers_of_a_stopped_run_are_not_used_again():
 
 
 def test_what_stops_a_run():
-    """Only False, and `cancel`, also before the run."""
+    """Only what is false, and `cancel`, also before the run."""
     with clpt.Renderer(sky()) as renderer:
-        assert renderer.run(3, lambda progress: None) and renderer.run(3, lambda progress: 0)
+        assert renderer.run(3, lambda progress: None) and renderer.run(3, lambda progress: 1)
         renderer.cancel()
         assert not renderer.run(3) and renderer.samples == 6
         assert renderer.run(3) and renderer.samples == 9

@@ -10,8 +10,8 @@ import pytest
 
 import clpt
 from clpt.errors import SceneError
-from clpt.render.analysis import filters
-from clpt.render.analysis.index import SceneIndex
+from clpt.render.film import filters
+from clpt.render.scene_index import SceneIndex
 from clpt.scene import Film, Scene, lights
 from clpt.scene import integrators as it
 from clpt.scene.cameras import Perspective

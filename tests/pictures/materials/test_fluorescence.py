@@ -14,7 +14,7 @@ import clpt
 from clpt import spectra
 from clpt import transforms as tf
 from clpt.errors import SceneError
-from clpt.render.lowering.scene import lower
+from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Orthographic
 from clpt.scene.integrators import Path, Whitted

@@ -12,8 +12,9 @@ from clpt import transforms as tf
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
 from clpt.scene.cameras import Perspective
-from clpt.scene.integrators import Auto, Path, is_long
-from clpt.scene.lights import Constant, Point
+from clpt.scene.integrators import Auto, ParticleTracer, Path, Vcm, is_long, shared
+from clpt.scene.lights import Area, Constant, Point
+from clpt.scene.params import fields_of
 from clpt.scene.shapes import Rectangle
 from tests.pictures.builders import ALBEDO, facing_down
 from tests.pictures.support import (
@@ -172,3 +173,46 @@ def test_volpath_counts_as_mitsubas(tmp_path, depth: int) -> None:
     scene = with_path(with_film(clpt.load(path), mode="rgb"), light_paths=0)
     theirs = mitsubas(path, 16, 512).mean(axis=(0, 1, 2))
     assert_mean(exposures(scene, 16, 1024), theirs, 0.02, 0.01)
+
+
+FREE = {
+    "path": Path(max_depth=3, light_paths=0),
+    "light paths": Path(max_depth=3, light_paths=1),
+    "vcm": Vcm(max_depth=3),
+    "particle_tracer": ParticleTracer(max_depth=3),
+}
+
+
+def test_panes_are_free_however_light_is_found() -> None:
+    """A lamp over four panes over a floor: three steps are the panes' light by every way."""
+    shapes = [
+        Rectangle(material=m.Diffuse(reflectance=0.8), to_world=tf.scale(2.0)),
+        *[
+            Rectangle(material=PANE, to_world=tf.translate([0, 0, 0.5 + 0.1 * i]) @ tf.scale(4.0))
+            for i in range(COUNT)
+        ],
+        Rectangle(
+            material=m.Diffuse(reflectance=0.0),
+            emission=Area(radiance=10.0),
+            to_world=tf.translate([0, 0, 1.5]) @ tf.rotate([1, 0, 0], 180) @ tf.scale(0.5),
+        ),
+    ]
+    view = tf.look_at([0, -1.2, 0.4], [0, 0, 0], [0, 0, 1])  # below the panes
+    means = {}
+    for name, way in FREE.items():
+        scene = Scene(
+            camera=Perspective(to_world=view, fov=40.0),
+            shapes=shapes,
+            integrator=way,
+            film=Film(width=12, height=12, mode="rgb"),
+        )
+        means[name] = float(clpt.render(scene, 256).mean())
+    assert means["path"] > 0.1
+    np.testing.assert_allclose(list(means.values()), means["path"], rtol=0.03)
+
+
+def test_what_auto_may_choose_has_its_parameters() -> None:
+    """What is asked of `auto` holds for what it takes: else it would change the picture."""
+    asked = Auto(max_depth=5, rr_depth=2, hide_lights=True, free_panes=False)
+    for other in (Path, Vcm):
+        assert shared(asked, other()) == fields_of(asked)

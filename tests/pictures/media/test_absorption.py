@@ -23,7 +23,7 @@ from clpt.scene.lights import Area, Constant, Point
 from clpt.scene.materials import Dielectric, Diffuse, Layer, Null, RoughDielectric
 from clpt.scene.shapes import Cube, Rectangle, Sphere
 from tests.pictures.builders import BLACK, DOWN, UP
-from tests.pictures.spectral.test_spectral import FINE, HALF_WIDTH, band, to_rgb
+from tests.pictures.spectra.test_spectral import FINE, HALF_WIDTH, band, to_rgb
 from tests.pictures.support import assert_agree, assert_mean, blocks, exposures
 from tests.rotation import rotating
 

@@ -14,7 +14,7 @@ import pytest
 import clpt
 from clpt import transforms as tf
 from clpt.errors import SceneError
-from clpt.render.lowering.scene import lower
+from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import Film, Scene, media
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Box

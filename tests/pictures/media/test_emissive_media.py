@@ -15,14 +15,14 @@ import clpt
 from clpt import spectra
 from clpt import transforms as tf
 from clpt.geometry.triangles import triangulate
-from clpt.render.analysis import glow
-from clpt.render.analysis.bricks import Glow
+from clpt.render.lights import glow
+from clpt.render.lights.bricks import Glow
 from clpt.scene import Film, Scene, media
 from clpt.scene.cameras import Orthographic, Perspective
 from clpt.scene.integrators import Box, Direct, Whitted
 from clpt.scene.integrators import Path as PathIntegrator
 from clpt.scene.lights import Constant, Point
-from clpt.scene.materials import Diffuse, Null, TwoSided
+from clpt.scene.materials import Dielectric, Diffuse, Null, TwoSided
 from clpt.scene.shapes import Cube, Mesh, Rectangle, Sphere
 from clpt.spectra import cie
 from clpt.spectra.emission import planck
@@ -305,3 +305,27 @@ def nothing(glow: Glow) -> Glow:
     """No brick of those that emit."""
     none = (values[:0] for values in (glow.numbers, glow.power, glow.corners, glow.edges))
     return Glow(*none, glow.emitting)
+
+
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+def test_a_black_body_within_glass_is_as_bright_as_outside(mode: str) -> None:
+    """Radiance in glass is n^2 of that outside: an opaque body shows 1 - F of Planck's."""
+    hot = media.Grid(
+        density=np.ones((2, 2, 2), np.float32),
+        sigma_a=200.0,
+        temperature=np.full((2, 2, 2), 3000.0, np.float32),
+        brightness=1e-6,
+    )
+    means = []
+    for material in (Null(), Dielectric(int_ior=1.5, ext_ior=1.0)):
+        body = Cube(material=material, interior=hot, to_world=tf.scale(0.5))
+        scene = Scene(
+            camera=Orthographic(
+                to_world=tf.look_at([0, 0, 3], [0, 0, 0], [0, 1, 0]) @ tf.scale([0.2, 0.2, 1])
+            ),
+            shapes=[body],
+            film=Film(width=4, height=4, mode=mode),
+            integrator=PathIntegrator(max_depth=16, light_paths=0),
+        )
+        means.append(np.asarray(clpt.render(scene, 256)).mean())
+    assert means[1] / means[0] == pytest.approx(0.96, abs=0.01)

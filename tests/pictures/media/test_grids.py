@@ -18,7 +18,8 @@ from clpt import spectra
 from clpt import transforms as tf
 from clpt.errors import SceneError
 from clpt.formats.volumes import vol
-from clpt.render.lowering import device_grids, grids
+from clpt.render.media import device_grids
+from clpt.render.media import encode_grids as grids
 from clpt.scene import Film, Scene, media
 from clpt.scene.cameras import Orthographic
 from clpt.scene.integrators import Box

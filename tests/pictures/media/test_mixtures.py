@@ -15,8 +15,8 @@ import pytest
 
 import clpt
 from clpt.errors import SceneError
-from clpt.render.lowering import grids
-from clpt.render.lowering.encoder import Encoder
+from clpt.render.materials.encoder import Encoder
+from clpt.render.media import encode_grids as grids
 from clpt.scene import integrators, media, phases
 from clpt.scene.cameras import Perspective
 from clpt.scene.lights import Constant, Spot

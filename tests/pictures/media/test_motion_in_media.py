@@ -13,7 +13,7 @@ import pytest
 
 from clpt import transforms as tf
 from clpt.errors import SceneError
-from clpt.render.lowering.scene import lower
+from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import Scene, media
 from clpt.scene import materials as m
 from clpt.scene.integrators import ParticleTracer, Path, Vcm

@@ -13,8 +13,8 @@ import pytest
 import clpt
 from clpt import transforms
 from clpt.errors import SceneError
-from clpt.render.editing.blurring import between
-from clpt.render.lowering.scene import lower
+from clpt.render.edit.blurring import between
+from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import Scene, cameras, integrators, lights, materials, shapes, textures
 from clpt.scene.motion import Deformation, Keys, Shutter
 from tests.pictures.motion.test_motion import ball

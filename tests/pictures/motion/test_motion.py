@@ -15,7 +15,7 @@ from clpt import transforms
 from clpt.errors import SceneError
 from clpt.geometry import motion
 from clpt.geometry.tubes import as_tubes
-from clpt.render.lowering.scene import lower
+from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import Scene, cameras, integrators, lights, materials, media, shapes, textures
 from clpt.scene.motion import Deformation, Keys, Shutter, decomposed, rotation
 from tests.pictures.support import Values

@@ -26,7 +26,7 @@ SCENES = (
     "thrown_images",
 )  # fmt: skip
 # Mitsuba's envmap is up to a quarter off its own RGB picture in spectral mode, where texels are
-# saturated; tests/pictures/spectral/test_spectral.py holds ours to the RGB picture instead.
+# saturated; tests/pictures/spectra/test_spectral.py holds ours to the RGB picture instead.
 CASES = [(name, mode) for name in SCENES for mode in ("rgb", "spectral")]
 CASES.remove(("envmap", "spectral"))
 CASES.remove(("thrown_images", "spectral"))  # of a projector Mitsuba does not take D65 for white

@@ -12,7 +12,7 @@ from PIL import Image
 import clpt
 from clpt import transforms as tf
 from clpt.errors import SceneError
-from clpt.render.lowering.scene import lower
+from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import Film, Scene, integrators
 from clpt.scene import materials as m
 from clpt.scene.cameras import Orthographic

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clpt.render.codegen import programs
-from clpt.render.lowering.scene import lower
+from clpt.images.spectral_exr import SpectralImage
+from clpt.render.flow import programs
+from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import Film, Scene, textures
 from clpt.scene import materials as m
 from clpt.scene.cameras import Perspective
@@ -21,7 +22,6 @@ from clpt.scene.lights import Area, Constant
 from clpt.scene.materials import LEAVES
 from clpt.scene.params import device_params
 from clpt.scene.shapes import Rectangle
-from clpt.spectral_exr import SpectralImage
 from clpt.transforms import look_at, rotate, scale, translate
 from tests.pictures.support import assert_agree, blocks, exposures
 

@@ -17,8 +17,8 @@ import clpt
 from clpt import device as dev
 from clpt import transforms as tf
 from clpt.errors import SceneError
-from clpt.render.analysis import analyse
-from clpt.render.lowering.scene import lower
+from clpt.render.flow import find as analyse
+from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
 from clpt.scene.cameras import Orthographic, Perspective, ThinLens

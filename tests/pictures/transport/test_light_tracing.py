@@ -18,7 +18,7 @@ import clpt
 from clpt import transforms as tf
 from clpt.device import choose
 from clpt.errors import SceneError
-from clpt.render.lowering.scene import lower
+from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import Film, Scene, kinds
 from clpt.scene import materials as m
 from clpt.scene.cameras import Camera, Orthographic, Perspective, ThinLens

@@ -17,7 +17,7 @@ import clpt
 from clpt import device as dev
 from clpt import transforms as tf
 from clpt.errors import SceneError
-from clpt.render.lowering.scene import lower
+from clpt.render.flow.scene_to_tables import lower
 from clpt.render.wavefront.bounce_loop import BounceLoop
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m

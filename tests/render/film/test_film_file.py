@@ -19,7 +19,7 @@ from clpt.errors import SceneError
 from clpt.render.film import film_file
 from clpt.render.film.picture_form import PictureForm
 from clpt.render.film.saved_film import Origin, SavedFilm, Session
-from clpt.render.wavefront.film_state import FilmState
+from clpt.render.film.state import FilmState
 from clpt.scene.fingerprint import Fingerprint
 
 FLIPS = 2000

@@ -9,15 +9,16 @@ import OpenEXR
 import pytest
 
 import clpt
-from clpt import images, spectral_exr
+from clpt import images
 from clpt.__main__ import run
-from clpt.render.analysis.colour import sensor
-from clpt.render.contract.layer_names import LayerNames
+from clpt.images import spectral_exr
+from clpt.render.film.colour import sensor
 from clpt.render.film.cryptomatte import RANKS
 from clpt.render.film.layer_channels import SETS, channels_of
 from clpt.render.film.layers import white_paper
 from clpt.render.film.picture_form import PictureForm
 from clpt.render.film.pictures import Still
+from clpt.render.records.layer_names import LayerNames
 from clpt.scene import Film
 from clpt.scene.layers import LAYERS
 from clpt.spectra import cie

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from clpt.render.lowering.scene import lower
+from clpt.render.flow.scene_to_tables import lower
 from clpt.render.trials import cost
 from clpt.render.trials.cost import Trial
 from clpt.scene import Film, Scene

@@ -12,8 +12,8 @@ import pytest
 
 import clpt
 from clpt.errors import SceneError
-from clpt.render.analysis import guides, worth
-from clpt.render.lowering.scene import Lowered, lower
+from clpt.render.flow.scene_to_tables import Lowered, lower
+from clpt.render.transport import guides, worth
 from clpt.render.trials import cost, trial
 from clpt.scene import Scene
 from clpt.scene.integrators import Auto, Integrator, Path
@@ -182,7 +182,7 @@ def test_the_cheapest_way_is_taken(monkeypatch: pytest.MonkeyPatch, best: tuple[
     assert asked == WAYS
     assert (found.integrator.light_paths, found.integrator.guiding) == best
     assert found.features.transport.guided == best[1]
-    assert "is sharp" in found.reason and "light paths 1.00" in found.reason
+    assert "is specular" in found.reason and "light paths 1.00" in found.reason
     assert found.candidates == ()
 
 

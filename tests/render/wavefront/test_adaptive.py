@@ -17,8 +17,8 @@ import clpt
 from clpt import transforms as tf
 from clpt.device import Device, choose
 from clpt.errors import SceneError
-from clpt.render.contract.features import Features, TransportFeatures
-from clpt.render.lowering.scene import lower
+from clpt.render.flow.scene_to_tables import lower
+from clpt.render.records import Features, TransportFeatures
 from clpt.render.wavefront.adaptive import LEAST, _partners, checked
 from clpt.render.wavefront.cells import SIDE
 from clpt.render.wavefront.light_rounds import LightRounds

@@ -10,8 +10,8 @@ import pytest
 
 import clpt
 from clpt import device
-from clpt.render.editing import parameter_patch, rebuild
-from clpt.render.lowering.scene import lower
+from clpt.render.edit import parameter_patch, rebuild
+from clpt.render.flow.scene_to_tables import lower
 from clpt.render.wavefront.strategy import Tuning
 from clpt.render.wavefront.wavefront import Wavefront
 from clpt.scene import Scene

@@ -9,8 +9,8 @@ import pytest
 
 import clpt
 from clpt import device, transforms
-from clpt.render.contract.features import MotionFeatures
-from clpt.render.lowering.scene import Lowered, lower
+from clpt.render.flow.scene_to_tables import Lowered, lower
+from clpt.render.records import MotionFeatures
 from clpt.render.wavefront import strategy
 from clpt.render.wavefront.strategy import Tuning
 from clpt.scene import Film, Scene, integrators, materials

@@ -15,10 +15,10 @@ from clpt import device
 from clpt.device import Source
 from clpt.layout import SLAB_BLOCK, Record
 from clpt.records import HIT, PATH, SHADOW, SLABS
-from clpt.render.codegen import programs
-from clpt.render.codegen.blocks import blocks_text, members, unused
-from clpt.render.codegen.signatures import scene_text
-from clpt.render.lowering.scene import lower
+from clpt.render.flow import programs
+from clpt.render.flow.blocks import blocks_text, members, unused
+from clpt.render.flow.scene_to_tables import lower
+from clpt.render.flow.signatures import scene_text
 from clpt.render.wavefront import queues
 from clpt.scene import Scene, integrators
 from clpt.scene.cameras import Perspective
@@ -39,12 +39,12 @@ ALIVE = 0x1000
 KINDS = 5
 VIRTUAL = {
     "generated/scene.cl": scene_text(),
-    "generated/spectrum.cl": '#include "spectrum/rgb.cl"\n',
-    "generated/spectrum_read.cl": '#include "spectrum/rgb_read.cl"\n',
+    "generated/spectrum.cl": '#include "spectra/rgb.cl"\n',
+    "generated/spectrum_read.cl": '#include "spectra/rgb_read.cl"\n',
     "generated/block.cl": blocks_text([lower(Scene(camera=Perspective())).features]),
     "sorting.cl": """
 #include "core/base.cl"
-#include "path/queue.cl"
+#include "transport/queue.cl"
 kernel void probe(SLAB_ARGS, global uint *queue, global uint *queue_starts, uint begin, uint end)
 {
     SLABS
@@ -55,7 +55,7 @@ kernel void probe(SLAB_ARGS, global uint *queue, global uint *queue_starts, uint
 """,
     "blocks.cl": """
 #include "core/base.cl"
-#include "path/queue.cl"
+#include "transport/queue.cl"
 kernel void probe(SLAB_ARGS, global const uint *queue, uint entry, uint end, uint block)
 {
     SLABS

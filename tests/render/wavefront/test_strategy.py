@@ -10,7 +10,7 @@ import pytest
 import clpt
 from clpt import device
 from clpt.errors import MemoryBudgetError
-from clpt.render.lowering.scene import Lowered, lower
+from clpt.render.flow.scene_to_tables import Lowered, lower
 from clpt.render.wavefront.path_buffers import (
     CPU_SLOTS,
     GROUP,

@@ -1,0 +1,91 @@
+"""Bytes a second that a kernel moves which only copies: others are compared with it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from clpt import device
+from clpt.bench.figures import Figure, Taken, clock_complaint, timed
+
+COPY = """
+/* Each work-item copies 64 bytes. */
+kernel void copy(global const uint16 *restrict from, global uint16 *restrict to)
+{
+    to[get_global_id(0)] = from[get_global_id(0)];
+}
+"""
+LARGEST = 1 << 27  # [bytes] beyond the caches of most devices
+WORD = 0x9E3779B9
+SLACK = 1.25  # how much faster than a copy may be: parts of what moves stay in registers
+
+
+class Copying:
+    """Copies between two buffers.
+
+    Raises MemoryBudgetError if the device does not have them.
+    """
+
+    def __init__(self, on: device.Device):
+        self.device = on
+        self._program = device.build(on, device.assemble("copy", {"copy": COPY}))
+        self._rates: dict[int, float] = {}
+
+    def rounds(self, nbytes: int, rounds: int) -> tuple[list[Taken], str]:
+        """Time copies of about `nbytes` bytes; return the times, and what is wrong if anything."""
+        items = max(nbytes // 64, 64)
+        give = device.Buffers(self.device)
+        source = (np.arange(items * 16, dtype=np.uint32) * WORD).view(np.uint32)
+        first = give.upload("the copy's source", source)
+        second = give.allocate("the copy's target", source.nbytes)
+        stream = device.Stream(self.device.queue)
+        bound = self._program.kernel("copy").bind(**{"from": first, "to": second})
+        repeats = max(1, min(64, (1 << 25) // nbytes))
+
+        def enqueue() -> list:
+            return [
+                stream.run(bound, (items,), (64 if items % 64 == 0 else 1,)) for _ in range(repeats)
+            ]
+
+        timed(self.device, enqueue)
+        stream.fill(second, 0, 0, source.nbytes)
+        taken = [timed(self.device, enqueue) for _ in range(rounds)]
+        wrong = (give.download(second, source.shape, np.uint32) != source).sum()
+        complaint = f"{wrong:,} of {source.size:,} words were not copied" if wrong else ""
+        each = [Taken(one.device / repeats, one.host / repeats) for one in taken]
+        return each, complaint or clock_complaint(taken)
+
+    def rate(self, nbytes: int) -> float:
+        """Bytes read and written a second, by copies of as many bytes in all; measured once."""
+        half = max(nbytes // 2 // 4096, 1) * 4096
+        if half not in self._rates:
+            taken, _ = self.rounds(half, 5)
+            self._rates[half] = 2 * half / min(one.device for one in taken)
+        return self._rates[half]
+
+    def complaint(self, nbytes: float, seconds: float, within: int) -> str:
+        """Why bytes cannot have been moved in the time, or "".
+
+        within: [bytes] of memory that they lie in, which may fit a cache or not.
+        """
+        limit = SLACK * max(self.rate(within), self.rate(2 * LARGEST))
+        if nbytes <= limit * seconds:
+            return ""
+        return (
+            f"{nbytes / seconds * 1e-9:.3g} GB/s cannot be: a copy of as much memory "
+            f"moves {limit / SLACK * 1e-9:.3g} GB/s"
+        )
+
+
+def measure(
+    on: device.Device, rounds: int, sizes: Sequence[int] = (1 << 21, LARGEST)
+) -> Iterator[Figure]:
+    """Figures of copies: GB/s read and written together, of a small and a large buffer."""
+    copying = Copying(on)
+    for size in sizes:
+        size = min(size, on.info.max_alloc // 64 * 64)
+        taken, complaint = copying.rounds(size, rounds)
+        speeds = tuple(2e-9 * size / one.device for one in taken)
+        name = f"copy {size / 2**20:g} MiB"
+        yield Figure("bandwidth", name, "GB/s", speeds, more={"bytes": 2 * size}).refuse(complaint)

@@ -1,0 +1,196 @@
+"""Launches of kernels: all that a stage is given and what it makes of that, to be run again.
+
+A stage that is launched again on another device, or by a program that its compiler did not
+optimise, must write the same words but for rounding. Which words may differ, and by how much, is a
+number for each, its margin m: m >= 0 compares floats, which may differ by m; below, whole numbers
+modulo 2^32 that may differ by -1 - m. A word of infinite margin is not compared.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import device
+from clpt.arrays import Words
+from clpt.bench.flight import Flight
+from clpt.layout import SLAB_BLOCK, Record
+from clpt.records import SLABS
+from clpt.render.flow import programs
+from clpt.render.wavefront.bounce_loop import Step
+
+PLAIN = ("-cl-opt-disable",)  # options of a compiler that shall not optimise
+ROUNDING = 1e-3  # by which a float may differ, of itself and of the mean size of its like
+EXACT, FREE = -1.0, np.inf  # margins
+MOST_OFF = 0.01  # of the words that a launch changes: paths whose choices hang on a rounding
+FREE_MEMBERS = ("low", "high", "cone")  # digits that follow from others; halves of a word
+COUNTS = ("queue_starts", "queue_counts")  # what else is compared; the order in queues is free
+
+
+@dataclass(frozen=True, eq=False)
+class Launch:
+    """A launch of a kernel.
+
+    stage: its name in a bounce; text: of its program; size, group: numbers of work-items;
+    before, after: the words of each buffer by the argument's name; values: the other arguments as
+    bytes, None for a null pointer; margins: of the words that are compared, by buffer.
+    """
+
+    stage: str
+    kernel: str
+    text: device.Source
+    size: tuple[int, ...]
+    group: tuple[int, ...] | None
+    arguments: tuple[device.Argument, ...]
+    before: Mapping[str, Words]
+    values: Mapping[str, bytes | None]
+    after: Mapping[str, Words]
+    margins: Mapping[str, NDArray[np.float32]]
+
+    def again(self, on: device.Device, options: Sequence[str] = ()) -> dict[str, Words]:
+        """Return the words of the buffers after this launch on a device.
+
+        options: of its compiler. Raises KernelBuildError, DeviceError, MemoryBudgetError.
+        """
+        kernel = device.build(on, self.text, options).kernel(self.kernel)
+        give, stream = device.Buffers(on), device.Stream(on.queue)
+        buffers = {name: give.upload(name, words) for name, words in self.before.items()}
+        values = {
+            name: None if value is None else np.frombuffer(value, np.uint8)
+            for name, value in self.values.items()
+        }
+        stream.run(kernel.bind(**buffers, **values), self.size, self.group)
+        after = {}
+        for name in self.margins:
+            after[name] = stream.read(buffers[name], np.empty_like(self.before[name]))
+        give.release(*buffers.values())
+        return after
+
+    def expecting(self, after: Mapping[str, Words], flight: Flight) -> Launch:
+        """Return this launch with other words after it, and their margins."""
+        margins = {name: _margins(flight, name, after[name]) for name in self.margins}
+        return dataclasses.replace(self, after={**self.after, **after}, margins=margins)
+
+    def compare(self, found: Mapping[str, Words]) -> Comparison:
+        """Compare what a device has made of this launch with the words after it."""
+        changed, off = 0, {}
+        for name, margins in self.margins.items():
+            expected = self.after[name]
+            which = is_off(found[name], expected, margins)
+            changed += int(((self.before[name] != expected) & (margins != FREE)).sum())
+            off[name] = np.flatnonzero(which)
+        return Comparison(self.stage, changed, off)
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A launch beside another: how many words it should change, and those that are off."""
+
+    stage: str
+    changed: int
+    off: Mapping[str, NDArray[np.intp]]
+
+    @property
+    def share(self) -> float:
+        """Words that are off, over those that the launch changes; at most 1."""
+        count = sum(map(len, self.off.values()))
+        return min(count / max(self.changed, 1), 1.0)
+
+    @property
+    def wrong(self) -> bool:
+        """Whether more words are off than rounding explains."""
+        return self.share > MOST_OFF
+
+
+def launches(flight: Flight) -> Iterator[Launch]:
+    """Run a bounce; yield the launch of each stage, before the next one runs."""
+    wave = flight.wavefront
+    loop, chosen = wave.loops[-1], wave.scene.strategy
+    texts = programs.sources(
+        loop.features, chosen.layout, wave.lanes, queued=chosen.queued,
+        interleaved=chosen.interleaved,
+    )  # fmt: skip
+    for step in wave.stages:
+        yield _launch(flight, step, texts.get(step.name) or texts["append"])
+
+
+def _launch(flight: Flight, step: Step, text: device.Source) -> Launch:
+    """Run a stage; return its launch."""
+    kernel, given = step.bound.kernel, step.bound.values
+    buffers: dict[str, Any] = {}
+    values: dict[str, bytes | None] = {}
+    for argument in kernel.arguments:
+        value = given[argument.name]
+        if argument.by_value:
+            values[argument.name] = np.asarray(value).tobytes()
+        elif value is None:
+            values[argument.name] = None
+        else:
+            buffers[argument.name] = value
+    before = {name: _words(flight, buffer) for name, buffer in buffers.items()}
+    flight.stage(step)
+    compared = {f"{record.name.lower()}_words" for record in SLABS} | {*COUNTS}
+    margins, after = {}, {}
+    for name in sorted(compared & buffers.keys()):
+        after[name] = _words(flight, buffers[name])
+        margins[name] = _margins(flight, name, after[name])
+    return Launch(
+        step.name, kernel.name, text, step.size, step.group, kernel.arguments, before, values,
+        after, margins,
+    )  # fmt: skip
+
+
+def _words(flight: Flight, buffer: Any) -> Words:
+    return flight.wavefront.stream.read(buffer, np.empty(buffer.size // 4, np.uint32))
+
+
+def is_off(found: Words, expected: Words, margins: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Return which words differ by more than their margins."""
+    with np.errstate(all="ignore"):
+        apart = np.abs(found.view(np.float32) - expected.view(np.float32))
+        near = apart <= margins
+        both_nan = np.isnan(found.view(np.float32)) & np.isnan(expected.view(np.float32))
+        steps = np.abs((found - expected).view(np.int32).astype(np.float64))
+    floats = (near | both_nan) & (margins >= 0)
+    whole = (steps <= -1.0 - margins.astype(np.float64)) & (margins < 0)
+    return np.asarray((found != expected) & ~floats & ~whole & (margins != FREE))
+
+
+def _margins(flight: Flight, name: str, expected: Words) -> NDArray[np.float32]:
+    """Return the margin of each word of a buffer."""
+    margins: NDArray[np.float32] = np.full(len(expected), EXACT, np.float32)
+    record = next((one for one in SLABS if f"{one.name.lower()}_words" == name), None)
+    if record is None:
+        return margins
+    rows, own = rows_of(flight, record, expected), rows_of(flight, record, margins)
+    for member in record.members:
+        for word in range(member.word, member.word + member.words):
+            digit = ("low", "middle", "high")[word - member.word] if member.type == "fixed" else ""
+            own[:, word] = _of_member(digit or member.name, member.type, rows[:, word])
+    return margins
+
+
+def rows_of(flight: Flight, record: Record, words: NDArray) -> NDArray:
+    """View a slab's words as (blocks, words, slots of a block)."""
+    if flight.wavefront.lanes == 1:
+        return words.reshape(-1, record.step, SLAB_BLOCK)
+    return words.reshape(1, record.step, -1)
+
+
+def _of_member(name: str, kind: str, words: NDArray[np.uint32]) -> NDArray:
+    """Return the margins of a word of all slots."""
+    if name in FREE_MEMBERS:
+        return np.full(words.shape, FREE)
+    if name == "middle":  # of a sum in units of 2^-48: this word counts units of 2^-16
+        signed = np.abs(words.view(np.int32).astype(np.float64))
+        return -2.0 - np.ceil(ROUNDING * (signed + signed.mean()))
+    if kind in ("integer", "natural", "natural3"):
+        return np.full(words.shape, EXACT)
+    size = np.abs(words.view(np.float32).astype(np.float64))
+    size[~np.isfinite(size)] = 0.0
+    return ROUNDING * (size + np.sqrt((size**2).mean()))

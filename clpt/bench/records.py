@@ -1,0 +1,125 @@
+"""Where and when something was measured, and the JSON lines that keep it."""
+
+from __future__ import annotations
+
+import datetime
+import json
+import os
+import platform
+import re
+import subprocess
+from collections.abc import Iterable
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from clpt import device
+from clpt.errors import SceneError
+from clpt.files import output_files
+
+ROOT = Path(__file__).parents[2]
+
+
+def processor() -> str:
+    """Return the name of the host's processor."""
+    try:
+        found = re.search(r"model name\s*:\s*(.+)", Path("/proc/cpuinfo").read_text())
+    except OSError:
+        found = None
+    return found[1].strip() if found else platform.processor() or platform.machine()
+
+
+def vectors() -> str:
+    """The widest vector instructions of an x86 processor, which a virtual one's name may hide."""
+    try:
+        flags = set(Path("/proc/cpuinfo").read_text().split())
+    except OSError:
+        return ""
+    return next((name for name in ("avx512f", "avx2", "avx", "sse2") if name in flags), "")
+
+
+def commit() -> str:
+    """The commit of a checkout, with a plus sign where files differ from it; "" if installed."""
+    if not (ROOT / ".git").exists():
+        return ""
+
+    def git(*arguments: str) -> str:
+        command = ["git", "-C", str(ROOT), *arguments]
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, check=True)
+        except (OSError, subprocess.CalledProcessError):
+            return ""
+        return done.stdout.strip()
+
+    changed = git("status", "--porcelain", "--untracked-files=no", "--", "clpt", "kernels")
+    return git("rev-parse", "--short", "HEAD") + ("+" if changed else "")
+
+
+def version() -> str:
+    """The version of clpt that is installed; "" if it runs from a checkout that is not."""
+    try:
+        return metadata.version("clpt")
+    except metadata.PackageNotFoundError:
+        return ""
+
+
+def circumstances() -> dict[str, Any]:
+    """Return the part of all records: date, version, commit, processor, its cores and its load."""
+    busy = {"load": round(os.getloadavg()[0], 1)} if hasattr(os, "getloadavg") else {}
+    return {
+        "date": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"),
+        "clpt": version(),
+        "commit": commit(),
+        "processor": f"{processor()} {vectors()}".strip(),
+        "cores": os.cpu_count(),
+        **busy,
+    }
+
+
+def of_device(info: device.DeviceInfo) -> dict[str, Any]:
+    """Return the part of a record that describes the device."""
+    own = info.cl_device
+    return {
+        "device": info.label,
+        "kind": info.kind,
+        "opencl": info.version,
+        "driver": info.driver,
+        "compute_units": info.compute_units,
+        "global_mem": info.global_mem,
+        "max_alloc": info.max_alloc,
+        "local_mem": own.local_mem_size,
+        "group": own.max_work_group_size,
+        "address_align": own.mem_base_addr_align // 8,
+        "doubles": "cl_khr_fp64" in own.extensions.split(),
+        "images": bool(own.image_support),
+    }
+
+
+def append(path: str | Path, rows: Iterable[dict[str, Any]]) -> None:
+    """Add records to a file of JSON lines, made where it is not there. Raises SceneError."""
+    about = circumstances()
+    try:
+        Path(path).parent.mkdir(parents=True, exist_ok=True)
+        heads = (({name: row[name] for name in ("bench",) if name in row}, row) for row in rows)
+        lines = [json.dumps({**head, **about, **row}) + "\n" for head, row in heads]
+        output_files.append_text(path, "".join(lines))
+    except OSError as error:
+        raise SceneError(f"cannot be written: {error}", file=path) from error
+
+
+def read(path: str | Path) -> list[dict[str, Any]]:
+    """The records of a file of JSON lines. Raises SceneError, telling the line."""
+    rows = []
+    try:
+        lines = Path(path).read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise SceneError(f"cannot be read: {error}", file=path) from error
+    for number, line in enumerate(lines, 1):
+        try:
+            row = json.loads(line)
+        except ValueError as error:
+            raise SceneError(f"is no JSON: {error}", file=path, line=number) from error
+        if not isinstance(row, dict):
+            raise SceneError("is no record, an object is wanted", file=path, line=number)
+        rows.append(row)
+    return rows

@@ -1,0 +1,159 @@
+"""Speed of each stage of a render: items a second, and bytes a second beside those of a copy.
+
+Each stage runs on the state that the stages before have left; its items are the slots that it has
+work for. Bytes are those of clpt.bench.traffic: what it must move of each path's state, without
+the scene's tables, trees and textures.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from clpt import device
+from clpt.bench.bandwidth import Copying
+from clpt.bench.figures import Figure, Taken, clock_complaint, timed
+from clpt.bench.flight import Flight
+from clpt.bench.traffic import traffic
+from clpt.records import SLABS
+from clpt.render.film.state import FILM_WORDS
+from clpt.render.flow import programs
+from clpt.render.wavefront import queues
+from clpt.render.wavefront.bounce_loop import Step
+from clpt.scene import Scene
+
+QUEUEING = [kernel for kernel, *_ in queues.steps(1, 1)]
+WARM = 4  # bounces before anything is noted, so that paths of all depths are in flight
+BOUNCES = 4  # of a round: in a single one few paths may begin
+
+Work = tuple[int, Taken]  # items, and what they took
+
+
+def measure(
+    on: device.Device,
+    scene: Scene,
+    rounds: int,
+    only: Sequence[str] = (),
+    **wavefront: Any,
+) -> Iterator[Figure]:
+    """Figures of every stage, in Mitems/s, each round a few bounces.
+
+    only: names of stages, or how they begin, as `shade`; all by default.
+    wavefront: parameters of clpt.render.wavefront.wavefront.Wavefront.create; raises as that does.
+    """
+    flight, copying = Flight(on, scene, **wavefront), Copying(on)
+    for _ in range(WARM):
+        flight.bounce()
+    noted: dict[str, list[Work]] = {}
+
+    def note(step: Step, enqueue: Callable[[], Any]) -> None:
+        items = flight.items(step)
+        noted.setdefault(step.name, []).append((items, timed(on, lambda: [enqueue()])))
+
+    for number in range(rounds):
+        for _ in range(BOUNCES):
+            flight.bounce(note)
+        for name, each in noted.items():
+            noted[name] = [*each[:number], _whole(each[number:])]
+    wave = flight.wavefront
+    features, layout = wave.features, wave.scene.strategy.layout
+    moved = traffic(features, layout, queued=wave.scene.strategy.queued)
+    for name, found in noted.items():
+        if name not in QUEUEING and _asked(name, only):
+            yield _figure(flight, copying, name, moved[name].total, found)
+    if _asked("append", only):
+        yield _queue(flight, copying, rounds)
+    if _asked("accumulate", only):
+        yield _accumulate(flight, copying, rounds)
+
+
+def _whole(each: Sequence[Work]) -> Work:
+    """The bounces of a round as one, without those that had nothing to do."""
+    busy = [(items, taken) for items, taken in each if items]
+    taken = Taken(sum(t.device for _, t in busy), sum(t.host for _, t in busy))
+    return sum(items for items, _ in busy), taken
+
+
+def _asked(name: str, only: Sequence[str]) -> bool:
+    return not only or any(name == one or name.startswith(f"{one}_") for one in only)
+
+
+def _figure(
+    flight: Flight, copying: Copying, name: str, nbytes: float, found: list[Work]
+) -> Figure:
+    """Return the speed of a stage; rounds in which no slot had work for it are left out."""
+    busy = [(items, taken) for items, taken in found if items]
+    within = 4 * sum(record.step for record in SLABS) * flight.slots
+    speeds = tuple(items * 1e-6 / taken.device for items, taken in busy)
+    more: dict[str, Any] = {"stage": name, "slots": flight.slots}
+    if not busy:
+        more["note"] = "no slot had work for it"
+        return Figure("stages", name, "Mitems/s", (), flight.scene.name, more)
+    copied = copying.rate(within) * 1e-9
+    gigabytes = float(np.median(speeds)) * nbytes * 1e-3
+    more |= {
+        "items": float(np.mean([items for items, _ in busy])),
+        "bytes": nbytes,
+        "gbytes": gigabytes,
+        "copy_gbytes": copied,
+        "of_copy": gigabytes / copied,
+        "lanes": flight.wavefront.lanes,
+        "layout": flight.wavefront.scene.strategy.layout,
+        "mode": flight.scene.film.mode,
+    }
+    figure = Figure("stages", name, "Mitems/s", speeds, flight.scene.name, more)
+    wrong = [copying.complaint(nbytes * i, t.device, within) for i, t in busy]
+    return figure.refuse(clock_complaint(t for _, t in busy), *wrong)
+
+
+def _queue(flight: Flight, copying: Copying, rounds: int) -> Figure:
+    """All slots brought into queues by the kind of their material, looked at afterwards."""
+    on, wave = flight.device, flight.wavefront
+    features, layout = wave.features, wave.scene.strategy.layout
+    kinds = len(features.materials.kinds)
+    for step in wave.stages:  # so that hits wait to be shaded
+        if step.bound.kernel.name == "shade" or step.name in QUEUEING:
+            break
+        flight.stage(step)
+    program = device.build(on, programs.append_source(features, layout, wave.lanes))
+    named, give = dict(wave.arguments), device.Buffers(on)
+    for name, size in queues.sizes(flight.slots, kinds, True).items():
+        named[name] = give.allocate("the queues", 4 * size)
+    steps = []
+    for name, size, group in queues.steps(flight.slots, kinds):
+        kernel = program.kernel(name)
+        bound = kernel.bind(**{a.name: named[a.name] for a in kernel.arguments})
+        steps.append((bound, (size,), (group,) if group else None))
+    found = []
+    for _ in range(rounds + 1):
+        wave.stream.fill(named["queue"], 0xFFFFFFFF, 0, named["queue"].size)
+        taken = timed(on, lambda: [wave.stream.run(*step) for step in steps])
+        found.append((flight.slots, taken))
+    nbytes = traffic(features, layout, queued=True)["append"].total
+    figure = _figure(flight, copying, "append", nbytes, found[1:])
+    queue, starts, counts = (
+        give.download(named[name], (named[name].size // 4,), np.uint32)
+        for name in ("queue", "queue_starts", "queue_counts")
+    )
+    wrong = 0
+    for kind in range(kinds):
+        own = queue[starts[kind] :][: counts[kind]]
+        expected = np.flatnonzero(flight.kinds == kind)
+        wrong += (
+            int((np.sort(own) != expected).sum()) if len(own) == len(expected) else len(expected)
+        )
+    return figure.refuse(f"{wrong:,} slots are not where they belong" if wrong else "")
+
+
+def _accumulate(flight: Flight, copying: Copying, rounds: int) -> Figure:
+    """The film made into a picture; its items are pixels."""
+    wave = flight.wavefront
+    size = flight.scene.film.size
+    nbytes = 4.0 * (FILM_WORDS + 4)
+    found = []
+    for _ in range(rounds + 1):
+        taken = timed(flight.device, lambda: [wave.accumulate_film()])
+        found.append((size[0] * size[1], taken))
+    return _figure(flight, copying, "accumulate", nbytes, found[1:])

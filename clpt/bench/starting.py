@@ -1,0 +1,132 @@
+"""Whole processes: seconds until a first picture of a scene, with empty caches and with full ones.
+
+Each is a new Python that imports clpt and renders 64x64 pixels with one sample. Cold means that
+the caches of clpt and of the drivers that are known here are empty folders.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from clpt.bench.figures import SECONDS, Figure
+from clpt.errors import DeviceError
+from clpt.files import child_processes, output_files
+
+CACHES = (  # what tells clpt and drivers where to keep what they compiled
+    "HOME", "XDG_CACHE_HOME", "POCL_CACHE_DIR", "CUDA_CACHE_PATH", "cl_cache_dir",
+    "NEO_CACHE_DIR", "AMD_COMGR_CACHE_DIR",
+)  # fmt: skip
+SIDE = 64
+
+
+@dataclass(frozen=True)
+class Process:
+    """Time of a process [s]: from its start to its end, and of the processor."""
+
+    seconds: float
+    cpu: float
+
+
+def run(command: Sequence[str], caches: Path, **environment: str) -> Process:
+    """Run a command whose caches lie in a folder. Raises DeviceError with its words if it fails."""
+    variables = {name: str(caches / name.lower()) for name in CACHES}
+    for folder in variables.values():
+        os.makedirs(folder, exist_ok=True)
+    with tempfile.TemporaryFile("w+") as output:
+        start = time.perf_counter()
+        process = subprocess.Popen(
+            command, env={**os.environ, **variables, **environment},
+            stdout=output, stderr=output,
+        )  # fmt: skip
+        cpu = float("nan")
+        if hasattr(os, "wait4"):
+            _, status, usage = os.wait4(process.pid, 0)
+            process.returncode = os.waitstatus_to_exitcode(status)
+            cpu = usage.ru_utime + usage.ru_stime
+        seconds = time.perf_counter() - start
+        if process.wait():
+            output.seek(0)
+            words = output.read().strip().splitlines()[-1:] or [f"status {process.returncode}"]
+            raise DeviceError(f"a process that was to be measured failed: {words[0]}")
+    return Process(seconds, cpu)
+
+
+def measure(
+    scene: str, mode: str | None, device: str | int, rounds: int, name: str
+) -> Iterator[Figure]:
+    """Figures of a cold and a warm start, in seconds.
+
+    scene: as `clpt.bench.opened` takes it; device: an index or a part of a name; name: the
+    scene's, for the figures. Raises DeviceError if a process fails.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        report = Path(folder) / "report.json"
+        main = f"from {__name__} import main; main(*sys.argv[1:])"
+        command = child_processes.command(main, str(report), scene, mode or "", str(device))
+        for what, times in (("cold", 1), ("warm", rounds)):
+            taken, stats = [], []
+            for _ in range(times):
+                report.unlink(missing_ok=True)
+                taken.append(run(command, Path(folder) / "caches"))
+                stats.append(json.loads(report.read_text(encoding="utf-8")))
+            yield _figure(f"{what} start", taken, stats, name)
+
+
+def _figure(name: str, taken: list[Process], stats: list[dict[str, Any]], scene: str) -> Figure:
+    middle = sorted(range(len(taken)), key=lambda i: taken[i].seconds)[len(taken) // 2]
+    more = {**stats[middle], "cpu": taken[middle].cpu}
+    figure = Figure("start", name, SECONDS, tuple(one.seconds for one in taken), scene, more)
+    dark = any(not fact["mean"] > 0.0 for fact in stats)
+    longer = any(fact["ready"] > one.seconds for fact, one in zip(stats, taken, strict=True))
+    return figure.refuse(
+        "its picture is black or not finite" if dark else "",
+        "it was ready later than its process ended" if longer else "",
+    )
+
+
+def main(target: str, scene: str, mode: str, which: str) -> None:
+    """The process that is measured: one small picture, and what it took."""
+    start = time.perf_counter()
+    import dataclasses
+
+    from clpt.bench.scenes import opened
+    from clpt.render.renderer import Renderer
+
+    plan = opened(scene, mode or None)
+    film = dataclasses.replace(plan.film, width=SIDE, height=SIDE, crop=None)
+    plan = dataclasses.replace(plan, film=film)
+    renderer = Renderer(plan, which or None)
+    ready = time.perf_counter() - start
+    renderer.run(1)
+    mean = float(renderer.image().mean())
+    builds = renderer.device.builds
+    stats = {
+        "mode": plan.film.mode,
+        "ready": ready,
+        "programs": builds.programs,
+        "build_seconds": builds.seconds,
+        "mean": mean if mean < float("inf") else 0.0,
+        "memory": _peak(),
+    }
+    output_files.write_text(target, json.dumps(stats))
+
+
+def _peak() -> int:
+    """The largest resident set of this process so far [bytes]; 0 where the system does not tell.
+
+    getrusage would tell that of the process which started it, if that was larger.
+    """
+    try:
+        found = re.search(r"VmHWM:\s*(\d+) kB", Path("/proc/self/status").read_text())
+    except OSError:
+        found = None
+    return int(found[1]) * 1024 if found else 0

@@ -1,0 +1,120 @@
+"""Edits of parameters, the camera's and those of materials: a few words are written."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from clpt.geometry.instancing import distinct
+from clpt.render.camera.encode import lower_camera
+from clpt.render.camera.find import dispersive_glasses
+from clpt.render.edit.rebuild import ranges
+from clpt.render.edit.scene_edit import Replacements
+from clpt.render.lights.aims import is_sharp
+from clpt.render.materials import gloss
+from clpt.render.materials.check import check_material
+from clpt.render.wavefront.device_scene import DeviceScene
+from clpt.scene import Scene
+from clpt.scene.cameras import Camera, Lens
+from clpt.scene.materials import CLEAR, COMPOSITES, Material
+from clpt.scene.params import fields_of
+
+
+def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> Callable[[], None] | str:
+    """Return what enqueues the words in which a scene differs from the one on the device.
+
+    They may differ in the camera, which must be of the same kind, and in values of materials; else
+    this returns why more than that differs. What is returned may be called again where an error
+    has ended it. Raises SceneError as `lower` does.
+    """
+    lowered = on_device.lowered
+    pairs = [] if scene.shapes is former.shapes else _pairs(former, scene)
+    if pairs is None:
+        return "a material is of another kind or structure"
+    if lowered.features.transport.balanced and any(
+        is_sharp(old) != is_sharp(new) for old, new in pairs
+    ):
+        return "light paths aim at what is sharp, and a material is so now, or no more"
+    if lowered.features.media.bodies and pairs:
+        return "bodies that overlap know each other's indices"
+    camera = None
+    if scene.camera is not former.camera:
+        if dispersive_glasses(scene.camera) != dispersive_glasses(former.camera):
+            return "the camera's lens is of another glass"
+        film, rows_ = scene.film, lowered.glass_rows
+        kind, camera = lower_camera(scene.camera, film.width, film.height, rows_)
+        if kind != lowered.features.camera.kind or len(camera) != len(lowered.tables["camera"]):
+            return "the camera is of another kind"
+        if _reflects(scene.camera) != _reflects(former.camera):
+            return "the camera's lens reflects, or no more"
+    rows: list[tuple[int, Any]] = []
+    for old, new in pairs:
+        check_material(new, scene.film)
+        changed = lowered.encoder.replaced(old, new, "materials")
+        if changed is None:
+            return f"parameters of a {new.kind} come from elsewhere, such as a texture or a table"
+        rows += changed
+        if before := lowered.features.lights.gloss:
+            word = np.array([gloss.word(new)], np.uint32)
+            rows += [(row - before, word) for row, _ in changed]
+    return lambda: _write(on_device, camera, rows)
+
+
+def _reflects(camera: Camera) -> tuple[bool, bool]:
+    """Return whether a camera's lens reflects in its kernels, and whether it has ghosts."""
+    return (camera.reflects, camera.ghosts > 0.0) if isinstance(camera, Lens) else (False, False)
+
+
+def _write(on_device: DeviceScene, camera: Any, rows: list[tuple[int, Any]]) -> None:
+    """Enqueue the words of a camera, if there is one, and of rows of materials."""
+    lowered, stream = on_device.lowered, on_device.stream
+    tables = dict(lowered.tables)
+    if camera is not None:
+        stream.write(on_device.tables["camera"], camera)
+        tables["camera"] = camera
+    if rows:
+        table = tables["materials"] = tables["materials"].copy()
+        for first, new in rows:
+            own = table[first : first + len(new)]
+            for begin, end in ranges(own, new):
+                buffer = on_device.tables["materials"]
+                stream.write(buffer, new[begin:end], 4 * (first + begin))
+            own[:] = new
+    on_device.lowered = dataclasses.replace(lowered, tables=tables)
+
+
+def _pairs(former: Scene, scene: Scene) -> list[tuple[Any, Any]] | None:
+    """The leaf materials that replace others, None where more than values differs."""
+    pairs: Replacements = {}
+    for old, new in zip(distinct(former.shapes), distinct(scene.shapes), strict=True):
+        if not _pair(old.material, new.material, pairs):
+            return None
+    changed = [(old, new) for old, new in pairs.values() if old is not new]
+    return [(old, new) for old, new in changed if not isinstance(old, COMPOSITES)]
+
+
+def _pair(old: Material, new: Material, pairs: Replacements) -> bool:
+    """Note which material replaces which; return whether they may differ in values only."""
+    if id(old) in pairs:
+        return pairs[id(old)][1] is new
+    pairs[id(old)] = old, new
+    if old is new and not isinstance(old, COMPOSITES):
+        return True
+    if type(old) is not type(new):
+        return False
+    if not isinstance(old, COMPOSITES):
+        absorb = [one.absorption != CLEAR for one in (old, new)]
+        traits = [(one.transmits, one.uses_tangents) for one in (old, new)]
+        return absorb[0] == absorb[1] and traits[0] == traits[1]
+    others = fields_of(new)
+    for name, a in fields_of(old).items():
+        b = others[name]
+        if isinstance(a, Material) and isinstance(b, Material):
+            if not _pair(a, b, pairs):
+                return False
+        elif a is not b and name != "name":
+            return False
+    return True

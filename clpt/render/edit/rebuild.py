@@ -1,0 +1,228 @@
+"""Another lowering of a scene that is on a device: only what differs is written or built."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pyopencl as cl
+from numpy.typing import NDArray
+
+from clpt import bvh
+from clpt.errors import SceneError
+from clpt.render.flow.scene_to_tables import Lowered
+from clpt.render.wavefront import trees
+from clpt.render.wavefront.device_scene import UPLOADED, DeviceScene
+from clpt.render.wavefront.strategy import Strategy
+from clpt.render.wavefront.wavefront import Wavefront
+
+log = logging.getLogger(__name__)
+
+GAP = 256  # words that are written though they are the same, rather than by two commands
+MOST_WRITES = 64  # beyond which the whole range between the first and the last is one write
+OF_FILM = (
+    "width", "height", "margin", "crop_x", "crop_y", "film_width", "film_height", "bands", "alpha",
+)  # fmt: skip
+OF_PATHS = ("light_paths", "guide_paths", "photon_places", "photon_pixels")
+
+
+@dataclass(frozen=True)
+class _Changes:
+    """The changes by another lowering: new kernels, new trees of triangles or boxes, or a refit."""
+
+    strategy: Strategy
+    kernels: bool
+    triangles: bool
+    boxes: bool
+    refit: bool
+
+
+@dataclass(frozen=True)
+class _Staged:
+    """New buffers, trees and queues for a lowering, which nothing uses yet.
+
+    tables: those that need a new buffer, by name.
+    """
+
+    tables: dict[str, cl.Buffer]
+    trees: trees.Trees
+    queue: dict[str, Any]
+
+
+def prepare(wavefront: Wavefront, lowered: Lowered, refit: bool = False) -> Callable[[], None]:
+    """Return what lets a wavefront render another lowering from now on.
+
+    It may be called again where an error has ended it. refit: refit the tree over triangles that
+    only moved, which is faster to do, and slower to trace where they went far. Programs are built
+    if the features differ, trees if triangles or boxes do; of tables the words that differ are
+    written. The picture is then that of a new renderer.
+
+    The paths are of the same kinds, see `has_other_paths`. Raises SceneError as `refusal` says,
+    KernelBuildError, MemoryBudgetError; nothing has changed then.
+    """
+    scene, paths = wavefront.scene, wavefront.paths
+    refused = refusal(scene.lowered, lowered)
+    if refused is not None:
+        raise refused
+    changes = _changes(wavefront, lowered, refit)
+    with scene.buffers.all_or_nothing():
+        staged = _stage(wavefront, lowered, changes)
+    replaced = _replaced(wavefront, staged)
+
+    def take() -> None:
+        _write_tables(scene, lowered, staged.tables)
+        paths.set_settings(lowered.settings)
+        scene.tables |= staged.tables
+        scene.lowered, scene.strategy, scene.trees = lowered, changes.strategy, staged.trees
+        scene.fill_grids()
+        paths.queue = staged.queue
+        _refit(scene, changes)
+        if changes.kernels or changes.boxes or replaced or staged.tables:
+            wavefront.bind_again(rebuilt=changes.kernels)
+        while replaced:
+            scene.buffers.release(replaced.pop())
+
+    return take
+
+
+def refusal(former: Lowered, new: Lowered) -> SceneError | None:
+    """Return why a renderer of one lowering cannot go on with another; None if it can."""
+    old, now = former.settings, new.settings
+    if any(old[name] != now[name] for name in OF_FILM):
+        message = "its size, bands, alpha and the reach of its filter stay; make a new Renderer"
+        return SceneError(message, where="film")
+    layers, others = former.features.film.layers, new.features.film.layers
+    if (layers.names, layers.light_groups) != (others.names, others.light_groups):
+        return SceneError("other layers need a new Renderer", where="film.layers")
+    return None
+
+
+def has_other_paths(former: Lowered, new: Lowered) -> bool:
+    """Return whether a lowering asks for other kinds of paths, so for a film of another form."""
+    return any(former.settings[name] != new.settings[name] for name in OF_PATHS)
+
+
+def _changes(wavefront: Wavefront, lowered: Lowered, refit: bool) -> _Changes:
+    """Return the changes that another lowering needs."""
+    scene = wavefront.scene
+    former, strategy = scene.lowered, wavefront.choose_strategy(lowered)
+    groups = former.instances.triangles != lowered.instances.triangles
+    groups |= former.instances.keys != lowered.instances.keys
+    faces = not (_same(former.faces, lowered.faces) and _same(former.tags, lowered.tags))
+    moved = "vertices" in scene.moved_tables or not _same(former.vertices, lowered.vertices)
+    triangles = strategy.layout != scene.strategy.layout or groups or faces
+    keyed = any(count > 1 for count in lowered.instances.keys)
+    triangles |= (keyed or not refit) and (moved or scene.tree_refitted)
+    parts = zip(vars(former.instances).values(), vars(lowered.instances).values(), strict=True)
+    instances = not all(_same(*map(np.asarray, pair)) for pair in parts)
+    boxes = instances or bool(scene.moved_tables) or not _same(former.boxes, lowered.boxes)
+    return _Changes(
+        strategy,
+        kernels=former.features != lowered.features or strategy != scene.strategy,
+        triangles=triangles,
+        boxes=triangles or boxes,
+        refit=moved and not triangles,
+    )
+
+
+def _stage(wavefront: Wavefront, lowered: Lowered, changes: _Changes) -> _Staged:
+    """Build kernels, buffers and trees that are new; what is on the device stays as it is."""
+    scene, paths, queue = wavefront.scene, wavefront.paths, wavefront.paths.queue
+    if changes.kernels:
+        before = scene.device.builds.programs
+        wavefront.build_ahead(lowered, changes.strategy)
+        built = scene.device.builds.programs - before
+        log.info("the scene needs other kernels: %d programs were built", built)
+    tables, new_trees = _new_tables(scene, lowered, changes), scene.trees
+    if changes.boxes:
+        vertices = tables.get("vertices", scene.tables["vertices"])
+        former = None if changes.triangles else scene.trees
+        layout, quality = changes.strategy.layout, scene.tree_quality
+        new_trees = trees.build(scene.buffers, lowered, vertices, layout, quality, former)
+        which = "triangles and boxes" if changes.triangles else "boxes"
+        log.info("trees are built over %s", which)
+    if changes.kernels:
+        queue = paths.new_queue(changes.strategy.queued, len(lowered.features.materials.kinds))
+    return _Staged(tables, new_trees, queue)
+
+
+def _new_tables(scene: DeviceScene, lowered: Lowered, changes: _Changes) -> dict[str, cl.Buffer]:
+    """Buffers of tables of another size, and of those that begin or cease to be the caller's."""
+    former, tables = scene.lowered, {}
+    for name in UPLOADED:
+        old, new = former.table(name), lowered.table(name)
+        of_caller = lowered.zero_copy.get(name)
+        built_of = name == "vertices" and changes.triangles  # the tree is built of a whole table
+        if of_caller is not None:
+            if scene.tables[name] is not of_caller:
+                tables[name] = of_caller
+        elif name in former.zero_copy or old.nbytes != new.nbytes or built_of:
+            tables[name] = scene.upload(name, new)
+    return tables
+
+
+def _replaced(wavefront: Wavefront, staged: _Staged) -> list[cl.Buffer]:
+    """The buffers of clpt that will not be used any more."""
+    scene, queue = wavefront.scene, wavefront.paths.queue
+    of_caller = scene.lowered.zero_copy
+    buffers = [scene.tables[name] for name in staged.tables if name not in of_caller]
+    if staged.trees is not scene.trees:
+        buffers.append(scene.trees.instances)
+    if staged.queue is not queue:
+        buffers += [value for value in queue.values() if isinstance(value, cl.Buffer)]
+    return buffers
+
+
+def _write_tables(scene: DeviceScene, lowered: Lowered, new: dict[str, cl.Buffer]) -> None:
+    """Enqueue that the words of tables become those of a lowering, but in buffers that are new."""
+    for name in UPLOADED:
+        if name in new or name in lowered.zero_copy:
+            continue
+        filled = name == "images" and _room(scene.lowered) != _room(lowered)
+        if name in scene.moved_tables or filled:
+            scene.stream.write(scene.tables[name], lowered.table(name))
+            continue
+        words = _words(lowered.table(name))
+        for begin, end in ranges(_words(scene.lowered.table(name)), words):
+            scene.stream.write(scene.tables[name], words[begin:end], 4 * begin)
+
+
+def _room(lowered: Lowered) -> list[tuple[int, tuple[int, ...]]]:
+    """Return the places in `images` where kernels write bricks of densities."""
+    return [(grid.first, grid.bricks) for grid in lowered.device_grids]
+
+
+def _refit(scene: DeviceScene, changes: _Changes) -> None:
+    """Refit the tree over triangles to their vertices, if it is not a new one."""
+    if changes.refit:
+        building = bvh.Building(scene.device, stream=scene.stream)
+        triangles = scene.trees.triangles
+        bvh.refit(building, triangles, scene.tables["vertices"], scene.tables["faces"])
+    scene.tree_refitted = changes.refit or (scene.tree_refitted and not changes.triangles)
+    scene.moved_tables.clear()
+
+
+def ranges(old: NDArray[Any], new: NDArray[Any]) -> list[tuple[int, int]]:
+    """Return the parts, begin and end, that hold all words in which two tables differ."""
+    differ = np.flatnonzero(old != new)
+    if not len(differ):
+        return []
+    far = np.flatnonzero(np.diff(differ) > GAP)
+    begins, ends = differ[np.r_[0, far + 1]], differ[np.r_[far, len(differ) - 1]] + 1
+    if len(begins) > MOST_WRITES:
+        return [(int(begins[0]), int(ends[-1]))]
+    return list(zip(begins.tolist(), ends.tolist(), strict=True))
+
+
+def _words(values: NDArray[Any]) -> NDArray[np.uint32]:
+    return np.ascontiguousarray(values).reshape(-1).view(np.uint32)
+
+
+def _same(some: NDArray[Any], others: NDArray[Any]) -> bool:
+    """Whether two arrays hold the same bits."""
+    if some is others:
+        return True
+    return some.shape == others.shape and np.array_equal(_words(some), _words(others))

@@ -1,0 +1,49 @@
+"""Rules of films: what they ask of the mode, the camera, the integrator and the filter."""
+
+from __future__ import annotations
+
+from clpt.errors import SceneError
+from clpt.render.film import colour, filters
+from clpt.scene import Scene
+from clpt.scene.integrators import HAVE_LAYERS, Box, Vcm
+from clpt.scene.layers import LAYERS
+
+WITH_AXIS = ("perspective", "thin_lens", "orthographic")
+LARGEST = 1 << 26  # pixels of a film; its tiles are divided in float32, see kernels/film/film.cl
+
+
+def check_film(scene: Scene) -> None:
+    """Raise SceneError for a film that is too large, or asks for what the scene cannot give."""
+    film = scene.film
+    if film.mode == "rgb":
+        asks = {"sensor": film.sensor != "cie1931", "bands": film.bands != 0}
+        for name in (name for name, asked in asks.items() if asked):
+            raise SceneError("needs the mode spectral, not rgb", where=f"film.{name}")
+    width, height = film.size
+    if width * height > LARGEST:
+        raise SceneError(f"{width}x{height} are more than {LARGEST >> 20} Mi pixels", where="film")
+    colour.output_matrix(film, film.mode)
+    if not isinstance(film.filter, Box):
+        filters.integrals(film.filter)
+    _check_layers(scene)
+
+
+def _check_layers(scene: Scene) -> None:
+    """Raise SceneError for layers that the integrator, the camera or the filter cannot make."""
+    film, how = scene.film, scene.integrator
+    if film.layers and not isinstance(how, HAVE_LAYERS):
+        names = ", ".join(cls.kind for cls in HAVE_LAYERS)
+        message = f"only the integrators {names} have layers, not {how.kind}"
+        raise SceneError(message, where="film.layers")
+    if scene.camera.kind not in WITH_AXIS:
+        for name, instead in (("z", ": ask for depth"), ("motion", "")):
+            if name in film.layers:
+                message = f"the camera {scene.camera.kind} has no axis for {name}{instead}"
+                raise SceneError(message, where="film.layers")
+    lights = [name for name in film.layers if LAYERS[name].form == "light"]
+    if isinstance(how, Vcm) and how.merging and "light_groups" in lights:
+        message = "photons do not know their group: leave light_groups out, or vcm.merging"
+        raise SceneError(message, where="film.layers")
+    if lights and film.filtering == "splatting":
+        message = f'{lights[0]} needs samples that serve one pixel: leave it out, or "importance"'
+        raise SceneError(message, where="film.filtering")

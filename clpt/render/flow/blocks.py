@@ -1,0 +1,118 @@
+"""Blocks: which words of a slot's state shading reads and writes: kernels/transport/queue.cl."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+
+from clpt.records import HIT, SHADOW, SLABS
+from clpt.render.records import Features
+
+ESCAPE = ("escape", "escape_axis", "escape_width", "escape_plane", "escape_depth")
+CHANGED = (
+    "o", "d", "beta", "radiance", "lambdas", "pdf", "sampled_hemisphere", "sampled_wo",
+    "sampled_gloss", "null_distance", "nulls", "ratio", "eta", "medium", "around", "bodies", "lead",
+    "rival", "pending", "expected", *ESCAPE, "state", "cone",
+)  # fmt: skip
+READ = ("weight", "light", "time", "pixel_index", "pixel_key", "sample")  # and not changed
+# members that not every scene has, each with the features that ask for it
+NEEDED: dict[str, Callable[[Features], bool]] = {
+    "lambdas": lambda f: f.spectra.spectral,
+    "sampled_hemisphere": lambda f: f.hemispheres,
+    "sampled_wo": lambda f: f.lights.gloss > 0,
+    "sampled_gloss": lambda f: f.lights.gloss > 0,
+    "null_distance": lambda f: f.materials.null_surfaces or "depth" in f.film.layers.names,
+    "nulls": lambda f: f.materials.null_surfaces,
+    "ratio": lambda f: f.ratios,
+    "medium": lambda f: f.media.absorbing,
+    "around": lambda f: f.media.present and f.media.absorption and not f.media.bodies,
+    "bodies": lambda f: f.media.bodies,
+    "lead": lambda f: f.media.absorbing,
+    "through": lambda f: f.shadow_media,
+    "into": lambda f: f.lights.volumes,
+    "rival": lambda f: f.transport.balanced,
+    "pending": lambda f: f.transport.merged,
+    "expected": lambda f: f.transport.guided,
+    **dict.fromkeys(ESCAPE, lambda f: f.media.escapes),
+    "cone": lambda f: f.textures.mips,
+    "weight": lambda f: f.transport.light_paths or _has_layers(f),
+    "light": lambda f: f.transport.balanced,
+    "time": lambda f: f.motion.present,
+    "pixel_index": lambda f: f.transport.light_paths or _has_layers(f),
+    "film": lambda f: f.transport.light_paths,
+    "instance": lambda f: f.geometry.instances,
+}
+
+
+def _has_layers(features: Features) -> bool:
+    """Whether a film has layers beside the picture."""
+    layers = features.film.layers
+    return layers.first_samples or layers.light_pictures > 0
+
+
+# members that stages other than shading use too, whatever the flags above
+ELSEWHERE = frozenset({"weight", "light", "pixel_index", "film"})
+
+
+def unused(features: Features) -> frozenset[str]:
+    """Return the members of slabs that no kind of paths of a scene uses."""
+    used = set(ELSEWHERE)
+    for own in features.passes:
+        used |= {name for name in NEEDED if _has(own, name)}
+    return frozenset(NEEDED.keys() - used)
+
+
+def _has(features: Features, name: str) -> bool:
+    """Whether paths of one kind have a member."""
+    return name not in NEEDED or NEEDED[name](features)
+
+
+def members(features: Features) -> dict[str, list[str]]:
+    """Return the members of each slab that a block takes.
+
+    As "changed" it has those of a path that shading may change, which come first.
+    """
+
+    def there(names: Iterable[str]) -> list[str]:
+        return [name for name in names if _has(features, name)]
+
+    chosen = ("light",) if features.film.layers.groups else ()  # by next-event estimation
+    changed = [*there(CHANGED), *chosen]
+    return {
+        "changed": changed,
+        "path": [*changed, *(name for name in there(READ) if name not in chosen)],
+        "hit": there(m.name for m in HIT.members),
+        "shadow": there(m.name for m in SHADOW.members),
+    }
+
+
+def blocks_text(kinds: Sequence[Features]) -> str:
+    """Return the words of a slot's state that a block takes: `BLOCK_WORDS(which)` for paths.
+
+    Of a path those that shading may change are first.
+    """
+    numbers = "".join(f"    uint {name};\n" for name in ("path", "changed", "hit", "shadow"))
+    arrays = "".join(f"    uchar {r.name.lower()}_words[{r.words}];\n" for r in SLABS)
+    t = next(m.word for m in SHADOW.members if m.name == "t")
+    rows = [f"typedef struct {{\n{numbers}{arrays}}} BlockWords;", f"#define SHADOW_T {t}"]
+    values = []
+    for features in kinds:
+        kept = members(features)
+        own = {name: _words(features, name, names) for name, names in kept.items()}
+        counts = [str(len(own[name])) for name in ("path", "changed", "hit", "shadow")]
+        lists = (", ".join(map(str, own[record.name.lower()])) for record in SLABS)
+        values.append(", ".join([*counts, *(f"{{{words}}}" for words in lists)]))
+    table = ", ".join(f"{{{one}}}" for one in values)
+    rows.append(f"constant BlockWords block_words[{len(kinds)}] = {{{table}}};")
+    which = "which" if len(kinds) > 1 else "0"
+    rows.append(f"#define BLOCK_WORDS(which) (&block_words[{which}])")
+    return "\n".join([*rows, ""])
+
+
+def _words(features: Features, slab: str, names: Iterable[str]) -> list[int]:
+    """The words of a slab's members; "changed" is a part of a path's."""
+    record = next(r for r in SLABS if r.name.lower() == ("path" if slab == "changed" else slab))
+    found = []
+    for member in (next(m for m in record.members if m.name == name) for name in names):
+        count = member.words - (member.type == "spectrum" and not features.spectra.spectral)
+        found += [member.word + i for i in range(count)]
+    return found

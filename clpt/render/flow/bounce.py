@@ -1,0 +1,237 @@
+"""The stages of a bounce in their order, and the verbs of kernels/stage/bounce.cl."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from clpt.render.flow import flags, signatures, vertices
+from clpt.render.records import Features
+from clpt.render.records.dispatch import function
+from clpt.scene.scatterer import Scatterer
+
+# what a bounce does, in its order
+VERBS = ("begin", "show", "intersect", "flight", "deposit", "train", "mix", "shade", "join")
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A stage of a bounce: what it does, its program, its kernel there, slots of a work-item."""
+
+    verb: str
+    program: str
+    kernel: str
+    lanes: int
+
+
+def order(features: Features, layout: str, lanes: int, interleaved: bool = False) -> list[Stage]:
+    """Return the stages of a bounce in their order, but for sorting."""
+    return [*_order(features, layout, lanes, interleaved)]
+
+
+def _order(features: Features, layout: str, lanes: int, interleaved: bool) -> Iterator[Stage]:
+    tracing, joining = trace_lanes(layout, lanes), join_lanes(features, layout, lanes, interleaved)
+    begin, join = begin_and_join(features)
+    yield Stage("begin", begin, begin, lanes)
+    if begin == "flare":
+        yield Stage("join", join, join, joining)
+        return
+    if features.shows_lights:
+        yield Stage("show", join, join, joining)
+    yield Stage("intersect", "intersect", "intersect", lanes if interleaved else tracing)
+    for cls in gathered(features):
+        yield Stage("flight", f"gather_{cls.kind}", "gather_along", lanes)
+    if features.media.present:
+        yield Stage("flight", flight(features), "flight", lanes)
+    if deposits(features):
+        yield Stage("deposit", "deposit", "deposit", lanes)
+    if trains(features):
+        yield Stage("train", "train", "train", lanes)
+    if features.materials.mixtures:
+        yield Stage("mix", "mix", "mix_materials", lanes)
+    for kind in features.materials.kinds:
+        yield Stage("shade", f"shade_{kind}", "shade", lanes)
+    if joins(features) and any(not cls.delta for cls in features.materials.leaves):
+        yield Stage("join", join, join, joining)
+
+
+def begin_and_join(features: Features) -> tuple[str, str]:
+    """Return the stage that begins paths, and the one that tests the rays that join them.
+
+    Rays join paths to a light or, if the paths start at lights, to the camera.
+    """
+    if not features.transport.light_paths:
+        return "generate", "shadow"
+    return "flare" if features.transport.lit_ghosts else "emit", "splat"
+
+
+def joins(features: Features) -> bool:
+    """Whether paths are joined to lights or, those that start at lights, to the camera."""
+    return not features.transport.light_paths or features.transport.joined
+
+
+def deposits(features: Features) -> bool:
+    """Whether paths leave photons."""
+    return features.transport.light_paths and features.transport.merged
+
+
+def gathered(features: Features) -> list[type[Scatterer]]:
+    """Return the phase functions in whose media rays from the camera gather photons."""
+    if not features.transport.merged or features.transport.light_paths:
+        return []
+    return [cls for cls in features.materials.leaves if flags.gathers_along(features, cls)]
+
+
+def trains(features: Features) -> bool:
+    """Whether paths leave what a guide learns from."""
+    return features.transport.light_paths and features.transport.guided
+
+
+def flight(features: Features) -> str:
+    """Return the program that takes rays through media.
+
+    That of light paths does without aims, and adds to no layers.
+    """
+    layers = features.media.emissive and bool(features.film.layers.lights)
+    of_light = features.transport.light_paths and (features.media.aims or layers)
+    return "flight_of_light" if of_light else "flight"
+
+
+def trace_lanes(layout: str, lanes: int) -> int:
+    """Return the number of rays that a work-item traces: one, or `lanes` where there is no tree."""
+    return lanes if layout == "brute" else 1
+
+
+def join_lanes(features: Features, layout: str, lanes: int, interleaved: bool) -> int:
+    """Return the number of rays that a work-item tests to join paths.
+
+    Where shapes are analytic, a work-item tests interleaved rays, those of `lanes` paths.
+    """
+    return lanes if interleaved and features.geometry.analytic else trace_lanes(layout, lanes)
+
+
+def has_both(features: Features) -> bool:
+    """Whether materials shade paths from the camera and from lights."""
+    return len(features.passes) > 1 and not features.transport.lit_ghosts
+
+
+@dataclass(frozen=True)
+class _Call:
+    """A call of a stage in the loop, where it is a function.
+
+    args: what it takes beside slabs and scene, each a type and what is passed.
+    """
+
+    stage: Stage
+    args: tuple[tuple[str, str], ...]
+
+    @property
+    def declaration(self) -> str:
+        own = "".join(f", {type_}" for type_, _ in self.args)
+        return f"void loop_{self.stage.program}(SLAB_ARGS, SCENE_ARGS{own}, uint at);"
+
+    @property
+    def text(self) -> str:
+        """The statement that calls it for the slots from `slot` on."""
+        own = "".join(f", {passed}" for _, passed in self.args)
+        return f"loop_{self.stage.program}(SLAB_PASSED, SCENE_PASSED{own}, slot);"
+
+    @property
+    def through(self) -> str:
+        """The statement that calls it for the slots from `first` to `end`."""
+        step = "LANES" if self.stage.lanes > 1 else "1"
+        return f"for (uint slot = first; slot < end; slot += {step}) {self.text}"
+
+
+def stages_text(features: Features, layout: str, lanes: int, interleaved: bool) -> str:
+    """Return the stages of the loop as functions, and the verbs of kernels/stage/bounce.cl.
+
+    A verb takes the slots from `first` to `end` through a stage, with the arguments of the loop. It
+    asks `which` paths are traced, where they differ in it, and does nothing where none has it.
+    """
+    passes = [
+        [_call(features, own, layout, stage) for stage in order(own, layout, lanes, interleaved)]
+        for own in features.passes
+    ]
+    declared = dict.fromkeys(call.declaration for calls in passes for call in calls)
+    found = {
+        verb: [[call for call in calls if call.stage.verb == verb] for calls in passes]
+        for verb in VERBS
+    }
+    shading = found.pop("shade")
+    head = "void bounce_shade_at(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, uint which, int kind, uint slot)"
+    kinds = enumerate(features.materials.leaves)
+    phases = " || ".join(f"(kind) == {i}" for i, cls in kinds if cls.is_phase)
+    of_camera = [[not own.transport.light_paths] for own in features.passes]
+    rows = [
+        *declared,
+        *(_verb(verb, calls) for verb, calls in found.items()),
+        function(head, *_cases(max(shading, key=len))),
+        f"#define PATHS_ARE_SHADED {_asked(shading)}",
+        f"#define PATHS_WALK {_asked(of_camera)}",
+        f"#define kind_is_phase(kind) ({phases or 0})",
+    ]
+    return "\n".join([*rows, ""])
+
+
+def _call(features: Features, own: Features, layout: str, stage: Stage) -> _Call:
+    """The call of a stage for one kind of paths, whose features are `own`."""
+    begin, join = begin_and_join(own)
+    groups = {
+        begin: signatures.begin_args(own),
+        "intersect": signatures.trace_args(own, layout),
+        "flight": signatures.flight_args(own),
+        "gather_along": signatures.gather_args(own),
+        "deposit": signatures.deposit_args(own),
+        "train": signatures.deposit_args(own),
+        join: signatures.join_args(own, layout),
+        "shade": signatures.shade_args(features),
+    }
+    args = [(type_, name) for name, type_ in groups.get(stage.kernel, {}).items()]
+    if stage.kernel == "shade":
+        args += [("uint ", "which")] if has_both(features) else []
+        return _shade_call(features, stage, args)
+    return _Call(stage, tuple(args))
+
+
+def _shade_call(features: Features, stage: Stage, args: list[tuple[str, str]]) -> _Call:
+    """The call of the part that shades a kind, with others where they share a vertex."""
+    leaves = features.materials.leaves
+    for vertex in vertices.vertices(features, stage.lanes):
+        if stage.program in (f"shade_{leaves[kind].kind}" for kind in vertex.kinds):
+            args += [("uint ", "kind")] if vertex.shared else []
+            stage = replace(stage, program=vertex.program)
+            break
+    return _Call(stage, tuple(args))
+
+
+def _verb(verb: str, passes: list[list[_Call]]) -> str:
+    """The macro of a verb, for each kind of paths its calls.
+
+    It stands there once where it is the same for all: compilers put into the loop what is called in
+    one place alone, which saves some hundredths of the time.
+    """
+    each = [" ".join(call.through for call in calls) for calls in passes]
+    if len(set(each)) == 1:
+        rows = [each[0]]
+    else:
+        rows = [f"if (which == {i}) {{ {one} }}" for i, one in enumerate(each) if one]
+    return " \\\n    ".join([f"#define bounce_{verb}(first, end)", *filter(None, rows)])
+
+
+def _cases(shading: list[_Call]) -> list[str]:
+    """Statements that shade by the kind of material."""
+    kinds: dict[str, list[str]] = {}
+    for kind, call in enumerate(shading):
+        kinds.setdefault(call.text, []).append(f"case {kind}:")
+    if len(kinds) == 1:
+        return [*kinds]
+    return ["switch (kind) {", *(f"{' '.join(own)} {t} break;" for t, own in kinds.items()), "}"]
+
+
+def _asked(passes: Sequence[Sequence[object]]) -> str:
+    """The condition for those kinds of paths that have something."""
+    having = [i for i, found in enumerate(passes) if any(found)]
+    if len(having) in (0, len(passes)):
+        return str(int(bool(having)))
+    return f"(which == {having[0]})"

@@ -1,0 +1,367 @@
+"""Choices: the virtual files that only choose which files of the kernels folder a scene needs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from clpt import bvh
+from clpt.render.flow import flags
+from clpt.render.records import Features
+from clpt.scene.materials import Dielectric
+from clpt.scene.scatterer import Scatterer
+
+
+def when(holds: object, *files: str) -> tuple[str, ...]:
+    """Return the files where a condition holds, else none."""
+    return files if holds else ()
+
+
+def either(holds: object, file: str) -> tuple[str, ...]:
+    """Return a file where a condition holds, else its twin that does nothing, `<name>_none.cl`."""
+    return (file if holds else f"{file.removesuffix('.cl')}_none.cl",)
+
+
+def _grid_meet(features: Features) -> str:
+    """Return the file about collisions in grids."""
+    grids = features.media.grids
+    if grids.mixed:
+        return "grid_meet_mixed"
+    varied = features.ratios and (grids.coloured or grids.tinted)
+    return "grid_meet_coloured" if varied else "grid_meet"
+
+
+# name: the files that stand for it, for a scene's features and the layout of its triangles
+CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
+    "generated/spectrum.cl": lambda f, _: (f"spectra/{f.spectra.mode}.cl",),
+    "generated/spectrum_read.cl": lambda f, _: _spectrum_read(f),
+    "generated/sampler.cl": lambda f, _: (
+        f"samplers/kinds/{f.transport.sampler}.cl",
+        f"samplers/pixel_sampler{'_z' * (f.transport.sampler == 'zsobol')}.cl",
+    ),
+    "generated/exposure.cl": lambda f, _: (
+        "film/splatting.cl" if f.film_weights else "film/exposure.cl",
+    ),
+    "generated/bands.cl": lambda f, _: ("film/bands.cl",) * f.film.bands,
+    "generated/integrator.cl": lambda f, _: (f"integrator/{f.transport.integrator}.cl",),
+    "generated/walk.cl": lambda f, _: either(flags.walks(f), "media/walk.cl"),
+    "generated/merging.cl": lambda f, _: either(f.transport.merged, "transport/photons/area.cl"),
+    "generated/collisions.cl": lambda f, _: either(
+        f.media.present, "transport/photons/collisions.cl"
+    ),
+    "generated/train_steps.cl": lambda f, _: either(
+        f.media.present, "transport/guiding/collisions.cl"
+    ),
+    "generated/cone.cl": lambda f, _: either(f.textures.mips, "textures/cone.cl"),
+    "generated/vertex_media.cl": lambda f, _: (
+        when(f.media.bodies, "media/vertex_bodies.cl")
+        or either(f.media.absorbing, "media/vertex_media.cl")
+    ),
+    "generated/front_motion.cl": lambda f, _: either(f.motion.camera, "cameras/front_motion.cl"),
+    "generated/ghosts.cl": lambda f, _: either(f.transport.lit_ghosts, "cameras/ghosts.cl"),
+    "generated/first_ray.cl": lambda f, _: (
+        f"cameras/first_ray{'_weighted' * f.camera.weighs}.cl",
+    ),
+    "generated/sky.cl": lambda f, _: (
+        *either(f.lights.infinite, "lights/sky.cl"),
+        *either(f.lights.infinite and bool(f.film.layers.lights), "lights/sky_layers.cl"),
+    ),
+    "generated/join_light.cl": lambda f, _: either(f.shows_lights, "lights/join_light.cl"),
+    "generated/layer_sums.cl": lambda f, _: (
+        *either(f.film.layers.words > 0, "film/layers.cl"),
+        *_screen_motion(f),
+    ),
+    "generated/layers.cl": lambda f, _: (
+        when(
+            f.film.layers.words > 0,
+            "generated/layer_args.cl",
+            *_screen_motion(f),
+            *either(f.screen_motion, "film/screen_motion_record.cl"),
+            *either(f.motion.camera, "cameras/camera_axis.cl"),
+            "film/layers_record.cl",
+        )
+        or ("film/layers_record_none.cl",)
+    ),
+    "generated/path_covers.cl": lambda f, _: either(f.film.alpha, "film/covers.cl"),
+    "generated/path_start.cl": lambda f, _: either(
+        f.film.alpha and f.camera.weighs, "cameras/start.cl"
+    ),
+    "generated/scouts.cl": lambda f, _: either(f.scouts, "film/scouts.cl"),
+    "generated/scouts_begin.cl": lambda f, _: either(f.scouts, "film/scouts_begin.cl"),
+    "generated/scout_choice.cl": lambda f, _: either(f.scouts, "film/scout_choice.cl"),
+    "generated/mattes.cl": lambda f, _: either(f.film.layers.mattes, "film/mattes.cl"),
+    "generated/light_layers.cl": lambda f, _: (
+        *when(f.film.layers.lights, "generated/light_layer_args.cl", "generated/sampler.cl"),
+        *either(f.film.layers.lights, "film/light_layers.cl"),
+    ),
+    "generated/met_weight.cl": lambda f, _: (
+        when(f.media.escapes, "integrator/steps/met_weight_escapes.cl")
+        or either(f.transport.balanced, "integrator/steps/met_weight.cl")
+    ),
+    "generated/escape_light.cl": lambda f, _: either(f.media.escapes, "tracing/escape_light.cl"),
+    "generated/medium.cl": lambda f, _: (
+        ("generated/medium_coefficients.cl", "media/medium.cl") * (f.media.absorbing)
+        + ("media/medium_grid.cl",) * f.media.grids.present
+        + ("media/medium_grid_light.cl",) * f.media.grids.emissive
+        + ("generated/body_index.cl",) * f.media.bodies
+        + either(f.media.bodies, "media/bodies.cl") * f.media.present
+    ),
+    "generated/grid_flight.cl": lambda f, _: (
+        *(
+            ("generated/lights.cl", "lights/met_light.cl")
+            if f.media.grids.emissive or f.lights.bodies
+            else when(f.media.grids.present, "lights/receiver_none.cl")
+        ),
+        *when(f.media.grids.present, "media/grid_flight.cl"),
+    ),
+    "generated/kept_hemisphere.cl": lambda f, _: (
+        when(f.lights.gloss, "lights/kept_receiver.cl")
+        or either(f.hemispheres, "lights/kept_hemisphere.cl")
+    ),
+    "generated/seen_wavelengths.cl": lambda f, _: either(
+        f.fluorescence, "spectra/seen_wavelengths.cl"
+    ),
+    "generated/infinite_weight.cl": lambda f, _: either(
+        f.transport.balanced, "lights/infinite_weight.cl"
+    ),
+    "generated/rival_dull.cl": lambda f, _: either(f.dull_paths_end, "transport/rival_dull.cl"),
+    "generated/emit_steps.cl": lambda f, _: (
+        *either(f.transport.aimed, "transport/aimed_rival.cl"),
+        *either(f.transport.balanced, "lights/light_kept.cl"),
+    ),
+    "generated/medium_steps.cl": lambda f, _: either(f.media.present, "media/medium_flies.cl"),
+    "generated/medium_dims.cl": lambda f, _: either(not f.shadow_media, "media/medium_dims.cl"),
+    "generated/light_media.cl": lambda f, _: either(f.light_media, "media/light_media.cl"),
+    "generated/grid_numbers.cl": lambda f, _: either(f.media.grids.bytes, "media/grid_bytes.cl"),
+    "generated/grid_steps.cl": lambda f, _: (
+        "generated/grid_words.cl",
+        *either(f.media.grids.coloured, "media/grid_coloured.cl"),
+        *either(f.media.grids.tinted, "media/grid_tinted.cl"),
+        *either(f.media.grids.mixed, "media/grid_mixed.cl"),
+    ),
+    "generated/grid_glow.cl": lambda f, _: (
+        *when(f.media.grids.hot, f"media/black_body_{f.spectra.mode}.cl"),
+        *either(f.media.grids.hot, "media/grid_glow.cl"),
+    ),
+    "generated/flight_steps_of_grids.cl": lambda f, _: (
+        *either(f.ratios, "media/grid_weigh.cl"),
+        *either(f.media.grids.emissive, "media/grid_gather.cl"),
+        f"media/{_grid_meet(f)}.cl",
+    ),
+    "generated/brick_weight.cl": lambda f, _: either(f.lights.bricks, "media/brick_weight.cl"),
+    "generated/body_weight.cl": lambda f, _: either(f.lights.bodies, "media/body_weight.cl"),
+    "generated/aim_cone.cl": lambda f, _: either(f.media.aim_cones, "media/aim_cone.cl"),
+    "generated/grid_origin.cl": lambda f, _: either(f.media.grids.emissive, "media/grid_origin.cl"),
+    "generated/flight_medium.cl": lambda f, _: (
+        f"media/flight_medium{'_bodies' * f.media.bodies}.cl",
+    ),
+    "generated/flight_steps.cl": lambda f, _: (
+        f"media/flight_medium{'_bodies' * f.media.bodies}.cl",
+        *either(f.media.grids.present, "media/near_grids.cl"),
+        *either(f.media.aims and not f.transport.light_paths, "media/flight_near.cl"),
+        *either(f.media.dyed, "media/flight_dye.cl"),
+        *either(f.ratios, "media/flight_weight.cl"),
+        *either(f.media.emissive, "media/flight_emission.cl"),
+        *either(f.media.grids.present, "media/flight_grids.cl"),
+    ),
+    "generated/light_of_flight.cl": lambda f, _: either(
+        bool(f.film.layers.lights) and not f.transport.light_paths, "media/flight_light_layers.cl"
+    ),
+    "generated/way_steps.cl": lambda f, _: (
+        *either(f.media.grids.present, "media/grid_way.cl"),
+        f"media/way_{'bodies' if f.media.bodies else 'shapes'}.cl",
+    ),
+    "generated/light_medium.cl": lambda f, _: (
+        ("generated/textures.cl", "generated/medium.cl")
+        if f.light_media
+        else ("media/light_medium_none.cl",)
+    ),
+    "generated/shading_frame.cl": lambda f, _: (
+        ("generated/normal_map.cl", "materials/shading_frame_mapped.cl")
+        if f.materials.normal_mapped
+        else ("materials/shading_frame.cl",)
+    ),
+    "generated/transmittance.cl": lambda f, _: (f"tracing/transmittance{_passing(f)}.cl",),
+    "generated/shadow_ray.cl": lambda f, _: (
+        when(f.shadow_media, "transport/shadow_ray_media.cl")
+        or when(f.media.escapes, "transport/shadow_ray_escapes.cl")
+        or ("transport/shadow_ray.cl",)
+    ),
+    "generated/trace.cl": lambda _, layout: (
+        f"tracing/trace_{'lanes' if layout == 'brute' else 'one'}.cl",
+    ),
+    "generated/curve_others.cl": lambda f, _: (
+        f"tracing/curve_others{'_none' * (f.geometry.analytic == ('curves',))}.cl",
+    ),
+    "generated/shape_traversal.cl": lambda f, layout: (
+        (f"bvh/{bvh.shapes_layout(layout)}.cl", "bvh/shapes.cl") * bool(f.geometry.analytic)
+    ),
+    "generated/hit_space.cl": lambda f, _: either(f.geometry.instances, "shapes/hit_space.cl"),
+    "generated/surface_steps.cl": lambda f, _: (
+        "generated/motion.cl",
+        *either(f.textures.attributes, "shapes/attributes.cl"),
+        *either(f.screen_motion and f.motion.vertices, "shapes/deforms.cl"),
+        *either(f.geometry.normals or f.geometry.uvs or f.geometry.tangents, "shapes/triangle.cl"),
+        *either(f.geometry.analytic, "shapes/analytic.cl"),
+    ),
+    "generated/corner_rows.cl": lambda f, _: (
+        f"shapes/corner_rows{'_keyed' * _corners_move(f)}.cl",
+    ),
+    "generated/triangle_steps.cl": lambda f, _: (
+        *either(f.geometry.normals, "shapes/triangle_normal.cl"),
+        *either(f.geometry.uvs, "shapes/triangle_uv.cl"),
+        *either(
+            f.geometry.tangents and f.textures.mappings and f.textures.attributes,
+            "shapes/second_uv.cl",
+        ),
+        *either(
+            f.geometry.uvs and f.geometry.tangents and f.geometry.vertex_tangents,
+            "shapes/triangle_tangents.cl",
+        ),
+    ),
+    "generated/uv_tangents.cl": lambda f, _: either(f.geometry.tangents, "shapes/uv_tangents.cl"),
+    "generated/analytic_steps.cl": lambda f, _: (
+        *either(f.motion.shapes, "shapes/shape_motion.cl"),
+        *either(f.screen_motion and f.motion.spheres, "shapes/spheres_move.cl"),
+        *either(f.geometry.tangents, "shapes/analytic_tangents.cl"),
+    ),
+    "generated/instances.cl": lambda f, _: ("tracing/instances.cl",) * f.geometry.instances,
+    "generated/motion.cl": lambda f, _: (
+        *either(f.motion.present, "motion/motion.cl"),
+        *when(f.motion.vertices or f.motion.spheres, "motion/vertex_keys.cl"),
+    ),
+    "generated/keyed_layout.cl": lambda f, layout: (
+        (f"bvh/{layout}_keyed.cl",) * (f.motion.vertices and layout != "brute")
+    ),
+    "generated/instance_traversal.cl": lambda f, layout: (
+        (
+            f"tracing/instances_{'few' if f.geometry.few_instances else layout}.cl",
+            "tracing/trace_instances.cl",
+        )
+        * f.geometry.instances
+    ),
+}
+
+_RIVALS = (
+    "generated/merging.cl",
+    "cameras/camera.cl",
+    "generated/camera.cl",
+    "film/connect.cl",
+    "generated/connect.cl",
+    "transport/rivals.cl",
+)
+
+
+def _merges(features: Features, cls: type[Scatterer]) -> bool:
+    """Whether paths from the camera are merged with photons at a material."""
+    return features.transport.merged and flags.gathers_photons(features, cls)
+
+
+def _escapes(features: Features, cls: type[Scatterer]) -> str:
+    """Return the end of the name of the file about rays that leave sealed media."""
+    if not features.media.escapes:
+        return "_none"
+    return "" if cls.is_phase else "_out" if cls is Dielectric else "_end"
+
+
+# likewise, for a scene's features and the kind of material that a program shades
+MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...]]] = {
+    "generated/rivals.cl": lambda f, cls: (
+        when(f.transport.balanced and not flags.is_null(f, cls), *_RIVALS)
+        or ("transport/rivals_none.cl",)
+    ),
+    "generated/rival_steps.cl": lambda f, cls: (
+        *either(f.transport.merged, "transport/rivals_merging.cl"),
+        *either(f.transport.joined and not cls.delta, "transport/rivals_camera.cl"),
+    ),
+    "generated/rival_area.cl": lambda f, cls: (
+        f"transport/rival_area{'_along' * cls.is_phase}.cl",
+    ),
+    "generated/hero_steps.cl": lambda f, cls: (
+        *either(
+            f.ratios and flags.is_chromatic(f, cls) and f.spectra.spectral, "spectra/hero_weighs.cl"
+        ),
+        *either(f.told_dispersion, "spectra/hero_alone.cl"),
+        *(
+            either(
+                flags.is_chromatic(f, cls) and (f.told_dispersion or cls.is_phase),
+                "transport/rival_pdf.cl",
+            )
+            if f.transport.balanced and not flags.is_null(f, cls)
+            else ("transport/rival_pdf_unasked.cl",)
+        ),
+    ),
+    "generated/pair.cl": lambda f, cls: ("materials/pair.cl",),
+    "generated/guide.cl": lambda f, cls: (
+        (
+            f"transport/guiding/at_{'collision' if cls.is_phase else 'surface'}.cl",
+            "transport/guiding/guided_vertex.cl",
+        )
+        if flags.is_guided(f, cls) and not f.transport.light_paths
+        else ("transport/guiding/guide_none.cl",)
+    ),
+    "generated/path_steps.cl": lambda f, cls: (
+        *either(cls.kind in f.materials.shining, "integrator/steps/met_emission.cl"),
+        *when(_merges(f, cls), "generated/photon.cl", "transport/photons/gather.cl"),
+        *either(_merges(f, cls), "integrator/steps/merge.cl"),
+        *either(f.lights.kinds and not cls.delta, "integrator/steps/next_event.cl"),
+        *either(not flags.is_null(f, cls), "integrator/steps/roulette.cl"),
+        *either(not flags.is_null(f, cls), "integrator/steps/scatters.cl"),
+        f"integrator/steps/escapes{_escapes(f, cls)}.cl",
+    ),
+    "generated/light_path_steps.cl": lambda f, cls: (
+        *either(f.transport.joined and not cls.delta, "integrator/steps/join_camera.cl"),
+        *either(flags.asks_chance(f, cls), "transport/rival_chosen.cl"),
+        *either(f.dull_paths_end and not cls.delta, "integrator/steps/dull_goes_on.cl"),
+        "integrator/steps/adjoint_weight.cl",
+        *either(not flags.is_null(f, cls), "integrator/steps/light_path_roulette.cl"),
+    ),
+    "generated/scout.cl": lambda f, cls: when(
+        f.film.layers.words > 0, *either(f.scouts and not cls.is_phase, "film/scout.cl")
+    ),
+    "generated/vertex_steps.cl": lambda f, cls: (
+        *either(f.names_surfaces, "transport/vertex_names.cl"),
+        *(
+            when(f.media.bodies, "media/vertex_bodies_ways.cl")
+            or either(f.media.absorbing, "media/vertex_media_ways.cl")
+        ),
+        *either(flags.between_bodies(f, cls), "media/between_bodies.cl"),
+        *either(flags.has_lobe(f, cls, "clearcoat_apart"), "materials/coat_normal.cl"),
+        *either(flags.has_lobe(f, cls, "anisotropy"), "materials/anisotropy.cl"),
+    ),
+}
+
+
+def _screen_motion(features: Features) -> tuple[str, ...]:
+    """Return the files of the motion of points on the film, for the layer that shows it."""
+    files = ("cameras/camera.cl", "generated/camera.cl", "generated/screen.cl")
+    needed = when(features.screen_motion, *files)
+    return (*needed, *either(features.screen_motion, "film/screen_motion.cl"))
+
+
+def _corners_move(features: Features) -> bool:
+    """Whether shading asks for rows of vertices, of meshes that deform."""
+    return features.motion.vertices and (features.geometry.normals or features.geometry.tangents)
+
+
+def _passing(features: Features) -> str:
+    """Return the end of the name of the file that tells which light passes."""
+    if features.shadow_media:
+        return "_media"
+    return "" if features.materials.null_surfaces else "_opaque"
+
+
+def _spectrum_read(features: Features) -> tuple[str, ...]:
+    """The look-up of spectra, and in spectral mode how the camera draws wavelengths."""
+    read = f"spectra/{features.spectra.mode}_read.cl"
+    drawn = f"spectra/{'density' if features.spectra.tabulated_density else 'visible'}.cl"
+    return (read, drawn) if features.spectra.spectral else (read,)
+
+
+def virtual_files(features: Features, layout: str) -> dict[str, tuple[str, ...]]:
+    """Return the files that stand for each name in CHOICES."""
+    return {name: choose(features, layout) for name, choose in CHOICES.items()}
+
+
+def material_files(features: Features, cls: type[Scatterer]) -> dict[str, tuple[str, ...]]:
+    """Return the files that stand for each name in MATERIAL_CHOICES."""
+    return {name: choose(features, cls) for name, choose in MATERIAL_CHOICES.items()}

@@ -1,0 +1,158 @@
+"""Analysis: what a scene has, and what follows from that, before anything becomes words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.geometry.lamps import plainly_lit
+from clpt.geometry.motion import at_rest
+from clpt.render.flow.check import check_at_rest
+from clpt.render.geometry import open_boundaries
+from clpt.render.geometry.find import Geometry, assembled
+from clpt.render.geometry.surroundings import (
+    bodies_around,
+    bodies_at,
+    boundaries,
+    camera_origin,
+    contested,
+    media_around,
+    media_at,
+    stands_still,
+    warnings_of,
+)
+from clpt.render.lights.aims import aims
+from clpt.render.lights.find import Sources, sources_of
+from clpt.render.media.bodies import matter_of
+from clpt.render.media.escapes import escape_lamps
+from clpt.render.media.light_media import NOWHERE, LightMedia, light_media
+from clpt.render.media.sealed import sealed_media
+from clpt.render.records.lowering_cache import LoweringCache
+from clpt.render.scene_index import SceneIndex
+from clpt.render.spectra.look import Look
+from clpt.render.transport.hard_light import Lit, decided
+from clpt.scene import Scene
+from clpt.scene.integrators import Integrator
+from clpt.scene.media import Medium
+
+
+@dataclass(frozen=True)
+class Before:
+    """Decisions that were made before an edit, and stay.
+
+    integrator: its film has a place for light paths, or none; lit_ghosts: whether light paths were
+    ghosts of a lens.
+    """
+
+    integrator: Integrator
+    lit_ghosts: bool
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """A scene with everything that was found in it before it is lowered.
+
+    index: with the integrator that renders it; reason: why that one, "" where there was no choice;
+    sphere: centre and radius of one around the scene [m]; sources: what its lights send; sealed:
+    media that rays to lights cannot leave; light_media: media around lights; around: the media, or
+    the matter of bodies, at the camera; aims (k, 5): spheres at which paths aim, see `aims` and
+    `escape_lamps`; warnings: of media.
+    """
+
+    index: SceneIndex
+    reason: str
+    geometry: Geometry
+    sphere: tuple[NDArray[np.float64], float]
+    sources: Sources
+    sealed: frozenset[Medium]
+    light_media: LightMedia
+    around: tuple[Any, ...]
+    aims: NDArray[np.float32]
+    warnings: tuple[str, ...]
+
+
+def analyse(scene: Scene, cache: LoweringCache, before: Before | None = None) -> Analysis:
+    """Return what a scene is; cache: what the analysis before need not make again.
+
+    Raises SceneError where the scene makes no sense: it names the shape, light or material.
+    """
+    scene = at_rest(scene)
+    check_at_rest(scene, cache)
+    scene = plainly_lit(scene)
+    index = replace(SceneIndex.of(scene), lit_before=before.lit_ghosts if before else None)
+    geometry = assembled(index, cache)
+    sphere = geometry.bounding_sphere()
+    look = Look.of(scene.film, cache)
+    sources = sources_of(index, geometry, sphere[1], look)
+    index, lit = _media_at_lights(index, geometry, sources, sphere, cache)
+    former = before.integrator if before else None
+    lights = Lit(index, geometry, look, sources, sphere, lit.extinction)
+    index, reason = decided(lights, former)
+    around, warnings = _at_the_camera(index, cache)
+    sealed = sealed_media(index, cache) if index.media else frozenset()
+    aimed = aims(index, geometry, sphere[1])
+    return Analysis(
+        index=index,
+        reason=reason,
+        geometry=geometry,
+        sphere=sphere,
+        sources=sources,
+        sealed=sealed,
+        light_media=lit,
+        around=around,
+        aims=aimed if len(aimed) else escape_lamps(index, sealed, cache),
+        warnings=(*warnings, *open_boundaries.warnings_of(index, cache)),
+    )
+
+
+def _media_at_lights(
+    index: SceneIndex,
+    geometry: Geometry,
+    sources: Sources,
+    sphere: tuple[NDArray[np.float64], float],
+    cache: LoweringCache,
+) -> tuple[SceneIndex, LightMedia]:
+    """Return the index with whether paths can start at lights in media, and the lights' media."""
+    if not index.has_media or not index.may_have_light_paths:
+        return index, NOWHERE
+    found = light_media(index, geometry, sources, sphere, cache)
+    return replace(index, lit_media=found.refusal), found
+
+
+def _at_the_camera(index: SceneIndex, cache: LoweringCache) -> tuple[tuple[Any, ...], list[str]]:
+    """Return the media or the bodies at the camera, and warnings."""
+    scene = index.scene
+    around: tuple[Any, ...] = ()
+    if index.nested:
+        around = bodies_around(scene, matter_of, cache)
+        warnings = contested(scene.shapes, matter_of, cache)
+    else:
+        around = media_around(scene, cache) if index.media else ()
+        warnings = warnings_of(around)
+    if index.motions and index.has_media and scene.camera.medium is None:
+        warnings += _passed_through(index, cache)
+    return around, warnings
+
+
+def _passed_through(index: SceneIndex, cache: LoweringCache) -> list[str]:
+    """A warning where the camera is not in the same media all the time, else none."""
+    bounding = boundaries(index.listed, matter_of if index.nested else None)
+    if index.motions.camera is None and stands_still(bounding):
+        return []
+    found: list[tuple[Any, ...]] = []
+    for time in index.motions.looks():
+        origin = camera_origin(index.camera, index.film, time)
+        found.append(
+            bodies_at(bounding, matter_of, origin, time, cache)
+            if index.nested
+            else media_at(bounding, origin, time, cache)
+        )
+    if all(one == found[0] for one in found):
+        return []
+    return [
+        "camera: it comes into another medium while the shutter is open; all its paths begin in "
+        "what is around it when that opens"
+    ]

@@ -1,0 +1,134 @@
+"""Flags: the macros by which kernels ask what a scene has, and a material.
+
+A flag that holds is 1. One that does not hold is not defined: `#if` takes it for 0. `assemble`
+decides each `#if`, so that a text has no line for what its scene has not. Numbers and names are
+defined as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from clpt.render.records import Features
+from clpt.render.records.macros import said
+from clpt.render.records.texture_rows import IMAGES
+from clpt.scene.params import device_params
+from clpt.scene.scatterer import Scatterer
+
+Defines = dict[str, str | int]
+
+
+def walks(features: Features) -> bool:
+    """Whether the camera's paths go from collision to collision in media."""
+    of_camera = not features.transport.light_paths
+    return of_camera and any(cls.is_phase for cls in features.materials.leaves)
+
+
+def fluoresces(features: Features, cls: type[Scatterer]) -> bool:
+    """Whether light may leave a material at another wavelength than it came."""
+    return cls.fluoresces and features.spectra.spectral
+
+
+def ends_light_paths(features: Features, cls: type[Scatterer]) -> bool:
+    """Whether a material does not do to light that comes the other way what it does to this."""
+    return not cls.reversible or fluoresces(features, cls)
+
+
+def gathers_photons(features: Features, cls: type[Scatterer]) -> bool:
+    """Whether paths from the camera are merged with photons on a material."""
+    return not (cls.delta or cls.is_null or cls.is_phase or ends_light_paths(features, cls))
+
+
+def gathers_along(features: Features, cls: type[Scatterer]) -> bool:
+    """Whether rays from the camera are merged with photons in media of a phase function."""
+    return cls.is_phase and not ends_light_paths(features, cls)
+
+
+def filters_at_random(features: Features, cls: type[Scatterer]) -> bool:
+    """Whether a random texel stands for some parameter of a material."""
+    images = {(kind, "reflectance") for kind in IMAGES}
+    if images.isdisjoint(features.textures.roles):
+        return False
+    sources, declared = features.materials.sources_of(cls.kind), device_params(cls)
+    return any(p.linear and "texture" in sources.get(n, ()) for n, p in declared.items())
+
+
+def has_lobe(features: Features, cls: type[Scatterer], name: str) -> bool:
+    """Whether a material of the scene has a lobe that a parameter of 0 leaves out."""
+    declared, none = device_params(cls), frozenset({"none"})
+    sources = features.materials.sources_of(cls.kind)
+    return name in declared and sources.get(name, none) != none
+
+
+def is_chromatic(features: Features, cls: type[Scatterer]) -> bool:
+    """Whether a material is asked at each wavelength: densities of its directions may differ.
+
+    Without dispersion they do not. Then eta alone tells what carried light has instead of radiance
+    (kernels/integrator/steps/adjoint_weight.cl), unless lobes that refract and others share
+    directions.
+    """
+    if cls.is_phase:
+        return features.materials.phase_varies(cls)
+    return cls.chromatic and (features.told_dispersion or not cls.lobes_apart)
+
+
+def is_null(features: Features, cls: type[Scatterer]) -> bool:
+    """Whether a material is none: paths cross it as if nothing were there."""
+    return cls.is_null and features.materials.null_surfaces
+
+
+def is_guided(features: Features, cls: type[Scatterer]) -> bool:
+    """Whether a guide helps to choose directions at a material."""
+    unsuited = cls.delta or cls.is_null or cls.no_back or fluoresces(features, cls)
+    alone = cls.refracts and features.told_dispersion  # a direction may be of one wavelength
+    return features.transport.guided and not (unsuited or alone)
+
+
+def asks_chance(features: Features, cls: type[Scatterer]) -> bool:
+    """Whether light paths ask at a material how often its gloss chooses their light."""
+    glossy = features.transport.balanced and features.lights.gloss > 0
+    return glossy and not is_null(features, cls)
+
+
+def between_bodies(features: Features, cls: type[Scatterer]) -> bool:
+    """Whether the index outside of a material is that of a body there."""
+    return features.media.bodies and cls.kind in BETWEEN_BODIES
+
+
+BETWEEN_BODIES = ("dielectric", "rough_dielectric")  # their index outside is that of a body there
+
+# name: whether it holds, or its value, of the features and the kind that a program shades
+MATERIAL: dict[str, Callable[[Features, type[Scatterer]], int]] = {
+    "BSDF_KIND": lambda f, cls: f.materials.leaves.index(cls),
+    "BSDF_DELTA": lambda f, cls: cls.delta,
+    "BSDF_TRANSMITS": lambda f, cls: int(cls.kind in f.materials.transmitting),  # calculated with
+    "BSDF_SHINES": lambda f, cls: cls.kind in f.materials.shining,
+    "BSDF_ABSORBS": lambda f, cls: cls.absorbs,
+    "BSDF_CHROMATIC": is_chromatic,
+    "BSDF_FLUORESCES": fluoresces,
+    "BSDF_ENDS_LIGHT_PATHS": lambda f, cls: f.transport.balanced and ends_light_paths(f, cls),
+    "BSDF_MERGES": lambda f, cls: (
+        f.transport.merged and (gathers_photons(f, cls) or gathers_along(f, cls))
+    ),
+    "BSDF_GUIDED": is_guided,
+    "BSDF_IS_PHASE": lambda f, cls: cls.is_phase,
+    "BSDF_IS_NULL": is_null,
+    "BSDF_IS_PANE": lambda f, cls: cls.is_pane and f.materials.free_panes,
+    "STOCHASTIC_FILTERING": filters_at_random,
+    "USES_CHOICE": lambda f, cls: cls.uses_lobe_sample or cls.fluoresces or not f.lights.few,
+}
+
+SCENE = frozenset(dict(said(Features())))  # the names of flags of a scene
+
+
+def of_scene(features: Features) -> Defines:
+    """Return the macros that features say."""
+    return {name: value for name, value in said(features) if value is not None}
+
+
+def of_material(features: Features, cls: type[Scatterer]) -> Defines:
+    """Return the macros of the kind of material that a program shades.
+
+    They are 0 where they do not hold: kernels also ask for them by `if`.
+    """
+    return {name: int(value(features, cls)) for name, value in MATERIAL.items()}

@@ -1,0 +1,166 @@
+"""The settings of a lowered scene: what holds for a whole render, whatever the device."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.records import SETTINGS
+from clpt.render.film.colour import film_scale, output_matrix
+from clpt.render.geometry.find import Geometry
+from clpt.render.lights.encode import LightRows
+from clpt.render.lights.level import light_level
+from clpt.render.records import LayerFeatures
+from clpt.render.scene_index import SceneIndex
+from clpt.render.spectra.find import Density
+from clpt.render.transport import guides, photons
+from clpt.scene.integrators import DEEPEST, Vcm
+from clpt.spectra.cie import tanh_ends
+
+LARGEST = 62  # exponent of 4 of a unit of areas, which is float32
+ORDINARY_SIZE = 10  # exponent of 2 of the radius of a scene [m], up and down
+MOST_SAMPLE_BITS = 16  # of a zsobol pixel's part of its sequence
+
+
+@dataclass(frozen=True)
+class Found:
+    """Findings of earlier steps of lowering that the settings need.
+
+    density_row: where the table of the density of wavelengths begins in `distributions`;
+    ambient_row: where the ambient light is in `light_params`; aims: the first of the spheres at
+    which light paths aim, and their number; around: words of the bodies and of the medium at the
+    camera; disperses: whether directions depend on wavelengths; layers: beside the picture;
+    second_uv: numbers of the attributes that a mesh's second set of uv are, -1 for none.
+    """
+
+    density_row: int
+    ambient_row: int
+    aims: tuple[int, int]
+    around: tuple[int, int]
+    disperses: bool
+    layers: LayerFeatures
+    second_uv: tuple[int, int]
+
+
+def settings_of(
+    index: SceneIndex,
+    geometry: Geometry,
+    lights: LightRows,
+    density: Density,
+    sphere: tuple[NDArray[np.float64], float],
+    found: Found,
+) -> NDArray[np.void]:
+    """Return the record SETTINGS of a scene; the wavefront adds what depends on the device.
+
+    density: of wavelengths; sphere: centre and radius of one around the scene [m].
+    """
+    settings = np.zeros((), SETTINGS.dtype)
+    _set_film(settings, index)
+    _set_paths(settings, index)
+    if index.merged:
+        _set_photons(settings, index, geometry, sphere[1], found.disperses)
+    if index.guided:
+        paths = settings["guide_paths"] = index.integrator.guide_paths or guides.PATHS
+        settings["photon_cells"], side = guides.cells_for(paths)
+        settings["guide_side"] = side * sphere[1]
+    settings["rival_area"] = rival_area(sphere[1])
+    _set_places(settings, found)
+    settings["light_count"] = len(lights.rows)
+    settings["infinite_count"] = lights.infinite
+    settings["first_analytic"] = geometry.first_analytic
+    settings["analytic_count"] = len(geometry.boxes)
+    settings["single_count"] = geometry.single_count
+    settings["shape_count"] = len(geometry.rows)
+    settings["tanh_min"], settings["tanh_max"] = tanh_ends(density.lo, density.hi)
+    film = index.film
+    matrix = output_matrix(film, index.mode)
+    scale = settings["film_scale"] = film_scale(film, light_level(index, lights, sphere))
+    settings["to_first"], settings["to_second"], settings["to_third"] = matrix / scale
+    settings["center"], settings["scene_radius"] = sphere
+    _set_layers(settings, found.layers)
+    return settings
+
+
+def _set_places(settings: NDArray[np.void], found: Found) -> None:
+    """Write where tables have what earlier steps found."""
+    settings["aims"], settings["aim_count"] = found.aims
+    settings["camera_bodies"], settings["camera_medium"] = found.around
+    settings["second_u"], settings["second_v"] = found.second_uv
+    settings["ambient"], settings["density"] = found.ambient_row, found.density_row
+
+
+def _set_film(settings: NDArray[np.void], index: SceneIndex) -> None:
+    """Write the size of the film, and which of its pixels and wavelengths are rendered."""
+    film = index.film
+    width, height = film.size
+    settings["width"], settings["height"] = width, height
+    settings["crop_x"], settings["crop_y"] = (0, 0) if film.crop is None else film.crop[:2]
+    settings["film_width"], settings["film_height"] = film.width, film.height
+    margin = settings["margin"] = 0 if index.light_paths else index.filter_reach
+    settings["tiles_x"] = -(-(width + 2 * margin) // 4)
+    settings["padded_pixels"] = 16 * settings["tiles_x"] * -(-(height + 2 * margin) // 4)
+    settings["alpha"] = index.alpha
+    settings["lambda_min"], settings["lambda_max"] = film.lambda_min, film.lambda_max
+    settings["bands"] = film.bands
+
+
+def _set_paths(settings: NDArray[np.void], index: SceneIndex) -> None:
+    """Write what the sampler and the integrator say of paths."""
+    scene, integrator = index.scene, index.integrator
+    settings["seed"] = scene.seed
+    settings["sample_bits"] = min((max(scene.spp, 1) - 1).bit_length(), MOST_SAMPLE_BITS)
+    depth = integrator.max_depth
+    settings["max_depth"] = DEEPEST if depth < 0 else min(depth, DEEPEST)
+    settings["rr_depth"] = min(integrator.rr_depth, DEEPEST)
+    settings["hide_lights"] = integrator.hide_lights
+    settings["light_paths"] = index.weighed
+
+
+def _set_layers(settings: NDArray[np.void], layers: LayerFeatures) -> None:
+    """Set where the layers beside the picture stand."""
+    for name, place in layers.places.items():
+        settings[f"layer_{name}"] = place
+    settings["layer_denoising"], settings["layer_words"] = layers.first_for_denoisers, layers.words
+    settings["mattes"], settings["material_numbers"] = len(layers.mattes), layers.material_numbers
+    settings["primitive_rows"] = layers.primitive_rows
+    settings["matte_object"] = layers.matte_of_objects
+    settings["matte_material"] = layers.matte_of_materials
+    settings["layer_direct"], settings["layer_indirect"] = layers.direct, layers.indirect
+    settings["layer_groups"], settings["light_groups"] = layers.groups, layers.light_group_row or 0
+
+
+def rival_area(scene_radius: float) -> float:
+    """Return the unit of areas in rivals of light paths [m^2], a power of two.
+
+    1 for scenes of ordinary size; of larger and smaller ones, what brings their size to these.
+    """
+    exponent = math.frexp(scene_radius)[1]
+    beyond = exponent - min(max(exponent, -ORDINARY_SIZE), ORDINARY_SIZE)
+    return 4.0 ** min(max(beyond, -LARGEST), LARGEST)
+
+
+def _set_photons(
+    settings: NDArray[np.void],
+    index: SceneIndex,
+    geometry: Geometry,
+    scene_radius: float,
+    disperses: bool,
+) -> None:
+    """Write what merging needs; the wavefront adds how many light paths leave photons."""
+    integrator, film = index.integrator, index.film
+    assert isinstance(integrator, Vcm)
+    settings["max_depth"] = min(int(settings["max_depth"]), photons.DEEPEST)
+    settings["radius"] = integrator.radius or photons.first_radius(
+        index.camera, geometry, (film.width, film.height), scene_radius
+    )
+    settings["photon_places"] = photons.places(integrator)
+    held = photons.pixels(integrator, int(settings["padded_pixels"]))
+    settings["photon_pixels"] = held
+    cells = max(held * integrator.light_paths, photons.FEWEST_CELLS)
+    settings["photon_cells"] = 1 << (cells - 1).bit_length()
+    suited = photons.GROUPS if disperses else photons.FEW_GROUPS
+    groups = integrator.wavelength_groups or suited
+    settings["wavelength_groups"] = groups if index.spectral else 1

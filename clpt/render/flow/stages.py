@@ -1,0 +1,309 @@
+"""Generated parts of the stages' text: camera, lights, materials and what passes null surfaces.
+
+The physics is always in a file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from clpt.records import PHOTON
+from clpt.render.flow import flags
+from clpt.render.lights import cases as lights
+from clpt.render.lights import emission_cases as emission
+from clpt.render.materials import cases as parameters
+from clpt.render.materials import thin_film_cases as thin_films
+from clpt.render.records import CameraFeatures, Features, GridFeatures, MaterialFeatures
+from clpt.render.records import camera_rows as camera_records
+from clpt.render.records.dispatch import Case, Function, active, function
+from clpt.render.records.parameter_words import MIXTURE, row_words, words
+from clpt.scene.materials import Dielectric
+from clpt.scene.params import device_params, interior_params
+from clpt.scene.roles import Role
+from clpt.scene.scatterer import Scatterer
+
+
+def camera_text(features: CameraFeatures, *, moves: bool = False) -> str:
+    """Return `camera_ray`, or `camera_weighted_ray`; moves: the camera does."""
+    kind, losses = features.kind, features.losses or features.ghosts
+    record = camera_records.RECORDS[kind]
+    camera = f"(global const {record.name} *)(scene).camera"
+    moving = '#include "cameras/moved.cl"\n' * moves
+    if kind in camera_records.WEIGHTED:
+        surface = camera_records.LENS_SURFACE
+        return (
+            f"{record.uniform_text()}{surface.row_text()}{surface.spread_text()}"
+            f"#define LENS_SURFACE_WORDS {surface.words}\n"
+            f"#define LENS_GHOST_CELLS {camera_records.GHOST_CELLS}\n"
+            + '#include "materials/film_stack.cl"\n'
+            * losses
+            + f'#include "cameras/kinds/{kind}.cl"\n{moving}'
+            "#define camera_weighted_ray(scene, film, lens, lambdas, weight) "
+            f"{_moved(f'{kind}_ray(scene, {camera}, film, lens, lambdas, weight)', moves)}\n"
+        )
+    ray = f"{kind}_ray({camera}, film, lens)"
+    if features.disperses:
+        row = f"(integer)(({camera})->glass)"
+        ray = f"{kind}_glass_ray({camera}, film, lens, spectra_row(scene, {row}, lambdas).x)"
+    return (
+        f'{record.uniform_text()}#include "cameras/kinds/{kind}.cl"\n{moving}'
+        f"#define camera_ray(scene, film, lens, lambdas) {_moved(ray, moves)}\n"
+    )
+
+
+def _moved(ray: str, moves: bool) -> str:
+    return f"camera_moved(scene, {ray})" if moves else ray
+
+
+def connect_text(features: Features) -> str:
+    """Return `camera_connect` for paths that start at lights, or what ghosts of a lens need.
+
+    It is nothing where no path is joined.
+    """
+    if features.transport.lit_ghosts and features.transport.light_paths:
+        return '#include "cameras/lens_ghosts.cl"\n'
+    if not features.transport.joined:
+        return ""
+    kind = features.camera.kind
+    record = camera_records.RECORDS[kind]
+    files = f'#include "cameras/{kind}_connect.cl"\n'
+    camera = f"(global const {record.name} *)(scene).camera"
+    if features.motion.camera:
+        rest = f"{kind}_connect({camera}, (scene).settings, p, away, lens)"
+        return f'{files}#include "cameras/moved_connect.cl"\n' + function(
+            "CameraPoint camera_connect(Scene scene, vec3 p, mask away, vec2 lens)",
+            "Motion motion = camera_motion(scene);",
+            "p = camera_point_back(motion, p, away);",
+            f"return camera_point_moved(motion, camera_near(scene, {rest}), away);",
+        )
+    return (
+        f"{files}#define camera_connect(scene, p, away, lens) "
+        f"camera_near(scene, {kind}_connect({camera}, "
+        "(scene).settings, p, away, lens))\n"
+    )
+
+
+def screen_text(features: Features) -> str:
+    """Return `camera_screen`, where on the film a point is seen, for the layer of motion."""
+    if not features.screen_motion:
+        return ""
+    kind = features.camera.kind
+    camera = f"(global const {camera_records.RECORDS[kind].name} *)(scene).camera"
+    return (
+        f'#include "cameras/{kind}_screen.cl"\n#define camera_screen(scene, p, away, seen) '
+        f"{kind}_screen({camera}, p, away, seen)\n"
+    )
+
+
+def photon_text(features: Features) -> str:
+    """Return the struct of a photon, and `photon_met(kind)`: whether one is kept at a material.
+
+    At a mixture one is kept while no part is chosen yet. `photon_along(kind)`: likewise in a medium
+    of a phase function; `photon_collides(kind)`: whether it is a phase function.
+    """
+    leaves = [*enumerate(features.materials.leaves)]
+    kinds = [i for i, cls in leaves if flags.gathers_photons(features, cls)]
+    along = [i for i, cls in leaves if flags.gathers_along(features, cls)]
+    asked = {
+        "met": [*kinds, *along, MIXTURE],
+        "along": along,
+        "collides": _phases(features),
+    }
+    rows = [f"{PHOTON.row_text(many=True)}{PHOTON.keep_text()}#define PHOTON_WORDS {PHOTON.words}"]
+    rows += [f"#define photon_{name}(kind) ({_among(of)})" for name, of in asked.items()]
+    return "\n".join([*rows, ""])
+
+
+def phases_text(features: Features) -> str:
+    """Return `is_phase(kind)`: whether a material is a phase function."""
+    return f"#define is_phase(kind) ({_among(_phases(features))})\n"
+
+
+def _phases(features: Features) -> list[int]:
+    """Return the numbers of the phase functions of a scene."""
+    return [i for i, cls in enumerate(features.materials.leaves) if cls.is_phase]
+
+
+def _among(kinds: Sequence[int]) -> str:
+    """The condition that a kind is one of these, in each lane."""
+    return " | ".join(f"((kind) == {kind})" for kind in kinds) or "mask_of(0)"
+
+
+def grid_words_text(grids: GridFeatures) -> str:
+    """Return where behind a medium's coefficients the words of its grid's colours and parts lie."""
+    albedo = (
+        19 + 6 * grids.emissive
+    )  # behind the words of its light, kernels/media/medium_grid_light.cl
+    colour = albedo + grids.tinted
+    words = {"ALBEDO": albedo, "COLOUR": colour, "MIXED": colour + grids.coloured}
+    rows = [f"#define GRID_{name} (2 * MEDIUM_SCATTERING + {n})" for name, n in words.items()]
+    # whether extinction has other colours from point to point
+    return "\n".join([*rows, f"#define GRIDS_VARY {int(grids.coloured or grids.mixed > 0)}", ""])
+
+
+def lights_text(features: Features) -> str:
+    """Return the loader of emissions, from wherever they come in this scene, and the dispatch."""
+    emissions = lights.emission_sources(features)
+    factors = features.materials.sources_of("factor").get("value", frozenset())
+    densities = emission.densities_text(features) if features.transport.balanced else ""
+    return (
+        ('#include "generated/textures.cl"\n' if "texture" in emissions | factors else "")
+        + parameters.emission_text(emissions)
+        + (parameters.factor_text(factors) if factors else "")
+        + lights.dispatch_text(features, densities)
+    )
+
+
+def null_transmittance_text(features: Features) -> str:
+    """Return `null_transmittance`: how much light passes a surface with some material word.
+
+    A mixture's children are one level below it, since kernels cannot call themselves.
+    """
+    leaves = [*enumerate(features.materials.leaves)]
+    passing = [f"(MATERIAL_KIND(word) == {i})" for i, cls in leaves if cls.is_null]
+    arguments = "(Scene scene, integer word, TexturePoint point, Wavelengths lambdas, real c)"
+    passes = f"sel({' | '.join(passing) or 'mask_of(0)'}, (real)(1.0f), (real)(0.0f))"
+    of = "Spectrum" if features.materials.free_panes else "real"
+    parts, cases = [], []
+    for i, cls in leaves if features.materials.free_panes else ():
+        if cls.is_pane:
+            parts += _pane_text(features, cls)
+            load = f"{cls.__name__} r = {cls.kind}_load"
+            row = active("MATERIAL_ROW(word)")
+            cases.append(
+                Case(
+                    f"MATERIAL_KIND(word) == {i}",
+                    "thin_slab_passed(c, r.int_ior, r.ext_ior, r.specular_transmittance)",
+                    (f"{load}(scene, {row}, point, lambdas);",),
+                )
+            )
+    first = Function(f"{of} null_transmittance_0{arguments}", f"passage_of({passes})", cases)
+    parts.append(first.text())
+    for level in range(1, features.materials.mixtures + 1):
+        below = f"null_transmittance_{level - 1}"
+        children = (
+            f"integer row = {active('MATERIAL_ROW(word)')};",
+            "real w = mixture_weight(scene, row, point, lambdas);",
+            f"{of} first = {below}(scene, gather_i(scene.mixtures, row + 2), point, lambdas, c);",
+            f"{of} second = {below}(scene, gather_i(scene.mixtures, row + 3), point, lambdas, c);",
+        )
+        lerp = "spectrum_add(first, spectrum_scale(spectrum_sub(second, first), w))"
+        value = lerp if features.materials.free_panes else "first + w * (second - first)"
+        mixed = Case(f"MATERIAL_KIND(word) == {MIXTURE:#x}", value, children)
+        leaf = f"{below}(scene, word, point, lambdas, c)"
+        parts.append(Function(f"{of} null_transmittance_{level}{arguments}", leaf, [mixed]).text())
+    last = features.materials.mixtures
+    return "".join([*parts, f"#define null_transmittance null_transmittance_{last}\n"])
+
+
+def _pane_text(features: Features, cls: type[Scatterer]) -> list[str]:
+    """The struct and the loader of thin glass."""
+    sources = features.materials.sources_of(cls.kind)
+    return [
+        '#include "materials/thin_slab.cl"\n',
+        parameters.struct_text(cls, sources),
+        parameters.load_text(cls, sources, "materials"),
+    ]
+
+
+def smooth_boundary_text(features: Features) -> str:
+    """Return the kind of smooth boundaries, for rays that leave sealed media."""
+    if not features.media.escapes:
+        return ""
+    number, sources = features.materials.leaves.index(Dielectric), features.materials.sources_of
+    return (
+        f"#define SMOOTH_BOUNDARY {number}\n"
+        + functions_text(Dielectric, features.spectra.mode, features)
+        + parameters.load_text(Dielectric, sources(Dielectric.kind), "materials")
+    )
+
+
+def functions_text(cls: type[Scatterer], mode: str, features: Features | None = None) -> str:
+    """Return a kind's struct and functions, with what its boundary needs.
+
+    features: where its parameters come from; without, all are constants.
+    """
+    loaded = features.materials if features else MaterialFeatures()
+    own, layer = loaded.sources_of(cls.kind), loaded.sources_of("layer")
+    boundary = thin_films.boundary_text(cls, mode, own, layer)
+    used = {param.role for param in device_params(cls).values()}
+    for role, table in parameters.TABLES.items():
+        if role in used:
+            boundary += _counts_text(role, own.get("data", frozenset())) if table.counted else ""
+            boundary += f'#include "{table.file}"\n'
+            boundary += f'#include "{table.load_file}"\n' if features else ""
+    struct, declared = parameters.struct_text(cls, own), _declared_text(cls)
+    return f'{boundary}{struct}{declared}#include "{cls.folder}/{cls.kind}.cl"\n'
+
+
+def _counts_text(role: Role, sources: frozenset[str]) -> str:
+    """Define the counts at the head of a measurement, where all of a scene have the same."""
+    if len(sources) != 1:
+        return ""
+    _, *counts = next(iter(sources)).split()
+    chosen = " : ".join(f"(i) == {i} ? {count}" for i, count in enumerate(counts))
+    return f"#define {role.name.upper()}_COUNT(t, i) ((integer)({chosen} : 0))\n"
+
+
+def _declared_text(cls: type[Scatterer]) -> str:
+    """Declare a kind's costly functions as inline.
+
+    Only so do compilers see which lobes a scene leaves out, and what the functions have in common.
+    """
+    types = {"sample": "BsdfSample", "eval": "Spectrum", "pdf": "real", "pdfs": "Spectrum"}
+    last = {"sample": "vec3 u"}
+    return "".join(
+        f"inline {types[verb]} {cls.kind}_{verb}"
+        f"({cls.__name__} m, vec3 wo, {last.get(verb, 'vec3 wi')});\n"
+        for verb in types
+        if verb != "pdfs" or cls.chromatic
+    )
+
+
+def bsdf_text(features: Features, cls: type[Scatterer]) -> str:
+    """Return a kind's struct, functions and loader, under the names that the integrators use."""
+    kind = cls.kind
+    reflectivity = "(m).reflectivity" if "reflectivity" in device_params(cls) else "(real)(0.0f)"
+    verbs = ("sample", "eval", "pdf", "albedo", "load", *(("pdfs",) if cls.chromatic else ()))
+    return "\n".join(
+        [
+            functions_text(cls, features.spectra.mode, features),
+            parameters.load_text(
+                cls,
+                features.materials.sources_of(kind),
+                "materials",
+                flags.filters_at_random(features, cls),
+            ),
+            f"typedef {cls.__name__} Bsdf;",
+            f"#define BSDF_REFLECTIVITY(m) {reflectivity}",
+            *(f"#define bsdf_{verb} {kind}_{verb}" for verb in verbs),
+            "#define bsdf_albedo_in(scene, m) bsdf_albedo(m)",
+            f"#define BSDF_INTERIOR(row) {interior(cls)}" if features.media.absorbing else "",
+            *(_shift_text(cls) if flags.fluoresces(features, cls) else ()),
+            "",
+        ]
+    )
+
+
+def interior(cls: type[Scatterer]) -> str:
+    """The name of the medium inside of a material at `row`, see kernels/media/medium.cl."""
+    own = interior_params(cls)
+    first = row_words(cls) - sum(map(words, own.values()))
+    inside = f"((row) + {1 + first})" if own else "((integer)(0))"
+    if own and "thin" in device_params(cls):  # a sheet has no inside
+        at = parameters.word_before(cls, "thin")
+        thin = f"gather_i(scene.materials, (row) + {at}) != 0"
+        inside = f"sel_i({thin}, (integer)(0), {inside})"
+    return inside
+
+
+def _shift_text(cls: type[Scatterer]) -> list[str]:
+    """`bsdf_shift`: the wavelengths by which light comes to a surface at `row`."""
+    at = parameters.word_before(cls, "reradiation")
+    table = f"gather_i((scene).materials, (row) + {at})"
+    own = "&(m).reflectance, &(m).reradiation, (m).amount"
+    return [
+        '#include "materials/reradiation.cl"',
+        "#define bsdf_shift(scene, row, m, lambdas, u, depth) "
+        f"reradiation_shift(scene, {table}, {own}, lambdas, u, depth)",
+    ]

@@ -1,0 +1,161 @@
+"""Vertices of paths that several kinds of materials share, in the loop of a CPU.
+
+Most of what shades a kind is the vertex of the path: light that is met and sought, weights against
+paths from the other end, roulette. Kinds for which that is the same are shaded by one part of the
+loop, and each has a part with what is its own, which the vertex calls for LANES paths of one kind
+at once. In one lane, as on GPUs, each kind has a program with all of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from clpt.render.flow import choices, flags, stages
+from clpt.render.records import Features
+from clpt.render.records.dispatch import function
+from clpt.scene.scatterer import Scatterer
+
+RUN_TIME = ("BSDF_KIND", "BSDF_TRANSMITS", "BSDF_SHINES", "BSDF_ABSORBS", "USES_CHOICE",
+            "STOCHASTIC_FILTERING")  # flags in which kinds of one vertex may differ  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Vertex:
+    """The program that shades some kinds of a scene's materials, and the numbers of the kinds."""
+
+    program: str
+    kinds: tuple[int, ...]
+
+    @property
+    def shared(self) -> bool:
+        """Whether several kinds have it."""
+        return len(self.kinds) > 1
+
+
+def vertices(features: Features, lanes: int) -> list[Vertex]:
+    """Return what shades the materials of a scene, in the order of their kinds."""
+    leaves = features.materials.leaves
+    alike: dict[object, list[int]] = {}
+    for kind, cls in enumerate(leaves):
+        key = _key(features, cls) if lanes > 1 and _may_share(features, cls) else kind
+        alike.setdefault(key, []).append(kind)
+    found = []
+    for kinds in alike.values():
+        others = "_and_others" if len(kinds) > 1 else ""
+        found.append(Vertex(f"shade_{leaves[kinds[0]].kind}{others}", tuple(kinds)))
+    return found
+
+
+def _may_share(features: Features, cls: type[Scatterer]) -> bool:
+    """Whether the vertex asks a kind once: photons, guides, escapes, hero wavelengths ask more."""
+    own = (flags.is_chromatic, flags.fluoresces, flags.is_guided, flags.between_bodies)
+    merged = features.transport.merged and flags.gathers_photons(features, cls)
+    turned = any(flags.has_lobe(features, cls, one) for one in ("clearcoat_apart", "anisotropy"))
+    sent = features.media.escapes and cls.is_phase
+    alone = merged or turned or sent or any(holds(features, cls) for holds in own)
+    return features.transport.integrator != "whitted" and not alone
+
+
+def _key(features: Features, cls: type[Scatterer]) -> object:
+    """Return a key that is equal for kinds of one vertex; whether they shine does not matter."""
+    own = flags.of_material(features, cls)
+    files = {
+        name: tuple(file.replace("met_emission_none", "met_emission") for file in chosen)
+        for name, chosen in choices.material_files(features, cls).items()
+    }
+    rest = (item for item in own.items() if item[0] not in RUN_TIME)
+    return (*rest, *files.items())
+
+
+def leader(features: Features, vertex: Vertex) -> type[Scatterer]:
+    """Return the kind whose files serve all kinds of a vertex: one that shines, if any does."""
+    classes = [features.materials.leaves[kind] for kind in vertex.kinds]
+    return max(classes, key=lambda cls: cls.kind in features.materials.shining)
+
+
+def defines(features: Features, vertex: Vertex) -> flags.Defines:
+    """Return the flags of a vertex: what its kinds differ in follows from `scene.kind`."""
+    each = [flags.of_material(features, features.materials.leaves[kind]) for kind in vertex.kinds]
+    if not vertex.shared:
+        return each[0]
+    # Of black materials a path's end is known late, when it has no light to carry.
+    found = {**each[0], "SHADES_SEVERAL": 1, "BSDF_KIND": "scene.kind", "BSDF_ABSORBS": 0}
+    for name in ("BSDF_SHINES", "STOCHASTIC_FILTERING"):
+        found[name] = max(own[name] for own in each)
+    for name in ("BSDF_TRANSMITS", "USES_CHOICE"):
+        bits = sum(1 << kind for kind, own in zip(vertex.kinds, each, strict=True) if own[name])
+        every = sum(1 << kind for kind in vertex.kinds)
+        found[name] = int(bits > 0) if bits in (0, every) else f"((0x{bits:x} >> scene.kind) & 1)"
+    return found
+
+
+def virtual_files(features: Features, vertex: Vertex) -> dict[str, str | tuple[str, ...]]:
+    """Return the files that stand for those of a single kind."""
+    return {
+        "generated/bsdf.cl": _calls_text(features, vertex),
+        "generated/pair.cl": ("materials/pair_apart.cl",),
+    }
+
+
+_READ = "Scene scene, integer row, TexturePoint point, Wavelengths lambdas"
+_READ_PASSED = "scene, row, point, lambdas"
+
+
+@dataclass(frozen=True)
+class Own:
+    """A function of a kind's part: its type and name, and what it takes besides where it reads."""
+
+    returns: str
+    name: str
+    takes: tuple[tuple[str, str], ...]
+    value: str
+
+    @property
+    def parameters(self) -> str:
+        """As they are declared."""
+        return ", ".join([_READ, *(f"{type_} {name}" for type_, name in self.takes)])
+
+    @property
+    def passed(self) -> str:
+        """As they are passed on."""
+        return ", ".join([_READ_PASSED, *(name for _, name in self.takes)])
+
+
+def _functions(features: Features) -> list[Own]:
+    """Return the functions that the parts of a scene's kinds have."""
+    joined = any(own.transport.joined for own in features.passes)
+    directions = (("vec3", "wo"), ("vec3", "wi"), ("vec3", "u"), ("uint", "adjoint"))
+    answer = f"material_answer(m, wo, wi, u, {'adjoint' if joined else '0'})"
+    found = [Own("BsdfAnswer", "answer", directions, answer)]
+    if features.film.layers.words:
+        found.append(Own("Spectrum", "albedo", (), "bsdf_albedo(m)"))
+    return found
+
+
+def part_text(features: Features, cls: type[Scatterer]) -> str:
+    """Return the functions of a kind's part."""
+    rows = []
+    for own in _functions(features):
+        rows.append(f"APART({own.returns}, loop_{cls.kind}_{own.name})({own.parameters})")
+        rows.append(f"{{\n    Bsdf m = bsdf_load({_READ_PASSED});\n    return {own.value};\n}}")
+    return "\n".join([*rows, ""])
+
+
+def _calls_text(features: Features, vertex: Vertex) -> str:
+    """Return the material of a shared vertex: functions that call those of the kinds' parts."""
+    classes = {kind: features.materials.leaves[kind] for kind in vertex.kinds}
+    rows = []
+    for own in _functions(features):
+        cases = []
+        for kind, cls in classes.items():
+            called = f"loop_{cls.kind}_{own.name}"
+            rows.append(f"{own.returns} {called}({own.parameters});")
+            cases.append(f"case {kind}: value = {called}({own.passed}); break;")
+        body = (f"{own.returns} value;", "switch (scene.kind) {", *cases, "}", "return value;")
+        rows.append(function(f"{own.returns} apart_{own.name}({own.parameters})", *body))
+    if features.media.absorbing:
+        inside = (f"case {kind}: return {stages.interior(cls)};" for kind, cls in classes.items())
+        head = "integer bsdf_interior(Scene scene, integer row)"
+        rows.append(function(head, "switch (scene.kind) {", *inside, "}", "return 0;"))
+        rows.append("#define BSDF_INTERIOR(row) bsdf_interior(scene, row)")
+    return "\n".join([*rows, '#include "materials/material_apart.cl"', ""])

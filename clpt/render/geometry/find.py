@@ -1,0 +1,345 @@
+"""The shapes of a scene as rays meet them: triangles, boxes and instances, all in order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import transforms
+from clpt.arrays import Faces, Points, fits_single
+from clpt.bvh.build import MOST
+from clpt.errors import SceneError
+from clpt.files import budget
+from clpt.geometry import (
+    analytic,
+    instancing,
+    motion,
+    shape_records,
+    shapes,
+    spheres,
+    strands,
+    triangles,
+)
+from clpt.geometry.instancing import Instances, Placed, Prototype
+from clpt.geometry.motion import Motions
+from clpt.records import SHAPE, SHAPE_BITS
+from clpt.render.records.lowering_cache import LoweringCache
+from clpt.render.scene_index import SceneIndex
+from clpt.scene.params import fields_of
+from clpt.scene.shapes import Shape
+from clpt.scene.textures import Texture
+
+LEAST_RADIUS = 1e-12  # of a sphere around a scene [m]
+SWEPT_CELLS = 4  # of the hull of what moves, see `instancing.hull_points`
+
+Owner = tuple[np.ndarray, Shape, int, int]  # a row of `shapes`, its shape, first vertex and face
+Triangles = tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.uint32]]
+
+
+@dataclass(frozen=True)
+class Emitter:
+    """A shape with an `emission`.
+
+    shape_row: its row in `shapes`; vertices, faces, uvs: its triangles as `shapes.triangles` gave
+    them, needed for a mesh and a cube; of `spheres`, vertices are their balls; keys: rows of each
+    vertex, as of `triangles.keyed`.
+    """
+
+    shape: Shape
+    shape_row: int
+    vertices: Points | None = None
+    faces: Faces | None = None
+    uvs: Points | None = None
+    keys: int = 1
+
+
+@dataclass(frozen=True)
+class Stored:
+    """Arrays of a shape that go to tables beside its row.
+
+    vertices: how many it has; normals, uvs: of the vertices, or None; many: balls (n, 4) or
+    (n, k, 4), or pieces of curves, where one shape stands for many.
+    """
+
+    vertices: int = 0
+    normals: Points | None = None
+    uvs: Points | None = None
+    many: NDArray[np.float32] | None = None
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """The shapes of a scene as triangles, boxes and instances, with their rows of `shapes`.
+
+    rows: those of analytic shapes last, with what is known before lowering: number, kind, first
+    primitive and flags; owners: the shape of each row, with its first vertex and face; stored: for
+    each row, arrays for other tables; vertices (n, 3) float32, faces (m, 3) uint32 and tags (m,)
+    uint32, the shape of each triangle: the world's before those of groups; boxes (k, 2, 3) float32:
+    of analytic shapes; world_vertices: number of vertices that are not a group's; first_analytic:
+    the first row of an analytic shape; single_count: number of analytic shapes that are one each;
+    analytic: their kinds; normals, uvs: whether a shape needs them; tangents: of shapes that have
+    their own, each with its first vertex; keys: by the first vertex of a shape how many rows each
+    of its vertices has, where that is not one.
+    """
+
+    rows: tuple[np.ndarray, ...]
+    owners: tuple[Owner, ...]
+    stored: tuple[Stored, ...]
+    vertices: NDArray[np.float32]
+    faces: NDArray[np.uint32]
+    tags: NDArray[np.uint32]
+    boxes: NDArray[np.float32]
+    instances: Instances
+    emitters: tuple[Emitter, ...]
+    world_vertices: int
+    first_analytic: int
+    single_count: int
+    analytic: frozenset[str]
+    normals: bool
+    uvs: bool
+    tangents: tuple[tuple[int, NDArray[np.float32]], ...]
+    warnings: tuple[str, ...]
+    keys: Mapping[int, int] = field(default_factory=dict)
+
+    def bounding_sphere(self) -> tuple[NDArray[np.float64], float]:
+        """Return centre and radius of a sphere around the scene; a unit one if it is empty.
+
+        Raises SceneError for a scene whose size is beyond float32.
+        """
+        vertices = self.vertices[: self.world_vertices]
+        boxes = [box for box in (self.boxes, self.instances.boxes) if len(box)]
+        lows = [vertices.min(axis=0)] if len(vertices) else []
+        highs = [vertices.max(axis=0)] if len(vertices) else []
+        lows += [box[:, 0].min(axis=0) for box in boxes]
+        highs += [box[:, 1].max(axis=0) for box in boxes]
+        if not lows:
+            return np.zeros(3), 1.0
+        low, high = np.min(lows, axis=0), np.max(highs, axis=0)
+        if max(np.abs(low).max(), np.abs(high).max()) > triangles.FAR:
+            low, high = low.astype(np.float64), high.astype(np.float64)
+        if not fits_single(2.0 * (high - low)):
+            raise SceneError("the scene is too large: its size must be below 1.7e38 m")
+        return (low + high) / 2, max(float(np.linalg.norm(high - low)) / 2, LEAST_RADIUS)
+
+
+def _divided(placed: Iterable[Placed]) -> tuple[list[Placed], list[Placed]]:
+    """Divide shapes into those of triangles and others; the latter, with many in one, come last."""
+    meshes: list[Placed] = []
+    others: list[Placed] = []
+    many = list(shape_records.ONE_OF)
+    for one in placed:
+        (others if one.shape.kind in shape_records.ANALYTIC else meshes).append(one)
+    others.sort(key=lambda one: one.shape.kind in many and 1 + many.index(one.shape.kind))
+    return meshes, others
+
+
+def assembled(index: SceneIndex, cache: LoweringCache) -> Geometry:
+    """Return the shapes of a scene as rays meet them.
+
+    Raises SceneError for a shape that makes no sense, and for more triangles than a tree can hold.
+    """
+    meshes, others = _divided(index.placed)
+    single = [one for one in others if one.shape.kind not in shape_records.ONE_OF]
+    builder = _Builder(cache, len(single), index.motions)
+    for one in meshes:
+        builder.add(one)
+    world_vertices = builder.vertex_count
+    instances = instancing.concatenated([builder.share(p) for p in index.prototypes])
+    first_analytic = len(builder.rows)
+    for one in others:
+        builder.add(one)
+    boxes = [np.zeros((0, 2, 3), np.float32)]
+    boxes += [builder.around(one, np.array([analytic.bounds(one.shape)])) for one in single]
+    many_boxes = zip(others[len(single) :], builder.many, strict=True)
+    boxes += [builder.around(one, own) for one, own in many_boxes]
+    vertices, faces, tags = builder.concatenated()
+    return Geometry(
+        rows=tuple(builder.rows),
+        owners=tuple(builder.owners),
+        stored=tuple(builder.stored),
+        vertices=vertices,
+        faces=faces,
+        tags=tags,
+        boxes=np.concatenate(boxes),
+        instances=instances,
+        emitters=tuple(builder.emitters),
+        world_vertices=world_vertices,
+        first_analytic=first_analytic,
+        single_count=len(single),
+        analytic=frozenset(one.shape.kind for one in others),
+        normals=builder.normals,
+        uvs=builder.uvs,
+        tangents=tuple(builder.tangents),
+        warnings=tuple(triangles.warnings_of(builder.flat)),
+        keys=builder.keys,
+    )
+
+
+def spheres_move(index: SceneIndex) -> bool:
+    """Whether many spheres in one shape belong to something that deforms."""
+    deforming = index.motions.deforming
+    return any(one.shape.kind == "spheres" and one.number in deforming for one in index.placed)
+
+
+@dataclass
+class _Builder:
+    """The parts of a `Geometry` that `assembled` has found so far."""
+
+    cache: LoweringCache
+    single_count: int
+    motions: Motions
+    rows: list[np.ndarray] = field(default_factory=list)
+    owners: list[Owner] = field(default_factory=list)
+    stored: list[Stored] = field(default_factory=list)
+    emitters: list[Emitter] = field(default_factory=list)
+    parts: list[tuple[np.ndarray, np.ndarray, int]] = field(default_factory=list)
+    flat: list[triangles.Flat] = field(default_factory=list)
+    many: list[NDArray[np.float32]] = field(default_factory=list)
+    vertex_count: int = 0
+    face_count: int = 0
+    normals: bool = False
+    uvs: bool = False
+    tangents: list[tuple[int, np.ndarray]] = field(default_factory=list)
+    keys: dict[int, int] = field(default_factory=dict)
+
+    def add(self, one: Placed, times: Sequence[float] = ()) -> None:
+        """Append a shape's row, and its triangles or what it is many of.
+
+        times: at which the vertices have rows, for what belongs to something that deforms.
+        """
+        budget.check_time()
+        shape = one.shape
+        row = np.zeros((), SHAPE.dtype)
+        row["number"], row["light"] = one.number, -1
+        self.owners.append((row, shape, self.vertex_count, self.face_count))
+        corners: tuple[Any, Any, Any] = (None, None, None)
+        stored = Stored()
+        if shape.kind not in shape_records.ANALYTIC:
+            corners, stored = self._add_triangles(shape, row, times)
+        else:
+            row["kind"] = 1 + shape_records.ANALYTIC.index(shape.kind)
+            if shape.kind == "curves":
+                stored = self._add_curves(shape, row)
+            elif shape.kind in shape_records.ONE_OF:
+                balls, stored = self._add_balls(shape, row, self.motions.deforming.get(one.number))
+                corners = balls, None, None
+        if shape.emission is not None:
+            count = len(times) if _in_triangles(shape) else 1
+            self.emitters.append(Emitter(shape, len(self.rows), *corners, keys=max(count, 1)))
+            values = fields_of(shape.emission).values()
+            self.uvs |= any(isinstance(value, Texture) for value in values)
+        self.rows.append(row)
+        self.stored.append(stored)
+
+    def around(self, one: Placed, boxes: NDArray[Any]) -> NDArray[np.float32]:
+        """Boxes (n, 2, 3) of a shape, and where it moves around all that they sweep."""
+        if one.number not in self.motions.shapes:
+            return np.asarray(boxes, np.float32)
+        return self.motions.swept(one.number, boxes)
+
+    def _add_balls(
+        self, shape: Shape, row: np.ndarray, times: tuple[float, ...] | None
+    ) -> tuple[Any, Stored]:
+        """Append the boxes of many spheres; return the spheres as they are at first, and all.
+
+        times: at which they have rows, for what belongs to something that deforms.
+        """
+        row["prim"] = self.single_count + sum(map(len, self.many))
+        row["flags"] |= SHAPE_BITS["many"]
+        by = shapes.geometry(shape)
+        if times:
+            keyed = self.cache(spheres.keyed, shape, times, by=(*by, times))
+            self.many.append(spheres.swept(keyed))
+            budget.take_made((keyed, self.many[-1]), shapes.where(shape))
+            return keyed[:, 0], Stored(many=keyed)
+        balls = self.cache(spheres.balls, shape, by=by)
+        self.many.append(spheres.boxes([balls]))
+        budget.take_made((balls, self.many[-1]), shapes.where(shape))
+        return balls, Stored(many=balls)
+
+    def _add_curves(self, shape: Shape, row: np.ndarray) -> Stored:
+        """Append the boxes of a shape's pieces."""
+        row["prim"] = self.single_count + sum(map(len, self.many))
+        found = self.cache(strands.pieces, shape, by=shapes.geometry(shape))
+        self.many.append(strands.boxes(found))
+        budget.take_made((found, self.many[-1]), shapes.where(shape))
+        return Stored(many=found)
+
+    def _add_triangles(
+        self, shape: Shape, row: np.ndarray, times: Sequence[float]
+    ) -> tuple[tuple[Any, Any, Any], Stored]:
+        """Append a shape's triangles; return their vertices, faces and uvs, and what is stored."""
+        by = shapes.geometry(shape)
+        if times:
+            row["flags"] |= SHAPE_BITS["deforms"]
+            self.keys[self.vertex_count] = len(times)
+            made = self.cache(triangles.keyed, shape, times, by=(*by, times))
+        else:
+            made = self.cache(triangles.counted, shape, by=by)
+        vertices, faces, normals, uvs, flat = made
+        budget.take_made((vertices, faces, normals, uvs), shapes.where(shape))
+        self.flat += flat
+        row["prim"] = self.face_count
+        row["flags"] |= SHAPE_BITS["normals"] if normals is not None else 0
+        row["flags"] |= SHAPE_BITS["uvs"] if uvs is not None else 0
+        self.normals |= normals is not None
+        if shape.tangents is not None and not times:
+            row["flags"] |= SHAPE_BITS["tangents"]
+            own = (*shapes.geometry(shape), shape.tangents)
+            along = self.cache(triangles.tangents, shape, by=own)
+            self.tangents.append((self.vertex_count, along))
+        moved = faces + np.uint32(self.vertex_count)
+        self.parts.append((vertices, moved, len(self.rows)))
+        self.vertex_count += len(vertices)
+        self.face_count += len(faces)
+        return (vertices, faces, uvs), Stored(len(vertices), normals, uvs)
+
+    def share(self, prototype: Prototype) -> instancing.Shared:
+        """Append the rows of shapes that instances share, and their triangles once."""
+        before, first = len(self.parts), self.face_count
+        times = self.motions.deforming.get(int(prototype.numbers[0]), ())
+        number = int(prototype.numbers[0]) if prototype.moves or times else 0
+        for shape in prototype.shapes:
+            self.add(Placed(shape, number), times)
+        own = self.parts[before:]
+        whole, centre = instancing.centred(np.concatenate([v for v, _, _ in own]))
+        points = instancing.hull_points(whole)
+        placed, boxes = instancing.place(prototype.to_world, prototype.numbers, points, centre)
+        moving = [i for i, n in enumerate(prototype.numbers) if int(n) in self.motions.shapes]
+        if moving:
+            coarse = instancing.hull_points(whole, SWEPT_CELLS).astype(np.float64) + centre
+            for i in moving:
+                keys = self.motions.shapes[int(prototype.numbers[i])]
+                swept = transforms.transform_points(prototype.to_world[i], coarse)
+                boxes[i] = motion.swept(keys, swept[None], self.motions.shutter)[0]
+        ends = np.cumsum([len(v) for v, _, _ in own])[:-1]
+        self.parts[before:] = [
+            (moved, faces, number)
+            for moved, (_, faces, number) in zip(np.split(whole, ends), own, strict=True)
+        ]
+        placed["prim"] = first
+        count = max(len(times), 1)
+        return instancing.Shared(placed, boxes, self.face_count - first, centre, count)
+
+    def concatenated(self) -> Triangles:
+        """Return all vertices, faces and tags."""
+        if max(self.vertex_count, self.face_count) > MOST:
+            raise SceneError(
+                f"{self.face_count:,} triangles with {self.vertex_count:,} vertices: of either "
+                f"there may be {MOST:,}; use instances for what repeats"
+            )
+        if not self.parts:
+            return np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint32), np.zeros(0, np.uint32)
+        vertices, faces, numbers = zip(*self.parts, strict=True)
+        self.parts.clear()
+        tags = [np.full(len(f), n, np.uint32) for f, n in zip(faces, numbers, strict=True)]
+        return np.concatenate(vertices), np.concatenate(faces), np.concatenate(tags)
+
+
+def _in_triangles(shape: Shape) -> bool:
+    """Whether each triangle of a shape that emits is a light."""
+    return shape.kind not in (*shape_records.RECORDS, *shape_records.ANALYTIC)

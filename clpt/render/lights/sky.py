@@ -1,0 +1,113 @@
+"""The sky as a light: its images as texels, and grids to choose directions by."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.arrays import Floats
+from clpt.device import kept_arrays
+from clpt.images.spectral_exr import SpectralImage
+from clpt.render.lights import block_grids
+from clpt.render.lights import images as image_lights
+from clpt.render.spectra.look import Look
+from clpt.render.textures.texels import bands, texels
+from clpt.scene.lights import Sky
+from clpt.scene.roles import EMISSION
+from clpt.sky import dome
+from clpt.sky.dome import (
+    COLUMNS,
+    ROWS,
+    SUN_COLUMNS,
+    SUN_RADIUS,
+    SUN_ROWS,
+    directions,
+    elevations,
+    horizon,
+)
+from clpt.spectra import Tabulated, air, data, luminance
+from clpt.spectra.air import LAMBDAS
+
+MOST = 0.75  # share of samples that the sun may take
+
+
+class Content(NamedTuple):
+    """The radiance of a sky: texels (n, bands or 4), the disc's too, and the grid to choose by."""
+
+    texels: NDArray[np.float32]
+    sun: NDArray[np.float32]
+    number: Tabulated | None
+    corners: Floats
+    grid: block_grids.BlockGrid
+    sun_share: float
+    strength: float
+
+
+def sun_share(lamp: Sky, look: Look) -> float:
+    """Return the share of a sky's samples that its disc gets, 0 where the sun has set."""
+    return content(lamp, look).sun_share
+
+
+def content(lamp: Sky, look: Look) -> Content:
+    """Return the radiance of a sky, found once."""
+    given = *dome.numbers(lamp), look.spectral, look.lo, look.hi
+    return look.cache(_content, *given, by=(repr(given),))
+
+
+def kept(numbers: tuple[float, ...], ground: tuple[float, ...]) -> tuple[Floats, Floats]:
+    """Return what `dome.unscaled` does, from the cache folder where it is there."""
+    code = *Path(dome.__file__).parent.glob("*.py"), Path(air.__file__)
+    tables = (data.ROOT / name for name in ("sky.csv", "air.csv"))
+    around, disc = kept_arrays.kept(dome.unscaled, numbers, ground, files=(*code, *tables))
+    return around, disc
+
+
+def _content(
+    numbers: tuple[float, ...], ground: tuple[float, ...], spectral: bool, lo: float, hi: float
+) -> Content:
+    """The tables of a sky; its spectra from lo to hi [nm]."""
+    around, sun = dome.images(kept, numbers, ground)
+    at = horizon(numbers[1])
+    flat = (f.reshape(1, -1, f.shape[-1]) for f in (around, sun))
+    images = [SpectralImage(f.astype(np.float32), LAMBDAS, True) for f in flat]
+    colours = [np.maximum(image.to_rgb(), 0.0) for image in images]
+    seen = [
+        luminance(colour) + image_lights.UNSEEN * image.values.mean(axis=2)
+        for colour, image in zip(colours, images, strict=True)
+    ]
+    if spectral:
+        (found, number), (disc, _) = bands(images[0], lo, hi), bands(images[1], lo, hi)
+    else:
+        found, disc = (texels(colour, EMISSION, False) for colour in colours)
+    half = seen[0].reshape(2, ROWS + 1, -1)
+    weights = np.concatenate([half, half[..., -2::-1]], axis=2).astype(np.float64)
+    rows = np.clip(np.arange(ROWS + 1), 0.25, ROWS - 0.25) / ROWS
+    root = np.stack([1.0 - rows, rows])
+    span = np.array([0.5 * np.pi - at, 0.5 * np.pi + at])[:, None]
+    angle = np.stack([elevations(at, rows), elevations(at, 1.0 + rows)])
+    area = 2.0 * root * span * np.cos(angle) * 2.0 * np.pi / (ROWS * COLUMNS)
+    corners = weights * area[..., None]
+    cell = 2.0 * 0.5 * np.pi / ROWS, 2.0 * np.pi / COLUMNS
+    grid = block_grids.of(corners, partial(directions, at), cell)
+    shining = _sun_power(seen[1].reshape(SUN_ROWS, SUN_COLUMNS))
+    total = grid.total + shining
+    share = min(shining / total, MOST) if total > 0.0 else 0.0
+    return Content(
+        found, disc, number if spectral else None, corners, grid, share, total / (4.0 * np.pi)
+    )
+
+
+def _sun_power(bright: NDArray[Any]) -> float:
+    """A disc's brightness times solid angle, of its image (rows, columns)."""
+    at = np.linspace(-1.0, 1.0, 101)
+    a, b = np.meshgrid(at, at)
+    inside = 1.0 - a * a - b * b
+    keep = inside > 0.0
+    row = (0.5 + 0.5 * b[keep]) * (SUN_ROWS - 1)
+    column = np.sqrt(inside[keep]) * (SUN_COLUMNS - 1)
+    found = bright[np.rint(row).astype(int), np.rint(column).astype(int)]
+    return float(found.mean() * np.pi * np.sin(SUN_RADIUS) ** 2)

@@ -1,0 +1,261 @@
+"""A tree over lights, to choose one in proportion to what it sends to a point.
+
+Conty Estevez and Kulla 2018: a node bounds where its lights are, and sums their power. What they
+send to each side it knows in the mean (light_lobes.py), where theirs knows a bound of it. It is
+built from the top by their surface area orientation heuristic, over bins as in pbrt-v4 (12.6.3),
+all nodes of a level at once. Every second level is then left out: a point looks at up to WIDTH
+nodes at once, which are neighbours.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.arrays import Floats
+from clpt.render.lights.bounds import Bounds
+from clpt.render.lights.cones import Cones, around, measure, merged
+from clpt.render.lights.lobes import Lobes, reach
+from clpt.render.records.light_rows import LINE, NODE, WIDTH
+
+BINS = 12  # places along an axis where a node may be split
+DEEPEST = 31  # levels below the root, half of which are left: two bits each of a trail
+
+
+@dataclass(frozen=True)
+class Tree:
+    """A tree over lights, as kernels read it.
+
+    nodes (k, WIDTH) structured as NODE, a group each, the root's first; groups that are not full
+    have nodes of power 0 behind. trails (n,) uint32: which nodes lead to a light, from the root.
+    """
+
+    nodes: np.ndarray
+    trails: NDArray[np.uint32]
+
+    def words(self, before: int) -> NDArray[np.uint32]:
+        """Return the words behind the rows in `lights`, which have so many words.
+
+        They are a trail for every row, and then the groups, aligned.
+        """
+        gap = np.zeros(-(before + len(self.trails)) % LINE, np.uint32)
+        return np.concatenate([self.trails, gap, self.nodes.ravel().view(np.uint32)])
+
+
+def build(bounds: Bounds, power: Floats) -> Tree:
+    """Build the tree over lights with these bounds; power (n,): of each, in any unit.
+
+    Lights that are not placed count the same whatever the point; they have a branch of their own.
+    """
+    power = np.asarray(power, np.float64)
+    builder = _Builder(bounds, power / max(power.sum(), 1e-300))
+    rows = np.arange(len(bounds))
+    groups = [g for g in (rows[bounds.placed], rows[~bounds.placed]) if len(g)]
+    if len(groups) == 2:
+        order = np.concatenate(groups)
+        builder.node(np.array([0]), builder.summed(order, np.array([0])), child=np.array([1]))
+        starts, depth = np.array([0, len(groups[0])]), 1
+    else:
+        order, starts, depth = rows, np.array([0]), 0
+    builder.run(order, starts, depth)
+    return _widened(builder.nodes[: builder.count], apart=depth == 1)
+
+
+def _widened(nodes: np.ndarray, apart: bool) -> Tree:
+    """The groups of a tree of two children a node (k,) structured as NODE.
+
+    apart: keep the root's two children as a group of their own.
+    """
+    empty = np.zeros(1, NODE.dtype)
+    empty["child"] = -1
+    nodes = np.concatenate([nodes, empty])
+    trails = np.zeros(int((nodes["child"][:-1] < 0).sum()), np.uint32)
+    if nodes["child"][0] < 0:
+        return Tree(nodes[[[0] + [-1] * (WIDTH - 1)]], trails)
+    groups, inner, trail = [], np.array([0]), np.zeros(1, np.uint32)
+    made, depth = 1, 0
+    while len(inner):
+        pairs = nodes["child"][inner][:, None] + [0, 1]
+        down = nodes["child"][pairs]
+        split = (down >= 0) & (depth > 0 or not apart)
+        first, second = np.where(split, down, pairs), np.where(split, down + 1, -1)
+        slots = np.stack([first, second], axis=2).reshape(-1, WIDTH)
+        group = nodes[slots]
+        trail = trail[:, None] | np.arange(WIDTH, dtype=np.uint32) << np.uint32(2 * depth)
+        leaf, more = (group["child"] < 0) & (slots >= 0), group["child"] >= 0
+        trails[-1 - group["child"][leaf]] = trail[leaf]
+        inner, trail = slots[more], trail[more]
+        group["child"][more] = made + np.arange(len(inner))
+        groups.append(group)
+        made, depth = made + len(inner), depth + 1
+    return Tree(np.concatenate(groups), trails)
+
+
+@dataclass
+class _Level:
+    """The sums and bounds (k,) that the nodes of a level hold, over segments of lights."""
+
+    low: Floats
+    high: Floats
+    cones: Cones
+    lobes: Lobes
+
+
+def _counts(starts: NDArray[np.int64], n: int) -> NDArray[np.int64]:
+    return np.diff(np.append(starts, n))
+
+
+class _Builder:
+    """The nodes of a tree of two children a node, so far."""
+
+    def __init__(self, bounds: Bounds, power: Floats):
+        self.bounds, self.power, self.lobes = bounds, power, Lobes.of(bounds, power)
+        self.nodes = np.zeros(2 * len(bounds) + 1, NODE.dtype)
+        self.count = 1
+
+    def summed(self, order: NDArray[np.int64], starts: NDArray[np.int64]) -> _Level:
+        """Bounds and power over the segments of `order` that begin at `starts`."""
+        own = self.bounds[order]
+        return _Level(
+            np.minimum.reduceat(own.low, starts),
+            np.maximum.reduceat(own.high, starts),
+            around(Cones.of(own), starts),
+            self.lobes.summed(order, starts),
+        )
+
+    def node(self, at: NDArray[np.int64], level: _Level, child: NDArray[np.int64]) -> None:
+        """Fill in nodes; those that are not placed get their radius afterwards."""
+        nodes = np.zeros(len(at), NODE.dtype)
+        mean, second, center = level.lobes.means()
+        far = np.maximum(center - level.low, level.high - center)
+        nodes["center"] = center
+        nodes["radius"] = np.linalg.norm(np.maximum(far, 0.0), axis=1) * (1.0 + 1e-5)
+        nodes["mean"], nodes["cos_e"] = mean, reach(mean, level.cones)
+        nodes["squares"] = second[:, [0, 1, 2], [0, 1, 2]]
+        nodes["products"] = second[:, [1, 2, 0], [2, 0, 1]]
+        nodes["power"], nodes["child"] = level.lobes.power, child
+        self.nodes[at] = nodes
+        self.count = max(self.count, int(at.max()) + 1)
+
+    def run(self, order: NDArray[np.int64], starts: NDArray[np.int64], depth: int) -> None:
+        """Make the nodes of a level, which are those of segments of `order`, and all below."""
+        at = depth + np.arange(len(starts))
+        free = int(at[-1]) + 1
+        while len(order):
+            level, counts = self.summed(order, starts), _counts(starts, len(order))
+            inner = counts > 1
+            child = np.where(inner, free + 2 * (np.cumsum(inner) - 1), -1 - order[starts])
+            self.node(at, level, child)
+            self.nodes["radius"][at[~self.bounds.placed[order[starts]]]] = -1.0
+            kept = np.repeat(inner, counts)
+            order, counts = order[kept], counts[inner]
+            if not len(order):
+                break
+            starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+            side = self._sides(order, starts, counts, level, inner, depth)
+            segment = np.repeat(np.arange(len(counts)), counts)
+            order = order[np.argsort(2 * segment + side, kind="stable")]
+            right = np.add.reduceat(side.astype(np.int64), starts)
+            starts = np.stack([starts, starts + counts - right], axis=1).ravel()
+            at = free + np.arange(2 * len(counts))
+            free += 2 * len(counts)
+            depth += 1
+
+    def _sides(
+        self,
+        order: NDArray[np.int64],
+        starts: NDArray[np.int64],
+        counts: NDArray[np.int64],
+        level: _Level,
+        inner: NDArray[np.bool_],
+        depth: int,
+    ) -> NDArray[np.int64]:
+        """Which child (n,) each light goes to: 0 or 1, neither of them empty."""
+        segment = np.repeat(np.arange(len(counts)), counts)
+        place = np.arange(len(order)) - starts[segment]
+        side = (2 * place >= counts[segment]).astype(np.int64)
+        deep = depth + np.ceil(np.log2(counts)).astype(np.int64) + 1 >= DEEPEST
+        large = (counts > 2) & ~deep
+        if not large.any():
+            return side
+        chosen = large[segment]
+        number = np.cumsum(large) - 1
+        size = (level.high - level.low)[inner][large]
+        found, split = self._splits(order[chosen], number[segment[chosen]], size)
+        side[chosen] = np.where(split[number[segment[chosen]]], found, side[chosen])
+        return side
+
+    def _splits(
+        self, order: NDArray[np.int64], segment: NDArray[np.int64], size: Floats
+    ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """The best side of each light (n,), and the segments (k,) in which there is a split."""
+        own, power, k = self.bounds[order], self.power[order], len(size)
+        starts = np.searchsorted(segment, np.arange(k))
+        centers = 0.5 * (own.low + own.high)
+        lo, hi = np.minimum.reduceat(centers, starts), np.maximum.reduceat(centers, starts)
+        best = np.full(k, np.inf)
+        side = np.zeros(len(order), np.int64)
+        longest = np.maximum(size.max(axis=1), 1e-30)
+        for axis in range(3):
+            extent = hi[:, axis] - lo[:, axis]
+            scale = np.where(extent > 0.0, BINS / np.where(extent > 0.0, extent, 1.0), 0.0)
+            bins = np.minimum((centers[:, axis] - lo[segment, axis]) * scale[segment], BINS - 1)
+            bins = bins.astype(np.int64)
+            costs = _costs(own, power, segment * BINS + bins, k)
+            costs *= (longest / np.maximum(size[:, axis], 1e-3 * longest))[:, None]
+            costs[extent <= 0.0] = np.inf
+            at = np.argmin(costs, axis=1)
+            cost = costs[np.arange(k), at]
+            better = cost < best
+            best = np.where(better, cost, best)
+            side = np.where(better[segment], bins > at[segment], side)
+        return side, np.isfinite(best)
+
+
+def _costs(own: Bounds, power: Floats, key: NDArray[np.int64], k: int) -> Floats:
+    """Costs (k, BINS - 1) of splitting behind each bin; infinite where a side is empty.
+
+    The heuristic of Conty Estevez and Kulla 2018 eq. 1: power times surface area times the measure
+    of the directions, of both sides. A little area is added to what is flat or a point.
+    """
+    sort = np.argsort(key, kind="stable")
+    ordered = key[sort]
+    starts = np.flatnonzero(np.diff(ordered, prepend=ordered[0] - 1))
+    present = ordered[starts]
+    shape = (k, BINS)
+    low, high = np.full((k * BINS, 3), np.inf), np.full((k * BINS, 3), -np.inf)
+    low[present] = np.minimum.reduceat(own.low[sort], starts)
+    high[present] = np.maximum.reduceat(own.high[sort], starts)
+    cones = Cones.none(k * BINS)
+    cones[present] = around(Cones.of(own[sort]), starts)
+    sums = np.bincount(key, power, k * BINS).reshape(shape)
+    number = np.bincount(key, minlength=k * BINS).reshape(shape)
+    boxes = low.reshape(*shape, 3), high.reshape(*shape, 3)
+    total = np.zeros((k, BINS - 1))
+    empty = np.zeros((k, BINS - 1), bool)
+    for step in (1, -1):
+        span = slice(None, None, step)
+        lows = np.minimum.accumulate(boxes[0][:, span], axis=1)
+        highs = np.maximum.accumulate(boxes[1][:, span], axis=1)
+        reach = np.maximum(highs - lows, 0.0)
+        area = (reach * np.roll(reach, 1, axis=2)).sum(axis=2) + 1e-6 * reach.max(axis=2) ** 2
+        counts = np.cumsum(number[:, span], axis=1)
+        part = np.cumsum(sums[:, span], axis=1) * np.maximum(area, 1e-30)
+        part *= _measures(cones, shape, step)
+        total += part[:, :-1] if step == 1 else part[:, :-1][:, ::-1]
+        none = counts[:, :-1] == 0
+        empty |= none if step == 1 else none[:, ::-1]
+    return np.where(empty, np.inf, total)
+
+
+def _measures(cones: Cones, shape: tuple[int, int], step: int) -> Floats:
+    """Measures (k, BINS) of the cones around the bins up to each one; of those behind for -1."""
+    at = np.arange(shape[0] * shape[1]).reshape(shape)[:, ::step]
+    made = np.empty(shape)
+    sofar = cones[at[:, 0]]
+    for i in range(shape[1]):
+        sofar = sofar if i == 0 else merged(sofar, cones[at[:, i]])
+        made[:, i] = measure(sofar)
+    return made

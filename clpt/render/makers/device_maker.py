@@ -1,0 +1,103 @@
+"""A device that takes the samples of a film in its own memory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+from clpt.errors import DeviceError, MemoryBudgetError
+from clpt.render.film.state import FilmState, Ranges
+from clpt.render.makers.contents import Contents
+from clpt.render.makers.device_film import DeviceFilm
+from clpt.render.makers.maker import Call, Discarded, Held, Maker, Settle
+from clpt.render.wavefront.adaptive import Adaptive
+from clpt.render.wavefront.wavefront import Counts
+
+
+class DeviceMaker(Maker):
+    """Takes samples on a device; home: their film."""
+
+    shows_meanwhile = True
+
+    def __init__(self, home: DeviceFilm):
+        self._home, self.start = home, home.start
+        self._discards = False
+
+    @property
+    def home(self) -> DeviceFilm:
+        """The film on the device."""
+        return self._home
+
+    # ---- samples
+
+    def begin(self, call: Call, now: Contents, more: Contents) -> Settle:
+        """Return what makes the film whole; see `Maker`.
+
+        After an error at any line the film holds `more`, though some pixels may lack some of these
+        samples, or `now` if none has begun. An error of the device makes nothing whole.
+        """
+        wavefront = self._home.wavefront
+        wavefront.begun = False
+
+        def settle(error: BaseException | None) -> Contents:
+            begun = wavefront.begun
+            if error is None:
+                return more
+            if isinstance(error, DeviceError) and not isinstance(error, MemoryBudgetError):
+                if begun:
+                    raise error
+                return now
+            wavefront.finish()
+            if more.adaptive is not None:
+                more.adaptive.finish()
+                if call.noise is None and begun and call.end > call.first:
+                    more.adaptive.skip(call.end)
+            wavefront.refresh()
+            return more if begun else now
+
+        return settle
+
+    def run(self, call: Call, adaptive: Adaptive | None, tick: Callable[[], bool]) -> bool:
+        """Add samples to the film; return whether all were added. Raises Discarded."""
+
+        def on_batch(_: object) -> bool:
+            goes_on = tick()
+            if not goes_on and self._discards:
+                raise Discarded
+            return goes_on
+
+        wavefront = self._home.wavefront
+        wavefront.leave.lower()  # that a `leave` raised which came too late for another call
+        if call.noise is not None and adaptive is not None:
+            return adaptive.run(call.end, call.noise, on_batch)
+        finished = wavefront.render_samples(call.first, call.end, on_batch)
+        if adaptive is not None:
+            adaptive.skip(call.end)  # after a stop too: numbers are not used again
+        return finished
+
+    def enqueue(self, call: Call, adaptive: Adaptive | None) -> None:
+        """Enqueue that all pixels get samples; wait for nothing."""
+        wavefront = self._home.wavefront
+        wavefront.enqueue(call.first, call.end)
+        wavefront.stream.flush()
+        if adaptive is not None:
+            adaptive.skip(call.end)
+
+    def leave(self, film: bool) -> None:
+        """Say whether a call that is told to stop may leave paths in flight as they are."""
+        if film and self._home.is_open:  # who sees the flag finds the reason soon
+            self._home.wavefront.leave.raise_()
+        self._discards = film
+
+    # ---- the film
+
+    def put(self, state: FilmState, counts: Counts | None = None) -> None:
+        """Enqueue that the film is another one."""
+        if counts is not None:
+            self._home.wavefront.counts = counts
+        self._home.put(state)
+
+    def hold(self, taken: Ranges) -> Held:
+        """Keep a copy of the film on the device, one at a time. Raises MemoryBudgetError."""
+        self._home.wavefront.film.hold()
+        return Held(partial(self._home.words, held=True, taken=taken), self.counts, taken)

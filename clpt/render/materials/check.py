@@ -1,0 +1,81 @@
+"""Rules of materials that hold others, or layers."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from clpt.errors import SceneError
+from clpt.render.textures.check import check_textures
+from clpt.scene.indices import check_indices
+from clpt.scene.integrators import Film
+from clpt.scene.materials import Blend, BumpMap, Layer, Mask, Material, NormalMap, TwoSided, parts
+from clpt.scene.params import Texture, fields_of
+
+Maps = tuple[tuple[type[Material], bool], ...]
+
+
+def check_material(material: Material, film: Film) -> None:
+    """Raise SceneError for a material whose parts do not go together, or not with a film."""
+    made = list(parts(material))
+    for part in made:
+        _check_held(part)
+    if len(made) > 1:
+        _check_sides(made)
+        _check_maps(material, (), False)
+    for part in made:
+        check_textures(part)
+        check_indices((part, *part.layers), film)
+        if part.layers and film.mode == "rgb":
+            _check_layers(part, part.layers)
+
+
+def _check_held(material: Material) -> None:
+    """Raise SceneError for a material in which another is missing that it cannot do without."""
+    own = fields_of(material)
+    for field in dataclasses.fields(material):
+        if field.type == "Material" and own[field.name] is None:
+            raise SceneError(f"{material.kind} needs a material as its {field.name!r}, not none")
+
+
+def _check_sides(made: list[Material]) -> None:
+    """Raise SceneError for light that is let through beside a two_sided material."""
+    passing = next((part for part in made if part.transmits), None)
+    if passing is not None and any(isinstance(part, TwoSided) for part in made):
+        message = f"{passing.kind} lets light through, so it cannot be a part of two_sided"
+        raise SceneError(f"{message}, or be mixed with it")
+
+
+def _check_maps(material: Material | None, outer: Maps, inside: bool) -> None:
+    """Raise SceneError for two maps of a kind in one another, or on both sides of a two_sided.
+
+    outer: the maps around, and whether each is inside of a two_sided material, as this may be.
+    """
+    if isinstance(material, TwoSided):
+        for side in (material.front, material.back):
+            _check_maps(side, outer, True)
+    elif isinstance(material, (NormalMap, BumpMap)):
+        kind = type(material)
+        if any(other is kind for other, _ in outer):
+            message = f"a {kind.kind} inside of a {kind.kind} is not supported"
+            raise SceneError(message)
+        if any(before != inside for _, before in outer):
+            message = "of normal_map and bump_map, one cannot stand inside and one around a "
+            raise SceneError(f"{message}two_sided")
+        _check_maps(material.material, (*outer, (kind, inside)), inside)
+    elif isinstance(material, Mask):
+        _check_maps(material.material, outer, inside)
+    elif isinstance(material, Blend):
+        for part in (material.first, material.second):
+            _check_maps(part, outer, inside)
+
+
+def _check_layers(material: Material, layers: tuple[Layer, ...]) -> None:
+    """Raise SceneError for layers that need the mode spectral."""
+    instead = 'or render in the mode "spectral"'
+    for name in ("eta", "k"):
+        if isinstance(fields_of(material).get(name), Texture):
+            message = f"{material.kind}.{name} cannot be a texture below layers in RGB mode; "
+            raise SceneError(f"{message}give a spectrum, {instead}")
+    if len({id(one.profile) for one in layers if isinstance(one.profile, Texture)}) > 1:
+        message = f"one texture can vary the layers of {material.kind} in RGB mode, not several; "
+        raise SceneError(f"{message}give them the same one, {instead}")

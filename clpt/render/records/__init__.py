@@ -1,0 +1,194 @@
+"""Features: what a lowered scene needs of the kernels. They alone decide the kernels' text.
+
+There is a record for each subject, with the macro of each field beside it. What follows from
+several subjects is a property of `Features`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from clpt.render.records.camera import CameraFeatures
+from clpt.render.records.film import FilmFeatures, FilterFeatures, LayerFeatures
+from clpt.render.records.geometry import GeometryFeatures
+from clpt.render.records.lights import LightFeatures
+from clpt.render.records.macros import macro
+from clpt.render.records.materials import MaterialFeatures
+from clpt.render.records.media import GridFeatures, MediaFeatures
+from clpt.render.records.motion import MotionFeatures
+from clpt.render.records.spectra import SpectraFeatures
+from clpt.render.records.textures import TextureFeatures
+from clpt.render.records.transport import TransportFeatures
+from clpt.scene.layers import LAYERS
+
+__all__ = [
+    "GROUP_WORDS",
+    "SUM_WORDS",
+    "CameraFeatures",
+    "Features",
+    "FilmFeatures",
+    "FilterFeatures",
+    "GeometryFeatures",
+    "GridFeatures",
+    "LayerFeatures",
+    "LightFeatures",
+    "MaterialFeatures",
+    "MediaFeatures",
+    "MotionFeatures",
+    "SpectraFeatures",
+    "TextureFeatures",
+    "TransportFeatures",
+]
+
+SUM_WORDS = 3  # kernels/core/fixed.cl
+GROUP_WORDS = 3 * SUM_WORDS + 1  # of a pixel: three sums and a count, see kernels/film/film.cl
+
+
+@dataclass(frozen=True)
+class Features:
+    """Features of a scene, and of one kind of its paths, see `passes`."""
+
+    camera: CameraFeatures = CameraFeatures()
+    film: FilmFeatures = FilmFeatures()
+    transport: TransportFeatures = TransportFeatures()
+    lights: LightFeatures = LightFeatures()
+    media: MediaFeatures = MediaFeatures()
+    motion: MotionFeatures = MotionFeatures()
+    geometry: GeometryFeatures = GeometryFeatures()
+    textures: TextureFeatures = TextureFeatures()
+    spectra: SpectraFeatures = SpectraFeatures()
+    materials: MaterialFeatures = MaterialFeatures()
+
+    @property
+    def passes(self) -> tuple[Features, ...]:
+        """The features of each kind of paths, in their order; those of the film are the last."""
+        if self.transport.guided:
+            none = LayerFeatures(present=self.film.layers.present)
+            return self._from_lights(self.film.filter, none, 0), self
+        if not self.transport.weighed:
+            return (self,)
+        layers = replace(self.film.layers, names=self.film.layers.lights, material_numbers=0)
+        own = FilterFeatures(self.film.filter.kind, *self.transport.light_filter)
+        return self._from_lights(own, layers, self.group_words), self
+
+    def _from_lights(self, own: FilterFeatures, layers: LayerFeatures, first: int) -> Features:
+        """The features of paths that start at lights beside those of the camera."""
+        film = replace(self.film, filter=own, layers=layers, first_word=first, alpha=False)
+        transport = replace(self.transport, integrator="particle_tracer", light_paths=True)
+        return replace(self, film=film, transport=transport)
+
+    @property
+    def mode(self) -> str:
+        """The mode of the kernels."""
+        return self.spectra.mode
+
+    @property
+    def dispersion(self) -> bool:
+        """Whether the direction of light depends on its wavelength somewhere."""
+        return self.camera.disperses or self.materials.disperses
+
+    @property
+    @macro("USES_DISPERSION")
+    def told_dispersion(self) -> bool:
+        """Whether the direction of light depends on the wavelengths that paths have."""
+        return self.dispersion and self.spectra.spectral
+
+    @property
+    @macro("USES_RATIO")
+    def ratios(self) -> bool:
+        """Whether the density of a path differs between its wavelengths."""
+        varies = any(map(self.materials.phase_varies, self.materials.leaves))
+        of_paths = self.spectra.spectral and (self.dispersion or varies)
+        return self.media.chromatic or of_paths
+
+    @property
+    def fluorescence(self) -> bool:
+        """Whether light may leave some material at another wavelength than it came."""
+        return self.spectra.spectral and any(cls.fluoresces for cls in self.materials.leaves)
+
+    @property
+    def dull_paths_end(self) -> bool:
+        """Whether most light paths end whose first surface is dull: others aim at what is sharp."""
+        return self.transport.aimed and self.transport.balanced and not self.media.present
+
+    @property
+    def hemispheres(self) -> bool:
+        """Whether paths keep the side of a surface from which their direction was chosen."""
+        weighed_there = self.transport.balanced and self.transport.light_paths
+        return self.lights.infinite or self.lights.tree or weighed_there
+
+    @property
+    def shows_lights(self) -> bool:
+        """Whether paths that start at lights join these to the camera."""
+        own = self.transport
+        return own.joined and own.light_paths and self.lights.visible and not own.weighed
+
+    @property
+    def shadow_media(self) -> bool:
+        """Whether rays to lights may go through several media."""
+        several = self.materials.null_surfaces or self.media.grids.present
+        return self.media.present and several
+
+    @property
+    def light_media(self) -> bool:
+        """Whether media are known around lights, as paths start there."""
+        own = self.transport
+        start = own.light_paths or own.weighed or own.guided
+        return self.media.present and start and not own.lit_ghosts
+
+    @property
+    def screen_motion(self) -> bool:
+        """Whether a layer tells how what is seen moves across the film, and anything may."""
+        return "motion" in self.film.layers.names and self.motion.present
+
+    @property
+    def names_surfaces(self) -> bool:
+        """Whether some layer asks which surface is seen."""
+        forms = {LAYERS[name].form for name in self.film.layers.names}
+        return self.screen_motion or not forms.isdisjoint(("id", "matte"))
+
+    @property
+    def scouts(self) -> bool:
+        """Whether paths go ahead to the first surface, as chance decides what others meet."""
+        chance = self.media.present or self.materials.mixtures or self.materials.free_panes
+        return self.film.layers.of_surfaces and bool(chance)
+
+    @property
+    @macro("FILM_WEIGHTS")
+    def film_weights(self) -> bool:
+        """Whether samples serve several pixels, whose sums are then divided by their weights."""
+        return self.film.filter.reach > 0 and not self.transport.light_paths
+
+    @property
+    def group_words(self) -> int:
+        """Words of a pixel that paths add to."""
+        return GROUP_WORDS + SUM_WORDS * (self.film_weights + self.film.alpha)
+
+    @property
+    def film_groups(self) -> int:
+        """Groups of sums of a pixel: of all paths, or of the camera's paths and of light paths."""
+        return 1 + self.transport.weighed
+
+    @property
+    def film_words(self) -> int:
+        """Words of a pixel of the film: of all its groups."""
+        beside = self.transport.weighed and not self.transport.light_paths
+        return self.film.first_word + self.group_words + GROUP_WORDS * beside
+
+    @property
+    @macro("FILM_GROUP", of_number=True)
+    def group_begins(self) -> int | None:
+        """The first word of a pixel that paths add to, where a film has two groups."""
+        return self.film.first_word if self.transport.weighed else None
+
+    @property
+    @macro("FILM_WORDS")
+    def words_of_groups(self) -> int:
+        """Words of a pixel, where a film has two groups."""
+        return self.film_words if self.transport.weighed else 0
+
+    @property
+    def footprint_words(self) -> int:
+        """Words of what a slot sums around its pixel, see kernels/film/splatting.cl."""
+        side = 2 * self.film.filter.reach + 1
+        return side * side * 8 * (1 + self.film.alpha) if self.film_weights else 0

@@ -1,0 +1,490 @@
+"""The images of bitmaps: decoded in threads, halved where too large, packed for the device.
+
+Images of 8 bits a channel stay small: a number takes a byte, a colour four bytes, or as a spectrum
+eight: its sigmoid's argument at three wavelengths, of 21 bits each. Other images are floats.
+
+An image with levels has its smaller copies behind it. They are means of linear values; where a
+colour becomes a spectrum, that of the mean colour.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import defaultdict
+from collections.abc import Iterable
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt import images, spectra
+from clpt.arrays import Words
+from clpt.errors import SceneError
+from clpt.files import budget
+from clpt.images import Stored, arrays
+from clpt.render.records.lowering_cache import LoweringCache, version
+from clpt.render.records.tables import TableStore
+from clpt.render.records.texture_rows import KINDS, MIPS
+from clpt.render.textures.texels import texels
+from clpt.scene.pixels import channel, spectral_image
+from clpt.scene.roles import EMISSION, REAL, REFLECTANCE, Role
+from clpt.scene.textures import Bitmap
+
+NODES = np.array([400.0, 550.0, 700.0])  # [nm] of packed spectra, as in spectral_read.cl
+LARGEST = 2**31 - 1  # words in `images` that an index reaches
+THREADS = 8
+UNKNOWN, NEW, MADE = range(3)
+CHUNK = 1 << 17  # texels of an image that are looked at at a time
+RUN = 64  # colours that are looked through together for new ones
+
+
+@dataclass
+class _Form:
+    """The form of an image, without its pixels.
+
+    shape: (h, w, c); bytes: whether it is of bytes; encoded: see `Stored.encoded`; profiled:
+    whether its colours are floats, of no transfer; notes: warnings when it is taken raw, and when
+    as colours.
+    """
+
+    shape: tuple[int, ...]
+    bytes: bool
+    encoded: bool
+    profiled: bool
+    notes: dict[bool, tuple[str, ...]]
+
+
+class _Pixels:
+    """The pixels of an image; of a file they are decoded beside, and let go of when packed."""
+
+    def __init__(self, image: Any):
+        self._image = image
+        self._stored: Future[Stored] | None = None
+        self._form: _Form | None = None
+        self._is_file = isinstance(image, (str, Path))
+        self.begin()
+
+    def begin(self) -> None:
+        """Take the pixels of an array, or begin to read those of a file."""
+        if self._is_file:
+            self._stored = _pool(os.getpid()).submit(
+                budget.carried(images.read_stored), self._image
+            )
+        else:
+            self._stored = Future()
+            self._stored.set_result(images.from_array(self._image, "bitmap.image"))
+
+    @property
+    def stored(self) -> Stored:
+        """The image; it is read again after `let_go`. Raises SceneError."""
+        if self._stored is None:
+            self.begin()
+        assert self._stored is not None
+        return self._stored.result()
+
+    @property
+    def form(self) -> _Form:
+        """The form of the image, which is known even after `let_go`. Raises SceneError."""
+        if self._form is None:
+            stored = self.stored
+            self._form = _Form(
+                stored.values.shape,
+                stored.values.dtype == np.uint8,
+                stored.encoded,
+                stored.is_profiled,
+                {raw: stored.notes_of(raw) for raw in (False, True)},
+            )
+        return self._form
+
+    def let_go(self) -> None:
+        """Forget the pixels of a file."""
+        if self._is_file and self._form is not None:
+            self._stored = None
+
+
+@dataclass
+class _Packed:
+    """The words of an image, a view of the table once that is joined; its height and width.
+
+    levels: first word, width and height of each of its levels, the image itself the first; (n, 3).
+    """
+
+    words: Words
+    size: tuple[int, ...]
+    levels: NDArray[np.int64] | None = None
+
+
+@dataclass
+class _Image:
+    """An image in one role, and the rows of `textures` that show it."""
+
+    texture: Bitmap
+    role: Role
+    pixels: _Pixels
+    rows: list[np.ndarray] = field(default_factory=list)
+    halvings: int = 0
+
+    @property
+    def has_levels(self) -> bool:
+        return has_levels(self.texture, self.role)
+
+    @property
+    def form(self) -> _Form:
+        """The form of the image as the texture means it: as data, or as colours."""
+        form = self.pixels.form
+        if self.texture.raw or not form.profiled:
+            return form
+        return replace(form, bytes=False, encoded=False)
+
+
+class Images:
+    """The images of a scene, each in the roles that it has; `finish` puts them into the tables.
+
+    budget: [bytes] that they may take, None for any number; cache: of what is decoded and packed.
+    """
+
+    def __init__(
+        self, spectral: bool, budget: int | None = None, cache: LoweringCache | None = None
+    ):
+        self.spectral, self.budget, self.cache = spectral, budget, cache or LoweringCache()
+        self._wanted: dict[Any, _Image] = {}
+        self._decoding: dict[bool, int] = {}
+        self._placed: list[tuple[int, _Packed]] = []  # the first word of each in the table
+        self._spectra: dict[bool, _Spectra] = defaultdict(_Spectra)
+
+    def add(self, texture: Bitmap, role: Role, row: np.ndarray) -> None:
+        """Ask for an image; where it lies will be written into the texture's row.
+
+        Raises SceneError for what is no image.
+        """
+        channel_of = role is REAL and texture.channel
+        levels = has_levels(texture, role)
+        key = (identity(texture), texture.raw, role, channel_of, levels)
+        if key not in self._wanted:
+            spectral = spectral_image(texture, role)
+            image = texture.image if spectral is None else spectral.to_rgb()
+            self._wanted[key] = _Image(texture, role, self._read(image))
+        self._wanted[key].rows.append(row)
+
+    def finish(self, store: TableStore, roles: set[tuple[str, str]]) -> list[str]:
+        """Put the images that were asked for into the tables; return warnings.
+
+        roles: gets the (kind, role) pairs of the images. Raises SceneError for files that cannot be
+        read.
+        """
+        wanted, self._wanted = list(self._wanted.values()), {}
+        notes = [*_left_out(wanted), *self._fit(wanted)]
+        for image in wanted:
+            roles.add((self._put(image, store), image.role.name))
+        for image in wanted:
+            image.pixels.let_go()
+        self._spectra.clear()
+        return notes
+
+    def _put(self, image: _Image, store: TableStore) -> str:
+        """Put an image into the tables, and where it is into its rows; return its kind."""
+        packed = self._packed(image)
+        height, width = packed.size
+        bytes_ = _packs(image.form, image, self.spectral)
+        kind = "packed_bitmap" if bytes_ else "bitmap"
+        if image.has_levels:
+            kind = next(name for name, level in MIPS.items() if level == kind)
+        if store.size("images") + packed.words.size > LARGEST:
+            raise SceneError("all images together have too many texels", where="bitmap.image")
+        curved = image.form.encoded and not image.texture.raw and not _is_alpha(image)
+        for row in image.rows:
+            row["kind"], row["width"], row["height"] = KINDS.index(kind), width, height
+            row["decode"] = self._decode(curved, store) if bytes_ else 0
+        first = store.append("images", packed.words)
+        self._placed.append((first, packed))
+        for row in image.rows:
+            row["first"] = first
+        if packed.levels is not None:
+            table = np.add(packed.levels, (first, 0, 0)).astype(np.uint32)
+            at = store.append("textures", table.reshape(-1))
+            for row in image.rows:
+                row["levels"], row["table"] = len(table), at
+        return kind
+
+    def _packed(self, image: _Image) -> _Packed:
+        """The words of an image, as they were made before if nothing differs."""
+        texture = image.texture
+        by = (
+            *(version(texture.image), texture.raw, image.role, texture.channel),
+            *(image.halvings, self.spectral, image.has_levels),
+        )
+        made: _Packed = self.cache(Images._words, self, image, by=by)
+        return made
+
+    def joined(self, table: Words) -> None:
+        """Keep the words of the images as parts of the table that they have been joined to."""
+        for first, packed in self._placed:
+            packed.words = table[first : first + packed.words.size]
+
+    def _words(self, image: _Image) -> _Packed:
+        """The words of an image, level by level, of each row by row from the top."""
+        texture, stored = image.texture, image.pixels.stored.meant(image.texture.raw)
+        packs = _packs(image.form, image, self.spectral)
+        values = arrays.checked(stored.values, "bitmap.image")
+        curved = stored.encoded and not texture.raw
+        if image.halvings:
+            values = _halved(values, curved, image.halvings)
+        if not image.has_levels:
+            return self._level(image, values, curved, packs)
+        made = [self._level(image, one, curved, packs) for one in _levels(values, curved)]
+        firsts = np.cumsum([0, *(one.words.size for one in made[:-1])])
+        table = [(at, one.size[1], one.size[0]) for at, one in zip(firsts, made, strict=True)]
+        words = np.concatenate([one.words for one in made])
+        return _Packed(words, made[0].size, np.array(table, np.int64))
+
+    def _level(self, image: _Image, values: NDArray[Any], curved: bool, packs: bool) -> _Packed:
+        """The words of one size of an image; curved, packs: of its bytes."""
+        texture, role, size = image.texture, image.role, values.shape[:2]
+        if role is REAL and packs:
+            number = "rgba".find(texture.channel) if values.shape[2] > 1 else 0
+            if texture.channel == "a" and values.shape[2] < 4:
+                return _Packed(np.full(1, 0xFFFFFFFF, np.uint32), (1, 1))
+            chosen = values[..., number].reshape(-1)
+            return _Packed(np.pad(chosen, (0, -len(chosen) % 4)).view("<u4"), size)
+        if packs:
+            codes = _codes(values)
+            made = self._spectra[curved].packed(codes, curved) if self.spectral else codes
+            return _Packed(made, size)
+        decoded = Stored(values, curved).decoded()
+        if role is REAL:
+            numbers = np.nan_to_num(channel(decoded, texture.channel).astype(np.float32))
+            return _Packed(numbers.reshape(-1).view(np.uint32), size)
+        colours = texels(np.nan_to_num(decoded[..., :3]), role, self.spectral)
+        colours = colours if self.spectral else colours[:, :3]
+        return _Packed(np.ascontiguousarray(colours).reshape(-1).view(np.uint32), size)
+
+    def _read(self, image: object) -> _Pixels:
+        """The pixels of an image; a file is decoded once."""
+        if isinstance(image, (str, Path)):
+            return self.cache(_Pixels, str(image), by=(version(image),))
+        return _Pixels(image)
+
+    def _decode(self, curved: bool, store: TableStore) -> int:
+        """The first of 256 words that say what bytes mean."""
+        if curved not in self._decoding:
+            self._decoding[curved] = store.append("images", _meaning(curved).view(np.uint32))
+        return self._decoding[curved]
+
+    def _fit(self, wanted: list[_Image]) -> list[str]:
+        """Halve the largest images until all fit into the budget."""
+        if self.budget is None:
+            return []
+        sizes = [_size(image, self.spectral) for image in wanted]
+        total = sum(sizes)
+        while total > self.budget and sizes:
+            worst = int(np.argmax(sizes))
+            before = sizes[worst]
+            wanted[worst].halvings += 1
+            sizes[worst] = _size(wanted[worst], self.spectral)
+            total += sizes[worst] - before
+            if sizes[worst] == before:
+                break  # single texels
+        return [_note(image) for image in wanted if image.halvings]
+
+
+def identity(texture: Bitmap) -> Any:
+    """Return a key that is equal for the same images: a file's name, or an object's id."""
+    image = texture.image
+    return str(image) if isinstance(image, (str, Path)) else id(image)
+
+
+def has_levels(texture: Bitmap, role: Role) -> bool:
+    """Return whether an image has smaller copies in a role: lights are sampled by the image."""
+    return texture.filter == "trilinear" and role is not EMISSION
+
+
+@cache
+def _pool(process: int) -> ThreadPoolExecutor:
+    """The threads of a process, by its id: those of a parent do not come along when it forks."""
+    return ThreadPoolExecutor(min(THREADS, os.cpu_count() or 1), "clpt-images")
+
+
+def _is_alpha(image: _Image) -> bool:
+    return image.role is REAL and image.texture.channel == "a"
+
+
+def _packs(form: _Form, image: _Image, spectral: bool) -> bool:
+    """Whether bytes stay bytes."""
+    if not form.bytes:
+        return False
+    if image.role is REAL:
+        return form.shape[2] == 1 or image.texture.channel != "luminance"
+    return not spectral or image.role is REFLECTANCE
+
+
+def _size(image: _Image, spectral: bool) -> int:
+    """Bytes on the device."""
+    form = image.form
+    height, width = (max(1, -(-n >> image.halvings)) for n in form.shape[:2])
+    packed = _packs(form, image, spectral)
+    if image.role is REAL:
+        texel = 1 if packed else 4
+    elif packed:
+        texel = 8 if spectral else 4
+    else:
+        texel = 16 if spectral else 12
+    sizes = _level_sizes(height, width) if image.has_levels else [(height, width)]
+    return sum(h * w for h, w in sizes) * texel
+
+
+def _left_out(wanted: Iterable[_Image]) -> list[str]:
+    """Return warnings of parts of image files that are left out, each once."""
+    said = [
+        f"{image.texture.image}: {note}"
+        for image in wanted
+        for note in image.pixels.form.notes[image.texture.raw]
+    ]
+    return list(dict.fromkeys(said))
+
+
+def _note(image: _Image) -> str:
+    height, width = image.pixels.form.shape[:2]
+    small = " x ".join(str(max(1, -(-n >> image.halvings))) for n in (width, height))
+    source = image.texture.image
+    name = source if isinstance(source, (str, Path)) else "an image"
+    return f"{name}: {width} x {height} texels made {small}, to keep to the texture budget"
+
+
+def _meaning(curved: bool) -> NDArray[np.float32]:
+    """Return the values (256,) that bytes stand for; curved: encoded as by sRGB."""
+    return Stored(np.arange(256, dtype=np.uint8).reshape(-1, 1, 1), curved).decoded().reshape(-1)
+
+
+def _halved(values: NDArray[Any], curved: bool, times: int) -> NDArray[Any]:
+    """Means of 2x2 texels of linear light, `times` over; bytes are made bytes again."""
+    made = Stored(values, curved).decoded()
+    for _ in range(times):
+        odd = [(0, n % 2 if n > 1 else 0) for n in made.shape[:2]]
+        made = np.pad(made, (*odd, (0, 0)), "edge")
+        made = made if made.shape[0] == 1 else 0.5 * (made[0::2] + made[1::2])
+        made = made if made.shape[1] == 1 else 0.5 * (made[:, 0::2] + made[:, 1::2])
+    return _stored_as(values, made, curved)
+
+
+def _level_sizes(height: int, width: int) -> list[tuple[int, int]]:
+    """The heights and widths of an image's levels: halves, rounded down, until there is 1 texel."""
+    count = max(height, width).bit_length()
+    return [(max(height >> i, 1), max(width >> i, 1)) for i in range(count)]
+
+
+def _levels(values: NDArray[Any], curved: bool) -> list[NDArray[Any]]:
+    """Return an image (h, w, c) and its smaller copies.
+
+    A texel is the mean of linear light over its part of the level before, to which texels count by
+    their share, so that each copy has its mean.
+    """
+    made, found = Stored(values, curved).decoded(), [values]
+    for height, width in _level_sizes(*values.shape[:2])[1:]:
+        made = _means(_means(made, height).swapaxes(0, 1), width).swapaxes(0, 1)
+        found.append(_stored_as(values, made, curved))
+    return found
+
+
+def _means(values: NDArray[Any], count: int) -> NDArray[Any]:
+    """Means of `count` equal parts of the first axis."""
+    n = len(values)
+    if n == count:
+        return values
+    if n == 2 * count:
+        return 0.5 * (values[0::2] + values[1::2])
+    edges = np.arange(count + 1) * (n / count)
+    sums = np.concatenate([np.zeros_like(values[:1], np.float64), values.cumsum(0, np.float64)])
+    below = np.minimum(edges.astype(int), n - 1)
+    share = (edges - below).reshape(-1, *(1,) * (values.ndim - 1))
+    at = sums[below] + share * values[below]
+    return ((at[1:] - at[:-1]) * (count / n)).astype(values.dtype)
+
+
+def _stored_as(values: NDArray[Any], made: NDArray[Any], curved: bool) -> NDArray[Any]:
+    """Linear values in the form of `values`: encoded if curved, bytes if those are bytes."""
+    stored = images.linear_to_srgb(made) if curved else made
+    if values.dtype != np.uint8 and not curved:
+        return made
+    if values.shape[2] == 4:
+        stored[..., 3] = made[..., 3]
+    if values.dtype != np.uint8:
+        return stored
+    return np.round(np.clip(stored, 0.0, 1.0) * 255.0).astype(np.uint8)
+
+
+def _codes(values: NDArray[np.uint8]) -> Words:
+    """r, g and b of each texel in the three lower bytes of a word, (n,)."""
+    made = np.zeros((values.shape[0] * values.shape[1], 4), np.uint8)
+    for i in range(3):
+        made[:, i] = values[..., i % values.shape[2]].reshape(-1)
+    return made.view("<u4").reshape(-1)
+
+
+class _Spectra:
+    """Packed spectra of colours of 8 bits a channel; each is made once, whatever images have it."""
+
+    def __init__(self) -> None:
+        self.places = np.zeros((1 << 24) // RUN, np.uint32)  # of a run of colours: its row; 0: none
+        self.runs = np.zeros(1, np.uint32)  # of each row: its run
+        self.states = np.zeros(RUN, np.uint8)  # of each colour of a row: UNKNOWN, NEW or MADE
+        self.words = np.zeros(RUN, np.uint64)
+
+    def packed(self, codes: Words, curved: bool) -> Words:
+        """Two words for each colour of `_codes`, (2 n,)."""
+        parts = np.split(codes, range(CHUNK, len(codes), CHUNK))
+        self._add_rows(parts)
+        for part in parts:
+            at = self._at(part)
+            self.states[at[self.states[at] == UNKNOWN]] = NEW
+        new = np.flatnonzero(self.states == NEW)
+        made = self.runs[new // RUN] * np.uint32(RUN) + (new % RUN).astype(np.uint32)
+        channels = np.stack([made & 255, made >> 8 & 255, made >> 16], axis=1)
+        packed = pack(spectra.uplift(_meaning(curved)[channels]))
+        self.words[new] = packed.view(np.uint64).reshape(-1)
+        self.states[new] = MADE
+        words = np.empty(len(codes), np.uint64)
+        for first, part in zip(range(0, len(codes), CHUNK), parts, strict=True):
+            words[first : first + CHUNK] = self.words[self._at(part)]
+        return words.view(np.uint32)
+
+    def _at(self, codes: Words) -> Words:
+        """Return the places of colours, whose runs have rows, in `states` and `words`."""
+        return self.places[codes // np.uint32(RUN)] * np.uint32(RUN) + codes % np.uint32(RUN)
+
+    def _add_rows(self, parts: list[Words]) -> None:
+        """Give rows to runs of colours that have none; a table of all would be slow to clear."""
+        seen = np.zeros(len(self.places), bool)
+        for part in parts:
+            seen[part // np.uint32(RUN)] = True
+        runs = np.flatnonzero(seen & (self.places == 0)).astype(np.uint32)
+        self.places[runs] = np.arange(len(self.runs), len(self.runs) + len(runs), dtype=np.uint32)
+        self.runs = np.concatenate([self.runs, runs])
+        needed = RUN * len(self.runs)
+        if needed > len(self.words):
+            self.states = _longer(self.states, max(needed, 2 * len(self.states)))
+            self.words = _longer(self.words, max(needed, 2 * len(self.words)))
+
+
+def _longer(array: NDArray[Any], size: int) -> NDArray[Any]:
+    """Return an array (n,) with zeros after it, (size,)."""
+    made = np.zeros(size, array.dtype)
+    made[: len(array)] = array
+    return made
+
+
+def pack(coefficients: NDArray[np.float32]) -> Words:
+    """Sigmoid coefficients (n, 3) as two words each (n, 2): x at NODES, of 21 bits.
+
+    The upper 21 bits of the words are the first two; the third's are in what is left.
+    """
+    c = coefficients.astype(np.float64)[:, :, None]
+    x = ((c[:, 0] * NODES + c[:, 1]) * NODES + c[:, 2]).astype(np.float32)
+    bits = x.view(np.uint32) + np.uint32(0x400)  # to the nearest
+    upper = bits & np.uint32(0xFFFFF800)
+    rest = bits[:, 2] >> np.uint32(11)
+    first, second = upper[:, 0] | rest >> np.uint32(10), upper[:, 1] | rest & np.uint32(0x3FF)
+    return np.stack([first, second], axis=1).astype(np.uint32)

@@ -1,0 +1,163 @@
+"""Kernel text of the textures: the look-up in each role, and the loaders that call it."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from clpt.render.records import TextureFeatures
+from clpt.render.records.dispatch import Case, Function, active, function, indented
+from clpt.render.records.texture_rows import (
+    END,
+    IMAGES,
+    KINDS,
+    MIPS,
+    OPERANDS,
+    OPERATIONS,
+    PROGRAM,
+    RECORDS,
+    ROLES,
+)
+from clpt.scene.params import device_params
+from clpt.scene.textures import KINDS as TEXTURE_KINDS
+from clpt.scene.textures import MAPPINGS, Texture
+
+_LOOKED_UP = "(Scene scene, integer row, TexturePoint point, Wavelengths lambdas)"
+
+# Of the loaders: a part of the loop has them for all others, another part calls them, or a text
+# has its own.
+Where = Literal["part", "elsewhere", "own"]
+
+
+def dispatch_text(features: TextureFeatures, stochastic: bool = False, where: Where = "own") -> str:
+    """Return the look-ups of the (kind, role) pairs in the scene, and the loaders that call them.
+
+    stochastic: for some material a random texel stands for a reflectance. where: the loaders are.
+
+    texture_<role>(scene, row, point, lambdas)                 whose row is at a word
+    spectrum_texture_<role>(scene, source, point, lambdas)     of 1 + the row, or no texture
+    spectrum_texture_texel(scene, source, point, lambdas)      a reflectance, or a texel of it
+    real_texture_real(scene, source, point, lambdas)           the same for a real
+    """
+    pairs, used = set(features.roles), set(features.kinds)
+    lines = [f"#define MAPPING_{name.upper()} {i}" for i, name in enumerate(MAPPINGS)]
+    lines += [
+        f"#define USES_MAPPINGS {int(features.mappings)}",
+        f"#define TEXTURE_PERMUTATION {RECORDS['spectral_bitmap'].words}",
+    ]
+    used |= {level for kind, level in MIPS.items() if kind in used}
+    used |= {"bitmap"} if used & {"spectral_bitmap", "packed_bitmap"} else set()  # addresses texels
+    present = [kind for kind in RECORDS if kind in used]
+    by_kind = {cls.kind: cls for cls in TEXTURE_KINDS}
+    parts = [*lines, '#include "textures/texture.cl"'] if used else []
+    for kind in present:
+        parts += _choice_lines(by_kind[kind]) if kind in by_kind else []
+        parts += [RECORDS[kind].row_text(), f'#include "textures/kinds/{kind}.cl"']
+    leaves = {
+        role: [kind for kind in present if (kind, role) in pairs]
+        for role in sorted({role for _, role in pairs})
+    }
+    programs = [role for role in leaves if ("program", role) in pairs]
+    for role, own in leaves.items():
+        parts.append(_look_up(role, own, "texture_leaf" if programs else "texture"))
+    if programs:
+        parts += _operand_text(leaves, features.depth)
+    for role in leaves:
+        parts += [_with_programs(role, role in programs)] if programs else []
+        parts.append(_parameter(role, where))
+    if stochastic:
+        parts += _texel_text(leaves["reflectance"], "reflectance" in programs, where)
+    return "\n".join([*parts, ""])
+
+
+def _texel_text(kinds: list[str], programs: bool, where: Where) -> list[str]:
+    """`spectrum_texture_texel`; programs: some texture is one, all of which is filtered."""
+    text = _look_up("texel", kinds, "texture_leaf" if programs else "texture")
+    own = [text, _with_programs("texel", True)] if programs else [text]
+    own.append(_parameter("texel", where, how="inline"))  # short, and in few places
+    return ["#if STOCHASTIC_FILTERING || TEXELS_AT_RANDOM", *own, "#endif"]
+
+
+def _choice_lines(cls: type[Texture]) -> list[str]:
+    """`#define KIND_PARAMETER_CHOICE` for the choices that a kind's row holds as numbers."""
+    return [
+        f"#define {f'{cls.kind}_{name}_{choice}'.upper()} {number}"
+        for name, param in device_params(cls).items()
+        for number, choice in enumerate(param.choices)
+        if choice != "trilinear"  # which is a kind of its own in the kernels
+    ]
+
+
+def _type(role: str) -> str:
+    return "real" if role == "real" else "Spectrum"
+
+
+def _look_up(role: str, kinds: list[str], name: str) -> str:
+    """`name`_<role>, for textures that combine nothing."""
+    zero, more = ("0.0f", "") if role == "real" else ("spectrum_of(0.0f)", ", lambdas")
+    row, cases = active("row"), []
+    for kind in kinds:
+        chosen = role == "texel" and kind in IMAGES
+        # Indices and factors are the same look-up, of other numbers.
+        verb = role if chosen or role in ("emission", "real") else "reflectance"
+        seen = "point, point.u" if chosen else "point"
+        looked_up = f"{kind}_{verb}({kind}_row(scene.textures, {row}), scene, {seen}{more})"
+        cases.append(Case(f"kind == {KINDS.index(kind)}", looked_up))
+    kind_of = "integer kind = gather_i(scene.textures, row);"
+    return Function(f"{_type(role)} {name}_{role}{_LOOKED_UP}", zero, cases, (kind_of,)).text()
+
+
+def _with_programs(role: str, some: bool) -> str:
+    """texture_<role> for all textures, where there are programs, and `some` in this role."""
+    own = "reflectance" if role == "texel" else role
+    run = f"texture_program(scene, TEXTURE_ROLE_{own.upper()}, row, m, point, lambdas)"
+    forms = {"real": f"{run}.x", "reflectance": f"spectrum_clamped({run})"}
+    case = Case(f"gather_i(scene.textures, row) == {PROGRAM}", forms.get(own, run))
+    leaf = f"texture_leaf_{role}(scene, row, point, lambdas)"
+    signature = f"{_type(role)} texture_{role}{_LOOKED_UP}"
+    return Function(signature, leaf, [case] if some else []).text()
+
+
+def _parameter(role: str, where: Where, how: str = "called") -> str:
+    """The texture that a parameter in a row names; how: see `function`."""
+    form = _type(role)
+    name = f"{form.lower()}_texture_{role}"
+    takes = "(Scene scene, integer source, TexturePoint point, Wavelengths lambdas)"
+    if where == "elsewhere":
+        return f"{form} loop_{name}{takes};\n#define {name} loop_{name}"
+    looked_up = f"return texture_{role}(scene, max_i(source - 1, (integer)(0)), point, lambdas);"
+    if where == "part":
+        return "\n".join([f"APART({form}, loop_{name}){takes}", "{", *indented(looked_up), "}"])
+    return function(f"{form} {name}{takes}", looked_up, how=how)
+
+
+def _operand_text(kinds: dict[str, list[str]], depth: int) -> list[str]:
+    """Return the lines of `texture_operand`, and the look-up of programs after it.
+
+    kinds: by role, the kinds of leaves that occur; depth: the most that a program stacks.
+    """
+    at = active("argument")
+    constant = f"texture_constant(scene, {at}, lambdas)"
+    cases = [Case("running & (operand == OPERAND_CONSTANT)", constant)]
+    for role in (role for role in ROLES if kinds.get(role)):
+        read = f"texture_leaf_{role}(scene, {at}, point, lambdas)"
+        # The role is known when the text is built: what it does not look up is dropped.
+        tests = [f"((operand == OPERAND_OWN) & mask_of(role == TEXTURE_ROLE_{role.upper()}))"]
+        if role == "real":
+            read = f"spectrum_of({read})"
+            tests.append("((operand == OPERAND_REAL) & mask_of(role != TEXTURE_ROLE_REAL))")
+        if role == "reflectance":
+            tests.append("((operand == OPERAND_FACTOR) & mask_of(role == TEXTURE_ROLE_EMISSION))")
+        cases.append(Case(f"running & ({' | '.join(tests)})", read))
+    signature = (
+        "Spectrum texture_operand(Scene scene, int role, integer operand, integer argument,"
+        " mask running, TexturePoint point, Wavelengths lambdas)"
+    )
+    return [
+        f"#define TEXTURE_DEPTH {depth}",
+        *(f"#define OPERAND_{name.upper()} {i}" for i, name in enumerate(OPERANDS)),
+        *(f"#define OPERATION_{name.upper()} {code}" for name, code in OPERATIONS.items()),
+        f"#define PROGRAM_END {END}",
+        *(f"#define TEXTURE_ROLE_{role.upper()} {i}" for i, role in enumerate(ROLES)),
+        Function(signature, "spectrum_of(as_real(argument))", cases).text(),
+        '#include "textures/program.cl"',
+    ]

@@ -1,0 +1,67 @@
+"""Rules of textures: an image of spectra holds what the parameter is that it stands for."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from clpt.errors import SceneError
+from clpt.images import spectral_exr
+from clpt.images.spectral_exr import SpectralImage
+from clpt.scene.params import Kind, fields_of, params
+from clpt.scene.roles import EMISSION, FACTOR, REFLECTANCE
+from clpt.scene.textures import Bitmap, Placed, Product, Solid, Texture
+
+
+def check_textures(kind: Kind) -> None:
+    """Raise SceneError for light where a kind's parameter reflects, and for the reverse.
+
+    What a file holds is not looked at.
+    """
+    given = fields_of(kind)
+    for name, param in params(type(kind)).items():
+        if isinstance(given[name], (Texture, tuple)):
+            _check(given[name], param.role is EMISSION)
+
+
+def check_image(image: object, where: str, *, emissive: bool) -> None:
+    """Raise SceneError for an image of the other kind of spectra, where it is in memory."""
+    if isinstance(image, SpectralImage):
+        spectral_exr.find(image, emissive=emissive, where=where)
+
+
+def _check(value: object, light: bool) -> None:
+    """Raise SceneError for a texture of the wrong kind of spectra; light: which is wanted."""
+    if isinstance(value, tuple):
+        for entry in value:
+            if isinstance(entry, Kind):
+                check_textures(entry)
+    elif isinstance(value, Texture):
+        _check_place(value)
+        if isinstance(value, Bitmap):
+            check_image(value.image, "bitmap.image", emissive=light)
+        given = fields_of(value)
+        for name, param in params(type(value)).items():
+            shines = light and param.role in (FACTOR, REFLECTANCE) and name != _factor(value)
+            _check(given[name], shines)
+
+
+def _check_place(texture: Texture) -> None:
+    """Raise SceneError for a matrix that is a projection, where it is used."""
+    if isinstance(texture, Placed):
+        last = texture.to_uv[2]
+        if not np.allclose(last[:2], 0.0) or np.isclose(last[2], 0.0):
+            raise SceneError("its last row must be 0 0 1", where=f"{texture.kind}.to_uv")
+        if texture.mapping in ("uv", "uv1"):
+            return
+    elif not isinstance(texture, Solid):
+        return
+    if not np.allclose(np.asarray(texture.to_texture)[3], [0.0, 0.0, 0.0, 1.0]):
+        raise SceneError("its last row must be 0 0 0 1", where=f"{texture.kind}.to_texture")
+
+
+def _factor(texture: Texture) -> str:
+    """The parameter that stays a factor in an emission: of a product one, for light times light."""
+    if not isinstance(texture, Product):
+        return ""
+    first, second = (isinstance(part, Texture) for part in (texture.first, texture.second))
+    return "first" if second and not first else "second"

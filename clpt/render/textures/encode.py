@@ -1,0 +1,269 @@
+"""The rows of textures.
+
+A row of `textures` belongs to one texture in one role. Row 0 is blank and valid as any kind in any
+role, so that lanes which look up nothing have something to read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from clpt.errors import SceneError
+from clpt.geometry.triangles import per_face
+from clpt.render.records.parameter_words import SPECTRUM_WORDS
+from clpt.render.records.tables import TableStore
+from clpt.render.records.texture_rows import KINDS, PROGRAM, RECORDS
+from clpt.render.spectra.encode import SpectraTable
+from clpt.render.textures import noise
+from clpt.render.textures.bitmaps import Images, has_levels, identity
+from clpt.render.textures.programs import folded, is_composite, program, separated
+from clpt.render.textures.texels import bands
+from clpt.scene.params import params
+from clpt.scene.pixels import spectral_image
+from clpt.scene.roles import EMISSION, REAL, REFLECTANCE, Role, Spectral
+from clpt.scene.textures import (
+    MAPPINGS,
+    PATTERNS,
+    SECOND_UV,
+    WRAPS,
+    Bitmap,
+    Checkerboard,
+    Checkers,
+    Dots,
+    Marble,
+    MeshAttribute,
+    Noise,
+    Placed,
+    Solid,
+    Texture,
+)
+from clpt.spectra import RGB, luminance
+
+LARGEST = 2**31 - 1  # floats in `texels` that an index reaches
+
+
+class TextureTable:
+    """The rows of `textures`, and what textures ask of images and meshes.
+
+    roles: the (kind, role) pairs that occur; attributes: the index in directories by (name, role,
+    channel); mappings: whether a texture makes its own uv; depth: the most values that a program
+    stacks.
+    """
+
+    def __init__(self, store: TableStore, spectra: SpectraTable, images: Images):
+        self.store, self.spectra, self.images = store, spectra, images
+        self.roles: set[tuple[str, str]] = set()
+        self.attributes: dict[tuple[str, Role, str], int] = {}
+        self.mappings = False
+        self.depth = 0
+        self._rows: dict[tuple[Any, Role], int] = {}
+        self._folded: dict[tuple[int, Role], Any] = {}
+        self._alive: list[Any] = []  # textures that are known by identity
+
+    def folded(self, texture: Texture, role: Role) -> Any:
+        """Return a texture with its constants put together, see `texture_programs.folded`."""
+        key = id(texture), role
+        if key not in self._folded:
+            made = folded(texture, role)
+            spectral = self.spectra.spectral and role in (REFLECTANCE, EMISSION)
+            self._folded[key] = separated(made, role) if spectral else made
+            self._alive.append(texture)
+        return self._folded[key]
+
+    def row(self, texture: Texture, role: Role) -> int:
+        """Put a texture in a role into the tables; return the first word of its row in `textures`.
+
+        A composite must be `folded`.
+        The same texture in the same role is put in once. Raises SceneError for an image or a uv
+        transform that cannot be used.
+        """
+        key = _identity(texture), role
+        if key not in self._rows:
+            if self.store.size("textures") == 0:
+                self._append_blank()
+            self._rows[key] = self._append(texture, role)
+            self._alive.append(texture)
+        return self._rows[key]
+
+    def finish(self) -> list[str]:
+        """Put the images into the tables, when all of them are known; return warnings."""
+        return self.images.finish(self.store, self.roles)
+
+    @property
+    def second_uv(self) -> tuple[int, int]:
+        """The indices of the attributes that make a mesh's second set of uv; -1: none asks."""
+        u, v = (self.attributes.get((name, REAL, ""), -1) for name in SECOND_UV)
+        return u, v
+
+    def attribute(self, name: str, role: Role, channel: str = "") -> int:
+        """Return the index of a mesh attribute in the directories of `attributes`.
+
+        role: as in `row`; channel: of a colour, for a number: "r", "g" or "b", "" for luminance.
+        """
+        return self.attributes.setdefault((name, role, channel), len(self.attributes))
+
+    def append_row(self, kind: str, members: dict[str, Any]) -> tuple[int, np.ndarray]:
+        """Append a row; return its first word, and the row, which may still be written to."""
+        words = np.zeros(1, RECORDS[kind].dtype)
+        words["kind"] = KINDS.index(kind)
+        for name, value in members.items():
+            words[name] = value
+        return self.store.append("textures", words.view(np.uint32)), words
+
+    def _append(self, texture: Texture, role: Role) -> int:
+        if isinstance(texture, Bitmap):
+            return _bitmap(texture, role, self)
+        if is_composite(texture):
+            self.roles.add(("program", role.name))
+            words, depth = program(texture, role, self.store, self.spectra, self.row)
+            self.depth = max(self.depth, depth)
+            return self.store.append("textures", [PROGRAM, *words])
+        kind, members = MEMBERS[type(texture)](texture, role, self)
+        self.roles.add((kind, role.name))
+        return self.append_row(kind, members)[0]
+
+    def _append_blank(self) -> None:
+        self.store.append_floats("texels", np.zeros(4))
+        self.store.append("images", np.zeros(4, np.uint32))
+        self.append_row("spectral_bitmap", {"kind": 0, "width": 1, "height": 1})
+        self.store.append("textures", noise.PERMUTATION)
+
+
+def _identity(texture: Texture) -> Any:
+    """Return a key that is equal for the same textures.
+
+    It has the parameters of a bitmap, else the id of the object.
+    """
+    if isinstance(texture, Bitmap):
+        values = texture.raw, texture.filter, texture.wrap, texture.wrap_v, texture.channel
+        to_texture = np.asarray(texture.to_texture).tobytes()
+        placed = (texture.to_uv.tobytes(), texture.mapping, to_texture)
+        return (identity(texture), *values, *placed)
+    return id(texture)
+
+
+def _uv(texture: Placed, table: TextureTable, down: bool = False) -> dict[str, Any]:
+    """The members of `_COMMON`; `down`: with v turned round, as an image's rows run."""
+    matrix = np.asarray(texture.to_uv, np.float64)
+    u, v = matrix[:2] / matrix[2, 2]
+    members = {"to_u": u, "to_v": [0.0, 0.0, 1.0] - v if down else v}
+    if texture.mapping == "uv":
+        return members
+    table.mappings = True
+    transform = _second_uv(table) if texture.mapping == "uv1" else _transform(texture, table)
+    return {**members, "mapping": MAPPINGS.index(texture.mapping), "transform": transform}
+
+
+def _second_uv(table: TextureTable) -> int:
+    """Append where a mesh's second set of uv stands, in as many words as a place in the world."""
+    words = np.zeros(12, np.uint32)
+    for i, name in enumerate(SECOND_UV):
+        words[i] = table.attribute(name, REAL)
+    return table.store.append("textures", words)
+
+
+def _transform(texture: Placed | Solid, table: TextureTable) -> int:
+    """Append the rows of `to_texture`."""
+    matrix = np.asarray(texture.to_texture, np.float32)
+    return table.store.append("textures", np.ascontiguousarray(matrix[:3]).view(np.uint32))
+
+
+def _checkerboard(
+    texture: Checkerboard, role: Role, table: TextureTable
+) -> tuple[str, dict[str, Any]]:
+    members = _uv(texture, table)
+    colours: dict[str, Any] = {"color0": texture.color0, "color1": texture.color1}
+    for name, value in colours.items():
+        if not isinstance(role, Spectral):
+            words = np.zeros(SPECTRUM_WORDS, np.float32)
+            words[0] = luminance(value.to_rgb("unbounded"))
+            members[name] = table.store.append("textures", words.view(np.uint32))
+        else:
+            members[name] = table.store.append("textures", table.spectra.words(value, role)[0])
+    return texture.kind, members
+
+
+def _bitmap(texture: Bitmap, role: Role, table: TextureTable) -> int:
+    """Append a bitmap's row; unless it is one of spectra, its image comes when all are known."""
+    filters, smooth = params(Bitmap)["filter"].choices, texture.filter == "trilinear"
+    members = {
+        **_uv(texture, table, down=True),
+        "filter": filters.index("bilinear" if smooth else texture.filter),
+        "wrap_u": WRAPS.index(texture.wrap),
+        "wrap_v": WRAPS.index(texture.wrap_v or texture.wrap),
+    }
+    spectral = (
+        spectral_image(texture, role) if table.spectra.spectral and role is not REAL else None
+    )
+    if spectral is None:
+        kind = "mip_bitmap" if has_levels(texture, role) else "bitmap"
+        at, row = table.append_row(kind, members)
+        table.images.add(texture, role, row)
+        return at
+    values, number = bands(spectral, *table.spectra.range)
+    if table.store.size("texels") + values.size > LARGEST:
+        raise SceneError("all images together have too many texels", where="bitmap.image")
+    table.roles.add(("spectral_bitmap", role.name))
+    more = {
+        "width": spectral.values.shape[1],
+        "height": spectral.values.shape[0],
+        "first": table.store.append_floats("texels", values),
+        "bands": values.shape[1],
+        "number": table.spectra.row(number),
+    }
+    return table.append_row("spectral_bitmap", {**members, **more})[0]
+
+
+def _mesh_attribute(
+    texture: MeshAttribute, role: Role, table: TextureTable
+) -> tuple[str, dict[str, Any]]:
+    channel = texture.channel if role is REAL and texture.channel != "luminance" else ""
+    number = table.attribute(texture.name, role, channel)
+    return texture.kind, {"number": number, "per_face": per_face(texture.name)}
+
+
+def _dots(texture: Dots, role: Role, table: TextureTable) -> tuple[str, dict[str, Any]]:
+    return texture.kind, _uv(texture, table)
+
+
+def _checkers(texture: Checkers, role: Role, table: TextureTable) -> tuple[str, dict[str, Any]]:
+    return texture.kind, {"transform": _transform(texture, table)}
+
+
+def _noise(texture: Noise, role: Role, table: TextureTable) -> tuple[str, dict[str, Any]]:
+    return texture.kind, {
+        "transform": _transform(texture, table),
+        "pattern": PATTERNS.index(texture.pattern),
+        "octaves": texture.octaves,
+        "roughness": texture.roughness,
+    }
+
+
+def _marble(texture: Marble, role: Role, table: TextureTable) -> tuple[str, dict[str, Any]]:
+    if role is REAL:
+        words = np.zeros((len(noise.MARBLE), SPECTRUM_WORDS), np.float32)
+        words[:, 0] = luminance(noise.MARBLE)
+    else:
+        made = [table.spectra.words(RGB(*rgb), REFLECTANCE)[0] for rgb in noise.MARBLE]
+        words = np.array(made).view(np.float32)
+    return texture.kind, {
+        "transform": _transform(texture, table),
+        "colours": table.store.append("textures", words.view(np.uint32)),
+        "octaves": texture.octaves,
+        "roughness": texture.roughness,
+        "scale": texture.scale,
+        "variation": texture.variation,
+    }
+
+
+MEMBERS: dict[type[Texture], Callable[..., tuple[str, dict[str, Any]]]] = {
+    Checkerboard: _checkerboard,
+    MeshAttribute: _mesh_attribute,
+    Dots: _dots,
+    Checkers: _checkers,
+    Noise: _noise,
+    Marble: _marble,
+}

@@ -1,0 +1,82 @@
+"""Images as the kernels read them: texels of colours, of spectra, of bands, or of numbers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from clpt import spectra
+from clpt.arrays import Floats32
+from clpt.errors import SceneError
+from clpt.images.spectral_exr import SpectralImage
+from clpt.scene.roles import REAL, REFLECTANCE, Role
+from clpt.spectra import Tabulated
+
+FAR = 1000.0  # bands: how far beyond its ends a spectral image's bands are numbered
+
+
+def texels(image: Floats32, role: Role, spectral: bool) -> Floats32:
+    """Return what stands in `texels` for an image of `pixels`, row by row from the top.
+
+    (h * w, 4): rgb, or sigmoid coefficients and a factor where `spectral`; (h * w,) for REAL.
+    """
+    if role is REAL:
+        return image.reshape(-1)
+    colours = np.broadcast_to(image, (*image.shape[:2], 3)).reshape(-1, 3)
+    made = np.ones((len(colours), 4), np.float32)
+    if not spectral:
+        np.clip(colours, 0.0, 1.0 if role is REFLECTANCE else None, out=made[:, :3])
+    elif role is REFLECTANCE:
+        distinct, which = _palette(np.clip(colours, 0.0, 1.0))
+        made[:, :3] = spectra.uplift(distinct)[which]
+    else:
+        made[:, 3], made[:, :3] = spectra.unbounded(colours)
+    return made
+
+
+def bands(image: SpectralImage, lo: float, hi: float) -> tuple[Floats32, Tabulated]:
+    """Return what stands in `texels` for a spectral image seen from `lo` to `hi` [nm].
+
+    (h * w, n) float32 and the number of the band by wavelength: whole at the bands' wavelengths,
+    linear between them and beyond the ends. Bands outside the range but for the next are left out.
+    Raises SceneError if there are fewer than two.
+    """
+    lambdas, n = image.lambdas, len(image.lambdas)
+    if n < 2:
+        raise SceneError("a texture of spectra needs two wavelengths at least", where="image")
+    first = min(max(int(np.searchsorted(lambdas, lo, "right")) - 1, 0), n - 2)
+    end = max(min(int(np.searchsorted(lambdas, hi)) + 1, n), first + 2)
+    kept = lambdas[first:end]
+    last, ends = len(kept) - 1.0, np.array([kept[1] - kept[0], kept[-1] - kept[-2]]) * FAR
+    number = Tabulated(
+        [kept[0] - ends[0], *kept, kept[-1] + ends[1]],
+        [-FAR, *np.arange(len(kept)), last + FAR],
+    )
+    values = np.nan_to_num(image.values[..., first:end].reshape(-1, len(kept)))
+    return np.clip(values, 0.0, None if image.emissive else 1.0), number
+
+
+def _palette(colours: Floats32) -> tuple[Floats32, Any]:
+    """Distinct colours (k, 3), and which of them each of (n, 3) is, if channels have few values.
+
+    The channels of an 8-bit image have at most 256. Other images come back as they are.
+    """
+    number, counts = np.zeros(len(colours), np.int64), 1
+    for channel in colours.T:
+        coarse = np.ascontiguousarray(channel).view(np.uint32) >> 12
+        values = np.zeros(1 << 20, np.float32)
+        values[coarse] = channel
+        present = np.zeros(1 << 20, bool)
+        present[coarse] = True
+        levels = int(present.sum())
+        if levels > 256 or not np.array_equal(values[coarse], channel):
+            return colours, slice(None)
+        number = number * levels + (np.cumsum(present) - 1)[coarse]
+        counts *= levels
+    chosen = np.full(counts, -1, np.int64)
+    chosen[number] = np.arange(len(colours))
+    used = np.flatnonzero(chosen >= 0)
+    place = np.zeros(counts, np.int64)
+    place[used] = np.arange(len(used))
+    return colours[chosen[used]], place[number]

@@ -1,0 +1,326 @@
+"""Choices for hard light: an integrator in place of `auto`, and "auto" light paths of `path`.
+
+Light paths find the light that something sharp has gathered on something dull. Where the lamp is
+large, paths from the camera find that light too, and sooner. Photons find it also where it is seen
+in a mirror or through glass.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.geometry import analytic, shape_records, shapes, triangles
+from clpt.render.camera import find as cameras
+from clpt.render.geometry import surroundings
+from clpt.render.geometry.find import Emitter, Geometry
+from clpt.render.lights import bounds as light_bounds
+from clpt.render.lights import images as image_lights
+from clpt.render.lights import sky as sky_light
+from clpt.render.lights.aims import is_sharp, sharp_pieces
+from clpt.render.lights.find import Sources
+from clpt.render.records.lowering_cache import LoweringCache
+from clpt.render.scene_index import SceneIndex
+from clpt.render.spectra.look import Look
+from clpt.render.transport import guides, worth
+from clpt.scene import materials as mt
+from clpt.scene.integrators import Auto, Integrator, Path, Vcm, shared
+from clpt.scene.lights import CubeMap, Envmap, Sky
+from clpt.scene.shapes import Shape
+
+SMALL = 0.03  # of the sphere that is seen: up to it a light is small
+NEAR = 0.25  # of the scene's radius: a light counts as no nearer to what it shines on
+SUN = 0.25  # of an image's power: where it comes from a small part the image is a small light
+FEWEST = 3  # edges of a path from a light over two surfaces to the camera: the shortest caustic
+MOSTLY = 0.5  # of the power of all lights: where small ones have less, few paths start at lights
+FEW = 0.125  # a sample
+SOME = 0.25  # where they have more; `vcm` has one, as its photons are these
+FOGGY = 0.25, 0.5  # the same two where lights are in media that scatter
+MANY = 8  # where they are in bulbs: the camera's paths find next to nothing there
+DIRECTIONS = 128  # in which a light looks for what is sharp
+SLACK = 1e-6  # of the cosine of a cone around what may be met, for roundings
+BULB = 0.75  # of them: where what is sharp fills more, the light is in a bulb
+SEEN = 0.02  # of the picture: where what is clear fills more, caustics may be seen through it
+CLEAR = 0.05  # roughness alpha of what is clear: light paths can be joined to what is rougher
+RAYS = 256  # of the camera, that look for what is clear
+
+LEAST = 0.25  # of the power of all lights: where small ones in media have less, they do not count
+THIN, DENSE = 0.3, 5.0  # optical depths from a light to the camera, see bench/NOTES.md
+ALL_AROUND = 0.49 * np.pi  # [rad] from a light's axis: what shines so far is no spot
+
+Ball = tuple[NDArray[np.float64], float]  # centre and radius
+
+
+@dataclass(frozen=True)
+class Lit:
+    """The parts of a scene by which the choice of an integrator is made.
+
+    sphere: centre and radius of one around the scene [m]; extinction (n,): of the medium around
+    each row of `lights` where it scatters, else 0, and nan on a grid [1/m]; () without media.
+    """
+
+    index: SceneIndex
+    geometry: Geometry
+    look: Look
+    sources: Sources
+    sphere: Ball
+    extinction: NDArray[np.float64]
+
+
+def decided(lit: Lit, former: Integrator | None = None) -> tuple[SceneIndex, str]:
+    """Return the index with the integrator that "auto" stands for, and the reason as a sentence.
+
+    The sentence is empty where the scene leaves no choice. former: what a renderer has chosen that
+    goes on with this scene, whose film has a place for light paths or none. Raises SceneError for
+    an image light that is broken.
+    """
+    index = lit.index
+    given = index.integrator
+    if not given.leaves_choice:
+        return index, ""
+    if former is None:
+        chosen, reason = _choice(lit)
+    else:
+        keeps = isinstance(former, Vcm) and isinstance(given, Auto)
+        guiding = former.guiding and not given.guiding
+        guide_paths = former.guide_paths if guiding else 0
+        plain = Path(light_paths=former.light_paths, guiding=guiding, guide_paths=guide_paths)
+        chosen = former if keeps else plain
+        reason = "as before the scene was edited"
+    if index.light_layers and index.adaptive:
+        chosen, reason = Path(light_paths=0), "layers of light have no guides of noise"
+    elif "light_groups" in index.layers and isinstance(chosen, Vcm):
+        chosen, reason = Path(light_paths=chosen.light_paths), "photons do not know their group"
+    if given.guiding:
+        chosen = Path(light_paths=0, guiding=True, guide_paths=given.guide_paths)
+        reason = "directions are guided"
+    chosen = replace(chosen, **shared(given, chosen))
+    index = replace(index, scene=replace(index.scene, integrator=chosen))
+    return replace(index, candidates=_candidates(index, chosen) if former is None else ()), reason
+
+
+def _candidates(index: SceneIndex, chosen: Integrator) -> tuple[Integrator, ...]:
+    """The integrators between which a trial may decide, the chosen one first; else none.
+
+    It pays if many samples are to come. Where a limit of noise ends the picture nobody knows how
+    many, and some scenes cannot have a guide. Photons blur the picture, which no variance tells: so
+    they are left where another way is cheaper all the same, and never taken. `path` is no such way
+    where it never finds a light through what is clear.
+    """
+    samples = index.samples
+    if samples < worth.SAMPLES or index.adaptive or index.lit_ghosts or chosen.guiding:
+        return ()
+    path = Path(light_paths=0, **shared(chosen, Path()))
+    finds = isinstance(chosen, Path) or (chosen.light_paths != MANY and _may_be_met(index))
+    plain = [path] if finds and chosen.light_paths else []
+    several = chosen.max_depth < 0 or chosen.max_depth > 2
+    can_guide = several and index.lights_reach
+    guide = replace(path, guiding=True, guide_paths=guides.paths_for(samples))
+    guided = [guide] if can_guide else []
+    return (chosen, *plain, *guided) if plain or guided else ()
+
+
+def _may_be_met(index: SceneIndex) -> bool:
+    """Whether a ray can meet every light."""
+    return all(light.reach in ("surface", "infinite") for light in index.lights)
+
+
+def _choice(lit: Lit) -> tuple[Integrator, str]:
+    """The integrator but for its depths, and why; what is cheap to know is asked first."""
+    index, geometry = lit.index, lit.geometry
+    integrator, without = index.integrator, Path(light_paths=0)
+    if not index.lights_reach:
+        return without, index.lit_media
+    if not cameras.is_connected(index.camera, index.mode):
+        return without, "points cannot be joined to this camera"
+    fewest = FEWEST - index.free_panes  # a pane on the way costs no depth
+    if 0 <= integrator.max_depth < fewest:
+        return without, "the longest path is too short for a caustic"
+    if (in_fog := _in_fog(lit)) is not None:
+        return in_fog
+    sharp = _first_with((one for one in index.shapes if not _hides(one)), is_sharp)
+    if sharp is None:
+        return without, "nothing is specular"
+    if _first_with((one for one in index.shapes if one.emission is None), _is_dull) is None:
+        return without, "there is nothing dull for a caustic to be seen on"
+    small = list(_small_lights(lit))
+    if not small:
+        return without, "no light is small"
+    reason = f"{shapes.where(sharp)} is specular, and {small[0][0]} is a small light"
+    if sum(share for *_, share in small) < MOSTLY:
+        return Path(light_paths=FEW), f"{reason}, though most light is of large ones"
+    number = SOME
+    if sum(share for _, place, share in small if _is_enclosed(geometry, place)) >= MOSTLY:
+        number, reason = MANY, f"{reason}, in a bulb"
+    if not isinstance(integrator, Auto):
+        return Path(light_paths=number), reason
+    if index.adaptive:
+        return Path(light_paths=number), f"{reason}; noise is not measured with photons"
+    if index.has_media or index.shifts:
+        return Path(light_paths=number), reason
+    if not _sees_clear(index, geometry):
+        number = number if number == MANY else FEW
+        return Path(light_paths=number), f"{reason}; the camera sees little glass and few mirrors"
+    if index.motions:
+        return Path(light_paths=number), f"{reason}; photons of a pass are all at one time"
+    whole = max(1, int(number))
+    return Vcm(light_paths=whole), f"{reason}; the camera sees glass or mirrors"
+
+
+def _in_fog(lit: Lit) -> tuple[Integrator, str] | None:
+    """The integrator where small lights are in media that scatter, None where they are not.
+
+    Near such a light much is scattered that the camera's paths find by chance alone. Through much
+    fog light paths do not come to the camera. In little, what is near a light is lit by it alone,
+    which the camera's paths find, but around a spot lamp.
+    """
+    if not lit.extinction.any():
+        return None
+    share = lit.sources.power / max(lit.sources.power.sum(), 1e-300)
+    bounds = light_bounds.concatenated([one.bounds for one in lit.sources.every])
+    spots = bounds.theta_o + bounds.theta_e < ALL_AROUND
+    index, shutter = lit.index, lit.index.motions.shutter
+    eye = surroundings.camera_origin(index.camera, index.film, (shutter.open + shutter.close) / 2.0)
+    small = []
+    for name, place, _, rows in _small_rows(lit):
+        far = 0.0 if place is None else float(np.linalg.norm(place - eye))
+        depth = far * lit.extinction[rows]
+        pays = np.isnan(depth) | (depth > np.where(spots[rows], 0.0, THIN)) & (depth < DENSE)
+        small.append((name, share[rows][pays].sum()))
+    power = sum(part for _, part in small)
+    if power < LEAST:
+        return None
+    name = next(name for name, part in small if part)
+    number = FOGGY[int(power >= MOSTLY)]
+    return Path(light_paths=number), f"{name} is a small light in a medium that scatters"
+
+
+def _hides(shape: Shape) -> bool:
+    """Whether what goes into a shape is scattered there, so that it makes no caustic."""
+    return shape.interior is not None and shape.interior.scatters
+
+
+def _is_enclosed(geometry: Geometry, place: NDArray[np.float64] | None) -> bool:
+    """Whether a light is in a bulb: what is only sharp fills most directions from its place [m]."""
+    if place is None:
+        return False
+    covered = np.zeros(DIRECTIONS, bool)
+    directions = _cone(np.array([0.0, 0.0, 1.0]), -1.0, DIRECTIONS)
+    for pieces in sharp_pieces(geometry, (), lambda one: is_sharp(one) and not _is_dull(one)):
+        covered[_covered(pieces, place, directions)] = True
+    return bool(covered.mean() > BULB)
+
+
+def _cone(axis: NDArray[np.float64], least: float, number: int) -> NDArray[np.float64]:
+    """Directions (3, number) spread evenly, on a spiral, in a cone: least is its lowest cosine."""
+    middle = np.arange(number) + 0.5
+    z, turn = 1.0 - (1.0 - least) * middle / number, np.pi * (1.0 + math.sqrt(5.0)) * middle
+    level = np.sqrt(1.0 - z * z)
+    least_along = np.eye(3)[np.abs(axis).argmin()]
+    right = np.cross(least_along, axis)
+    right /= np.linalg.norm(right)
+    up = np.cross(axis, right)
+    return np.stack([right, up, axis], axis=1) @ [level * np.cos(turn), level * np.sin(turn), z]
+
+
+def _covered(
+    pieces: NDArray[np.float64], place: NDArray[np.float64], directions: NDArray[np.float64]
+) -> NDArray[np.intp]:
+    """Return which directions (3, n) from a place meet pieces, some more than once."""
+    a, b, c = (pieces[:, i : i + 3] - place for i in (0, 3, 6))
+    middle, reach = (a + b + c) / 3.0, pieces[:, 9]
+    size = reach + np.max([np.linalg.norm(p - middle, axis=1) for p in (a, b, c)], axis=0)
+    away, along = np.linalg.norm(middle, axis=1), middle @ directions
+    edge = np.where(size < away, np.sqrt(np.maximum(away * away - size * size, 0.0)), -away)
+    piece, way = np.nonzero(along >= (edge - SLACK * away)[:, None])  # a cone around each piece
+    a, b, c, middle, reach = (one[piece] for one in (a, b, c, middle, reach))
+    ahead = np.sign(np.einsum("ij,ij->i", a, np.cross(b, c)))
+    towards = directions.T[way]
+    sides = [np.einsum("ij,ij->i", np.cross(p, q), towards) for p, q in ((a, b), (b, c), (c, a))]
+    apart = (middle * middle).sum(axis=1) - np.maximum(along[piece, way], 0.0) ** 2
+    return way[(apart <= reach * reach) | (np.min(sides * ahead, axis=0) > 0.0)]
+
+
+def _sees_clear(index: SceneIndex, geometry: Geometry) -> bool:
+    """Whether mirrors and clear things fill enough of the picture: as if nothing hid them."""
+    view = cameras.view_of(index.camera, index.film.width, index.film.height)
+    assert view is not None, "a camera that can be joined has a point"
+    directions = _cone(view.axis, math.cos(view.angle), RAYS)
+    for pieces in sharp_pieces(geometry, index.motions.shapes, lambda one: is_sharp(one, CLEAR)):
+        met = _covered(pieces, view.place, directions)
+        directions = np.delete(directions, met, axis=1)
+        if directions.shape[1] <= (1.0 - SEEN) * RAYS:
+            return True
+    return False
+
+
+def _first_with(all_: Iterable[Shape], wanted: Callable[[mt.Material], object]) -> Shape | None:
+    """The first shape whose material is as wanted; a material is asked once."""
+    asked: set[int] = set()
+    for shape in all_:
+        if id(shape.material) not in asked and wanted(shape.material):
+            return shape
+        asked.add(id(shape.material))
+    return None
+
+
+def _is_dull(material: mt.Material) -> bool:
+    """Whether light paths can be joined to the camera on a material, or on one inside it."""
+    if isinstance(material, mt.NormalMapped) or not material.reversible:
+        return False
+    if isinstance(material, mt.COMPOSITES):
+        return any(_is_dull(part) for _, part in mt.inner(material))
+    return not material.delta and not is_sharp(material)
+
+
+def _small_lights(lit: Lit) -> Iterator[tuple[str, NDArray[np.float64] | None, float]]:
+    """The names of small lights, where they are [m], and the share of all light that is theirs."""
+    for name, place, share, _ in _small_rows(lit):
+        yield name, place, share
+
+
+def _small_rows(lit: Lit) -> Iterator[tuple[str, NDArray[np.float64] | None, float, slice]]:
+    """Yield small lights as `_small_lights` does, each with its rows in `lights`."""
+    motions, geometry = lit.index.motions, lit.geometry
+    sources, (middle, radius) = lit.sources, lit.sphere
+    lamps, share = lit.index.lights, sources.power / max(sources.power.sum(), 1e-300)
+    for row, i in enumerate(sources.order):
+        lamp = lamps[i]
+        if isinstance(lamp, (Envmap, CubeMap)):
+            small = image_lights.extent(lamp, lit.look, SUN) < SMALL
+        elif isinstance(lamp, Sky):
+            small = sky_light.sun_share(lamp, lit.look) >= SUN
+        else:
+            small = lamp.reach in ("placed", "distant") and lamp.falloff
+        if small:
+            place = None
+            if lamp.reach == "placed":
+                bounds = light_bounds.of_lamp(lamp)
+                place = motions.halfway(motions.lamps.get(i), (bounds.low + bounds.high)[0] / 2.0)
+            yield f"lights[{i}]", place, float(share[row]), slice(row, row + 1)
+    ends = (*sources.first, len(share))[1:]
+    for emitter, first, end in zip(geometry.emitters, sources.first, ends, strict=True):
+        area, place = _area_and_place(emitter, lit.look.cache)
+        keys = motions.shapes.get(int(geometry.rows[emitter.shape_row]["number"]))
+        place = motions.halfway(keys, place)
+        far = max(float(np.linalg.norm(place - middle)), NEAR * radius)
+        if area < SMALL * 4.0 * np.pi * far**2:
+            rows = slice(first, end)
+            yield shapes.where(emitter.shape), place, float(share[rows].sum()), rows
+
+
+def _area_and_place(emitter: Emitter, cache: LoweringCache) -> tuple[float, NDArray[Any]]:
+    """The area of a shape that emits [m^2], and the middle of the box around it (3,) [m]."""
+    vertices, faces = emitter.vertices, emitter.faces
+    if vertices is None:
+        low, high = analytic.bounds(emitter.shape)
+        return analytic.area(emitter.shape), (low + high) / 2.0
+    middle = (vertices[:, :3].min(axis=0) + vertices[:, :3].max(axis=0)) / 2.0
+    if emitter.shape.kind in shape_records.ONE_OF:
+        return float(4.0 * np.pi * (vertices[:, 3].astype(np.float64) ** 2).sum()), middle
+    return float(cache(triangles.triangle_areas, vertices, faces).sum()), middle

@@ -1,0 +1,121 @@
+"""Photons: how many a pass has, and the radius in which they are gathered."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.records import PHOTON
+from clpt.render.camera import find as cameras
+from clpt.render.geometry.find import Geometry
+from clpt.scene.cameras import Camera
+from clpt.scene.integrators import Vcm
+
+# of a path where photons are merged, each vertex of which has a place; many files ask for 65
+DEEPEST = 65
+FIRST = 2  # surfaces of a light path, before which it leaves no photon
+MIB = 1 << 20
+FEWEST_CELLS = 1 << 10
+GROUPS = 8  # of wavelengths, where light disperses
+FEW_GROUPS = 2
+RADIUS = 1.25  # of a disk in pixels
+LEAST, MOST = 5e-4, 1e-2  # radii, over that of the scene
+SPLITS = 24  # rounds in which triangles are split that are large where they are seen
+MOST_SPLIT = 1 << 15  # in a round
+BOX = np.array(  # corners of a box's sides, of which bit k says where they are along axis k
+    [
+        (0, 1, 3), (0, 3, 2), (4, 5, 7), (4, 7, 6), (0, 1, 5), (0, 5, 4),
+        (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 3, 7), (1, 7, 5),
+    ]
+)  # fmt: skip
+WORDS = PHOTON.words + 2  # with the number of its cell, and its place in the order
+BYTES = 4 * WORDS
+
+
+def places(integrator: Vcm) -> int:
+    """Return how many photons a light path may leave: all its surfaces but the first and last."""
+    depth = integrator.max_depth
+    return (DEEPEST if depth < 0 else min(depth, DEEPEST)) - FIRST
+
+
+def pixels(integrator: Vcm, number: int) -> int:
+    """Return of how many of `number` pixels the light paths leave photons.
+
+    There is one at least: 1 MiB, the least memory, holds the most photons of the most light paths.
+    """
+    each = BYTES * places(integrator) * integrator.light_paths
+    return min(number, integrator.photon_memory * MIB // each)
+
+
+def first_radius(
+    camera: Camera, geometry: Geometry, film: tuple[int, int], scene_radius: float
+) -> float:
+    """Return a radius that suits a picture [m]: some pixels, where the camera sees surfaces.
+
+    film: width and height of the whole [pixels]; scene_radius: of a sphere around the scene [m].
+    The distance of surfaces is the median over what fills the picture, as if nothing hid them. A
+    power of the square root of 2, so that small changes of a scene rarely change it.
+    """
+    least, most = LEAST * scene_radius, MOST * scene_radius
+    view = cameras.view_of(camera, *film)
+    if view is None:
+        return _rounded(math.sqrt(least * most))
+    far = _median_distance(_triangles(geometry) - view.place, view.axis, view.angle)
+    pixel = far * view.width / film[0]
+    return _rounded(float(np.clip(RADIUS * pixel, least, most)) if far else least)
+
+
+def _rounded(radius: float) -> float:
+    """The nearest power of the square root of 2."""
+    return float(2.0 ** (round(2.0 * math.log2(radius)) / 2.0))
+
+
+def _median_distance(triangles: NDArray[np.float64], axis: NDArray, angle: float) -> float:
+    """The distance [m] within which half of what is seen from the origin lies; 0 if nothing is.
+
+    triangles: (n, 3, 3); axis: of the cone that is seen, unit length; angle: from it to the cone's
+    edge [rad]. Triangles that are large where they are seen are split.
+    """
+    kept = []
+    for _ in range(SPLITS):
+        middles, distance, size = _measures(triangles)
+        apart = np.arccos(np.clip(middles @ axis / distance, -1.0, 1.0))
+        seen = apart < angle + np.arcsin(np.minimum(size / distance, 1.0))
+        large = seen & (size > distance / 4.0)
+        if not large.any() or large.sum() > MOST_SPLIT:
+            break
+        a, b, c = np.moveaxis(triangles[large], 1, 0)
+        ab, bc, ca = (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0
+        parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+        halves = np.concatenate([np.stack(part, axis=1) for part in parts])
+        kept.append(triangles[seen & ~large])
+        triangles = halves
+    triangles = np.concatenate([*kept, triangles])
+    middles, distance, _ = _measures(triangles)
+    across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    share = np.abs((across * middles).sum(axis=1)) / distance**3
+    share[middles @ axis < math.cos(angle) * distance] = 0.0
+    order = np.argsort(distance)
+    summed = np.cumsum(share[order])
+    if not len(summed) or not summed[-1] > 0.0:
+        return 0.0
+    return float(distance[order][np.searchsorted(summed, summed[-1] / 2.0)])
+
+
+def _measures(triangles: NDArray[np.float64]) -> tuple[NDArray, NDArray, NDArray]:
+    """Return the middles of triangles, their distances from the origin, and the longest sides."""
+    middles = triangles.mean(axis=1)
+    sides = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2)
+    return middles, np.maximum(np.linalg.norm(middles, axis=1), 1e-30), sides.max(axis=1)
+
+
+def _triangles(geometry: Geometry) -> NDArray[np.float64]:
+    """The corners (n, 3, 3) of triangles, and of the sides of boxes around all other shapes [m]."""
+    world = geometry.faces.max(axis=1, initial=0) < geometry.world_vertices
+    corners = geometry.vertices[geometry.faces[world]].astype(np.float64)
+    boxes = np.concatenate([geometry.boxes, geometry.instances.boxes]).astype(np.float64)
+    units = np.array([[i >> axis & 1 for axis in range(3)] for i in range(8)])
+    points = boxes[:, None, 0] + (boxes[:, None, 1] - boxes[:, None, 0]) * units
+    return np.concatenate([corners, points[:, BOX].reshape(-1, 3, 3)])

@@ -1,0 +1,53 @@
+/* The contract of a camera kind: kernels/cameras/kinds/<kind>.cl has
+ *
+ *   CameraRay <kind>_ray(global const <Kind>Camera *camera, vec2 film, vec2 lens);
+ *
+ * and of a kind that can be of glass which disperses
+ *
+ *   CameraRay <kind>_glass_ray(global const <Kind>Camera *camera, vec2 film, vec2 lens, real index);
+ *
+ * A kind whose rays have weights has instead
+ *
+ *   CameraRay <kind>_ray(Scene scene, global const <Kind>Camera *camera, vec2 film, vec2 lens, Wavelengths lambdas,
+ *                        Spectrum *weight);
+ *
+ * with directions for the hero's wavelength, if its glasses disperse. A ray that does not get to the scene has a weight
+ * of 0 and ends at once.
+ *
+ * A kind that has an axis also has kernels/cameras/<kind>_screen.cl with
+ *
+ *   vec2 <kind>_screen(global const <Kind>Camera *camera, vec3 p, mask away, mask *seen);
+ *
+ * where on the film the point p is, or where `away` what is infinitely far along the unit vector p. `seen` becomes 0
+ * where it is nowhere, as behind the camera; a lens counts as its middle.
+ *
+ * film: position on the film, x and y in [0, 1], y down; lens: a point of the unit square;
+ * index: of the glass at the hero's wavelength, for which alone the ray then holds.
+ * The struct is a uniform Record in clpt/render/records/camera_rows.py.
+ */
+typedef struct {
+    vec3 o, d; /* [m]; unit length. The origin lies on the near plane. */
+    real far;  /* distance from there to the far plane [m]; FAR: none */
+} CameraRay;
+
+/* Throughput as a path begins, and what spectra/hero.cl keeps of it. */
+inline Spectrum camera_start(void)
+{
+    Spectrum r = spectrum_of(1.0f);
+#if CAMERA_DISPERSES
+    r = spectrum_of(0.0f);
+    r.x = 4.0f;
+#endif
+    return r;
+}
+
+inline vec3 matrix_point(global const float *m, real x, real y, real z) /* row-major, affine */
+{
+    return v3(m[0] * x + m[1] * y + m[2] * z + m[3], m[4] * x + m[5] * y + m[6] * z + m[7],
+              m[8] * x + m[9] * y + m[10] * z + m[11]);
+}
+inline vec3 matrix_vector(global const float *m, real x, real y, real z)
+{
+    return v3(m[0] * x + m[1] * y + m[2] * z, m[4] * x + m[5] * y + m[6] * z,
+              m[8] * x + m[9] * y + m[10] * z);
+}

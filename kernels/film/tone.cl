@@ -1,0 +1,52 @@
+/* Tone curves: linear Rec. 709 of any brightness to what a screen shows, linear, white is 1. The host has the
+ * same, clpt/images/colour/tones.py, whose names of curves stand in the order of these numbers.
+ *
+ * Reinhard: Reinhard et al. 2002, "Photographic Tone Reproduction", eq. 3, of the luminance of Rec. 709.
+ * Aces: the rational fit to the curve of ACES by Narkowicz 2015, "ACES Filmic Tone Mapping Curve".
+ * AgX: Sobotka 2022; Neutral: Khronos 2024, "PBR Neutral Tone Mapper". */
+#define TONE_REINHARD 1
+#define TONE_ACES 2
+#define TONE_AGX 3
+#define TONE_NEUTRAL 4
+#define LARGEST 1e18f /* its square is finite */
+
+/* The sigmoid of AgX: slope 2 through (pivot, 1/2), and 0 and 1 at the ends of [0, 1]. */
+inline float4 agx_curve(float4 x)
+{
+    const float pivot = 10.0f / 16.5f;
+    float4 away = x - pivot, far = fabs(away);
+    float4 below = powr(1.0f + 59.507875f * far * far * far, (float4)(-1.0f / 3.0f));
+    float4 above = powr(1.0f + 69.862789f * powr(far, (float4)(3.25f)), (float4)(-1.0f / 3.25f));
+    return 0.5f + 2.0f * away * select(above, below, away < 0.0f);
+}
+
+inline float4 agx(float4 c)
+{
+    const float4 weights = (float4)(0.04240107f, 0.0784365f, 0.07916243f, 0.0f); /* of grey: a fifth */
+    float4 stops = log2(fmax(0.8f * c + dot(weights, c), 1e-10f) * (1.0f / 0.18f));
+    float4 v = agx_curve(clamp((stops + 10.0f) * (1.0f / 16.5f), 0.0f, 1.0f));
+    v = (v - dot(weights, v)) * (1.0f / 0.8f);
+    return powr(clamp(v, 0.0f, 1.0f), (float4)(2.2f));
+}
+
+inline float4 neutral(float4 c)
+{
+    const float f90 = 0.04f, start = 0.76f, d = 0.24f;
+    float least = fmin(c.x, fmin(c.y, c.z));
+    c -= least < 2.0f * f90 ? least - least * least / (4.0f * f90) : f90;
+    float peak = fmax(c.x, fmax(c.y, c.z));
+    if (peak < start) return c;
+    float lowered = 1.0f - d * d / (peak + d - start);
+    float white = 1.0f - 1.0f / (0.15f * (peak - lowered) + 1.0f);
+    return mix(c * (lowered / peak), (float4)(lowered), white);
+}
+
+inline float4 tone_curve(float4 c, int tone)
+{
+    if (tone == 0) return c;
+    c = clamp(c, 0.0f, LARGEST);
+    if (tone == TONE_REINHARD) return c / (1.0f + 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z);
+    if (tone == TONE_AGX) return agx(c);
+    if (tone == TONE_NEUTRAL) return neutral(c);
+    return clamp(c * (2.51f * c + 0.03f) / (c * (2.43f * c + 0.59f) + 0.14f), 0.0f, 1.0f);
+}

@@ -1,0 +1,24 @@
+/* A point whose intensity is that of an image in latitude and longitude, its directions as in
+ * lights/kinds/envmap.cl, its texels' centres off the poles as in textures/kinds/bitmap.cl. Irradiance falls with the
+ * square of the distance. */
+inline Spectrum goniometric_intensity(Goniometric l, Scene scene, vec3 d, Wavelengths lambdas)
+{
+    real x = dot3(d, l.x), y = dot3(d, l.y), z = dot3(d, l.z);
+    real turn = atan2_r(x, -z) * INV_2PI;
+    vec2 uv = {turn + sel(turn < 0.0f, (real)(1.0f), (real)(0.0f)), 1.0f - atan2_r(sqrt(x * x + z * z), y) * INV_PI};
+    TexturePoint point = texture_point(uv, l.position);
+    Spectrum value = emission_load(scene, l.radiance, point, lambdas);
+    return spectrum_scale(spectrum_mul(value, factor_load(scene, l.factor, point, lambdas)), l.scale);
+}
+
+LightSample goniometric_sample(Goniometric l, Scene scene, vec3 p, vec2 u, Wavelengths lambdas)
+{
+    vec3 to = sub3(l.position, p);
+    real t2 = max_r(dot3(to, to), (real)(1e-20f)), t = sqrt(t2);
+    LightSample s;
+    s.wi = scale3(to, 1.0f / t);
+    s.t = t;
+    s.radiance = spectrum_scale(goniometric_intensity(l, scene, neg3(s.wi), lambdas), 1.0f / t2);
+    s.pdf = -1.0f;
+    return s;
+}

@@ -1,0 +1,136 @@
+/* Choosing a light in proportion to what it may send to a point, by a tree over all lights (Conty Estevez
+ * and Kulla 2018). Behind the rows in `lights` lie a word for every row, two bits of which say at each level which node
+ * of a group leads to it, and then the groups: see clpt/render/lights/tree.py. */
+#define LIGHT_TREE_SLACK 1e-3f /* of a cosine, so that rounding hides no light */
+#define LIGHT_TREE_DARK 1e-5f  /* of a cosine: rounding, behind what is flat */
+/* For lights of a node are not where its centre is: the share of the square of its radius that adds to that of the
+ * distance; by how much of the square of its sine as seen from p that of the cosine at the lights grows; and the share
+ * of the cosine at p of what rises above its horizon. All were measured, see bench/NOTES.md. */
+#define LIGHT_TREE_NEAR 0.33f
+#define LIGHT_TREE_AROUND 0.1f
+#define LIGHT_TREE_RISING 0.25f
+/* The least importance of lights at places over that of those that shine on the whole scene, and the other way round,
+ * where both may send light: what is in the way is not known. */
+#define LIGHT_TREE_LEAST 0.05f
+
+/* In which lanes lights of a node may shine on p by their cones, `from` their centre; among them all may. */
+inline mask light_tree_in_cone(LightNode n, vec3 from)
+{
+    real d2 = dot3(from, from), inverse = 1.0f / sqrt(max_r(d2, (real)(1e-20f)));
+    real sine = min_r(n.radius * inverse, (real)(1.0f));
+    real turned = n.cos_e * sqrt_r(1.0f - sqr(sine)) - sqrt_r(1.0f - sqr(n.cos_e)) * sine;
+    mask within = dot3(n.mean, from) * inverse > (turned - LIGHT_TREE_SLACK) * sqrt(dot3(n.mean, n.mean));
+    return within | (n.radius * inverse >= 1.0f);
+}
+
+/* What the lights below a node may send to p, all surfaces there shading them: their power, times the mean of their
+ * cosines (light_lobes.py), over the squared distance; and times what p reflects, which of a dull surface is the cosine
+ * there if light from one hemisphere only matters. No light is lost: 0 means that there is none. lift: 1 where light
+ * from both sides matters, else 0. Lights that shine on the whole scene count as much everywhere. */
+inline real light_tree_importance(LightNode n, vec3 p, Receiver receiver, real lift)
+{
+    vec3 from = sub3(p, n.center);
+    real d2 = dot3(from, from) + LIGHT_TREE_NEAR * sqr(n.radius), inverse = 1.0f / sqrt(max_r(d2, (real)(1e-20f)));
+    vec3 w = scale3(from, inverse), across = v3(w.y * w.z, w.z * w.x, w.x * w.y);
+    real sine = min_r(n.radius * inverse, (real)(1.0f));
+    real square = dot3(n.squares, v3(w.x * w.x, w.y * w.y, w.z * w.z)) + 2.0f * dot3(n.products, across);
+    real along = dot3(n.mean, w), shines = 0.5f * (along + sqrt_r(square + LIGHT_TREE_AROUND * sqr(sine)));
+    mask flat = (n.child < 0) & (dot3(n.mean, n.mean) > 1.0f - LIGHT_TREE_SLACK);
+    mask faces = !flat | (along > LIGHT_TREE_DARK);
+    mask narrow = n.cos_e > -1.0f;
+    if (any(narrow)) faces = faces & (!narrow | light_tree_in_cone(n, from));
+    real straight = lift - dot3(receiver_hemisphere(receiver), w), highest = straight + sine;
+    real cosine = max_r(max_r(straight, LIGHT_TREE_RISING * highest), (real)(LIGHT_TREE_SLACK));
+    real reflected = receiver_reflects(receiver, neg3(w), sine, min_r(cosine, (real)(1.0f)));
+    real importance = n.power * shines * reflected * sqr(inverse);
+    importance = sel(faces & (highest > -LIGHT_TREE_SLACK), importance, (real)(0.0f));
+    return sel(n.radius < 0.0f, n.power, importance);
+}
+
+/* The importance of the nodes of a group, and where each leads; their sum. */
+inline real light_tree_group(Scene scene, integer group, vec3 p, Receiver receiver, real value[LIGHT_TREE_WIDTH],
+                             integer child[LIGHT_TREE_WIDTH])
+{
+    int words = scene.settings->light_count * (LIGHT_ROW_WORDS + 1);
+    global const uint *nodes = scene.lights + (words + LIGHT_TREE_LINE - 1) / LIGHT_TREE_LINE * LIGHT_TREE_LINE;
+    integer at = group * (LIGHT_TREE_WIDTH * LIGHT_NODE_WORDS);
+    real lift = sel(hemisphere_given(receiver_hemisphere(receiver)), (real)(0.0f), (real)(1.0f)), sum = 0.0f;
+    mask placed = mask_of(0), everywhere = mask_of(0); /* of the root's group: the first node and the middle one */
+    for (int i = 0; i < LIGHT_TREE_WIDTH; i++) {
+        LightNode n = light_node_row(nodes + i * LIGHT_NODE_WORDS, at);
+        value[i] = light_tree_importance(n, p, receiver, lift);
+        child[i] = n.child;
+        if (i == 0) placed = n.radius >= 0.0f;
+        if (i == LIGHT_TREE_WIDTH / 2) everywhere = n.radius < 0.0f;
+    }
+    real near = value[0], far = value[LIGHT_TREE_WIDTH / 2];
+    mask apart = placed & everywhere & (near > 0.0f) & (far > 0.0f);
+    value[0] = sel(apart, max_r(near, LIGHT_TREE_LEAST * far), near);
+    value[LIGHT_TREE_WIDTH / 2] = sel(apart, max_r(far, LIGHT_TREE_LEAST * near), far);
+    for (int i = 0; i < LIGHT_TREE_WIDTH; i++) sum += value[i];
+    return sum;
+}
+
+/* A row, and its chance at p, for a surface that does with light what `receiver` says: 0 where no light reaches p. What
+ * is left of *u is uniform in [0, 1) again. other: see light_bits. */
+inline integer light_tree_pick(Scene scene, vec3 p, Receiver receiver, real *u, real other, real *pmf)
+{
+    integer at = 0, child[LIGHT_TREE_WIDTH];
+    real value[LIGHT_TREE_WIDTH];
+    mask open = at >= 0;
+    *pmf = 1.0f;
+#if !FEW_LIGHTS
+    real grain = UNIT_GRAIN; /* of *u: grows as its bits are spent */
+#endif
+    while (any(open)) {
+        real sum = light_tree_group(scene, max_i(at, (integer)(0)), p, receiver, value, child);
+        real target = min_r(*u, (real)(0.9999998f)) * sum, below = 0.0f, part = value[0], above = value[0];
+        integer next = child[0];
+        for (int i = 1; i < LIGHT_TREE_WIDTH; i++) {
+            mask beyond = target >= above;
+            below = sel(beyond, above, below);
+            part = sel(beyond, value[i], part);
+            next = sel_i(beyond, child[i], next);
+            above += value[i];
+        }
+        real chance = part / max_r(sum, (real)(1e-37f)), remainder = (target - below) / max_r(part, (real)(1e-37f));
+        *u = sel(open, clamp_r(remainder, (real)(0.0f), (real)(0.99999994f)), *u);
+        *pmf *= sel(open, chance, (real)(1.0f));
+#if !FEW_LIGHTS
+        grain /= sel(open, max_r(chance, (real)(1e-20f)), (real)(1.0f));
+        mask coarse = open & (grain > 0x1p-11f);
+        if (any(coarse)) {
+            real finer = *u + light_bits(as_natural(next), other, min_r(grain, (real)(1.0f)));
+            *u = sel(coarse, min_r(finer, (real)(0.99999994f)), *u);
+            grain = sel(coarse, (real)(UNIT_GRAIN), grain);
+        }
+#endif
+        at = sel_i(open, next, at);
+        open = at >= 0;
+    }
+    return -1 - at;
+}
+
+/* The chance of a row at p. */
+inline real light_tree_pmf(Scene scene, integer row, vec3 p, Receiver receiver)
+{
+    int trails = scene.settings->light_count * LIGHT_ROW_WORDS;
+    natural trail = as_natural(gather_i(scene.lights, row + trails));
+    integer at = 0, child[LIGHT_TREE_WIDTH];
+    real value[LIGHT_TREE_WIDTH];
+    mask open = at >= 0;
+    real pmf = 1.0f;
+    while (any(open)) {
+        real sum = light_tree_group(scene, max_i(at, (integer)(0)), p, receiver, value, child), part = value[0];
+        integer slot = as_integer(trail & (LIGHT_TREE_WIDTH - 1)), next = child[0];
+        for (int i = 1; i < LIGHT_TREE_WIDTH; i++) {
+            part = sel(slot == i, value[i], part);
+            next = sel_i(slot == i, child[i], next);
+        }
+        pmf *= sel(open, part / max_r(sum, (real)(1e-37f)), (real)(1.0f));
+        at = sel_i(open, next, at);
+        trail = trail >> 2;
+        open = at >= 0;
+    }
+    return pmf;
+}

@@ -1,0 +1,54 @@
+/* The contract of a material kind, materials/kinds/<kind>.cl, and of a phase function, media/kinds/<kind>.cl:
+ *
+ *   BsdfSample <kind>_sample(<Kind> m, vec3 wo, vec3 u);     u.z chooses a lobe, u.x and u.y a direction
+ *   Spectrum   <kind>_eval  (<Kind> m, vec3 wo, vec3 wi);    f |cos|, of the lobes that are not delta
+ *   real       <kind>_pdf   (<Kind> m, vec3 wo, vec3 wi);    [1/sr], likewise
+ *   Spectrum   <kind>_albedo(<Kind> m);                      the colour a person would name
+ *   Spectrum   <kind>_pdfs  (<Kind> m, vec3 wo, vec3 wi);    of `chromatic` kinds: pdf, were each wavelength the hero
+ *
+ * wo points to the viewer, wi to the light, both away from the surface, in the local frame whose z is
+ * the shading normal, on the front's side: wo.z < 0 is a look at the back. The struct <Kind> is
+ * generated from the dataclass: Spectrum for spectra, real for numbers, integer for flags and choices
+ * (the choice's position). Textures and wavelengths have been resolved by the loader; a kind that
+ * `needs_wavelengths` has the path's as `lambdas` [nm].
+ * What is sampled may depend on the hero (x) where LOBE_DISPERSE or `pdfs` tell; else a probability
+ * must be symmetric in the wavelengths: take it from a spectrum_mean. spectra/hero.cl relies on that.
+ * Where a parameter is declared with lobe=True, USES_<KIND>_<PARAMETER> says whether the scene has that lobe: 0 if the
+ * parameter is 0 in all of its materials. The first three functions are declared as inline before the file is read.
+ * Functions are pure and free of branches but for if (any(mask)); lanes that have nothing to do
+ * compute what they like, but their result must not be NaN where pdf > 0.
+ */
+#include "generated/lobe_bits.cl"
+
+typedef struct {
+    vec3 wi;
+    Spectrum weight; /* f |cos| / pdf; on transmission it holds the change of solid angle, 1/eta^2 */
+    real pdf;        /* 0: nothing was sampled, the path ends */
+    real eta;        /* index of the side of wi over that of wo; 1 on reflection */
+    integer lobe;    /* LOBE_ bits */
+    real p, p_back;  /* those of BsdfPair, of wo and wi: spectra/hero.cl sets them */
+} BsdfSample;
+
+/* What a material has for a pair of directions, see materials/pair.cl. */
+typedef struct {
+    Spectrum f;      /* f |cos| */
+    real pdf;        /* of wi, as hero_pdf has it */
+    real p, p_back;  /* of wi and of wo, as rival_pdf has them */
+} BsdfPair;
+
+/* What a vertex asks of its material. */
+typedef struct {
+    BsdfPair pair;
+    BsdfSample sample;
+} BsdfAnswer;
+
+inline BsdfSample bsdf_nothing(void)
+{
+    BsdfSample s;
+    s.wi = v3(0.0f, 0.0f, 1.0f);
+    s.weight = spectrum_of(0.0f);
+    s.pdf = 0.0f;
+    s.eta = 1.0f;
+    s.lobe = LOBE_REFLECT;
+    return s;
+}

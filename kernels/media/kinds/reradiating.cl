@@ -1,0 +1,23 @@
+/* The same in all directions, and by which wavelengths light came is chosen by materials/reradiation.cl, as in
+ * materials/kinds/fluorescent.cl: in a medium a point has no normal, and f = (reflectance + glow) / 4 pi [1/sr]. */
+#include "materials/glow.cl"
+
+Spectrum reradiating_albedo(Reradiating m) { return with_glow(m.reflectance, m.reradiation, m.amount); }
+
+BsdfSample reradiating_sample(Reradiating m, vec3 wo, vec3 u)
+{
+    BsdfSample s = bsdf_nothing();
+    vec2 point = {u.x, u.y};
+    s.wi = uniform_sphere(point);
+    s.weight = reradiating_albedo(m);
+    s.pdf = 0.25f * INV_PI;
+    s.lobe = LOBE_TRANSMIT;
+    return s;
+}
+
+Spectrum reradiating_eval(Reradiating m, vec3 wo, vec3 wi)
+{
+    return spectrum_scale(reradiating_albedo(m), 0.25f * INV_PI);
+}
+
+real reradiating_pdf(Reradiating m, vec3 wo, vec3 wi) { return 0.25f * INV_PI; }

@@ -1,0 +1,25 @@
+/* The media around a vertex of a path. */
+typedef struct {
+    integer medium;  /* that the ray has come through */
+    integer inside;  /* what is behind the surface */
+    integer outside; /* and before it, where its shape says so, or the path remembers */
+    integer around;  /* what the path remembers: the medium around the body that it is in, if that absorbs by itself */
+    mask absorbs;    /* such a body is met here, which names no media */
+} VertexMedia;
+
+inline VertexMedia vertex_media(Scene scene, Slab path, Slab hit, uint at, mask active, integer row, mask front)
+{
+    VertexMedia m;
+    m.inside = medium_that_absorbs(scene, BSDF_INTERIOR(row));
+    m.absorbs = m.inside != 0;
+    m.around = sel_i(active, load_path_around(path, at), (integer)(0));
+    m.outside = sel_i(m.absorbs, m.around, (integer)(0));
+#if USES_MEDIA && !BSDF_IS_PHASE
+    ShapeMedia own = shape_media(scene, sel_i(active, load_hit_shape(hit, at), (integer)(0)));
+    m.inside = sel_i(own.inside != 0, own.inside, m.inside);
+    m.absorbs = m.absorbs & (own.inside == 0) & (own.outside == 0);
+    m.outside = sel_i(m.absorbs, m.around, own.outside);
+#endif
+    m.medium = medium_met(sel_i(active, load_path_medium(path, at), (integer)(0)), m.inside, front);
+    return m;
+}

@@ -1,2 +1,0 @@
-/* Stands for path/mattes.cl where there are none. */
-#define mattes_record(scene, mattes, first, pixel_index, v)

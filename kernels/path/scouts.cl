@@ -1,5 +1,0 @@
-/* Where fog, thin glass or masks decide by chance what a path meets first, a path goes ahead of each of a pixel's first
- * samples, to the first surface, for layers alone (path/scout.cl). */
-#define LAYERS_SCOUT 1
-#define PATH_SCOUTS 0x40000000
-#define path_scouts(state) (((state) & PATH_SCOUTS) != 0)

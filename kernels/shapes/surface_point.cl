@@ -1,0 +1,92 @@
+/* A point of a surface, and what of it follows from the hit alone. */
+typedef struct {
+    vec3 p;       /* on it, but for the rounding of p itself [m] */
+    real size;    /* of the primitive [m], see core/rounding.cl */
+    vec3 n;       /* geometric normal, unit length, on the side of the front */
+    vec3 ns;      /* shading normal, unit length */
+    vec3 dpdu;    /* how p moves with the surface's u; may be zero */
+    vec3 dpdv;    /* and with v */
+    vec3 along;   /* what maps and frames are along: dpdu, or the tangent that the mesh tells; of any length */
+    vec3 beside;  /* and dpdv, or the other direction of that tangent's frame */
+    vec3 along1;  /* the same for the mesh's second set of uv */
+    vec3 beside1;
+    mask told;    /* the mesh tells tangents, so that all sets have the same directions */
+    vec2 uv;
+    mask flipped; /* the back of a two-sided surface was hit, and ns negated */
+    integer light; /* row in `lights`, -1: does not emit */
+    integer attributes, face; /* of triangles, see textures/texture_point.cl */
+    vec2 b, dbdu, dbdv; /* dbdu, dbdv: how b moves with the surface's uv */
+    real footprint; /* of the path's cone, see textures/texture_point.cl */
+    vec3 to_open, to_close; /* from p to where what deforms has the point when the shutter opens, closes [m] */
+} Surface;
+
+/* A point of a medium, as a surface without extent: it has no normal. */
+inline Surface surface_of_point(vec3 p)
+{
+    Surface s;
+    s.p = p;
+    s.size = 0.0f;
+    s.n = v3(0.0f, 0.0f, 0.0f);
+    s.ns = s.n;
+    s.dpdu = s.n;
+    s.dpdv = s.n;
+    s.along = s.n;
+    s.beside = s.n;
+    s.along1 = s.n;
+    s.beside1 = s.n;
+    s.told = mask_of(0);
+    s.uv.x = 0.0f;
+    s.uv.y = 0.0f;
+    s.flipped = mask_of(0);
+    s.light = -1;
+    s.attributes = 0;
+    s.face = 0;
+    s.b = s.uv;
+    s.dbdu = s.uv;
+    s.dbdv = s.uv;
+    s.footprint = 0.0f;
+    s.to_open = s.n;
+    s.to_close = s.n;
+    return s;
+}
+
+/* The point where the ray from `o` along `d` ends, on a flat triangle. */
+inline Surface surface_met(TraceHit h, mask active, vec3 o, vec3 d)
+{
+    Surface s = surface_of_point(o);
+    vec3 n = sel3(active, h.n, v3(0.0f, 0.0f, 1.0f));
+    real inverse = 1.0f / wide_length3(n);
+    s.n = scale3(n, inverse);
+    s.size = triangle_size(h.side, inverse);
+    /* The ray's roundings grow with its length. They may have put its end behind the surface, so that it is put back
+     * on it, or behind a neighbour, so that it goes back along the ray first, but not behind its beginning. */
+    s.p = madd3(d, max_r(h.t - 2.0f * rounding_step(o, h.t), 0.5f * h.t), o);
+    s.p = madd3(s.n, h.plane * inverse - dot3(s.n, s.p), s.p);
+    s.ns = s.n;
+    s.uv.x = h.u;
+    s.uv.y = h.v;
+    return s;
+}
+
+/* The row in `lights` of a primitive, -1 for one that does not emit. */
+inline integer surface_light(ShapeRow shape, integer prim, mask active)
+{
+    mask emits = active & (shape.light >= 0);
+    integer light = -1;
+    if (any(emits)) {
+        integer offset = sel_i((shape.flags & SHAPE_ONE_LIGHT) != 0, (integer)(0), prim - shape.prim);
+        light = sel_i(emits, shape.light + offset, (integer)(-1));
+    }
+    return light;
+}
+
+/* As a viewer along d sees it. Each normal is turned by itself: where they disagree, as at the silhouette of a coarse
+ * mesh, a BSDF that saw its back would be black. */
+inline Surface surface_turned(Surface s, ShapeRow shape, mask front, vec3 d)
+{
+    mask both = (shape.flags & SHAPE_TWO_SIDED) != 0;
+    s.flipped = both & (dot3(s.ns, d) > 0.0f);
+    s.n = sel3(both & !front, neg3(s.n), s.n);
+    s.ns = sel3(s.flipped, neg3(s.ns), s.ns);
+    return s;
+}

@@ -1,3 +1,0 @@
-/* Stands for surface/attributes.cl where no texture reads attributes. */
-#define surface_attributes(scene, shape, prim, active, s)
-#define surface_attributes_tell(s, t)

@@ -1,2 +1,0 @@
-/* Stands for surface/triangle_uv.cl where no mesh has uv. */
-#define triangle_uv(scene, shape, space, c, s)

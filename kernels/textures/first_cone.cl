@@ -1,0 +1,11 @@
+/* The word of Path.cone with which a path begins at the camera: of its ray, and one that begins a pixel farther. */
+#include "textures/cone.cl"
+
+inline integer first_cone(Scene scene, CameraRay ray, vec2 position, vec2 lens, Wavelengths lambdas)
+{
+    vec2 beside = {position.x + 1.0f / to_real((integer)(scene.settings->film_width)),
+                   position.y + 1.0f / to_real((integer)(scene.settings->film_height))};
+    Spectrum unused;
+    CameraRay other = first_ray(scene, beside, lens, lambdas, &unused);
+    return cone_word(cone_of_pixel(ray.o, ray.d, other.o, other.d));
+}

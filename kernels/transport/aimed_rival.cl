@@ -1,0 +1,2 @@
+/* Over what aiming gains, see lights/aiming.cl. */
+#define aimed_rival(rival, r) ((rival) / (r).gain)

@@ -1,0 +1,30 @@
+/* Photons of light paths that collide in media. */
+#include "transport/photons/media.cl"
+
+typedef struct {
+    mask met;
+    integer medium;
+} Collision;
+
+#include "transport/photons/part.cl"
+
+/* Whether light paths collide, and where a medium has no photons they are `active` no more. */
+inline Collision collision_met(Scene scene, Slab path, Slab hit, uint at, mask *active)
+{
+    integer part = merging_part(scene, *active, load_hit_material(hit, at));
+    Collision c;
+    c.met = photon_collides(MATERIAL_KIND(part));
+    c.medium = sel_i(*active, load_path_medium(path, at), (integer)(0));
+    *active = *active & (!c.met | photon_along(MATERIAL_KIND(merging_phase(scene, c.medium))));
+    return c;
+}
+
+/* What photons there have of their own: the medium in the place of a normal, and no cosine. */
+inline void collision_photon(Slab path, Slab hit, uint at, Collision c, Photon *photon, integer *group)
+{
+    vec3 p = madd3(load_path_d(path, at), load_hit_t(hit, at), load_path_o(path, at));
+    photon->p = sel3(c.met, p, photon->p);
+    photon->normal = sel_n(c.met, as_natural(c.medium), photon->normal);
+    photon->rival = sel(c.met, load_path_rival(path, at), photon->rival);
+    *group = *group | sel_i(c.met, (integer)(MERGING_IN_MEDIUM), (integer)(0));
+}

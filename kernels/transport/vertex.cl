@@ -1,0 +1,157 @@
+/* What integrators share at a vertex of a path: the ray that arrives, the surface that it meets, how the material
+ * scatters there, and how the path goes on. The ray's throughput has been dimmed by what absorbs along it. */
+#include "generated/cone.cl"
+#include "generated/vertex_media.cl"
+
+typedef struct {
+    vec3 o, d;            /* the ray that arrives; d of unit length */
+    real t;               /* and its length [m] */
+    Wavelengths lambdas;
+    Spectrum beta;        /* throughput, here */
+    integer state, depth; /* see transport/path_state.cl */
+    integer met;          /* surfaces so far, with the null ones, which are no depth */
+    Surface s;
+    mask front;           /* the front was hit */
+    integer row;          /* of the material */
+    Cone cone;            /* around the ray, here */
+    integer object, primitive, material; /* see transport/vertex_names.cl */
+    VertexMedia media;    /* what is around */
+} Vertex;
+
+#include "generated/vertex_steps.cl"
+
+/* |cosine| of a direction d to a surface of normal n, by which densities of its directions become those of points. In
+ * a medium the extinction is in its place: it is the same for light that comes the other way, and counts as 1. */
+#if BSDF_IS_PHASE
+#define VERTEX_COSINE(n, d) ((real)(1.0f))
+#else
+#define VERTEX_COSINE(n, d) fabs(dot3(n, d))
+#endif
+
+#define VERTEX_COUNTS (!BSDF_IS_NULL && !BSDF_IS_PANE) /* it is a step of its path, whatever the lobe */
+
+/* The material at a vertex, and the random numbers of the vertex. */
+typedef struct {
+    Sampler sampler;
+    natural dimension;     /* the first of the vertex */
+    vec2 choice;           /* chooses a light, and a lobe; 0 where there is nothing to choose */
+    Wavelengths lambdas;   /* by which light comes: others than the vertex's where it fluoresces */
+    Bsdf bsdf;
+    ShadingFrame shading;
+    vec3 wo;               /* to where the ray comes from, in shading.frame */
+} Scattering;
+
+inline Vertex vertex_load(Scene scene, Slab path, Slab hit, uint at, mask active)
+{
+    Vertex v;
+    v.o = load_path_o(path, at);
+    v.d = load_path_d(path, at);
+    v.t = load_hit_t(hit, at);
+    v.lambdas = load_path_lambdas(path, at);
+    v.beta = load_path_beta(path, at);
+    v.state = load_path_state(path, at);
+    v.depth = v.state & PATH_DEPTH;
+    v.met = v.depth + load_path_nulls(path, at);
+#if BSDF_IS_PHASE
+    v.s = surface_of_point(madd3(v.d, v.t, v.o));
+    v.front = mask_of(1);
+#else
+    v.s = common_surface_load(scene, hit, at, active, v.o, v.d, &v.front);
+#endif
+    v.cone = cone_after(load_path_cone(path, at), v.t);
+    v.s.footprint = cone_footprint(v.cone, v.d, v.s.n, v.s.dpdu, v.s.dpdv);
+    v.row = MATERIAL_ROW(sel_i(active, load_hit_material(hit, at), (integer)(0)));
+    vertex_names(scene, hit, at, active, &v);
+    v.media = vertex_media(scene, path, hit, at, active, v.row, v.front);
+    v.beta = vertex_arriving(scene, path, at, active, v);
+    return v;
+}
+
+/* Loads the material. Where it fluoresces, the `active` paths take the wavelengths by which light comes. */
+inline Scattering vertex_scattering(Scene scene, Slab path, uint at, mask active, Vertex v, Sampler sampler)
+{
+    Scattering scatter;
+    scatter.sampler = sampler;
+    scatter.dimension = as_natural(DIMENSION_VERTEX + v.met * DIMENSIONS_A_VERTEX);
+    vec2 none = {0.0f, 0.0f};
+    scatter.choice = USES_CHOICE ? sampler_pair(sampler, scatter.dimension + DIMENSION_CHOICE) : none;
+    scatter.lambdas = v.lambdas;
+    TexturePoint point = surface_texture_point(v.s);
+#if STOCHASTIC_FILTERING
+    point.u = sampler_pair(sampler, as_natural(DIMENSION_TEXEL + v.met));
+#endif
+    scatter.bsdf = bsdf_load(scene, v.row, point, v.lambdas);
+    bsdf_between_bodies(scene, active, v, &scatter.bsdf);
+#if BSDF_FLUORESCES
+    scatter.lambdas = bsdf_shift(scene, v.row, scatter.bsdf, v.lambdas, scatter.choice.y, v.depth);
+    store_path_lambdas(path, at, active, scatter.lambdas);
+#endif
+    scatter.shading = shading_frame_load(scene, v.row, v.s, v.d, scatter.lambdas);
+    scatter.bsdf = coat_normal_turned(scene, v.row, scatter.bsdf, v.s, scatter.shading.frame);
+    scatter.bsdf = anisotropy_turned(scene, v.row, scatter.bsdf, v.s, scatter.shading.frame);
+    scatter.wo = to_frame(scatter.shading.frame, neg3(v.d));
+    return scatter;
+}
+
+/* Whether a collision is in a medium that no ray to a light leaves. */
+#if USES_LIGHTS && BSDF_IS_PHASE && SEALED_MEDIA
+#define BSDF_IS_SEALED 1
+#define vertex_sealed(v) (((v).media.medium & MEDIUM_SEALED) != 0)
+#else
+#define BSDF_IS_SEALED 0
+#define vertex_sealed(v) mask_of(0)
+#endif
+
+/* To which hemisphere the material sends light, or to the whole sphere, and with what gloss along `away`. */
+inline Receiver vertex_receiver(Scene scene, Vertex v, Scattering scatter, vec3 away)
+{
+    real sign = BSDF_TRANSMITS ? (real)(0.0f) : sel(scatter.wo.z < 0.0f, (real)(-1.0f), (real)(1.0f));
+    return receiver_at(scene, v.row, scale3(scatter.shading.frame.n, sign), away);
+}
+
+/* Whether what leaves by such a lobe has met a null surface. */
+inline mask vertex_is_null(integer lobe)
+{
+    return BSDF_IS_NULL ? mask_of(1) : BSDF_IS_PANE ? (lobe & LOBE_NULL) != 0 : mask_of(0);
+}
+
+/* Whether paths may be longer than to this vertex; null: those that it does not count for. */
+inline mask vertex_continues(Scene scene, Vertex v, mask null)
+{
+    mask more = v.depth + 1 < scene.settings->max_depth, beyond = v.met - v.depth < MOST_NULL_SURFACES;
+    return BSDF_IS_NULL ? beyond : BSDF_IS_PANE ? sel_i(null, beyond, more) : more;
+}
+
+/* The `next` paths go on from here, along d; null: for which nothing has happened, as the surface is none. */
+inline void vertex_leave(Slab path, uint at, mask next, mask null, Vertex v, vec3 d, Spectrum beta)
+{
+    if (BSDF_IS_NULL || BSDF_IS_PANE) { /* the camera's ray has its end, and lights are weighed by what was before */
+        real pdf = load_path_pdf(path, at), onward = v.t + surface_lead(v.s, d);
+        store_path_pdf(path, at, next & null & (v.depth == 0), pdf + onward);
+        store_path_null_distance(path, at, next & null, load_path_null_distance(path, at) + onward);
+    }
+    store_path_o(path, at, next, surface_offset(v.s, d));
+    store_path_d(path, at, next, d);
+    store_path_beta(path, at, next, beta);
+    store_path_medium(path, at, next, vertex_medium(v, d));
+    store_path_around(path, at, next, vertex_around(v, d));
+    store_path_lead(path, at, next, surface_lead(v.s, d));
+    store_path_bodies(path, at, next, vertex_through(v, d));
+}
+
+/* The `active` paths are a vertex longer, if it is not a null surface; those that do not go on are no longer alive. */
+inline void vertex_end(Slab path, uint at, mask active, mask next, mask null, integer state)
+{
+    state = sel_i(next, state, state - (state & PATH_ALIVE));
+    if (BSDF_IS_NULL || BSDF_IS_PANE) store_path_nulls(path, at, active & null, load_path_nulls(path, at) + 1);
+    store_path_state(path, at, active, BSDF_IS_NULL ? state : sel_i(null, state, state + 1));
+}
+
+inline void hide_light(Slab path, uint at, mask hidden, Vertex v) /* the camera's ray goes on behind it */
+{
+    store_path_o(path, at, hidden, surface_offset(v.s, v.d));
+    store_path_pdf(path, at, hidden, load_path_pdf(path, at) + v.t);
+    store_path_null_distance(path, at, hidden, load_path_null_distance(path, at) + v.t);
+    store_path_cone(path, at, hidden, cone_word(v.cone));
+    store_path_rival(path, at, hidden, (real)(0.0f)); /* the light is in the way of what light paths bring there */
+}
