@@ -25,8 +25,9 @@
  *
  * Light that comes to x_1 from the light itself is left to the camera's path, which chooses a light there: a light
  * path is joined from its second vertex on, and for k = 2 the third density is 0. (Splats of light that next-event
- * estimation finds without noise are noise only, see bench/NOTES.md.) But where x_1 is a collision, which the camera's
- * path comes to by chance, and no ray meets the light, a light path is joined there too. Null surfaces change nothing.
+ * estimation finds without noise are noise only, see bench/notes/light_paths.md.) But where x_1 is a collision, which
+ * the camera's path comes to by chance, and no ray meets the light, a light path is joined there too. Null surfaces
+ * change nothing.
  * Where a material ends light paths (`rival_ends`) the camera's rival is 0.
  *
  * A vertex may be a collision in a medium. Either side flies to it with a density of transmittance times extinction, to
