@@ -56,13 +56,8 @@ def check_material(
         drawn = settings(cls, mode, rng, SETTINGS, **fixed)
         tests = len(modes) * SETTINGS * len(checks.ANGLES)
         for number, params in enumerate(drawn):
-            same = 2 * number < SETTINGS  # at all wavelengths
-            checks.lobes_are_told_truly(probe, params, rng, hero_alone=not same)
-            checks.flags_are_told_truly(probe, params, rng)
-            checks.tangents_are_declared(probe, params, rng)
-            checks.weight_is_eval_over_pdf(probe, params, rng)
-            checks.samples_follow_the_pdf(probe, params, rng, CHANCE / tests)
-            checks.delta_lobes_keep_energy(probe, params, rng)
+            checks.lobes_are_told_truly(probe, params, rng, hero_alone=2 * number >= SETTINGS)
+            _check_functions(probe, params, rng, CHANCE / tests)
             if reciprocal:
                 checks.is_reciprocal(probe, params, rng)
         for params in settings(cls, mode, rng, SETTINGS, **{**fixed, **white(cls)}):
@@ -70,6 +65,16 @@ def check_material(
         checks.extremes_are_finite(probe, rng, **fixed)
         for lanes in (1, 8):
             checks.lanes_agree(probe, Probe(cls, mode, lanes, on), drawn[0], rng)
+
+
+def _check_functions(
+    probe: Probe, params: checks.Params, rng: np.random.Generator, significance: float
+) -> None:
+    checks.flags_are_told_truly(probe, params, rng)
+    checks.tangents_are_declared(probe, params, rng)
+    checks.weight_is_eval_over_pdf(probe, params, rng)
+    checks.samples_follow_the_pdf(probe, params, rng, significance)
+    checks.delta_lobes_keep_energy(probe, params, rng)
 
 
 def _chosen(requested: device.Device | None) -> device.Device:
