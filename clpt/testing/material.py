@@ -33,15 +33,14 @@ def check_material(
 ) -> None:
     """Check that a material's functions have the properties that the kernels rely on.
 
-    `sample` follows `pdf`, its weight is `eval` / `pdf`, the albedo is at most 1 where every
-    reflectance is 1, f is reciprocal, all values are finite at grazing directions and at the ends
-    of the parameters, all numbers of lanes return the same, and the class's flags,
-    `transmits` and `uses_tangents` agree with its functions.
+    `sample` follows `pdf`, its weight is `eval` / `pdf`, no light is created, f is reciprocal,
+    values are finite, widths of lanes agree, and the class's flags, `transmits` and
+    `uses_tangents` agree with its functions. It takes some seconds.
 
     material: a class, whose parameters are drawn at random within their limits, or an instance,
     whose textured parameters alone are drawn. reciprocal: whether f(wo, wi) must equal f(wi, wo).
     tolerance: how far the albedo may exceed 1. device: by default the first; seed: of the random
-    parameters. It takes some seconds.
+    parameters.
 
     Raises AssertionError with the failed property and its parameters; KernelBuildError with the
     line of the author's file; SceneError for a class that is no material kind.
