@@ -42,16 +42,15 @@ def check_material(
     tolerance: how far the albedo may exceed 1. device: by default the first; seed: of the random
     parameters.
 
-    Raises AssertionError with the failed property and its parameters; KernelBuildError with the
-    line of the author's file; SceneError for a class that is no material kind.
+    Raises AssertionError with the failed property; KernelBuildError; SceneError for a class that
+    is no material kind.
     """
     cls = material if isinstance(material, type) else type(material)
     if cls not in LEAVES:
         custom_materials.check(cls)
-    on = _chosen(device)
     for mode in modes:
         fixed = {} if isinstance(material, type) else _values(material, mode)
-        rng, probe = np.random.default_rng(seed), Probe(cls, mode, on=on)
+        rng, probe = np.random.default_rng(seed), Probe(cls, mode, on=_chosen(device))
         drawn = settings(cls, mode, rng, SETTINGS, **fixed)
         tests = len(modes) * SETTINGS * len(checks.ANGLES)
         for number, params in enumerate(drawn):
@@ -63,7 +62,7 @@ def check_material(
             checks.energy_is_not_made(probe, params, rng, tolerance)
         checks.extremes_are_finite(probe, rng, **fixed)
         for lanes in (1, 8):
-            checks.lanes_agree(probe, Probe(cls, mode, lanes, on), drawn[0], rng)
+            checks.lanes_agree(probe, Probe(cls, mode, lanes, probe.on), drawn[0], rng)
 
 
 def _check_functions(
