@@ -323,10 +323,7 @@ def _heights_of_directions(radii: Floats) -> tuple[Floats, Floats]:
 
 
 def field(a: Air, albedo: Floats, sun: float) -> Field:
-    """Return all orders of scattered light around a point with an angle of the sun [rad].
-
-    The angle counts from the vertical; albedo (n,): of the ground.
-    """
+    """Return all orders of scattered light; sun: its zenith angle [rad]; albedo (n,): ground."""
     angles = _places_around(sun)
     turns = np.cos(np.pi * (np.arange(TURNS) + 0.5) / TURNS)
     radii = np.maximum(HEIGHTS, 1e-3) + EARTH
