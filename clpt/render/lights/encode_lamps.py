@@ -24,7 +24,7 @@ from clpt.scene.lights import Light
 from clpt.scene.params import fields_of, params
 from clpt.scene.pixels import pixels, spectral_image
 from clpt.scene.roles import REFLECTANCE, Param, Role
-from clpt.scene.textures import Bitmap
+from clpt.scene.textures import Bitmap, Texture
 
 
 def blank_row() -> NDArray[np.uint32]:
@@ -126,7 +126,8 @@ def _projected_members(lamp: Light, encoder: Encoder) -> dict[str, ArrayLike]:
         axes = _place(lamp.to_world, "projector.to_world", half, half / aspect(lamp))
         return {**axes, **_image(lamp.image, encoder)}
     if isinstance(lamp, lights.Goniometric):
-        return {**_place(lamp.to_world, "goniometric.to_world"), **_image(lamp.image, encoder)}
+        place = _place(lamp.to_world, "goniometric.to_world")
+        return {**place, **_image(with_poles(lamp.image), encoder)}
     assert isinstance(lamp, lights.Spot)
     half = float(np.tan(np.radians(lamp.cutoff)))
     return {
@@ -136,6 +137,22 @@ def _projected_members(lamp: Light, encoder: Encoder) -> dict[str, ArrayLike]:
         "smooth": lights.SPOT_EDGES.index(lamp.edge),
         "factor": encoder.store.append("light_params", encoder.factor_words(lamp.image)),
     }
+
+
+def with_poles(image: object) -> object:
+    """Return an image around a point that ends at the poles, with all its parts.
+
+    Without `wrap_v` a bitmap would continue at the opposite pole. A bitmap that `to_uv` moves along
+    v or repeats stays as it is.
+    """
+    if isinstance(image, Bitmap):
+        corners = np.asarray(image.to_uv)[1] @ np.array([[0, 0, 1, 1], [0, 1, 0, 1], [1, 1, 1, 1]])
+        inside = bool((np.abs(corners - 0.5) <= 0.5 + 1e-6).all())
+        return dataclasses.replace(image, wrap_v="clamp") if inside and not image.wrap_v else image
+    if not isinstance(image, Texture):
+        return image
+    parts = {name: value for name, value in fields_of(image).items() if isinstance(value, Texture)}
+    return dataclasses.replace(image, **{name: with_poles(part) for name, part in parts.items()})
 
 
 def _image(image: object, encoder: Encoder) -> dict[str, ArrayLike]:
