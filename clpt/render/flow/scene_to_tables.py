@@ -214,7 +214,7 @@ def _encode_surfaces(found: Analysis, encoder: Encoder) -> _Surfaces:
     materials = _begin_materials(found, encoder)
     moves = spheres_move(index)
     geometry = lower_geometry(found.geometry, encoder, materials, spheres_move=moves)
-    media = MediumWords(index, encoder, materials, found.sealed, found.sources.glows)
+    media = MediumWords(index, encoder, materials, found.sealed, found.sources.volumes)
     lights = _lower_lights(index, encoder, geometry, found.sources, media)
     near = _lower_medium_aims(index, encoder, lights)
     around = _lower_bodies(found, geometry, encoder, materials, media)
