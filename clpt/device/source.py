@@ -17,6 +17,7 @@ from .text_rows import Row, rows_of
 
 _GENERATED = "generated/"  # begins the names of files that are made for a scene
 TWIN = "#none"  # ends the name of a half of a file: the step that does nothing
+_HEAD = re.compile(r"/\*.*?\*/", re.DOTALL)
 _STEP, _TWIN = "\n/* Step. */", "\n/* Twin, "  # begin the halves
 _QUOTED = re.compile(r'"([^"]+)"$')
 _LINE = re.compile(r'\s*#\s*line (\d+)(?: "([^"]+)")?')
@@ -149,17 +150,23 @@ def _text(folder: Path, name: str) -> str:
 def _half(folder: Path, name: str) -> Part:
     """A file up to its twin; or, where the name ends with TWIN, without the step. Raises OSError.
 
-    What stands above the step belongs to both halves. Blank rows stand for the step.
+    What stands above the step belongs to both halves. Blank rows stand for what is left out: of a
+    twin also the comments at the heads of the file and of the half, as it does nothing.
     """
     file = name.removesuffix(TWIN)
     text, _, twin = _text(folder, file).partition(_TWIN)
     if file == name:
-        return Part(text, f"kernels/{file}")
+        return Part(text.replace(_STEP, "\n"), f"kernels/{file}")
     if not twin:
         raise FileNotFoundError(name)
     shared = text.partition(_STEP)[0] if _STEP in text else ""
-    blank = "\n" * text.count("\n", len(shared))
-    return Part(f"{shared}{blank}{_TWIN}{twin}", f"kernels/{file}")
+    head = _HEAD.match(shared)
+    described = head[0] if head else ""
+    about, _, functions = twin.partition("*/")
+    left_out = (text[len(shared) :], about)
+    blank = "\n" * sum(part.count("\n") for part in (_TWIN, *left_out))
+    above = "\n" * described.count("\n") + shared[len(described) :]
+    return Part(f"{above}{blank}{functions}", f"kernels/{file}")
 
 
 class _BadRow(Exception):

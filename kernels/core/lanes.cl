@@ -78,11 +78,7 @@ typedef struct { real x, y, z, w; } vec4;
 inline real sel(mask m, real a, real b) { return m ? a : b; }
 inline integer sel_i(mask m, integer a, integer b) { return m ? a : b; }
 inline natural sel_n(mask m, natural a, natural b) { return m ? a : b; }
-inline vec3 sel3(mask m, vec3 a, vec3 b)
-{
-    vec3 r = {sel(m, a.x, b.x), sel(m, a.y, b.y), sel(m, a.z, b.z)};
-    return r;
-}
+inline vec3 sel3(mask m, vec3 a, vec3 b) { vec3 r = {sel(m, a.x, b.x), sel(m, a.y, b.y), sel(m, a.z, b.z)}; return r; }
 
 inline real min_r(real a, real b) { return a < b ? a : b; }
 inline real max_r(real a, real b) { return a > b ? a : b; }

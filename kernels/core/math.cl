@@ -6,16 +6,8 @@
 #define INV_4PI 0.0795774715459477f
 #define FAR 1e30f
 
-inline vec3 v3(real x, real y, real z)
-{
-    vec3 r = {x, y, z};
-    return r;
-}
-inline vec4 v4(real x, real y, real z, real w)
-{
-    vec4 r = {x, y, z, w};
-    return r;
-}
+inline vec3 v3(real x, real y, real z) { vec3 r = {x, y, z}; return r; }
+inline vec4 v4(real x, real y, real z, real w) { vec4 r = {x, y, z, w}; return r; }
 inline vec3 add3(vec3 a, vec3 b) { return v3(a.x + b.x, a.y + b.y, a.z + b.z); }
 inline vec3 sub3(vec3 a, vec3 b) { return v3(a.x - b.x, a.y - b.y, a.z - b.z); }
 inline vec3 scale3(vec3 a, real s) { return v3(a.x * s, a.y * s, a.z * s); }

@@ -102,7 +102,4 @@ inline integer layers_record(Scene scene, Slab path, uint at, mask met, Vertex v
 
 /* Twin, where there are none beside the picture. */
 inline integer layers_record(Scene scene, Slab path, uint at, mask met, Vertex v, Scattering scatter,
-                             integer state LAYER_ARGS)
-{
-    return state;
-}
+                             integer state LAYER_ARGS) { return state; }

@@ -19,7 +19,4 @@ inline integer light_joined(Scene scene, Slab shadow, uint at, mask ended, mask 
 
 /* Twin, where light paths do not show lights to the camera. */
 inline integer light_joined(Scene scene, Slab shadow, uint at, mask ended, mask go, Sampler sampler, Surface s,
-                            LightRay r, Wavelengths lambdas)
-{
-    return (integer)(0);
-}
+                            LightRay r, Wavelengths lambdas) { return (integer)(0); }

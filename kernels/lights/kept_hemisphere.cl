@@ -11,9 +11,5 @@ inline void path_receiver_keep(Slab path, uint at, mask m, Receiver r)
 }
 
 /* Twin, where no light is chosen by it. */
-inline Receiver path_receiver(Slab path, uint at)
-{
-    Receiver r = {v3(0.0f, 0.0f, 0.0f)};
-    return r;
-}
+inline Receiver path_receiver(Slab path, uint at) { Receiver r = {v3(0.0f, 0.0f, 0.0f)}; return r; }
 inline void path_receiver_keep(Slab path, uint at, mask m, Receiver r) {}

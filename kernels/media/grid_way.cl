@@ -23,7 +23,4 @@ inline Spectrum grid_way(Scene scene, integer medium, vec3 o, vec3 d, real way, 
 /* Twin, where there are no grids. */
 inline natural grid_way_key(Scene scene, Slab path, uint at) { return (natural)(0u); }
 inline Spectrum grid_way(Scene scene, integer medium, vec3 o, vec3 d, real way, natural key, mask active,
-                         Wavelengths lambdas, Spectrum dims)
-{
-    return dims;
-}
+                         Wavelengths lambdas, Spectrum dims) { return dims; }

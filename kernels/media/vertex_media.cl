@@ -29,6 +29,6 @@ inline VertexMedia vertex_media(Scene scene, Slab path, Slab hit, uint at, mask 
 /* Twin, where there are no media. */
 inline VertexMedia vertex_media(Scene scene, Slab path, Slab hit, uint at, mask active, integer row, mask front)
 {
-    VertexMedia m = {(integer)(0), (integer)(0), (integer)(0), (integer)(0), mask_of(0)};
+    VertexMedia m = {0, 0, 0, 0, mask_of(0)};
     return m;
 }

@@ -15,10 +15,8 @@ inline integer vertex_through(Vertex v, vec3 w) { return vertex_medium(v, w); }
 
 /* Twin, where there are no media. */
 inline Spectrum vertex_arriving(Scene scene, Slab path, uint at, mask active, Vertex v) { return v.beta; }
-inline Spectrum vertex_beyond(Scene scene, Vertex v, vec3 w, real t, Wavelengths lambdas, Spectrum value)
-{
-    return value;
-}
+inline Spectrum vertex_beyond(Scene scene, Vertex v, vec3 w, real t, Wavelengths lambdas,
+                              Spectrum value) { return value; }
 inline integer vertex_medium(Vertex v, vec3 w) { return (integer)(0); }
 inline integer vertex_around(Vertex v, vec3 w) { return (integer)(0); }
 inline integer vertex_through(Vertex v, vec3 w) { return (integer)(0); }

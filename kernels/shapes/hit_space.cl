@@ -23,11 +23,6 @@ inline vec3 hit_vector(HitSpace s, vec3 v) { return sel3(s.placed, instance_vect
 
 /* Twin, in a scene without instances, where triangles lie in the world. */
 inline void hit_space_load(TraceHit *h, Slab hit, uint at) {}
-inline HitSpace hit_space(Scene scene, TraceHit h, mask active)
-{
-    HitSpace s;
-    s.placed = mask_of(0);
-    return s;
-}
+inline HitSpace hit_space(Scene scene, TraceHit h, mask active) { HitSpace s = {mask_of(0)}; return s; }
 inline vec3 hit_normal(HitSpace s, vec3 n) { return n; }
 inline vec3 hit_vector(HitSpace s, vec3 v) { return v; }

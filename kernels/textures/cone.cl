@@ -56,9 +56,5 @@ inline real cone_footprint(Cone c, vec3 d, vec3 n, vec3 dpdu, vec3 dpdv)
 /* Twin, where no image has levels to choose among. */
 inline integer cone_word(Cone c) { return (integer)(0); }
 inline integer cone_scattered(Cone c, real pdf, mask delta) { return (integer)(0); }
-inline Cone cone_after(integer word, real t)
-{
-    Cone c = {(real)(0.0f), (real)(0.0f)};
-    return c;
-}
+inline Cone cone_after(integer word, real t) { Cone c = {(real)(0.0f), (real)(0.0f)}; return c; }
 inline real cone_footprint(Cone c, vec3 d, vec3 n, vec3 dpdu, vec3 dpdv) { return (real)(0.0f); }

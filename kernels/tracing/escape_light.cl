@@ -51,7 +51,4 @@ inline Spectrum escape_light(TRACE_ARGS, Scene scene, Slab path, uint at, vec3 o
 /* Twin, where no ray leaves a sealed medium toward a lamp. */
 inline mask escape_waits(real t) { return mask_of(0); }
 inline Spectrum escape_light(TRACE_ARGS, Scene scene, Slab path, uint at, vec3 o, vec3 d, real t, mask active,
-                             Spectrum passes)
-{
-    return passes;
-}
+                             Spectrum passes) { return passes; }

@@ -212,32 +212,16 @@ inline real rival_joint(Scene scene, Rival r, Vertex v, BsdfPair pair, CameraPoi
 }
 
 /* Twin, where paths are not weighed against light paths. */
-inline Rival rival_nothing(void)
-{
-    real zero = (real)(0.0f);
-    Rival r = {zero, zero, mask_of(0), mask_of(0), zero, zero};
-    return r;
-}
+inline Rival rival_nothing(void) { Rival r = {0.0f, 0.0f, mask_of(0), mask_of(0), 0.0f, 0.0f}; return r; }
 inline Rival rival_of_camera(Scene scene, Slab path, uint at, Vertex v, Sampler sampler) { return rival_nothing(); }
-inline Rival rival_of_emission(Scene scene, Slab path, uint at, Vertex v, Receiver receiver)
-{
-    return rival_nothing();
-}
+inline Rival rival_of_emission(Scene scene, Slab path, uint at, Vertex v, Receiver receiver) { return rival_nothing(); }
 inline real event_begins(Scene scene, Surface s, LightSample ls) { return (real)(0.0f); }
-inline real event_weight(Scene scene, Rival r, Surface s, LightSample ls, real begins, BsdfPair pair, real p)
-{
-    return sel(ls.pdf < 0.0f, (real)(1.0f), mis_weight(ls.pdf, p));
-}
+inline real event_weight(Scene scene, Rival r, Surface s, LightSample ls, real begins, BsdfPair pair,
+                         real p) { return sel(ls.pdf < 0.0f, (real)(1.0f), mis_weight(ls.pdf, p)); }
 inline real rival_goes_to_light(Slab path, uint at, mask scatters, Rival r, Vertex *v, vec3 onward, mask delta,
-                                BsdfSample bs)
-{
-    return bs.pdf;
-}
+                                BsdfSample bs) { return bs.pdf; }
 inline mask rival_goes_to_camera(Scene scene, Slab path, uint at, mask next, mask null, Rival r, Vertex *v, vec3 onward,
-                                 BsdfSample bs)
-{
-    return next;
-}
+                                 BsdfSample bs) { return next; }
 inline real rival_joint(Scene scene, Rival r, Vertex v, BsdfPair pair, CameraPoint c, mask *shine)
 {
     return (real)(1.0f);

@@ -35,7 +35,4 @@ inline integer path_escapes(Scene scene, Slab path, Slab shadow, uint at, mask n
 
 /* Twin, where no medium is sealed by a smooth boundary. */
 inline integer path_escapes(Scene scene, Slab path, Slab shadow, uint at, mask next, Vertex v, Scattering scatter,
-                            BsdfSample bs, vec3 onward)
-{
-    return (integer)(0);
-}
+                            BsdfSample bs, vec3 onward) { return (integer)(0); }

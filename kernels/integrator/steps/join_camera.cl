@@ -41,7 +41,4 @@ inline CameraJoint join_camera_seek(Scene scene, Vertex v, Scattering scatter)
     return joint;
 }
 inline integer join_camera(Scene scene, Slab shadow, uint at, mask active, Vertex v, Scattering scatter, Rival rival,
-                           CameraJoint joint, real arrives)
-{
-    return (integer)(0);
-}
+                           CameraJoint joint, real arrives) { return (integer)(0); }

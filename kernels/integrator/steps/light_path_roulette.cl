@@ -16,7 +16,4 @@ inline mask light_path_roulette(Scene scene, Slab path, uint at, mask next, mask
 
 /* Twin, at null surfaces, where nothing is lost. */
 inline mask light_path_roulette(Scene scene, Slab path, uint at, mask next, mask null, Vertex v, Scattering scatter,
-                                Spectrum *beta)
-{
-    return next;
-}
+                                Spectrum *beta) { return next; }

@@ -8,7 +8,6 @@ typedef struct {
 } NextEvent;
 
 /* Step. */
-
 /* Chooses the point. */
 inline NextEvent next_event_seek(Scene scene, mask next, Vertex v, Scattering scatter)
 {
@@ -57,10 +56,7 @@ inline NextEvent next_event_seek(Scene scene, mask next, Vertex v, Scattering sc
     return e;
 }
 inline NextEvent next_event_weigh(Scene scene, NextEvent e, Vertex v, Scattering scatter, Rival rival, Guided guided,
-                                  Spectrum ratio SHADE_ARGS)
-{
-    return e;
-}
+                                  Spectrum ratio SHADE_ARGS) { return e; }
 inline integer next_event_keep(Scene scene, Slab path, Slab shadow, uint at, mask active, Vertex v, NextEvent e)
 {
     return (integer)(0);

@@ -17,7 +17,4 @@ inline mask path_roulette(Scene scene, Slab path, uint at, mask next, mask null,
 
 /* Twin, at null surfaces, where nothing is lost. */
 inline mask path_roulette(Scene scene, Slab path, uint at, mask next, mask null, Vertex v, Scattering scatter,
-                          Guided guided, real eta, Spectrum *beta)
-{
-    return next;
-}
+                          Guided guided, real eta, Spectrum *beta) { return next; }

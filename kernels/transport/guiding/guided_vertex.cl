@@ -40,17 +40,10 @@ inline mask guided_plays(Slab path, uint at, Guided guided, Spectrum beta, Scatt
 }
 
 /* Twin, where the material alone chooses directions. */
-inline Guided guide_at(Scene scene, Surface s, vec3 d MERGE_ARGS)
-{
-    Guided g = {(integer)(0), (real)(0.0f), (real)(0.0f)};
-    return g;
-}
+inline Guided guide_at(Scene scene, Surface s, vec3 d MERGE_ARGS) { Guided g = {0, 0.0f, 0.0f}; return g; }
 inline real guided_pdf(Guided guided, vec3 d, real p MERGE_ARGS) { return p; }
 inline mask guided_plays(Slab path, uint at, Guided guided, Spectrum beta, Scattering scatter, mask *next,
-                         Spectrum *after)
-{
-    return mask_of(0);
-}
+                         Spectrum *after) { return mask_of(0); }
 inline BsdfSample onward_sample(Scattering scatter, Guided guided, Spectrum *ratio MERGE_ARGS)
 {
     vec2 uv = sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_BSDF);
