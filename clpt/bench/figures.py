@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from clpt import device
-from clpt.device.timing import Timings
+from clpt.device.stream import Timings
 
 SECONDS = "s"  # the one unit of which less is better
 

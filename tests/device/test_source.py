@@ -29,7 +29,7 @@ def test_each_file_once_even_in_a_circle():
 def test_lines_are_counted_past_an_include():
     virtual = {"a": 'one\n#include "b"\nthree\n#include "b"\nfive', "b": "x\ny"}
     source = assemble("a", virtual, {"one": 1})
-    places = {text: source.place(row) for row, text in enumerate(source.text.splitlines(), 1)}
+    places = {text: source.location(row) for row, text in enumerate(source.text.splitlines(), 1)}
     assert places["y"] == ("b", 2)
     assert places["three"] == ("a", 3)
     assert places["five"] == ("a", 5)
@@ -49,7 +49,7 @@ def test_a_comment_at_a_files_head_stands_in_front_of_what_is_left_of_it():
     source = assemble("a", {**virtual, "c": "int c;"})
     lines = ["/* A. */", '#line 1 "c"', "int c;", '#line 4 "b"', "/* B. */", "int x;"]
     assert source.text.splitlines() == ['#line 1 "a"', *lines, '#line 5 "a"', "int x;"]
-    assert source.place(7) == ("b", 5)
+    assert source.location(7) == ("b", 5)
     assert source.files == ("a", "c", "b")
 
 

@@ -1,7 +1,7 @@
 """The fewest registers that a work-item of a GPU is to have, by program.
 
 Left alone, compilers take more than some programs need, and fewer work-items run at once. These
-limits are tried (clpt/device/registers.py). With one that spills nothing a program of the scenes
+limits are tried (clpt/device/native_programs.py). With one that spills nothing a program of the scenes
 has some 4 % more instructions at most: `python -m bench.gpu_compilers` compiles by them.
 """
 
