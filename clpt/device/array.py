@@ -59,7 +59,7 @@ class DeviceArray(Array):
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         """Wait and return a copy on the host. Raises ValueError for copy=False."""
         if copy is not None and not copy:
-            raise ValueError("numpy needs a copy of an array on an OpenCL device")
+            raise ValueError("an array on an OpenCL device becomes numpy's only by a copy")
         host = self.get()
         return host if dtype is None else host.astype(dtype, copy=False)
 
@@ -107,7 +107,7 @@ class DeviceArray(Array):
 
     def _mapped(self) -> NDArray[Any]:
         if not self._in_host_memory:
-            raise BufferError("the host needs a copy of memory of this OpenCL device")
+            raise BufferError("memory of this OpenCL device becomes the host's only by a copy")
         try:
             return self.map_to_host()
         except cl.Error as error:

@@ -16,6 +16,9 @@ from .definitions import Paragraph, macro, named, paragraphs, whole, with_gaps
 from .text_rows import Row, rows_of
 
 _GENERATED = "generated/"  # prefix of files generated for a scene
+TWIN = "#none"  # suffix of the half of a file with the step that does nothing
+_TWIN = "
+/* Twin, "  # the start of that half
 _QUOTED = re.compile(r'"([^"]+)"$')
 _LINE = re.compile(r'\s*#\s*line (\d+)(?: "([^"]+)")?')
 _PRIVATE = re.compile(  # at a line's start: a constant, or a function with an argument
@@ -144,6 +147,17 @@ def _text(folder: Path, name: str) -> str:
     return (folder / inside).read_text(encoding="utf-8")
 
 
+def _half(folder: Path, name: str) -> Part:
+    """Return a file up to its twin or, for a name with TWIN, the twin. Raises OSError."""
+    file = name.removesuffix(TWIN)
+    step, _, twin = _text(folder, file).partition(_TWIN)
+    if file == name:
+        return Part(step, f"kernels/{file}")
+    if not twin:
+        raise FileNotFoundError(name)
+    return Part(f"{_TWIN[1:]}{twin}", f"kernels/{file}", step.count("\n") + 2)
+
+
 class _BadRow(Exception):
     """An error in a row of a file, with the row's number."""
 
@@ -266,7 +280,7 @@ class _Assembly:
                 content = "".join(f'#include "{file}"\n' for file in content)
             return content if isinstance(content, Part) else Part(content, name)
         try:
-            return Part(_text(self.folder, name), f"kernels/{name}")
+            return _half(self.folder, name)
         except OSError:
             self._fail(includer, line, f"no file {name!r} in {self.folder} and no generated one")
 
