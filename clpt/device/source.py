@@ -17,8 +17,7 @@ from .text_rows import Row, rows_of
 
 _GENERATED = "generated/"  # prefix of files generated for a scene
 TWIN = "#none"  # suffix of the half of a file with the step that does nothing
-_TWIN = "
-/* Twin, "  # the start of that half
+_TWIN = "\n/* Twin, "  # the start of that half
 _QUOTED = re.compile(r'"([^"]+)"$')
 _LINE = re.compile(r'\s*#\s*line (\d+)(?: "([^"]+)")?')
 _PRIVATE = re.compile(  # at a line's start: a constant, or a function with an argument
