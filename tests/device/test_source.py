@@ -175,7 +175,7 @@ def test_a_file_has_two_halves() -> None:
     text = (kernels_folder() / "spectra/hero_alone.cl").read_text("utf-8").splitlines()
     rows = twin.text.splitlines()
     at = next(i for i, row in enumerate(rows) if "hero_goes_alone" in row)
-    file, line = twin.place(at + 1)
+    file, line = twin.location(at + 1)
     assert file == "spectra/hero_alone.cl" and line is not None and text[line - 1] == rows[at]
     with pytest.raises(KernelBuildError, match="no file"):
         assemble("a", {"a": '#include "core/lanes.cl#none"'})
