@@ -120,7 +120,7 @@ class InstancedAccel(Queries):
             if mesh.layout != self.layout or mesh.queue.context != self.queue.context:
                 raise SceneError("it has another layout or context", where=f"accels[{i}]")
         if not self.count or which.dtype.kind not in "iu":
-            message = f"whole numbers (k,) are wanted, not {which.shape} {which.dtype}"
+            message = f"whole numbers (k,) with k > 0 are wanted, not {which.shape} {which.dtype}"
             raise SceneError(message, where="prototypes")
         if which.min() < 0 or which.max() >= len(self.accels):
             message = f"{which.max()} is none of {len(self.accels)} meshes"
