@@ -6,12 +6,15 @@ import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import escape
 
 from clpt.bench.figures import Figure
 from clpt.bench.pictures import ALL, PART
 from clpt.files import output_files
+
+if TYPE_CHECKING:
+    from PIL.ImageDraw import ImageDraw
 
 WIDTH, MARGIN, ROW, HEAD, FOOT = 640, 28, 34, 132, 60  # [pixels]
 NAMES, VALUES = 120, 96  # widths of the columns beside the bars [pixels]
@@ -41,10 +44,12 @@ class Text:
             f'text-anchor="{"end" if self.right else "start"}">{escape(self.words)}</text>'
         )
 
-    def draw(self, drawing: Any, fonts: Any) -> None:
-        """Draw the words by Pillow's ImageDraw and ImageFont."""
+    def draw(self, drawing: ImageDraw) -> None:
+        """Draw the words on the PNG."""
+        from PIL import ImageFont  # here: slow
+
         at, anchor = (SCALE * self.x, SCALE * self.y), "rs" if self.right else "ls"
-        font = fonts.load_default(SCALE * self.size)
+        font = ImageFont.load_default(SCALE * self.size)
         drawing.text(at, self.words, self.colour, font, anchor, stroke_width=int(self.bold))
 
 
@@ -64,8 +69,8 @@ class Bar:
             f'rx="3" fill="{BAR}"/>'
         )
 
-    def draw(self, drawing: Any, fonts: Any) -> None:
-        """Draw the bar by Pillow's ImageDraw."""
+    def draw(self, drawing: ImageDraw) -> None:
+        """Draw the bar on the PNG."""
         left, top = SCALE * self.x, SCALE * self.y
         corners = (left, top, left + SCALE * self.length, top + SCALE * self.height)
         drawing.rounded_rectangle(corners, min(6.0, SCALE * self.length / 2), BAR)
@@ -93,14 +98,14 @@ class Card:
 
     def png(self) -> bytes:
         """Return the card as a PNG of twice the size, in Pillow's font."""
-        from PIL import Image, ImageDraw, ImageFont  # here: slow
+        from PIL import Image, ImageDraw  # here: slow
 
         image = Image.new("RGBA", (SCALE * WIDTH, SCALE * self.height))
         draw = ImageDraw.Draw(image)
         whole = (0, 0, SCALE * WIDTH - 1, SCALE * self.height - 1)
         draw.rounded_rectangle(whole, SCALE * 12, PAPER)
         for element in self.drawn:
-            element.draw(draw, ImageFont)
+            element.draw(draw)
         content = io.BytesIO()
         image.save(content, "PNG")
         return content.getvalue()
