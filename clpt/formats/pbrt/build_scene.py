@@ -193,11 +193,13 @@ def _emission(state: State, form: Geometry) -> Light | None:
 
 def lights(contents: Contents) -> list[Light]:
     """Make all lights that are on no shape. Raises SceneError."""
-    made = []
+    lamps = []
     for each in contents.lights:
-        made.append(light(each.kind, each.params, each.state))
-        _warn_of_unused(each.params, each.state)
-    return made
+        lamp = light(each.kind, each.params, each.state)
+        if lamp is not None:
+            lamps.append(lamp)
+            _warn_of_unused(each.params, each.state)
+    return lamps
 
 
 def check_unused_materials(contents: Contents) -> None:

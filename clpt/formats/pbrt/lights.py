@@ -33,10 +33,14 @@ WHITE = RGBIlluminant(1.0, 1.0, 1.0)
 SWAP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])  # y is up for a goniometer
 
 
-def light(kind: str, params: Parameters, state: State) -> Light:
-    """Make what a `LightSource` directive describes. Raises SceneError."""
+def light(kind: str, params: Parameters, state: State) -> Light | None:
+    """Make the light of a `LightSource` directive; None for an unknown kind that is left out.
+
+    Raises SceneError.
+    """
     if kind not in MAKERS:
-        raise UnknownKindError("light", kind, MAKERS, **params.location())
+        state.stand_in(UnknownKindError("light", kind, MAKERS, **params.location()), params)
+        return None
     with params.locating():
         return MAKERS[kind](params, state)
 

@@ -33,14 +33,16 @@ PLAIN: dict[str, Any] = {
 
 def material(kind: str, params: Parameters, state: State, name: str = "") -> Material:
     """Make what a `Material` or `MakeNamedMaterial` directive describes. Raises SceneError."""
-    if state.shared.old:
+    if state.shared.old and old_materials.is_known(kind):
         with params.locating():
             made = old_materials.material(kind, params, state)
             return replace(_bumped(made, params, state), name=name)
     if old_materials.is_known(kind) and kind not in MAKERS:
         raise params.error(f"{kind!r} is a material of pbrt-v3, but the file is of version 4")
     if kind not in MAKERS:
-        raise UnknownKindError("material", kind, MAKERS, **params.location())
+        known = old_materials.MAKERS if state.shared.old else MAKERS
+        state.stand_in(UnknownKindError("material", kind, known, **params.location()), params)
+        return both(materials.Diffuse(name=name))
     with params.locating():
         return replace(_bumped(MAKERS[kind](params, state), params, state), name=name)
 

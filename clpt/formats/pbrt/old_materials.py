@@ -141,40 +141,32 @@ def _diffuse_of(reflectance: Any) -> Material:
 
 
 def _coat_of(eta: Any, alphas: dict[str, Any]) -> Callable[[Any], Material]:
-    """Return how the reflection of a rough dielectric is made, by its factor."""
+    """Return how the reflection of a rough dielectric is made, by its factor.
+
+    A conductor without extinction has the Fresnel factor of a dielectric, and is opaque.
+    """
 
     def coat(reflectance: Any) -> Material:
-        return materials.RoughDielectric(
-            int_ior=eta,
-            ext_ior=1.0,
-            specular_reflectance=reflectance,
-            specular_transmittance=0.0,
-            **alphas,
-        )
+        return materials.RoughConductor(eta=eta, k=0.0, specular_reflectance=reflectance, **alphas)
 
     return coat
 
 
 def _uber(params: Parameters, state: State) -> Material:
     eta, alphas = _index(params, state), _alphas(params, state, 0.1)
-    boundary = {"int_ior": eta, "ext_ior": 1.0}
+
+    def _transmission(factor: Any) -> Material:
+        return materials.Dielectric(
+            int_ior=eta, ext_ior=1.0, specular_reflectance=0.0, specular_transmittance=factor
+        )
+
     shares = {"Kd": 0.25, "Ks": 0.25, "Kr": 0.0, "Kt": 0.0}
     values = {name: textured(params, name, REFLECTANCE, state, v) for name, v in shares.items()}
     lobes: list[Lobe] = [
         (values["Kd"], _diffuse_of),
         (values["Ks"], _coat_of(eta, alphas)),
-        (
-            values["Kr"],
-            lambda v: materials.Dielectric(
-                **boundary, specular_reflectance=v, specular_transmittance=0.0
-            ),
-        ),
-        (
-            values["Kt"],
-            lambda v: materials.Dielectric(
-                **boundary, specular_reflectance=0.0, specular_transmittance=v
-            ),
-        ),
+        (values["Kr"], lambda v: materials.Conductor(eta=eta, k=0.0, specular_reflectance=v)),
+        (values["Kt"], _transmission),
     ]
     summed = _sum(lobes, params, state)
     if not _is_dark(values["Kt"]):

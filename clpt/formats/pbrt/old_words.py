@@ -16,7 +16,7 @@ from clpt.spectra import cie
 # What only files of versions 2 and 3 say.
 OLD = re.compile(
     rb"^[ \t]*(?:WorldEnd|SurfaceIntegrator|VolumeIntegrator|Renderer|PixelSampler)\b"
-    rb'|Film\s+"image"|"(?:color|xyz)\s+\w+"|Texture\s+"[^"\n]*"\s+"color"|(?:Material|"string\s+type"\s*\[?)\s*'
+    rb'|Film\s+"image"|"(?:color|xyz)\s+\w+"|Texture\s+"[^"\n]*"\s+"color"|(?:(?<![a-zA-Z])Material|"string\s+type"\s*\[?)\s*'
     rb'"(?:matte|plastic|uber|substrate|translucent|kdsubsurface|disney|mirror|glass|metal)"',
     re.MULTILINE,
 )
@@ -85,7 +85,11 @@ _IGNORED = {(directive, name) for directive, name, _ in IGNORED}
 
 def is_old(data: bytes) -> bool:
     """Return whether the text of a file is of version 2 or 3."""
-    return OLD.search(data) is not None
+    for match in OLD.finditer(data):
+        line = data.rfind(b"\n", 0, match.start()) + 1
+        if b"#" not in data[line : match.start()]:
+            return True
+    return False
 
 
 def directive(name: str) -> str:

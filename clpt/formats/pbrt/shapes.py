@@ -89,7 +89,8 @@ def geometry(definition: Definition) -> Geometry | None:
     if kind in OLD and kind not in known:
         raise params.error(f"the shape {kind!r} is not supported; use a mesh")
     if kind not in known:
-        raise UnknownKindError("shape", kind, SHAPES, **params.location())
+        state.stand_in(UnknownKindError("shape", kind, known, **params.location()), params)
+        return None
     with params.locating():
         if transforms.is_singular(state.ctm):
             raise SceneError("its transform flattens space")

@@ -112,6 +112,12 @@ class State:
         where = source.location()["where"]
         self.shared.warnings.append(f"{source.file.name}:{source.line}: {where}: {text}")
 
+    def stand_in(self, error: SceneError, params: Parameters) -> None:
+        """Warn of an unknown kind that is left out, or grey; raise where that is not allowed."""
+        if self.shared.missing == "error":
+            raise error
+        self.warn(params, f"{error.message}; grey stands for it, or it is left out")
+
     def tell(self, text: str) -> None:
         """Warn of what a file beside the scene has that is left out, once."""
         if text not in self.shared.warnings:
