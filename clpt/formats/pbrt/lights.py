@@ -175,7 +175,7 @@ def _infinite(params: Parameters, state: State) -> Light:
     return lights.Envmap(image=around, scale=scale)
 
 
-def _lat_long(image: Any, colour: Any, state: State) -> Light:
+def _lat_long(image: Floats32, colour: RGBIlluminant | None, state: State) -> Light:
     """Return the light of a map in latitude and longitude: pbrt-v3, src/lights/infinite.cpp.
 
     Its +z is up, and u grows from +x to +y. Rows of ours lie on the poles, its half a row off.
@@ -224,7 +224,7 @@ def _goniometric(params: Parameters, state: State) -> Light:
     )
 
 
-def _old_goniometric(image: Any, params: Parameters, state: State) -> Light:
+def _old_goniometric(image: Floats32, params: Parameters, state: State) -> Light:
     """A map in latitude and longitude whose +y is up: pbrt-v3, src/lights/goniometric.h."""
     placed = transforms.translate(transforms.transform_points(state.ctm, np.zeros(3)))
     placed[:3, :3] = state.ctm[:3, :3] @ SWAP @ LAT_LONG

@@ -32,6 +32,7 @@ MIRRORS = ("mirror", "glass")
 VERSION_1 = ("bluepaint", "brushedmetal", "clay", "felt", "primer", "shinymetal", "skin")
 LARGEST = 1.0  # what a texture of unknown values may reach
 TINY = 1e-6
+Values = Any  # a number, a colour, a spectrum or a texture
 Lobe = tuple[Any, Callable[[Any], Material]]
 
 
@@ -78,7 +79,7 @@ def _mirror(params: Parameters, state: State) -> Material:
     return both(_mirror_of(textured(params, "Kr", REFLECTANCE, state, 0.9)))
 
 
-def _mirror_of(reflectance: Any) -> Material:
+def _mirror_of(reflectance: Values) -> Material:
     return materials.Conductor(eta=0.0, k=1.0, specular_reflectance=reflectance)
 
 
@@ -97,7 +98,7 @@ def _glass(params: Parameters, state: State) -> Material:
     return materials.RoughDielectric(**dielectric, **alphas)
 
 
-def _index(params: Parameters, state: State) -> Any:
+def _index(params: Parameters, state: State) -> Values:
     eta = spectrum(params, "eta", INDEX, state)
     index = spectrum(params, "index", INDEX, state, 1.5)
     return index if eta is None else eta
@@ -119,10 +120,10 @@ def _alphas(params: Parameters, state: State, usual: float) -> dict[str, Any]:
     }
 
 
-def _alpha(roughness: Any, remap: bool) -> Any:
+def _alpha(roughness: Values, remap: bool) -> Values:
     """Return alpha: src/core/microfacet.h, RoughnessToAlpha."""
 
-    def remapped(r: Any) -> Any:
+    def remapped(r: Values) -> Values:
         x = np.log(np.maximum(r, 1e-3))
         alpha = 1.62142 + x * (0.819955 + x * (0.1734 + x * (0.0171201 + x * 0.000640711)))
         return np.clip(alpha if remap else r, 1e-4, 1.0)
@@ -139,17 +140,17 @@ def _plastic(params: Parameters, state: State) -> Material:
     return both(_sum([(diffuse, _diffuse_of), (specular, _coat_of(1.5, alphas))], params, state))
 
 
-def _diffuse_of(reflectance: Any) -> Material:
+def _diffuse_of(reflectance: Values) -> Material:
     return materials.Diffuse(reflectance=reflectance)
 
 
-def _coat_of(eta: Any, alphas: dict[str, Any]) -> Callable[[Any], Material]:
+def _coat_of(eta: Values, alphas: dict[str, Any]) -> Callable[[Any], Material]:
     """Return how the reflection of a rough dielectric is made, by its factor.
 
     A conductor without extinction has the Fresnel factor of a dielectric, and is opaque.
     """
 
-    def coat(reflectance: Any) -> Material:
+    def coat(reflectance: Values) -> Material:
         return materials.RoughConductor(eta=eta, k=0.0, specular_reflectance=reflectance, **alphas)
 
     return coat
@@ -158,7 +159,7 @@ def _coat_of(eta: Any, alphas: dict[str, Any]) -> Callable[[Any], Material]:
 def _uber(params: Parameters, state: State) -> Material:
     eta, alphas = _index(params, state), _alphas(params, state, 0.1)
 
-    def _transmission(factor: Any) -> Material:
+    def _transmission(factor: Values) -> Material:
         return materials.Dielectric(
             int_ior=eta, ext_ior=1.0, specular_reflectance=0.0, specular_transmittance=factor
         )
@@ -193,7 +194,7 @@ def _substrate(params: Parameters, state: State) -> Material:
     dimmed = _dimmed(diffuse, specular)
     metal = {"eta": 1.0, "k": map_values(specular, _extinction)}
 
-    def coat(factor: Any) -> Material:
+    def coat(factor: Values) -> Material:
         return materials.RoughConductor(**metal, specular_reflectance=factor, **alphas)
 
     share = max(_largest(specular), TINY)
@@ -202,12 +203,12 @@ def _substrate(params: Parameters, state: State) -> Material:
     )
 
 
-def _extinction(r: Any) -> Any:
+def _extinction(r: Values) -> Values:
     r = np.clip(r, 0.0, 0.9999)
     return 2.0 * np.sqrt(r / (1.0 - r))
 
 
-def _dimmed(diffuse: Any, specular: Any) -> Any:
+def _dimmed(diffuse: Values, specular: Values) -> Values:
     """Return Kd (1 - Ks)."""
     rest = map_values(specular, lambda v: 1.0 - np.clip(v, 0.0, 1.0))
     if isinstance(diffuse, Texture) or isinstance(rest, Texture):
@@ -229,7 +230,7 @@ def _translucent(params: Parameters, state: State) -> Material:
     return materials.DiffuseTransmission(**shares)
 
 
-def _product(first: Any, second: Any) -> Any:
+def _product(first: Values, second: Values) -> Values:
     if isinstance(first, Texture) or isinstance(second, Texture):
         return Product(first=first, second=second)
     return tuple(float(v) for v in np.broadcast_to(_rgb(first), 3) * _rgb(second))
@@ -288,19 +289,19 @@ def _sum(lobes: Sequence[Lobe], params: Parameters, state: State) -> Material:
     return summed
 
 
-def _over(value: Any, divisor: float) -> Any:
+def _over(value: Values, divisor: float) -> Values:
     if isinstance(value, Texture):
         return Product(first=value, second=1.0 / divisor)
     return map_values(value, lambda v: np.minimum(v / divisor, 1.0))
 
 
-def _rgb(value: Any) -> Any:
+def _rgb(value: Values) -> Values:
     if isinstance(value, (float, int, tuple)):
         return np.asarray(value, np.float64)
     return np.asarray(value.to_rgb("unbounded"), np.float64)
 
 
-def _largest(value: Any) -> float:
+def _largest(value: Values) -> float:
     """Return the largest number of a factor; of an image its largest texel."""
     if isinstance(value, Bitmap):
         return min(float(map_values(value, lambda v: v).image.max()), LARGEST)
@@ -311,11 +312,11 @@ def _largest(value: Any) -> float:
     return LARGEST if isinstance(value, Texture) else float(np.max(_rgb(value)))
 
 
-def _is_dark(value: Any) -> bool:
+def _is_dark(value: Values) -> bool:
     return not isinstance(value, Texture) and not np.any(_rgb(value))
 
 
-def _number(value: Any, params: Parameters, state: State) -> Any:
+def _number(value: Values, params: Parameters, state: State) -> Values:
     """Return a colour as a number: its mean, with a warning where it is not grey."""
     if isinstance(value, (Texture, float)):
         return value

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from clpt import transforms
 from clpt.errors import SceneError, UnknownKindError
@@ -350,7 +350,7 @@ def _hyperboloid(params: Parameters, state: State) -> Geometry | None:
     return _revolved(params, (1.0 - parts) * ends[0] + parts * ends[1])
 
 
-def _revolved(params: Parameters, profile: Any) -> Geometry | None:
+def _revolved(params: Parameters, profile: ArrayLike) -> Geometry | None:
     turn = surfaces.phi_max(params)
     return Geometry(shapes.Mesh, surfaces.revolved_mesh(np.asarray(profile, np.float64), turn))
 

@@ -93,7 +93,7 @@ def _inward(steps: NDArray[np.float64]) -> NDArray[np.float64]:
     return signs[:, None] * steps
 
 
-def _turned(points: Any, phi: Any) -> Any:
+def _turned(points: NDArray[np.float64], phi: NDArray[np.float64]) -> NDArray[np.float64]:
     """Turn points (n, 3) around the z axis by angles (n,) [radians]."""
     cos, sin = np.cos(phi), np.sin(phi)
     x, y, z = points.T

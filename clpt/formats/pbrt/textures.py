@@ -38,6 +38,7 @@ from clpt.scene.textures import (
 )
 from clpt.spectra import Spectrum
 
+Values = Any  # a number, a colour or a texture
 IDENTITY_UV = np.eye(3)
 SRGB = "sRGB"
 WRAPS = {"repeat": "repeat", "black": "zero", "clamp": "clamp", "octahedralsphere": "clamp"}
@@ -103,7 +104,7 @@ def _scale(form: str, params: Parameters, state: State) -> Any:
     return first if second == 1.0 else Product(first=first, second=second)
 
 
-def _product(first: Any, second: Any) -> Any:
+def _product(first: Values, second: Values) -> Values:
     """Return the product of two values or textures, as in versions 2 and 3."""
     if isinstance(first, Texture) or isinstance(second, Texture):
         return Product(first=first, second=second)
