@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from clpt.errors import UnknownKindError
 from clpt.formats.mitsuba import bsdfs, emitters, media, sensors, shapes, spectra
@@ -80,7 +81,7 @@ def _colour(element: Element, kind: str, values: Mapping[str, Any]) -> Element:
     return Element(kind, attributes, element.file, 0)
 
 
-def _child(name: str, value: Any, file: Path, depth: int) -> Element:
+def _child(name: str, value: object, file: Path, depth: int) -> Element:
     """Return the element of an object, a parameter, a transform or an array."""
     if isinstance(value, Mapping):
         return _object(name, value, file, depth)
@@ -96,13 +97,12 @@ def _child(name: str, value: Any, file: Path, depth: int) -> Element:
         return parameter("float", repr(float(value)))
     if isinstance(value, (str, Path)):
         return parameter("string", value)
-    matrix = getattr(value, "matrix", None)
-    if matrix is not None:
-        return _transform(name, matrix, file)
+    if hasattr(value, "matrix"):
+        return _transform(name, value.matrix, file)
     return _array(name, value, file)
 
 
-def _transform(name: str, matrix: Any, file: Path) -> Element:
+def _transform(name: str, matrix: ArrayLike, file: Path) -> Element:
     element = Element("transform", {"name": name}, file, 0)
     numbers = np.asarray(matrix, np.float64)
     if numbers.shape[:2] not in ((4, 4), (3, 3)) or numbers.size not in (16, 9):
@@ -112,7 +112,7 @@ def _transform(name: str, matrix: Any, file: Path) -> Element:
     return element
 
 
-def _array(name: str, value: Any, file: Path) -> Element:
+def _array(name: str, value: object, file: Path) -> Element:
     """Return three numbers as a <vector>; a larger array, such as an image, as it is."""
     element = Element("vector", {"name": name}, file, 0)
     try:

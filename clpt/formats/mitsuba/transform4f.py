@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from clpt import transforms
 
@@ -25,7 +26,7 @@ class ScalarTransform4f:
     """A transform (4, 4) float64; its steps act from right to left, as matrices do.
 
     `look_at(origin, target, up)`, `translate(v)`, `scale(v)` and `rotate(axis, angle)` [degrees]
-    return the transform with one more step. `@` joins two.
+    return the transform with another step. `@` joins two. matrix: (4, 4), by default the identity.
     """
 
     look_at = _Step(lambda origin, target, up: transforms.look_at(origin, target, up))
@@ -33,7 +34,7 @@ class ScalarTransform4f:
     scale = _Step(lambda v: transforms.scale(v))
     rotate = _Step(lambda axis, angle: transforms.rotate(axis, angle))
 
-    def __init__(self, matrix: Any = None):
+    def __init__(self, matrix: ArrayLike | None = None):
         self.matrix = np.eye(4) if matrix is None else np.array(matrix, np.float64).reshape(4, 4)
 
     def __matmul__(self, other: ScalarTransform4f) -> ScalarTransform4f:

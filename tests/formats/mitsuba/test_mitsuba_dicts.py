@@ -83,7 +83,7 @@ def test_arrays_are_volumes():
     })  # fmt: skip
     medium = scene.shapes[0].interior
     assert isinstance(medium, media.Grid) and medium.phase.g.value == 0.3
-    assert np.array_equal(medium.density.values, grid.transpose(2, 1, 0))
+    assert np.array_equal(medium.density, grid.transpose(2, 1, 0))
 
 
 def test_spectra_are_pairs():
