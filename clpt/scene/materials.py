@@ -153,6 +153,24 @@ class Diffuse(Material):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class OrenNayar(Material):
+    """Rough diffuse reflection of the front side (Oren and Nayar 1994).
+
+    It is brighter toward the light, and flatter, than `diffuse`. With `interreflection` their full
+    model, with light that meets two facets; without it their qualitative one. Where the fits
+    exceed 1, at grazing angles, reflectances of more than 0.954 are cut off to keep energy.
+    """
+
+    absorbs = True
+
+    reflectance: Textured = reflectance(0.5, "albedo of the facets")
+    sigma: TexturedNumber = real(
+        20.0, "standard deviation of the facets' slopes", "degrees", 0.0, 90.0, textured=True
+    )
+    interreflection: bool = flag(True, "whether light meets two facets")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Phong(Material):
     """Modified Phong (Lafortune and Willems 1994): diffuse and a cosine-power lobe, front side.
 
@@ -765,6 +783,7 @@ class BumpMap(NormalMapped):
 
 LEAVES = (
     Diffuse,
+    OrenNayar,
     Phong,
     Dielectric,
     ThinDielectric,

@@ -28,6 +28,7 @@ from clpt.scene.materials import (
     Merl,
     NormalMap,
     Null,
+    OrenNayar,
     Phong,
     Plastic,
     Principled,
@@ -243,6 +244,10 @@ TWO = partial(TwoSided, front=Diffuse(reflectance=ORANGE))
 
 MATERIALS = {
     "diffuse": three("Three colours.", *each(Diffuse, "reflectance", (RED, CREAM, BLUE))),
+    "oren_nayar": three(
+        "`sigma` 0, 20 and 60 degrees.",
+        *each(OrenNayar, "sigma", (0.0, 20.0, 60.0), reflectance=CREAM),
+    ),
     "phong": three(
         "`exponent` 10, 60 and 600.",
         *each(Phong, "exponent", (10.0, 60.0, 600.0), diffuse=GREEN, specular=0.3),

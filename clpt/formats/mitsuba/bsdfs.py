@@ -67,6 +67,18 @@ def _diffuse(props: Properties) -> Parameters:
     return {"reflectance": reflectance(props, name, 0.5)}
 
 
+def _rough_diffuse(props: Properties) -> Parameters:
+    """Read Mitsuba 0.6's `roughdiffuse`: alpha is the root of twice the slopes' variance."""
+    alpha = real(props, "alpha", 0.2)
+    degrees = np.degrees(np.sqrt(0.5))
+    scaled = Product(first=alpha, second=float(degrees)) if isinstance(alpha, Texture) else None
+    return {
+        **_diffuse(props),
+        "sigma": scaled or min(max(alpha * degrees, 0.0), 90.0),
+        "interreflection": not props.flag("use_fast_approx", False),
+    }
+
+
 def _phong(props: Properties) -> Parameters:
     return {
         "diffuse": reflectance(props, "diffuse_reflectance", 0.5),
@@ -369,6 +381,7 @@ def _nested(props: Properties, low: int, high: int) -> list[Material]:
 PLUGINS: dict[str, tuple[type[Material], Callable[[Properties], Parameters]]] = {
     "diffuse": (materials.Diffuse, _diffuse),
     "phong": (materials.Phong, _phong),
+    "roughdiffuse": (materials.OrenNayar, _rough_diffuse),
     "dielectric": (materials.Dielectric, _coated_dielectric),
     "thindielectric": (materials.ThinDielectric, _thin_dielectric),
     "roughdielectric": (materials.RoughDielectric, _rough_dielectric),

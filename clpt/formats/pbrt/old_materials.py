@@ -67,9 +67,12 @@ def has_mirrors(contents: Contents) -> bool:
 def _matte(params: Parameters, state: State) -> Material:
     reflectance = textured(params, "Kd", REFLECTANCE, state, 0.5)
     sigma = textured(params, "sigma", REAL, state, 0.0)
-    if isinstance(sigma, Texture) or sigma > 0.0:
-        state.warn(params, "'sigma' is left out: the surface is smooth")
-    return both(materials.Diffuse(reflectance=reflectance))
+    if not isinstance(sigma, Texture):
+        sigma = float(np.clip(sigma, 0.0, 90.0))  # src/materials/matte.cpp
+    if sigma == 0.0:
+        return both(materials.Diffuse(reflectance=reflectance))
+    rough_facets = {"sigma": sigma, "interreflection": False}
+    return both(materials.OrenNayar(reflectance=reflectance, **rough_facets))
 
 
 def _mirror(params: Parameters, state: State) -> Material:
