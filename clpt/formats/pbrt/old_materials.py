@@ -184,36 +184,13 @@ def _uber(params: Parameters, state: State) -> Material:
 
 
 def _substrate(params: Parameters, state: State) -> Material:
-    diffuse = textured(params, "Kd", REFLECTANCE, state, 0.5)
-    specular = textured(params, "Ks", REFLECTANCE, state, 0.5)
-    alphas = _alphas(params, state, 0.1)
-    state.warn(
-        params, "is read as plastic: a diffuse base of Kd (1 - Ks) and a coat of Ks head-on, "
-        "without what Ashikhmin and Shirley take from the base at grazing angles"
-    )  # fmt: skip
-    dimmed = _dimmed(diffuse, specular)
-    metal = {"eta": 1.0, "k": map_values(specular, _extinction)}
-
-    def coat(factor: Values) -> Material:
-        return materials.RoughConductor(**metal, specular_reflectance=factor, **alphas)
-
-    share = max(_largest(specular), TINY)
     return both(
-        _sum([(dimmed, _diffuse_of), (share, lambda v: coat(_over(v, share)))], params, state)
+        materials.AshikhminShirley(
+            diffuse=textured(params, "Kd", REFLECTANCE, state, 0.5),
+            specular=textured(params, "Ks", REFLECTANCE, state, 0.5),
+            **_alphas(params, state, 0.1),
+        )
     )
-
-
-def _extinction(r: Values) -> Values:
-    r = np.clip(r, 0.0, 0.9999)
-    return 2.0 * np.sqrt(r / (1.0 - r))
-
-
-def _dimmed(diffuse: Values, specular: Values) -> Values:
-    """Return Kd (1 - Ks)."""
-    rest = map_values(specular, lambda v: 1.0 - np.clip(v, 0.0, 1.0))
-    if isinstance(diffuse, Texture) or isinstance(rest, Texture):
-        return Product(first=diffuse, second=rest)
-    return tuple(float(v) for v in np.broadcast_to(_rgb(diffuse), 3) * _rgb(rest))
 
 
 def _translucent(params: Parameters, state: State) -> Material:

@@ -293,3 +293,11 @@ def test_unknown_kinds_are_errors_that_an_option_turns_into_grey(tmp_path, end):
     assert [shape.kind for shape in scene.shapes] == ["disk"] and not scene.lights
     told = " ".join(scene.warnings)
     assert all(word in told for word in ("ofafork", "portal", "aaplane"))
+
+
+def test_rough_matte_and_substrate(read):
+    made = surface(read, '"matte" "float sigma" 20')
+    assert (made.kind, made.sigma, made.interreflection) == ("oren_nayar", 20.0, False)
+    made = surface(read, '"substrate" "float uroughness" .1 "float vroughness" .2')
+    assert made.kind == "ashikhmin_shirley"
+    assert made.alpha_u == pytest.approx(0.46176, abs=1e-4) < made.alpha_v
