@@ -250,6 +250,10 @@ MATERIALS = {
         "`sigma` 0, 20 and 60 degrees.",
         *each(OrenNayar, "sigma", (0.0, 20.0, 60.0), reflectance=CREAM),
     ),
+    "phong": three(
+        "`exponent` 10, 60 and 600.",
+        *each(Phong, "exponent", (10.0, 60.0, 600.0), diffuse=GREEN, specular=0.3),
+    ),
     "ward": three(
         "`alpha_u` 0.05, 0.15 and 0.4.",
         *each(Ward, "alpha_u", (0.05, 0.15, 0.4), diffuse=GREEN, specular=0.3),
@@ -257,10 +261,6 @@ MATERIALS = {
     "ashikhmin_shirley": three(
         "`specular` 0.05, 0.2 and 0.6.",
         *each(AshikhminShirley, "specular", (0.05, 0.2, 0.6), diffuse=RED),
-    ),
-    "phong": three(
-        "`exponent` 10, 60 and 600.",
-        *each(Phong, "exponent", (10.0, 60.0, 600.0), diffuse=GREEN, specular=0.3),
     ),
     "dielectric": three(
         "`int_ior` 1.33 (water), 1.5 (glass) and 2.42 (diamond).",

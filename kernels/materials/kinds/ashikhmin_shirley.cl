@@ -20,9 +20,8 @@ Spectrum ashikhmin_shirley_eval(AshikhminShirley m, vec3 wo, vec3 wi)
     mask front = (wo.z > 0.0f) & (wi.z > 0.0f);
     real cosine = sel(front, wi.z, (real)(0.0f));
     Spectrum f;
-#define C(c) \
-    f.c = cosine * (m.diffuse.c * (1.0f - m.specular.c) * base \
-                    + lobe * (m.specular.c + (1.0f - m.specular.c) * grazing));
+    real specular = 1.0f - grazing;
+#define C(c) f.c = cosine * (m.diffuse.c * (1.0f - m.specular.c) * base + lobe * (m.specular.c * specular + grazing));
     SPECTRUM_EACH(C)
 #undef C
     return f;

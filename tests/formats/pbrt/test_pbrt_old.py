@@ -300,4 +300,4 @@ def test_rough_matte_and_substrate(read):
     assert (made.kind, made.sigma, made.interreflection) == ("oren_nayar", 20.0, False)
     made = surface(read, '"substrate" "float uroughness" .1 "float vroughness" .2')
     assert made.kind == "ashikhmin_shirley"
-    assert made.alpha_u == pytest.approx(0.46176, abs=1e-4) < made.alpha_v
+    assert made.alpha_u == pytest.approx(0.46176, abs=1e-4) and made.alpha_u < made.alpha_v
