@@ -2,8 +2,8 @@
 
 Three slabs hold the state of all paths: `Path`, `Hit` and `Shadow`, with a slot for each path. The
 scene lies in tables of 4-byte words: `TABLES` lists them once, and the kernels' `Scene` struct and
-arguments follow from it. A member's text is what it means, with its unit. `CONSTANTS` are the bits and other
-numbers that both sides know, each a file `generated/<name>.cl` of kernels.
+arguments follow from it. A member's text is what it means, with its unit. `CONSTANTS` are the bits
+and other numbers that both sides know, each a file `generated/<name>.cl` of kernels.
 """
 
 from __future__ import annotations
