@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Protocol, TypeVar, cast
 
 from clpt.errors import SceneError, nearest
@@ -176,9 +176,10 @@ def _walked(
 def _no_root(path: str, scene: Parts, roots: dict[str, object]) -> str:
     """Return what to say of a path whose beginning is no part of a scene."""
     first = re.split(r"[.\[]", path)[0]
-    if first not in ("shapes", "lights"):
+    lists: dict[str, Sequence[object]] = {"shapes": scene.shapes, "lights": scene.lights}
+    if first not in lists:
         return f"a scene has no {first!r}{nearest(first, _shown(roots))}"
-    parts = {id(one) for one in getattr(scene, first)}
+    parts = {id(one) for one in lists[first]}
     known = [name for name, one in roots.items() if id(one) in parts]
     listed = ", ".join(map(repr, known[:MOST_LISTED])) + (", ..." if known[MOST_LISTED:] else "")
     number = re.match(r"[^.]*", path)
