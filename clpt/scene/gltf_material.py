@@ -1,4 +1,4 @@
-"""What glTF says of a material beyond its reflection, from plain values: factors times textures,
+"""Parts of materials as glTF has them, from plain values: factors times textures,
 alpha, normals, sides, and light. All readers that have such materials ask here.
 """
 

@@ -87,7 +87,7 @@ def _physical(given: object, name: str) -> tuple[Material, Light | None]:
     cutoff = _number(given, "alphaCutoff", gltf_material.CUTOFF)
     mode, alpha = _of(given, "alphaMode", str) or "OPAQUE", (*factor, 1.0)[3]
     share = gltf_material.opacity(mode, alpha, base, cutoff)
-    both = bool(getattr(given, "doubleSided", False))
+    both = bool(_of(given, "doubleSided", (bool, np.bool_)))
     return gltf_material.finished(inner, share, _glow(given, both), both=both)
 
 
@@ -106,9 +106,9 @@ def _image(
     image = _of(given, name, object)
     if image is None:
         return None
-    convert = getattr(image, "convert", None)
-    if convert is not None and _of(image, "mode", str) not in ("L", "RGB", "RGBA"):
-        image = convert("RGBA" if getattr(image, "has_transparency_data", False) else "RGB")
+    if hasattr(image, "convert") and _of(image, "mode", str) not in ("L", "RGB", "RGBA"):
+        clear = _of(image, "has_transparency_data", bool)
+        image = image.convert("RGBA" if clear else "RGB")
     return Bitmap(image=np.asarray(image), raw=raw, channel=channel)
 
 

@@ -125,7 +125,9 @@ def _moving(shape: Shape, state: State) -> Shape:
     return replace(shape, to_world=own, motion=keys)
 
 
-def _masked(emission: Light | None, opacity: Any, source: Parameters, state: State) -> Light | None:
+def _masked(
+    emission: Light | None, opacity: float | Texture, source: Parameters, state: State
+) -> Light | None:
     """Return the light of a shape with an alpha: what is not there does not shine.
 
     By pbrt's rule an alpha of 0 all over hides a lamp and leaves it all its light.
