@@ -23,7 +23,7 @@ from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.shapes import Geometry, displaced, geometry, with_uvs
 from clpt.formats.pbrt.state import Definition, State
 from clpt.formats.pbrt.textures import textured
-from clpt.scene.lights import Light
+from clpt.scene.lights import Area, Light
 from clpt.scene.materials import Diffuse, Mask, Material, Null, TwoSided
 from clpt.scene.media import Medium
 from clpt.scene.params import Kind, fields_of
@@ -138,8 +138,8 @@ def _masked(
         message = "an 'alpha' of 0 hides its surface, not its light, which the camera sees here"
         state.warn(source, message)
         return emission
-    light: Any = emission  # an Area, as there is no other
-    return cast(Light, replace(light, radiance=Product(first=light.radiance, second=opacity)))
+    light = cast(Area, emission)  # as there is no other
+    return replace(light, radiance=Product(first=light.radiance, second=opacity))
 
 
 def _material(source: Parameters, state: State) -> Material:
