@@ -11,12 +11,10 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Words
 from clpt.records import MEDIUM_BITS
+from clpt.render.lights.bodies import BodyLight
 from clpt.render.lights.bounds import Bounds
-from clpt.render.lights.bricks import Glow, black_bodies, brick_counts
+from clpt.render.lights.bricks import BrickLights, black_bodies, brick_counts
 from clpt.render.lights.encode import LightRows
-from clpt.render.lights.encode_bodies import BodyLight
-from clpt.render.lights.encode_bricks import BrickLights
-from clpt.render.lights.glow import GlowingBody
 from clpt.render.materials.encode import MaterialWords
 from clpt.render.materials.encoder import Encoder
 from clpt.render.media import encode_grids as grids
@@ -82,12 +80,13 @@ class MediumWords:
         encoder: Encoder,
         materials: MaterialWords,
         sealed: frozenset[Medium] = frozenset(),
-        glows: Mapping[Medium, Glow | GlowingBody] = MappingProxyType({}),
+        glows: Mapping[Medium, BrickLights | BodyLight] = MappingProxyType({}),
     ):
         self._index, self._encoder, self._materials = index, encoder, materials
         self._sealed, self._glows = sealed, glows
         self._words: dict[Medium, int] = {}
-        self.lights: list[BrickLights | BodyLight] = []  # of media whose words are made
+        # words of media, and their lights
+        self.lights: list[tuple[int, BrickLights | BodyLight]] = []
         self._row = len(index.lights)  # in `lights`, of the next part of a medium
         self._has_media = bool(index.media)  # not of an integrator that sees none
 
@@ -112,7 +111,7 @@ class MediumWords:
         phases = medium.collisions(spectral) if medium.scatters else ()
         rows = []
         body = self._glows.get(medium)
-        body = body if isinstance(body, GlowingBody) else None
+        body = body if isinstance(body, BodyLight) else None
         if self._index.emitting:
             light = medium.light or Constant(0.0)
             rows.append(np.array([1 + self._row if body else 0], np.uint32))
@@ -130,7 +129,7 @@ class MediumWords:
         word |= before + self._encoder.store.size("materials")
         if body is not None:
             self._row += 1
-            self.lights.append(BodyLight(word, body))
+            self.lights.append((word, body))
         if isinstance(medium, Lattice) and self._index.grids.emissive:
             rows.append(self._glow(medium, word))
         if isinstance(medium, Lattice) and self._index.grids.tinted:
@@ -218,11 +217,11 @@ class MediumWords:
         if source is not None:
             words[2] = store.append("images", self._encoder.cache(grids.bricks, source))
         bright = self._glows[medium]
-        assert isinstance(bright, Glow)
+        assert isinstance(bright, BrickLights)
         rows = np.zeros(np.prod(brick_counts(medium.size)), np.int32)
         rows[bright.emitting] = -1
         rows[bright.numbers] = 1 + self._row + np.arange(len(bright.numbers))
         words[0] = store.append("images", rows.view(np.uint32))
         self._row += len(bright.numbers)
-        self.lights.append(BrickLights(word, bright))
+        self.lights.append((word, bright))
         return words
