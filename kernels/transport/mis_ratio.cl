@@ -42,8 +42,8 @@
  *
  * With photon merging (transport/photons/gather.cl) vertex merging at x_i is a fourth technique. x_i is the first
  * vertex from the camera that is not specular, if some vertex beyond it is specular: the camera's path and a light path
- * that end there nearly meet. Light paths that are connected to the camera find such light
- * at x_1 more sharply: x_i is not x_1 then. With e = `merging_area`, the density of merging over the product of both paths' densities is e. So a
+ * that end there nearly meet. Light paths that are connected to the camera find such light at x_1 more sharply, and x_i
+ * is not x_1 then. With e = `merging_area`, the density of merging over the product of both paths' densities is e. So a
  * camera's path carries from x_i on (dVM of Georgiev 2012)
  *
  *     merge_ratio' = e c' / p,    then merge_ratio / c p_back c' / p,
