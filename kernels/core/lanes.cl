@@ -112,11 +112,7 @@ inline int any_lane(mask m) { return LANE_BITS(m) != 0; }
 #elif LANES == 8
 inline int any_lane(mask m) { return as_ulong(__builtin_convertvector(m, char8)) != 0; }
 #else
-inline int any_lane(mask m)
-{
-    ulong2 q = as_ulong2(__builtin_convertvector(m, char16));
-    return (q.x | q.y) != 0;
-}
+inline int any_lane(mask m) { ulong2 q = as_ulong2(__builtin_convertvector(m, char16)); return (q.x | q.y) != 0; }
 #endif
 #undef any
 #define any(m) any_lane(m) /* OpenCL's own any() is slow on some runtimes */

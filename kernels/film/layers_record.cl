@@ -23,10 +23,7 @@ inline real layer_z(Scene scene, vec3 p)
 }
 
 /* The shading normal; points of media have none. */
-inline vec3 layer_normal(Scattering scatter)
-{
-    return BSDF_IS_PHASE ? v3(0.0f, 0.0f, 0.0f) : scatter.shading.frame.n;
-}
+inline vec3 layer_normal(Scattering scatter) { return BSDF_IS_PHASE ? v3(0.0f, 0.0f, 0.0f) : scatter.shading.frame.n; }
 
 /* Puts three numbers of any size. */
 inline void layer_put_long3(integer *words, mask m, vec3 v, real weight)

@@ -1,9 +1,5 @@
 /* The hemisphere to which the surface sends light where a ray was chosen: lights are chosen by it. */
-inline Receiver path_receiver(Slab path, uint at)
-{
-    Receiver r = {load_path_sampled_hemisphere(path, at)};
-    return r;
-}
+inline Receiver path_receiver(Slab path, uint at) { Receiver r = {load_path_sampled_hemisphere(path, at)}; return r; }
 
 inline void path_receiver_keep(Slab path, uint at, mask m, Receiver r)
 {

@@ -1,8 +1,5 @@
 /* Choosing one row of `lights`, by the alias method (Walker 1977). */
-inline LightRow light_at(Scene scene, integer row)
-{
-    return light_row_row(scene.lights, row * LIGHT_ROW_WORDS);
-}
+inline LightRow light_at(Scene scene, integer row) { return light_row_row(scene.lights, row * LIGHT_ROW_WORDS); }
 
 /* Where there are few lights, the number that chooses one is good enough to go on with: the light and
  * the point on it then come from one well-spread pair. Of many, it would have no bits left. */

@@ -17,10 +17,7 @@ called int queue_walks(Slab path, Slab hit, int kind, int n, integer *ended, uin
     return n < WALK && 2 * count > LANES;
 }
 /* Wakes those that were put to rest. */
-called void queue_walked(Slab path, integer ended, uint block)
-{
-    store_path_state(path, block, ended != 0, ended);
-}
+called void queue_walked(Slab path, integer ended, uint block) { store_path_state(path, block, ended != 0, ended); }
 
 /* Takes those that wait for a phase function so. Their slots are sorted again behind it. starts: of each kind's queue;
  * block: the first of LANES slots for a block. */
