@@ -6,7 +6,7 @@
  * and the path's own are two ways to choose a direction at the collision, each weighed by its density (balance
  * heuristic), so the guess needs not be right.
  *
- * Balls around lamps stand in `distributions`, see clpt/render/media/escapes.py. */
+ * Balls around lamps stand in `distributions`, see clpt/render/media/sealed.py. */
 #include "core/rows.cl"
 
 #define ESCAPE_WORDS 5           /* of a ball: centre, radius and one that is not used */
