@@ -20,7 +20,7 @@ HEAD = """# What was measured
 
 Made by `python -m bench.report` from the JSON lines beside it, which `make bench` writes; the
 newest record of each figure. What the figures mean: the first lines of `bench/*.py`. What was
-tried: `bench/NOTES.md`.
+tried: `bench/notes`.
 """
 
 Row = dict[str, object]

@@ -50,6 +50,15 @@ def test_links_lead_somewhere():
     assert [f"{page.name}: {link}" for page, link in links if not (DOCS / link).exists()] == []
 
 
+def test_notes_are_indexed_and_linked():
+    notes = ROOT / "bench/notes"
+    index = (notes / "README.md").read_text("utf-8")
+    pages = {page.name for page in notes.glob("*.md")} - {"README.md"}
+    assert set(LINK.findall(index)) >= pages
+    links = [(page, link) for page in notes.glob("*.md") for link in LINK.findall(page.read_text())]
+    assert [f"{page.name}: {link}" for page, link in links if not (notes / link).exists()] == []
+
+
 def test_the_site_has_the_pictures_of_scenes():
     pytest.importorskip("mkdocs")
     from docs.theme.pages import pictures

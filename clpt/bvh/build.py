@@ -23,7 +23,7 @@ from .layouts import BOX_LAYOUTS, LAYOUTS, Mesh, Part
 
 log = logging.getLogger(__name__)
 
-BRUTE_LIMIT = 96  # triangles up to which brute force is faster; measured, see bench/NOTES.md
+BRUTE_LIMIT = 96  # triangles up to which brute force is faster; see bench/notes/traversal.md
 
 WIDE8_BYTES = 54  # of a triangle, with its share of nodes, in large scenes
 MOST = (2**31 - 1) // 3  # triangles or vertices: kernels count words of them by an int
@@ -64,7 +64,7 @@ def choose_tree(device: Device) -> str:
     """Return the layout that traces fastest on the device among those that have a tree.
 
     Measured on CPUs and a GPU of NVIDIA's. Elsewhere it is the literature's choice, as compilers
-    for AMD's and Intel's GPUs have too few registers for the other: see bench/NOTES.md.
+    for AMD's and Intel's GPUs have too few registers for the other: see bench/notes/gpus.md.
     """
     measured = device.info.is_cpu or "nvidia" in device.info.vendor.casefold()
     return "wide8" if measured else "compact"

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from clpt import device
 from clpt.arrays import Image
 
-# What was tried is in bench/NOTES.md.
+# bench/notes/denoising.md has the alternatives.
 SCALE = 0.2  # of the mean light, from which statistics are those of logarithms
 NOISE_RADIUS = 3  # pixels around one whose variance tells its own
 ERROR_RADIUS = 4  # likewise of errors
@@ -109,7 +109,7 @@ class Statistical:
         Even and odd samples of a Sobol sequence keep off each other: their (a - b)^2 is up to twice
         their noise, and this is too low. So it is no less than the noise of both that is left,
         (d(a) - d(b))^2 / 4, where it is that for the same reason which is too large. What was
-        measured is in bench/NOTES.md. It takes twice the time of the picture.
+        measured is in bench/notes/denoising.md. It takes twice the time of the picture.
         """
         a, b = (self._both[:, :, i, :3].astype(float) for i in range(2))
         of_a, of_b = (half.astype(float) for half in self.halves())

@@ -16,6 +16,8 @@ from .definitions import Paragraph, macro, named, paragraphs, whole, with_gaps
 from .text_rows import Row, rows_of
 
 _GENERATED = "generated/"  # begins the names of files that are made for a scene
+TWIN = "#none"  # ends the name of a half of a file: the step that does nothing
+_TWIN = "\n/* Twin, "  # begins that half
 _QUOTED = re.compile(r'"([^"]+)"$')
 _LINE = re.compile(r'\s*#\s*line (\d+)(?: "([^"]+)")?')
 _PRIVATE = re.compile(  # at the beginning of a line: a constant, or a function with an argument
@@ -144,6 +146,17 @@ def _text(folder: Path, name: str) -> str:
     return (folder / inside).read_text(encoding="utf-8")
 
 
+def _half(folder: Path, name: str) -> Part:
+    """A file up to its twin; or, where the name ends with TWIN, the twin. Raises OSError."""
+    file = name.removesuffix(TWIN)
+    step, _, twin = _text(folder, file).partition(_TWIN)
+    if file == name:
+        return Part(step, f"kernels/{file}")
+    if not twin:
+        raise FileNotFoundError(name)
+    return Part(f"{_TWIN[1:]}{twin}", f"kernels/{file}", step.count("\n") + 2)
+
+
 class _BadRow(Exception):
     """A fault in a row of a file, with the row's number."""
 
@@ -266,7 +279,7 @@ class _Assembly:
                 given = "".join(f'#include "{file}"\n' for file in given)
             return given if isinstance(given, Part) else Part(given, name)
         try:
-            return Part(_text(self.folder, name), f"kernels/{name}")
+            return _half(self.folder, name)
         except OSError:
             self._fail(includer, line, f"no file {name!r} in {self.folder} and no generated one")
 

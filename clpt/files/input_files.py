@@ -23,6 +23,8 @@ REACH = {
     "gltf": BELOW,
     "mesh": ANYWHERE,  # .obj, with its .mtl, and .ply
 }
+POINTER = b"version https://git-lfs.github.com/spec/"  # git-lfs docs/spec.md
+LARGEST_POINTER = 1024  # bytes
 _KINDS = (
     (stat.S_ISDIR, "a folder"),
     (stat.S_ISFIFO, "a pipe"),
@@ -67,7 +69,24 @@ def regular(path: Path) -> os.stat_result:
         raise _unreadable(path, error) from None
     if kind := _other_kind(status):
         raise SceneError(f"is {kind}, not a file", file=path)
+    if status.st_size <= LARGEST_POINTER and _is_pointer(path):
+        message = "is a Git LFS pointer in place of the file: run `git lfs pull` where it lies"
+        raise SceneError(message, file=path)
     return status
+
+
+def _is_pointer(path: Path) -> bool:
+    """Return whether a file is what a clone without Git LFS has in its place."""
+    try:
+        handle = os.open(path, _FLAGS | _NO_WAITING)
+    except (OSError, ValueError) as error:
+        raise _unreadable(path, error) from None
+    try:
+        return os.read(handle, len(POINTER)) == POINTER
+    except OSError as error:
+        raise _unreadable(path, error) from None
+    finally:
+        os.close(handle)
 
 
 def opened(path: Path) -> BinaryIO:

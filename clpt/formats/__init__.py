@@ -63,7 +63,8 @@ def load(
     may speak. `variables` set the `$names` of Mitsuba's XML; of glTF they choose scene, animation
     and time; of both `camera` is the number or name of one of several. `progress` is called with
     the share that is read, from 0 to 1, and a text, for files of many shapes.
-    `missing_textures`: "grey" puts grey in the place of images that are not there, with a warning.
+    `missing_textures`: "grey" puts grey in the place of images that are not there, and of unknown
+    materials of Mitsuba; it leaves out unknown shapes and lights. Each has a warning.
     `budget`: what the load may take of memory and time; a file that asks for more is refused.
     Raises SceneError with the file and, where it is known, the line.
     """

@@ -21,11 +21,12 @@ from clpt.scene.textures import Bitmap
 ROWS, COLUMNS = 360, 720  # of the image: half degrees
 MOST_VALUES = 1 << 22
 AROUND = ((0, 90), (0, 180), (0, 360), (90, 270))
+NEW = ("IESNA:", "IES:")  # begin files of 1995 and later; IESNA91 or nothing begins older ones
 TYPES = {2: "B", 3: "A"}  # of photometry, about axes that lie; 1 is C, about the vertical
 # keys of what follows TILT, in their order
 HEADER = (
     "lamps", "lumens", "multiplier", "vertical", "horizontal", "photometry", "units", "width",
-    "length", "height", "ballast", "future", "watts",
+    "length", "height", "ballast", "ballast_lamp", "watts",
 )  # fmt: skip
 
 
@@ -129,7 +130,7 @@ class _Reader:
                 f"{sizes[0]} x {sizes[1]} values are more than the {MOST_VALUES} that are read"
             )
         rest = self._many("header", len(HEADER) - 5)
-        photometry, ballast = rest[0], rest[5]
+        photometry = rest[0]
         if photometry in TYPES:
             self.fail(f"photometry of type {TYPES[int(photometry)]}; only type C is supported")
         if photometry != 1.0:
@@ -139,22 +140,43 @@ class _Reader:
         )
         if vertical[0] < -1e-9 or vertical[-1] > 180.0 + 1e-9:
             self.fail("vertical angles must lie between 0 and 180 degrees")
-        self._check_around(horizontal)
+        scale = head["multiplier"] * rest[5] * (rest[6] if self._factor_of_lamps() else 1.0)
         values = self._many("candela", math.prod(sizes))
-        candela = np.array(values).reshape(sizes[1], sizes[0]) * head["multiplier"] * ballast
+        candela = np.array(values).reshape(sizes[1], sizes[0]) * scale
+        horizontal, candela = self._around(horizontal, candela)
         if not (np.isfinite(candela).all() and (candela >= 0.0).all() and candela.any()):
             self.fail("candela must not be negative, and not all zero")
         return Photometry(vertical, horizontal, candela)
 
-    def _check_around(self, angles: NDArray[np.float64]) -> None:
-        """Raise SceneError unless the angles go around wholly, or cover a half or a quarter."""
+    def _factor_of_lamps(self) -> bool:
+        """Return whether the ballast-lamp photometric factor counts: in editions before 1995.
+
+        LM-63-1995 keeps its place for the future. LM-63-2019 has a kind of file there.
+        """
+        first = next((line.strip().upper() for line in self.lines if line.strip()), "")
+        return not first.startswith(NEW)
+
+    def _around(
+        self, angles: NDArray[np.float64], candela: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return horizontal angles and candela (h, v) that go around wholly, or cover a half or a
+        quarter.
+
+        Some files leave out 360, which repeats 0: even steps, of which one more ends there, say so.
+        Raises SceneError.
+        """
         if len(angles) == 1:
-            return
+            return angles, candela
+        steps = np.diff(angles)
+        open_ = len(angles) > 2 and angles[-1] > 180.0 + 1e-6 and np.ptp(steps) < 1e-3 * steps[0]
+        if open_ and abs(angles[0]) < 1e-6 and abs(angles[-1] + steps[0] - 360.0) < 1e-3 * steps[0]:
+            return np.append(angles, 360.0), np.vstack([candela, candela[:1]])
         ends = angles[[0, -1]]
         if not any(np.abs(ends - known).max() < 1e-6 for known in AROUND):
             found = f"{angles[0]:g} to {angles[-1]:g}"
             message = "horizontal angles go from 0 to 90, 180 or 360, or from 90 to 270 degrees"
             self.fail(f"{message}, not from {found}")
+        return angles, candela
 
     def _angles(self, name: str, count: int) -> NDArray[np.float64]:
         angles = np.array(self._many(f"{name} angles", count))

@@ -24,6 +24,7 @@ FINEST = 32  # most pieces of a cubic
 PIECES = 1 << 20  # from which on axes follow their curves less closely, down to one piece a cubic
 TRIANGLES = 1 << 23  # from which on tubes have fewer sides
 SIDES = (4, 16)  # least and most sides of a tube
+SIDES_OF_WORLD = np.eye(3)[::-1]  # z, y, x: on which of a strand u is a quarter
 THINNEST = 1e-4  # of the thickest, which a tube has where the radius is zero
 LEAST = {"linear": 2, "bspline": 4, "bezier": 4}  # points of a strand
 # From four control points of a uniform cubic B-spline to those of the same cubic's Bezier form.
@@ -61,7 +62,9 @@ def tubes(shape: Curves, name: str, alike: Sequence[Curves] = ()) -> tuple[Any, 
     sides = int(np.clip(TRIANGLES // (2 * len(lower)), *SIDES))
     first = np.r_[True, strand[span[1:]] != strand[span[:-1]]]
     v = (span + t) / len(spans)
-    return _around(center, slope, tangent, frames(tangent, first), v, lower, sides)
+    from_world = np.linalg.pinv(np.asarray(shape.to_world, np.float64)[:3, :3])
+    axes = frames(tangent, first, SIDES_OF_WORLD @ from_world.T)
+    return _around(center, slope, tangent, axes, v, lower, sides)
 
 
 def strands(shape: Curves, name: str, alike: Sequence[Curves], vertices: int) -> Integers:
@@ -172,16 +175,20 @@ def _tangents(center: Floats, slope: Floats, strand: Integers) -> Floats:
     return tangent / length[:, None]
 
 
-def frames(tangent: Floats, first: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+def frames(
+    tangent: Floats, first: NDArray[np.bool_], world: Floats = SIDES_OF_WORLD
+) -> tuple[Floats, Floats]:
     """Return two unit axes across each tangent, which turn along a strand no more than they must.
 
-    tangent: (n, 3) of unit length, strand after strand; first: (n,), where a strand begins.
+    tangent: (n, 3) of unit length, strand after strand; first: (n,), where a strand begins;
+    world: (3, 3), the axes z, y and x of the world in the space of the tangents, of any length. u
+    is a quarter on the side of the first of them that a strand's beginning does not go along.
 
     Each is the rotation from the tangent before, after all rotations of the strand up to there:
     quaternions, whose products are found in as many passes as a strand's length has bits.
     """
     before = np.roll(tangent, 1, axis=0)
-    before[first] = (0.0, 0.0, 1.0)
+    before[first] = tangent[first]
     turn = np.empty((len(tangent), 4))
     turn[:, 0] = 1.0 + np.einsum("ij,ij->i", before, tangent)
     turn[:, 1:] = np.cross(before, tangent)
@@ -196,11 +203,22 @@ def frames(tangent: Floats, first: NDArray[np.bool_]) -> tuple[Floats, Floats]:
         later = np.flatnonzero(within >= step)
         turn[later] = _product(turn[later], turn[later - step])
         step *= 2
-    w, x, y, z = turn.T
-    across = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)], axis=1)
+    start = _across(tangent[first], world)[np.cumsum(first) - 1]
+    half = 2.0 * np.cross(turn[:, 1:], start)
+    across = start + turn[:, :1] * half + np.cross(turn[:, 1:], half)
     across -= tangent * np.einsum("ij,ij->i", across, tangent)[:, None]
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     return across, np.cross(tangent, across)
+
+
+def _across(tangent: Floats, world: Floats) -> Floats:
+    """Return unit axes (n, 3) across tangents where u is 0: a quarter before a side of `world`."""
+    up, *others = world / np.linalg.norm(world, axis=1, keepdims=True)
+    across = np.cross(up, tangent)
+    for side in others:
+        along = np.linalg.norm(across, axis=1) < 1e-6
+        across[along] = np.cross(side, tangent[along])
+    return np.asarray(across / np.linalg.norm(across, axis=1, keepdims=True))
 
 
 def _product(a: Floats, b: Floats) -> Floats:

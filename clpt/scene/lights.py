@@ -254,7 +254,8 @@ class Projector(Lamp):
 class Goniometric(PoweredLamp):
     """A point whose intensity depends on the direction, as an image in latitude and longitude says.
 
-    Directions lie in the image as in that of an envmap.
+    Directions lie in the image as in that of an envmap. Its first and last rows hold on to the
+    poles, unless its `wrap_v` says other.
     """
 
     intensity: SpectrumLike = emission(

@@ -213,7 +213,10 @@ class Cylinder(Shape):
 class Curves(Shape):
     """Strands of a round cross-section, as hair: what spheres along a line cover.
 
-    u runs around, v along, from 0 to 1 over all pieces of all strands, as in Mitsuba. A B-spline is
+    u runs around, v along, from 0 to 1 over all pieces of all strands. Where a strand begins, u is
+    as in Mitsuba: 1/4 on the side of +z of the world, or of +y if the strand goes along z. From
+    there it goes on without a twist, while Mitsuba looks for +z anew at each point; for straight
+    strands, and those in a plane with z or across z, this is the same. A B-spline is
     uniform and cubic; a Bezier strand has 4, 7, 10, ... points. `to_world` scales radii too. Curves
     that emit light, that deform, that a transform stretches, or that more than 16 instances share
     become tubes of triangles, which are open at the ends; others end in half spheres.

@@ -29,7 +29,11 @@ ELSEWHERE = {
     "kernels/README.md": "kernels.md",
     "examples/README.md": "examples.md",
     "bench/results/README.md": "figures.md",
-    "bench/NOTES.md": "notes.md",
+    "bench/notes/README.md": "notes/index.md",
+    **{
+        f"bench/notes/{page.name}": f"notes/{page.name}"
+        for page in sorted((ROOT / "bench/notes").glob("[a-z]*.md"))
+    },
 }
 MODULES = {
     "clpt.scene": "scene",

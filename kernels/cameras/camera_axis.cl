@@ -7,3 +7,6 @@ inline void camera_axis_moved(Scene scene, vec3 *from, vec3 *axis)
     *from = motion_point(m, *from);
     *axis = motion_vector(m, *axis);
 }
+
+/* Twin, where the camera stands still. */
+#define camera_axis_moved(scene, from, axis)

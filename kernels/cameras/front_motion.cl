@@ -13,3 +13,7 @@ inline vec3 front_lowered(Scene scene, vec3 to, real *grows)
 #endif
     return to;
 }
+
+/* Twin, where the camera stands still. */
+#define front_moved(scene, ray) (ray)
+#define front_lowered(scene, to, grows) (to)

@@ -3,3 +3,6 @@ inline Spectrum path_start(Scene scene, Slab path, uint at, integer pixel_index,
 {
     return sample_begin(scene, path, at, mask_of(0), pixel_index, sample).beta;
 }
+
+/* Twin, where all rays count alike, or the film has no alpha. */
+#define path_start(scene, path, at, pixel_index, sample) camera_start()

@@ -11,3 +11,6 @@ inline real path_covers(Scene scene, Slab path, uint at, PathEnd end, Wavelength
     share = sel(whole > 0.0f, share, (real)(1.0f));
     return 1.0f - sel(through & (fabs(share) < FIXED_LARGEST), share, (real)(0.0f));
 }
+
+/* Twin, where the film has no alpha. */
+#define path_covers(scene, path, at, end, lambdas, start) ((real)(1.0f))

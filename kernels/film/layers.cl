@@ -112,3 +112,6 @@ inline void mattes_add(Scene scene, global uint *mattes, mask m, integer pixel_i
             matte_add(mattes + list * LAYER_MATTE_SLOTS, numbers[i]);
         }
 }
+
+/* Twin, where there are none beside the picture. */
+#define layers_count(scene, path, at, layers, unseen)

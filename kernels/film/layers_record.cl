@@ -99,3 +99,6 @@ inline integer layers_record(Scene scene, Slab path, uint at, LAYER_ARGS, mask m
     layers_add(scene, layers + before, adds, load_path_pixel_index(path, at), words, settings->layer_words - before);
     return state;
 }
+
+/* Twin, where there are none beside the picture. */
+#define layers_record(scene, path, at, layers, met, v, scatter, state) (state)

@@ -56,3 +56,7 @@ inline void light_layers_add(Scene scene, Slab path, uint at, mask m, integer su
     vec3 v = scale3(film_value(scene, light, lambdas), load_path_weight(path, at) * scene.settings->film_scale);
     light_layers_sum(scene, m, load_path_pixel_index(path, at), surfaces, row, 0, v, light_layers);
 }
+
+/* Twin, where there are none. */
+#define light_layers_add(scene, path, at, m, surfaces, row, light, light_layers)
+#define light_layers_chosen(path, at, m, row)

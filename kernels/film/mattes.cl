@@ -6,3 +6,6 @@ inline void mattes_record(Scene scene, global uint *mattes, mask first, integer 
     if (object) mattes_add(scene, mattes, first, pixel_index, object - 1, v.object);
     if (material) mattes_add(scene, mattes, first, pixel_index, material - 1, v.material);
 }
+
+/* Twin, where there are none. */
+#define mattes_record(scene, mattes, first, pixel_index, v)

@@ -21,3 +21,6 @@ inline mask scout_vertex(Scene scene, Slab path, uint at, LAYER_ARGS, mask activ
     }
     return active & !scouts;
 }
+
+/* Twin, where no path scouts, or none meets the material. */
+#define scout_vertex(scene, path, at, layers, active, v) (active)

@@ -9,3 +9,6 @@ inline real scout_choice(Scene scene, natural key, integer state, natural dimens
     real turned = u + 0.5f - sampler_pair(first, dimension).y;
     return sel(path_scouts(state), turned - floor(turned), u);
 }
+
+/* Twin, where no path scouts. */
+#define scout_choice(scene, key, state, dimension, u) (u)

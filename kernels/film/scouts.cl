@@ -3,3 +3,7 @@
 #define LAYERS_SCOUT 1
 #define PATH_SCOUTS 0x40000000
 #define path_scouts(state) (((state) & PATH_SCOUTS) != 0)
+
+/* Twin, where no path scouts. */
+#define LAYERS_SCOUT 0
+#define path_scouts(state) mask_of(0)

@@ -9,3 +9,8 @@ inline integer scouts_begin(mask ended, integer sample)
     return sel_i(!ended & (sample < LAYER_SAMPLES), (integer)(PATH_SCOUTS), (integer)(0));
 }
 #define LAYERS_END(end, scouted) (scouted)
+
+/* Twin, where no path scouts. */
+#define scouts_ended(end) mask_of(0)
+#define scouts_begin(ended, sample) 0
+#define LAYERS_END(end, scouted) ((end).ended & (end).begun)

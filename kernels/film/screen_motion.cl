@@ -72,3 +72,6 @@ inline void layers_of_sky(Scene scene, Slab path, uint at, global uint *layers, 
     layers_add(scene, layers + scene.settings->layer_motion, m, load_path_pixel_index(path, at), words,
                4 * LAYER_LONG_WORDS);
 }
+
+/* Twin, where no layer tells how what is seen moves. */
+#define layers_of_sky(scene, path, at, layers, unseen)

@@ -9,3 +9,10 @@ inline void screen_motion_record(Scene scene, integer *words, mask first, Vertex
     ScreenMotion motion = screen_motion(scene, v.object, v.s.p, opens, closes, mask_of(0));
     screen_motion_put(words, first, motion, weight);
 }
+
+/* Twin, where nothing moves. */
+#include "film/layers.cl"
+inline void screen_motion_record(Scene scene, integer *words, mask first, Vertex v, real weight)
+{
+    for (int i = 0; i < 4 * LAYER_LONG_WORDS; i++) words[i] = 0;
+}

@@ -16,3 +16,6 @@ inline integer light_joined(Scene scene, Slab shadow, uint at, mask ended, mask 
     connect_camera(shadow, at, ended, shine, s, c, spectrum_scale(r.seen, cosine * c.importance));
     return sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
 }
+
+/* Twin, where light paths do not show lights to the camera. */
+#define light_joined(scene, shadow, at, ended, go, sampler, s, r, lambdas) ((integer)(0))

@@ -4,3 +4,6 @@ inline void light_kept(Slab path, uint at, mask go, LightRay r)
     store_path_light(path, at, go, r.row);
     store_path_sampled_hemisphere(path, at, go, r.n);
 }
+
+/* Twin, where light paths are not weighed. */
+#define light_kept(path, at, go, r)

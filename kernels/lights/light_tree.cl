@@ -5,7 +5,7 @@
 #define LIGHT_TREE_DARK 1e-5f  /* of a cosine: rounding, behind what is flat */
 /* For lights of a node are not where its centre is: the share of the square of its radius that adds to that of the
  * distance; by how much of the square of its sine as seen from p that of the cosine at the lights grows; and the share
- * of the cosine at p of what rises above its horizon. All were measured, see bench/NOTES.md. */
+ * of the cosine at p of what rises above its horizon. All were measured, see bench/notes/lights.md. */
 #define LIGHT_TREE_NEAR 0.33f
 #define LIGHT_TREE_AROUND 0.1f
 #define LIGHT_TREE_RISING 0.25f

@@ -56,3 +56,9 @@ inline real receiver_reflects(Receiver r, vec3 wi, real sine, real cosine)
     if (any(glossy)) cosine = sel(glossy, cosine * (1.0f - r.share) + receiver_gloss(r, wi, sine), cosine);
     return cosine;
 }
+
+/* Twin, where only its `hemisphere` matters. */
+#define Receiver vec3
+#define receiver_hemisphere(r) (r)
+#define receiver_at(scene, row, hemisphere, away) (hemisphere)
+#define receiver_reflects(r, wi, sine, cosine) (cosine)

@@ -38,3 +38,7 @@ inline Spectrum sky_gather(Scene scene, Slab path, uint at, PathEnd end, Wavelen
 
 /* To begin paths takes longer, as light is gathered there: lanes wait for others. */
 #define sky_due(end) path_end_of_half(end)
+
+/* Twin, in a scene without light from all around. */
+#define sky_gather(scene, path, at, end, lambdas, radiance) (radiance)
+#define sky_due(end) any((end).ended)

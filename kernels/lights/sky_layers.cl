@@ -11,3 +11,6 @@ inline void sky_layers(Scene scene, Slab path, uint at, PathEnd end, Wavelengths
         light_layers_add(scene, path, at, v.seen, end.depth, (integer)(row), light, light_layers);
     }
 }
+
+/* Twin, where there are no layers of light, or none comes from all around. */
+#define sky_layers(scene, path, at, end, lambdas, light_layers)

@@ -12,3 +12,6 @@ inline Bsdf anisotropy_turned(Scene scene, integer row, Bsdf m, Surface s, Frame
     m.anisotropy_rotation = 360.0f * INV_2PI * atan2_r(dot3(along, shaded.t), dot3(along, shaded.s));
     return m;
 }
+
+/* Twin, where a material is equally rough in all directions, or knows no turn. */
+#define anisotropy_turned(scene, row, m, s, shaded) (m)

@@ -15,3 +15,6 @@ inline Bsdf coat_normal_turned(Scene scene, integer row, Bsdf m, Surface s, Fram
     m.clearcoat_normal_scale = 1.0f;
     return m;
 }
+
+/* Twin, where a material has no coat with a normal of its own. */
+#define coat_normal_turned(scene, row, m, s, shaded) (m)

@@ -8,3 +8,6 @@ inline void bsdf_between_bodies(Scene scene, mask active, Vertex v, Bsdf *m)
         m->ext_ior = spectrum_sel(known, outside, m->ext_ior);
     }
 }
+
+/* Twin, where what is outside of a material does not change it. */
+#define bsdf_between_bodies(scene, active, v, m)

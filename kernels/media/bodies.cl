@@ -59,3 +59,7 @@ inline integer bodies_beyond(BodyBoundary b, mask inward)
 {
     return sel_i(inward & (b.body != 0), bodies_with(b.others, b.body), b.others);
 }
+
+/* Twin, where bodies do not overlap: a ray to a light knows its medium by name. */
+#define camera_through(settings) ((integer)((settings)->camera_medium))
+#define light_through(scene, row) light_medium(scene, row)

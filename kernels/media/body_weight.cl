@@ -11,3 +11,6 @@ inline Spectrum body_weighed(Scene scene, Slab path, uint at, mask flies, Spectr
     }
     return light;
 }
+
+/* Twin, where no homogeneous medium is a light. */
+#define body_weighed(scene, path, at, flies, light) (light)

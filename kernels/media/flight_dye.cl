@@ -23,3 +23,9 @@ inline Spectrum flight_dye_pdf(FlightDye f, real t, mask collides, Spectrum pdf)
     real dyes = sel(collides, f.ends.share * dye_pdf(f.ends, t), (real)(0.0f));
     return spectrum_add(spectrum_scale(pdf, 1.0f - f.ends.share), spectrum_of(dyes));
 }
+
+/* Twin, where no medium has a dye. */
+typedef integer FlightDye;
+#define flight_dye(name, m, end, scatters, u) ((integer)(0))
+#define flight_dye_end(f, t) (t)
+#define flight_dye_pdf(f, t, collides, pdf) (pdf)

@@ -14,3 +14,7 @@ inline void flight_light(Scene scene, Slab path, uint at, mask flies, integer st
     store_path_radiance(path, at, flies, spectrum_add(load_path_radiance(path, at), light));
     flight_light_layers(scene, path, at, flies, state, light);
 }
+
+/* Twin, where no medium emits. */
+#define flight_emission(scene, flies, name, m, end, lambdas) spectrum_of(0.0f)
+#define flight_light(scene, path, at, flies, state, light)

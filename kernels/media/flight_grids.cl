@@ -19,3 +19,6 @@ inline void flight_grids(Scene scene, Slab path, uint at, mask flies, integer na
         m->phase = sel_i(gridded, own.phase, m->phase);
     }
 }
+
+/* Twin, where there are no grids. */
+#define flight_grids(scene, path, at, flies, name, r, ratio, lambdas, light, weight, collides, t, m)

@@ -27,3 +27,9 @@ inline Spectrum flight_near_pdf(FlightNear n, real t, mask collides, Spectrum pd
     real nearby = sel(collides, n.ends.share * equiangular_pdf(n.ends, t), (real)(0.0f));
     return spectrum_add(spectrum_scale(pdf, n.left), spectrum_of(nearby));
 }
+
+/* Twin, without lamps in media, and for paths from lamps, which have no reason to stay. */
+typedef integer FlightNear;
+#define flight_near(scene, sampler, vertex, name, o, d, end, m, scatters, u) ((integer)(0))
+#define flight_near_end(n, t) (t)
+#define flight_near_pdf(n, t, collides, pdf) (pdf)

@@ -6,3 +6,6 @@ inline Spectrum flight_weight(Slab path, uint at, mask flies, Spectrum ratio, Sp
     store_path_ratio(path, at, flies, spectrum_scale(pdfs, inverse));
     return spectrum_scale(f, inverse);
 }
+
+/* Twin, where extinction is the same at all wavelengths. */
+#define flight_weight(path, at, flies, ratio, f, pdf) spectrum_scale(f, 1.0f / max_r((pdf).x, (real)(1e-30f)))

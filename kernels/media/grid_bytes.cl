@@ -8,3 +8,7 @@ inline real grid_number_at(integer packed, integer word, integer at)
     integer place = sel_i(small, (at & 3) << 3, (at & 1) << 4), most = sel_i(small, (integer)(0xff), (integer)(0xffff));
     return to_real((word >> place) & most) / to_real(most);
 }
+
+/* Twin, where all numbers have 16 bits. */
+#define grid_packed(name) ((integer)(1))
+#define grid_number_at(packed, word, at) (to_real(((word) >> (((at) & 1) << 4)) & 0xffff) * (1.0f / 65535.0f))

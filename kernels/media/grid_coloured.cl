@@ -6,3 +6,6 @@ inline void grid_coloured(Scene scene, integer name, GridWalk w, mask active, na
     m->sigma_s = spectrum_mul(m->sigma_s, colour);
     m->sigma_t = spectrum_mul(m->sigma_t, colour);
 }
+
+/* Twin, where extinction has no colours on a grid. */
+#define grid_coloured(scene, name, w, active, bits, lambdas, m)

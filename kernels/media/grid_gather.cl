@@ -17,3 +17,6 @@ inline void grid_gather(Scene scene, integer name, Medium m, GridWalk w, GridBri
     light = spectrum_scale(spectrum_mul(here.weight, light), way * w_met);
     f->light = spectrum_sel(active, spectrum_add(f->light, light), f->light);
 }
+
+/* Twin, where no grid emits. */
+#define grid_gather(scene, name, m, w, b, to, passed, dims, bits, active, f, lambdas, origin)

@@ -8,3 +8,6 @@ inline Spectrum grid_glow(Scene scene, integer at, real number, mask active, Wav
     }
     return light;
 }
+
+/* Twin, where no grid has a temperature. */
+#define grid_glow(scene, at, number, active, lambdas, light) (light)

@@ -40,3 +40,6 @@ inline void grid_mixed(Scene scene, integer name, GridWalk w, mask active, natur
         m->sigma_t = spectrum_sel(shares != 0, whole.sigma_t, m->sigma_t);
     }
 }
+
+/* Twin, where all grids are of one part. */
+#define grid_mixed(scene, name, w, active, bits, lambdas, m)

@@ -6,3 +6,6 @@ inline void grid_origin_load(Slab path, uint at, FlightRay r, GridOrigin *origin
     origin->from = madd3(r.d, -origin->before, r.o);
     origin->receiver = path_receiver(path, at);
 }
+
+/* Twin, where no grid emits. */
+#define grid_origin_load(path, at, r, origin)

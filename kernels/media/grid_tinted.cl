@@ -4,3 +4,6 @@ inline void grid_tinted(Scene scene, integer name, GridWalk w, mask active, natu
 {
     m->sigma_s = spectrum_mul(m->sigma_s, grid_tint(scene, name, GRID_ALBEDO, w, active, bits, lambdas));
 }
+
+/* Twin, where no albedo is on a grid. */
+#define grid_tinted(scene, name, w, active, bits, lambdas, m)

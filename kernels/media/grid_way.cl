@@ -19,3 +19,7 @@ inline Spectrum grid_way(Scene scene, integer medium, vec3 o, vec3 d, real way, 
     }
     return dims;
 }
+
+/* Twin, where there are no grids. */
+#define grid_way_key(scene, path, at) ((natural)(0u))
+#define grid_way(scene, medium, o, d, way, key, active, lambdas, dims) (dims)

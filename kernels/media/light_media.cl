@@ -3,3 +3,7 @@
 #define MEDIA_OF_SHAPES (4 * MEDIUM_AIMS + 2 * scene.settings->light_count)
 inline integer light_medium(Scene scene, integer row) { return gather_i(scene.media, 4 * MEDIUM_AIMS + 2 * row + 1); }
 inline integer light_bodies(Scene scene, integer row) { return gather_i(scene.media, 4 * MEDIUM_AIMS + 2 * row); }
+
+/* Twin, where no path starts at lights. */
+#define MEDIA_OF_SHAPES (4 * MEDIUM_AIMS)
+inline integer light_medium(Scene scene, integer row) { return (integer)(0); }

@@ -71,3 +71,7 @@ inline ShapeMedia shape_media(Scene scene, integer shape)
 
 /* The medium that a surface has still to dim a ray by: none that it has flown through. */
 #define MEDIUM_LEFT(medium) sel_i(((medium) & MEDIUM_FLIES) != 0, (integer)(0), medium)
+
+/* Twin, where bodies absorb and nothing else. */
+#define medium_extinction(scene, medium, row, a, lambdas) (a)
+#define MEDIUM_LEFT(medium) (medium)

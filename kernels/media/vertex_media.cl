@@ -23,3 +23,7 @@ inline VertexMedia vertex_media(Scene scene, Slab path, Slab hit, uint at, mask 
     m.medium = medium_met(sel_i(active, load_path_medium(path, at), (integer)(0)), m.inside, front);
     return m;
 }
+
+/* Twin, where there are no media. */
+typedef integer VertexMedia;
+#define vertex_media(scene, path, hit, at, active, row, front) ((integer)(0))

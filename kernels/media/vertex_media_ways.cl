@@ -12,3 +12,7 @@ inline integer vertex_around(Vertex v, vec3 w)
     return sel_i(enters, v.media.medium, sel_i(leaves & !v.front, (integer)(0), v.media.around));
 }
 inline integer vertex_through(Vertex v, vec3 w) { return vertex_medium(v, w); }
+
+/* Twin, where there are no media. */
+#define vertex_arriving(scene, path, at, active, v) ((v).beta)
+#define vertex_beyond(scene, v, w, t, lambdas, value) (value)

@@ -48,3 +48,6 @@ inline void bounce_walk(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, uint which, global uin
     }
     queue_sort(path, hit, queue, starts, first, end);
 }
+
+/* Twin, where no path from the camera is in a medium. */
+#define bounce_walk(slabs, scene, loop, which, queue, starts, first, end)

@@ -105,3 +105,6 @@ inline InstanceRow motion_of_instance(Scene scene, InstanceRow i)
     i.origin = motion_point(m, i.origin);
     return i;
 }
+
+/* Twin, where nothing moves. */
+#define motion_time(scene, u) ((real)(0.0f))

@@ -15,3 +15,6 @@ inline void surface_analytic(Scene scene, ShapeRow shape, integer prim, mask act
         analytic_tangents(scene, shape, prim, analytic, motion, rest, s);
     }
 }
+
+/* Twin, where all is made of triangles. */
+#define surface_analytic(scene, shape, prim, active, end, s)

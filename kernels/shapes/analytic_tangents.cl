@@ -8,3 +8,6 @@ inline void analytic_tangents(Scene scene, ShapeRow shape, integer prim, mask an
     s->along = sel3(analytic, s->dpdu, s->along);
     s->beside = sel3(analytic, s->dpdv, s->beside);
 }
+
+/* Twin, where nothing asks for directions along a surface. */
+#define analytic_tangents(scene, shape, prim, analytic, motion, rest, s)

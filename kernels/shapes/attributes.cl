@@ -23,3 +23,8 @@ inline void surface_attributes_move(Surface s, real u, real v, TexturePoint *t)
     t->b.x += s.dbdu.x * u + s.dbdv.x * v;
     t->b.y += s.dbdu.y * u + s.dbdv.y * v;
 }
+
+/* Twin, where no texture reads attributes. */
+#define surface_attributes(scene, shape, prim, active, s)
+#define surface_attributes_tell(s, t)
+#define surface_attributes_move(s, u, v, t)

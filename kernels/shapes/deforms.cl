@@ -13,3 +13,6 @@ inline void surface_deforms(Scene scene, ShapeRow shape, HitSpace space, integer
         s->to_close = sel3(deforms, hit_vector(space, last), s->to_close);
     }
 }
+
+/* Twin, where nothing deforms, or no layer tells how. */
+#define surface_deforms(scene, shape, space, prim, active, h, s)

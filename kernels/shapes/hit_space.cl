@@ -18,3 +18,10 @@ inline HitSpace hit_space(Scene scene, TraceHit h, mask active)
 
 inline vec3 hit_normal(HitSpace s, vec3 n) { return sel3(s.placed, instance_normal(s.frame, n), n); }
 inline vec3 hit_vector(HitSpace s, vec3 v) { return sel3(s.placed, instance_vector(s.frame, v), v); }
+
+/* Twin, in a scene without instances, where triangles lie in the world. */
+typedef integer HitSpace;
+#define hit_space_load(h, hit, at)
+#define hit_space(scene, h, active) ((integer)(0))
+#define hit_normal(space, n) (n)
+#define hit_vector(space, v) (v)

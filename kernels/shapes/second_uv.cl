@@ -21,3 +21,6 @@ inline void triangle_second_uv(Scene scene, ShapeRow shape, HitSpace space, Corn
         s->beside1 = sel3(r.regular, r.dpdv, s->beside1);
     }
 }
+
+/* Twin, where no map lies on a second set of uv. */
+#define triangle_second_uv(scene, shape, space, c, s)

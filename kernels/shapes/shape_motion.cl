@@ -7,3 +7,11 @@ typedef Motion ShapeMotion;
 
 /* What the way to where the shape was lowered and back rounds, as a primitive's size [m]. */
 #define shape_motion_size(motion, rest) (4.0f * (size3((motion).t) + size3(shape_vector(motion, rest))))
+
+/* Twin, where shapes stand still. */
+typedef integer ShapeMotion;
+#define shape_motion(scene, shape) ((integer)(0))
+#define shape_point(motion, p) (p)
+#define shape_point_back(motion, p) (p)
+#define shape_vector(motion, v) (v)
+#define shape_motion_size(motion, rest) 0.0f

@@ -9,3 +9,6 @@ inline void spheres_move(Scene scene, ShapeRow shape, integer prim, mask analyti
     s->to_open = sel3(spheres, shape_vector(motion, first), s->to_open);
     s->to_close = sel3(spheres, shape_vector(motion, last), s->to_close);
 }
+
+/* Twin, where spheres do not move by themselves, or no layer tells how. */
+#define spheres_move(scene, shape, prim, analytic, motion, rest, s)

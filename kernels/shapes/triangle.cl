@@ -10,3 +10,6 @@ inline void surface_triangle(Scene scene, ShapeRow shape, HitSpace space, intege
     triangle_second_uv(scene, shape, space, c, s);
     triangle_tangents(scene, shape, space, c, s);
 }
+
+/* Twin, where nothing asks for more than the flat triangle. */
+#define surface_triangle(scene, shape, space, prim, active, s)

@@ -9,3 +9,6 @@ inline void triangle_normal(Scene scene, HitSpace space, Corners *c, Surface *s)
         s->ns = sel3(usable, normalize3(hit_normal(space, ns)), s->ns);
     }
 }
+
+/* Twin, in a scene whose meshes have no normals. */
+#define triangle_normal(scene, space, c, s)

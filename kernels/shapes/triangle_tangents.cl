@@ -21,3 +21,6 @@ inline void triangle_tangents(Scene scene, ShapeRow shape, HitSpace space, Corne
         s->beside1 = sel3(told, beside, s->beside1);
     }
 }
+
+/* Twin, where no mesh has tangents, or nothing asks for them. */
+#define triangle_tangents(scene, shape, space, c, s)

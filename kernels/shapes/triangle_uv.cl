@@ -11,3 +11,6 @@ inline void triangle_uv(Scene scene, ShapeRow shape, HitSpace space, Corners c, 
         uv_tangents(scene, space, c, mapped, ta, tb, tc, s);
     }
 }
+
+/* Twin, where no mesh has uv. */
+#define triangle_uv(scene, shape, space, c, s)

@@ -36,3 +36,6 @@ inline void uv_tangents(Scene scene, HitSpace space, Corners c, mask mapped, vec
     s->dbdv.x = sel(r.regular, r.dbdv.x, s->dbdv.x);
     s->dbdv.y = sel(r.regular, r.dbdv.y, s->dbdv.y);
 }
+
+/* Twin, where nothing asks for directions along a surface. */
+#define uv_tangents(scene, space, c, mapped, ta, tb, tc, s)

@@ -8,3 +8,6 @@ inline void hero_goes_alone(BsdfSample *s, Spectrum *ratio)
         *ratio = spectrum_sel(alone, hero, *ratio);
     }
 }
+
+/* Twin, where directions hold for all wavelengths. */
+#define hero_goes_alone(s, ratio)

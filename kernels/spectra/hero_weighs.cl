@@ -17,3 +17,7 @@ inline void hero_weighs(Bsdf m, vec3 wo, BsdfSample *s, Spectrum *ratio)
     s->weight = spectrum_scale(s->weight, sel(usable, s->pdf * inv, (real)(1.0f)));
     s->pdf = sel(usable, pdf, (real)(0.0f));
 }
+
+/* Twin, where densities of directions are those of all wavelengths. */
+#define hero_pdf(m, wo, wi, ratio) bsdf_pdf(m, wo, wi)
+#define hero_weighs(m, wo, s, ratio)

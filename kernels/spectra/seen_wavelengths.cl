@@ -4,3 +4,6 @@ inline Wavelengths seen_wavelengths(Scene scene, Slab path, uint at, Wavelengths
     Sampler begun = pixel_sampler(scene.settings, load_path_pixel_key(path, at), load_path_sample(path, at));
     return wavelengths_sample(scene, sampler_pair(begun, (natural)(DIMENSION_WAVELENGTH)).x);
 }
+
+/* Twin, where nothing fluoresces. */
+#define seen_wavelengths(scene, path, at, lambdas) (lambdas)

@@ -50,3 +50,8 @@ inline real cone_footprint(Cone c, vec3 d, vec3 n, vec3 dpdu, vec3 dpdv)
     real area = wide_length3(cross3(dpdu, dpdv)), cosine = max_r(fabs(dot3(n, d)), (real)(1e-3f));
     return sel(area > 1e-36f, c.width / (cosine * sqrt(area)), (real)(0.0f));
 }
+
+/* Twin, where no image has levels to choose among. */
+typedef integer Cone;
+#define cone_after(word, t) (word)
+#define cone_footprint(c, d, n, dpdu, dpdv) ((real)(0.0f))

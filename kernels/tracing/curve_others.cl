@@ -19,3 +19,7 @@ inline ShapeHit curve_others(Scene scene, integer prim, mask active, vec3 o, vec
     }
     return hit;
 }
+
+/* Twin, where there are none. */
+#define curve_others(scene, prim, active, o, d, t, hit) (hit)
+#define CURVE_OTHERS 0

@@ -46,3 +46,7 @@ inline Spectrum escape_light(TRACE_ARGS, Scene scene, Slab path, uint at, vec3 o
     }
     return spectrum_sel(active, light, passes);
 }
+
+/* Twin, where no ray leaves a sealed medium toward a lamp. */
+#define escape_waits(t) mask_of(0)
+#define escape_light(trace, scene, path, at, o, d, t, active, passes) (passes)

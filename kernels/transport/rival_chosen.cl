@@ -9,3 +9,6 @@ inline Rival rival_chosen(Scene scene, Slab path, uint at, Vertex v, Rival r, Re
     }
     return r;
 }
+
+/* Twin, where the chance of a light does not hang on where its light goes. */
+#define rival_chosen(scene, path, at, v, r, receiver) (r)

@@ -11,3 +11,6 @@ inline mask is_dull(real p) { return (p >= 0.0f) & (p <= DULL_PDF); }
 
 /* The density of light paths over that of a camera's path, whose last surface before the light has such a p. */
 inline real rival_of_dull(real third, real p) { return third * sel(is_dull(p), (real)(DULL_SHARE), (real)(1.0f)); }
+
+/* Twin, where all light paths go on from dull surfaces. */
+#define rival_of_dull(third, p) (third)

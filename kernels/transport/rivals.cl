@@ -25,8 +25,9 @@
  *
  * Light that comes to x_1 from the light itself is left to the camera's path, which chooses a light there: a light
  * path is joined from its second vertex on, and for k = 2 the third density is 0. (Splats of light that next-event
- * estimation finds without noise are noise only, see bench/NOTES.md.) But where x_1 is a collision, which the camera's
- * path comes to by chance, and no ray meets the light, a light path is joined there too. Null surfaces change nothing.
+ * estimation finds without noise are noise only, see bench/notes/light_paths.md.) But where x_1 is a collision, which
+ * the camera's path comes to by chance, and no ray meets the light, a light path is joined there too. Null surfaces
+ * change nothing.
  * Where a material ends light paths (`rival_ends`) the camera's rival is 0.
  *
  * A vertex may be a collision in a medium. Either side flies to it with a density of transmittance times extinction, to
@@ -208,3 +209,14 @@ inline real rival_joint(Scene scene, Rival r, Vertex v, BsdfPair pair, CameraPoi
     *shine = *shine & joined & !hidden & !rival_ends(scene, v);
     return 1.0f / (1.0f + rival_of_joint(scene, r, v.s, c, pair.p, pair.p_back));
 }
+
+/* Twin, where paths are not weighed against light paths. */
+typedef integer Rival;
+#define rival_of_camera(scene, path, at, v, sampler) ((integer)(0))
+#define rival_of_emission(scene, path, at, v, receiver) ((integer)(0))
+#define event_begins(scene, s, ls) ((real)(0.0f))
+#define event_weight(scene, rival, s, ls, begins, pair, p) \
+    sel((ls).pdf < 0.0f, (real)(1.0f), mis_weight((ls).pdf, p))
+#define rival_goes_to_light(path, at, scatters, rival, v, onward, delta, bs) ((bs).pdf)
+#define rival_goes_to_camera(scene, path, at, next, null, rival, v, onward, bs) (next)
+#define rival_joint(scene, rival, v, pair, c, shine) ((real)(1.0f))

@@ -1,7 +1,8 @@
 /* Russian roulette: the chance that a path goes on, by its throughput over what it began with. Where paths end only by
  * chance (1 after surfaces that absorb nothing), a little less than 1 brings them to an end; a path that still has a
  * third of its light is worth its time. In media that is not so: a path there has hundreds of collisions before it
- * comes out, and those that chance had left would be few and bright. All numbers were measured, see bench/NOTES.md. */
+ * comes out, and those that chance had left would be few and bright. All numbers were measured:
+ * bench/notes/samplers.md. */
 #define ROULETTE_FREE (BSDF_IS_PHASE ? 1.5f : 3.0f)
 #define ROULETTE_MOST (BSDF_IS_PHASE ? 1.0f : 0.98f)
 

@@ -24,3 +24,6 @@ inline void vertex_names(Scene scene, Slab hit, uint at, mask active, Vertex *v)
         v->primitive = sel_i(listed, told, v->primitive);
     }
 }
+
+/* Twin, where no layer names what is seen. */
+#define vertex_names(scene, hit, at, active, v)

@@ -165,3 +165,17 @@ def test_no_include_leaves_the_folder():
 def test_an_include_inside_an_if_is_refused():
     with pytest.raises(KernelBuildError, match="stands inside an #if"):
         assemble("a", {"a": '#ifdef X\n#include "b"\n#endif', "b": ""})
+
+
+def test_a_file_has_two_halves() -> None:
+    """An include takes the step, or the twin that does nothing, with the rows of the file."""
+    step = assemble("a", {"a": '#include "spectra/hero_alone.cl"'}, library=True)
+    twin = assemble("a", {"a": '#include "spectra/hero_alone.cl#none"'}, library=True)
+    assert "Twin" not in step.text and "LOBE_DISPERSE" not in twin.text
+    text = (kernels_folder() / "spectra/hero_alone.cl").read_text("utf-8").splitlines()
+    rows = twin.text.splitlines()
+    at = next(i for i, row in enumerate(rows) if "hero_goes_alone" in row)
+    file, line = twin.place(at + 1)
+    assert file == "spectra/hero_alone.cl" and line is not None and text[line - 1] == rows[at]
+    with pytest.raises(KernelBuildError, match="no file"):
+        assemble("a", {"a": '#include "core/lanes.cl#none"'})

@@ -221,6 +221,35 @@ def test_files_of_the_system_without_an_end_end():
     assert input_files.read_bytes(path) == b""
 
 
+POINTER = (
+    "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a214614ab2935c943f9e0ff69d"
+    "22eadbb8f32b1258daaa5e2ca24d17e2393\nsize 12345\n"
+)
+
+
+@pytest.mark.parametrize("suffix", [
+    ".json", ".xml", ".pbrt", ".gltf", ".glb", ".obj", ".ply", ".stl", ".off", ".vol", ".vdb",
+    ".nvdb",
+])  # fmt: skip
+def test_a_pointer_of_git_lfs_says_so(tmp_path, suffix):
+    path = write(tmp_path / f"a{suffix}", POINTER)
+    with pytest.raises(SceneError, match=r"is a Git LFS pointer .* `git lfs pull`"):
+        clpt.load(path)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".jpg", ".exr", ".hdr", ".pfm", ".npy"])
+def test_a_pointer_of_git_lfs_in_place_of_an_image(tmp_path, suffix):
+    with pytest.raises(SceneError, match=r"is a Git LFS pointer"):
+        images.read(write(tmp_path / f"a{suffix}", POINTER))
+
+
+def test_a_pointer_of_git_lfs_in_a_scene(tmp_path):
+    write(tmp_path / "a.serialized", POINTER)
+    shape = '<shape type="serialized"><string name="filename" value="a.serialized"/></shape>'
+    with pytest.raises(SceneError, match=r"is a Git LFS pointer"):
+        clpt.load(write(tmp_path / "a.xml", f'<scene version="3.0.0">{shape}</scene>'))
+
+
 READ_ELSEWHERE = {  # by what is read outside of a load
     "film": film_file.read,
     "header of a film": film_file.read_header,

@@ -59,6 +59,37 @@ def test_table_and_its_mirrors(written):
     assert ies.read(written(tilted)).intensity(0.0, 7.0) == pytest.approx(200.0)
 
 
+@pytest.mark.parametrize(
+    ("head", "counts"),
+    [
+        ("TILT=NONE\n", True),  # of 1986
+        ("IESNA91\n[TEST] a\nTILT=NONE\n", True),
+        ("IESNA:LM-63-1995\nTILT=NONE\n", False),
+        ("IESNA:LM-63-2002\nTILT=NONE\n", False),
+        ("IES:LM-63-2019\nTILT=NONE\n", False),  # a number of the kind of file
+    ],
+)
+def test_the_ballast_lamp_factor_is_of_old_editions(written, head, counts):
+    text = lamp(head=head).replace("0.5 1 40", "0.5 0.9 40")
+    assert ies.read(written(text)).intensity(0.0, 0.0) == pytest.approx(
+        200.0 * (0.9 if counts else 1.0)
+    )
+
+
+@pytest.mark.parametrize("step", [15, 45, 90])
+def test_angles_around_without_360(written, step):
+    """Even steps that end one before 360 go around; others say what is missing."""
+    angles = tuple(range(0, 360, step))
+    found = ies.read(written(lamp(angles)))
+    assert found.horizontal[-1] == 360.0
+    last = 200.0 + angles[-1]
+    assert found.intensity(0.0, angles[-1]) == pytest.approx(last)
+    assert found.intensity(0.0, 360 - step / 2) == pytest.approx((last + 200.0) / 2.0)
+    for wrong in ((0, 90, 200, 270), (0, 90, 180, 260), (10, 100, 190, 280)):
+        with pytest.raises(SceneError, match="horizontal angles go from"):
+            ies.read(written(lamp(wrong)))
+
+
 def test_a_floor_below_a_lamp(written, tmp_path):
     """Candela over the square of the distance, times the cosine: as native, and as Mitsuba's."""
     path = written(lamp((0, 90, 180, 270, 360)))

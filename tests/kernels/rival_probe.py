@@ -67,7 +67,7 @@ inline Lamp lamp(integer row)
 #define load_path_null_distance(path, at) ((real)(0.0f))
 #define store_path_pending(path, at, m, value)
 #define load_path_sampled_hemisphere(path, at) v3(0.0f, 0.0f, 0.0f)
-#include "lights/receiver_none.cl"
+#include "lights/receiver.cl#none"
 #include "transport/rivals.cl"
 #undef Scene
 #undef Slab
@@ -177,7 +177,7 @@ class VertexProbe:
                 "generated/rival_steps.cl": (
                     *either(merged, "transport/rivals_merging.cl"),
                     *either(joined, "transport/rivals_camera.cl"),
-                    "transport/rival_pdf_none.cl",
+                    "transport/rival_pdf.cl#none",
                 ),
                 "generated/rival_area.cl": ("transport/rival_area.cl",),
                 "world.cl": WORLD,

@@ -7,14 +7,12 @@ from collections import defaultdict
 from fnmatch import fnmatch
 from pathlib import Path
 
-from clpt.device.source import kernels_folder
+from clpt.device.source import TWIN, kernels_folder
 from clpt.render.flow import flags, programs
 from clpt.scene import KINDS
 
 ALTERNATIVES = (  # files, of each row of which a program has one at most
     ("bvh/*_keyed.cl",),
-    ("media/light_media.cl", "media/light_medium_none.cl"),
-    ("media/medium_dims*.cl", "media/light_medium_none.cl"),
     ("media/black_body_*.cl",),
     ("media/flight_medium*.cl",),
     ("transport/rival_area*.cl",),
@@ -35,10 +33,10 @@ ALTERNATIVES = (  # files, of each row of which a program has one at most
     ("materials/shading_frame*.cl", "media/phase_frame.cl"),
     ("lights/kept_*.cl",),
     ("cameras/first_ray*.cl",),
-    ("media/vertex_bodies.cl", "media/vertex_media.cl", "media/vertex_media_none.cl"),
-    ("media/vertex_bodies_ways.cl", "media/vertex_media_ways*.cl"),
-    ("media/vertex_dims.cl", "media/vertex_media_ways_none.cl"),
-    ("transport/guiding/guided_vertex.cl", "transport/guiding/guide_none.cl"),
+    ("media/vertex_bodies.cl", "media/vertex_media.cl"),
+    ("media/vertex_bodies_ways.cl", "media/vertex_media_ways.cl"),
+    ("media/vertex_dims.cl", "media/vertex_media_ways.cl#none"),
+    ("transport/guiding/guide.cl", "transport/guiding/guided_vertex.cl#none"),
     ("transport/guiding/at_*.cl",),
     ("materials/pair*.cl",),
     ("samplers/pixel_sampler*.cl",),
@@ -78,20 +76,27 @@ def defined(text: str) -> dict[str, set[str]]:
 
 
 def files() -> dict[str, str]:
-    """The texts of all kernel files by their paths in the folder."""
-    root = kernels_folder()
-    paths = sorted(root.rglob("*.cl"))
-    return {path.relative_to(root).as_posix(): Path(path).read_text("utf-8") for path in paths}
+    """The texts of all kernel files by their paths in the folder; twins apart."""
+    root, texts = kernels_folder(), {}
+    for path in sorted(root.rglob("*.cl")):
+        name = path.relative_to(root).as_posix()
+        texts[name], begins, twin = path.read_text("utf-8").partition("\n/* Twin, ")
+        if begins:
+            texts[f"{name}{TWIN}"] = begins[1:] + twin
+    return texts
 
 
 def meet(first: str, second: str, texts: dict[str, str]) -> bool:
     """Whether one program may have both files."""
-    if second == f"{first.removesuffix('.cl')}_none.cl":  # the twin that does nothing
+    if second == f"{first}{TWIN}":
         return False
     if second in INCLUDE.findall(texts[first]) or first in INCLUDE.findall(texts[second]):
         return True
     return not any(
-        all(any(fnmatch(name, pattern) for pattern in row) for name in (first, second))
+        all(
+            any(fnmatch(of, pattern) for pattern in row for of in (name, name.removesuffix(TWIN)))
+            for name in (first, second)
+        )
         for row in ALTERNATIVES
     )
 

@@ -164,7 +164,7 @@ _OPTIONS = (
     ),
     click.option(
         "--missing-textures", type=Choice(get_args(Missing)), default="error",
-        help="grey: go on with grey where an image is not there.",
+        help="grey: go on with grey where an image is not there, or a material is unknown.",
     ),
 )  # fmt: skip
 

@@ -37,6 +37,9 @@ def _view(view: Element) -> None:
     end = view.integer("byteOffset", 0) + view.integer("byteLength", low=1)
     if end > buffer.integer("byteLength", low=1):
         raise view.error(f"ends at byte {end}, its buffer has {buffer.integer('byteLength')}")
+    if view.value.get("byteStride") == 0:
+        view.warn("byteStride of 0 is read as none")
+        del view.value["byteStride"]
     view.integer("byteStride", 4, low=4, high=252)
 
 

@@ -24,6 +24,7 @@ from clpt.scalars import is_flag, is_number, is_whole
 
 T = TypeVar("T")
 REQUIRED: Any = object()
+ROUNDING = 1e-6  # by how much a number may exceed its limits, relative to them or to 1
 LARGEST = 2**53  # whole numbers that JSON's readers agree upon
 JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942
 PER_BYTE = 4  # bytes of memory for each of the file, while it is read
@@ -179,9 +180,10 @@ class Element:
             raise self.error(f"must be a number, not {_shown(value)}", key)
         if abs(value) > 1e38:  # beyond what single precision holds; JSON's 1e999 is infinity
             raise self.error(f"{_shown(value)} is too large", key)
-        if not low <= value <= high:
+        near = min(max(value, low), high)  # an exporter's float32 may exceed a limit by rounding
+        if abs(value - near) > ROUNDING * max(abs(near), 1.0):
             raise self.error(f"{value:g} is outside [{low:g}, {high:g}]", key)
-        return float(value)
+        return float(near)
 
     def _in_table(self, value: int, key: str, table: str) -> int:
         count = self.document.root.count(table)

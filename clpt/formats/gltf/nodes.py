@@ -58,7 +58,7 @@ def graph(document: Document, chosen: str | None, pose: Pose) -> Graph:
     scene = _scene(document, chosen)
     starts = roots if scene is None else scene.indices("nodes", "nodes")
     if scene is not None and any(parents[start] >= 0 for start in starts):
-        raise scene.error("names a node that is another's child", "nodes")
+        scene.warn("names a node that is another's child: it stays where its parents put it")
     if scene is not None and len(set(starts)) < len(starts):
         raise scene.error("names a node twice", "nodes")
     return Graph(document, to_world, _descendants(starts, children), pose)

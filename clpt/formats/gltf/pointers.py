@@ -36,12 +36,15 @@ def node_path(names: list[str]) -> tuple[int, str] | None:
 def put(root: Element, names: list[str], values: NDArray[np.float64]) -> bool:
     """Write values where a pointer points to; return whether there is such a place.
 
-    Objects on the way that the file leaves out, as their numbers are the usual ones, are added.
+    Objects on the way that the file leaves out, as their numbers are the usual ones, are added. A
+    texture that the file leaves out is not, as it needs an image.
     """
     if names[0] not in TABLES or len(names) < 3 or (names[0] == "meshes" and names[2:] != [*LISTS]):
         return False
     at: Any = root.value
     for number, name in enumerate(names[:-1]):
+        if name.endswith("Texture") and not (isinstance(at, dict) and name in at):
+            return False
         if isinstance(at, dict) and (number > 1 or name in at):
             at = at.setdefault(name, {})
         elif isinstance(at, list) and name.isdigit() and int(name) < len(at):

@@ -41,12 +41,12 @@ def apply(primitive: Element, made: Geometry, joints: NDArray[np.float64]) -> No
     turned = None if normals is None else normals.astype(np.float64)
     along = made.attributes.get("TANGENT")
     along = None if along is None else along.astype(np.float64)
-    total = sum(weights.sum(axis=1, keepdims=True) for _, weights in pairs)
+    total = _total(primitive, pairs)
     for first in range(0, len(positions), CHUNK):
         part = slice(first, first + CHUNK)
         blend = np.zeros((len(positions[part]), 4, 4))
         for which, weights in pairs:
-            share = np.broadcast_to(weights / np.where(total > 0.0, total, 1.0), which.shape)[part]
+            share = np.broadcast_to(weights / total, which.shape)[part]
             blend += np.einsum("nk,nkij->nij", share, joints[which[part]])
         moved = np.einsum("nij,nj->ni", blend[:, :3, :3], positions[part])
         positions[part] = moved + blend[:, :3, 3]
@@ -59,6 +59,23 @@ def apply(primitive: Element, made: Geometry, joints: NDArray[np.float64]) -> No
         made.attributes["NORMAL"] = turned.astype(np.float32)
     if along is not None:
         made.attributes["TANGENT"] = along.astype(np.float32)
+
+
+def _total(
+    primitive: Element, pairs: list[tuple[NDArray[np.int64], NDArray[np.float64]]]
+) -> NDArray[np.float64]:
+    """Return the sum of each vertex' weights (n, 1); a vertex without any follows joint 0.
+
+    The specification wants a sum of 1. Exporters write vertices without weights, and viewers agree
+    on joint 0 for these.
+    """
+    total = sum(weights.sum(axis=1, keepdims=True) for _, weights in pairs)
+    free = ~(total[:, 0] > 0.0)
+    if free.any():
+        primitive.warn(f"{free.sum():,} vertices have no weights; they follow the joint 0")
+        pairs[0][0][free, 0], pairs[0][1][free, 0] = 0, 1.0
+        total = np.where(free[:, None], 1.0, total)
+    return total
 
 
 def _influences(

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from clpt.formats.gltf import volume
-from clpt.formats.gltf.document import Element
+from clpt.formats.gltf.document import ROUNDING, Element
 from clpt.formats.gltf.textures import texture
 from clpt.scene.materials import GltfSurface
 from clpt.scene.textures import Bitmap, MeshAttribute, Mix, Product, turned
@@ -67,6 +67,7 @@ def colour(
 ) -> Any:
     """Return a factor, times the texture where there is one; of four numbers the first three."""
     rgb = owner.numbers(factor, count, (*default, 1.0)[:count], low=0.0)[:3]
+    rgb = tuple(1.0 if 1.0 < value <= 1.0 + ROUNDING else value for value in rgb)
     child = owner.child(info)
     if child is None:
         return rgb

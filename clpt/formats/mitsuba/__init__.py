@@ -1,7 +1,9 @@
-"""Scenes in Mitsuba 3's XML; names of Mitsuba 0.6 and 2 in camel case are read as well.
+"""Scenes in the XML of Mitsuba 2 and 3, and in that of Mitsuba 0.3 to 0.6.
 
-An unsupported element or an unknown parameter is an error that names the element, the file and the
-line; so a picture is never silently a different one.
+The version of the file decides: one below 2 has the words and defaults of Mitsuba 0.x. An
+unsupported element or an unknown parameter is an error that names the element, the file and the
+line. In files of Mitsuba 0.x, which nobody corrects, an unknown parameter or integrator is told
+instead.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from clpt.choices import Missing
-from clpt.formats.mitsuba import sensors
+from clpt.formats.mitsuba import old_words, sensors
 from clpt.formats.mitsuba.bsdfs import bsdf
 from clpt.formats.mitsuba.emitters import emitter
 from clpt.formats.mitsuba.grids import Bounds
@@ -41,6 +43,8 @@ def load(path: Path, missing: Missing = "error", /, **variables: object) -> Scen
     supported.
     """
     document = parse(path, variables)
+    if document.is_old:
+        document.renamed = old_words.rename(document.root)
     context = Context(document, missing)
     scene = _scene(path, document, context)
     if not context.endless:
@@ -107,7 +111,7 @@ def _scene(path: Path, document: Document, context: Context) -> Scene:
         spp=4 if first is None else first.spp,
         seed=0 if first is None else first.seed,
         name=path.stem,
-        warnings=context.warnings,
+        warnings=[*context.warnings, *context.grouped()],
         extra={
             "format": "mitsuba",
             "variables": dict(document.variables),

@@ -38,6 +38,10 @@ SMOOTHEST = 1e-4  # Mitsuba's own floor of a roughness
 # metals of Mitsuba without free data
 WITHOUT_DATA = ("Cu2O", "CuO", "HgTe", "Se", "Se-e", "SnTe", "Ta")
 GREY_METAL = 0.3  # what they reflect head-on
+PHONG = ("phong", "as")  # distributions of Mitsuba 0.6, of exponent 2 / alpha^2 - 2
+MOST_PARTS = 32  # of a `mixturebsdf`
+TINY = 1e-30
+AIR = 1.000277  # the default of `ext_eta`: src/bsdfs/ior.h
 
 
 def bsdf(element: Element, context: Context) -> Material:
@@ -46,15 +50,15 @@ def bsdf(element: Element, context: Context) -> Material:
 
 
 def _bsdf(element: Element, context: Context) -> Material:
+    name = element.attributes.get("id", "")
     if element.type not in PLUGINS:
-        raise unknown(element, PLUGINS)
+        return context.stand_in(unknown(element, PLUGINS), element, materials.Diffuse(name=name))
     cls, read = PLUGINS[element.type]
     props = Properties(element, context)
     with element.locating():
-        given = within(cls, read(props), props)
-        made = cls(name=element.attributes.get("id", ""), **given)
+        material = cls(name=name, **within(cls, read(props), props))
     props.finish()
-    return made
+    return material
 
 
 def _diffuse(props: Properties) -> Parameters:
@@ -94,6 +98,8 @@ def _rough_dielectric(props: Properties) -> Parameters:
 
 def _metal(props: Properties) -> Parameters:
     around = _around(props)
+    if props.context.old:
+        return _old_metal(props, around)
     named = "material" in props.named
     if named and ("eta" in props.named or "k" in props.named):
         raise props.element.error("give either 'material' or 'eta' and 'k', not both")
@@ -106,11 +112,28 @@ def _metal(props: Properties) -> Parameters:
     return {"eta": over(eta, around), "k": over(k, around)}
 
 
+def _old_metal(props: Properties, around: float) -> Parameters:
+    """Take Mitsuba 0.6's metal: copper by default (src/bsdfs/conductor.cpp), `eta` and `k` over it.
+
+    The name `none` is a mirror.
+    """
+    child = props.take("material")
+    if child is None:
+        eta, k = spectra.metal("Cu")
+    else:
+        with child.locating():
+            eta, k = _named_metal(child, props.context)
+    return {
+        "eta": over(index(props, "eta", eta), around),
+        "k": over(index(props, "k", k), around),
+    }
+
+
 def _around(props: Properties) -> float:
-    """Take Mitsuba 0.6's index of what is around a metal, over which its own index counts."""
+    """Take Mitsuba 0.6's index around a metal, by which eta and k are divided."""
     child = props.named.get("ext_eta")
     if child is None:
-        return 1.0
+        return AIR if props.context.old else 1.0
     around = ior(props, "ext_eta", "air")
     around = around.value if isinstance(around, Constant) else around
     if not isinstance(around, float) or around <= 0.0:
@@ -166,7 +189,12 @@ def _layer(element: Element, context: Context) -> materials.Layer:
 
 def _distribution(props: Properties) -> str:
     props.ignore("sample_visible")
-    return props.text("distribution", "beckmann", materials.DISTRIBUTIONS)
+    known = (*materials.DISTRIBUTIONS, *(PHONG if props.context.old else ()))
+    distribution = props.text("distribution", "beckmann", known)
+    if distribution in PHONG:
+        props.context.read_as(props.element, f"distribution {distribution!r}", "beckmann")
+        return "beckmann"
+    return distribution
 
 
 def _roughness(props: Properties) -> Parameters:
@@ -269,6 +297,32 @@ def _blend(props: Properties) -> Parameters:
     return {"first": first, "second": second, "weight": _share(props, "weight")}
 
 
+def _mixture(props: Properties) -> Parameters:
+    """Read Mitsuba 0.6's `mixturebsdf`: nested blends; the share that the weights lack absorbs."""
+    child = props.take("weights")
+    if child is None:
+        raise props.element.error("needs the parameter 'weights'")
+    weights = numbers(child, "value")
+    parts = _nested(props, 1, MOST_PARTS)
+    if len(weights) != len(parts) or min(weights) < 0.0 or not sum(weights) > 0.0:
+        message = f"must be {len(parts)} numbers, one for each <bsdf>, none of them negative"
+        raise child.error(message)
+    if sum(weights) > 1.0:
+        props.context.warn(child, "the weights exceed 1 in all: they are divided by their sum")
+        weights = [weight / sum(weights) for weight in weights]
+    parts.append(materials.Diffuse(reflectance=0.0))
+    weights.append(max(1.0 - sum(weights), 0.0))
+    mixed, total = parts[0], weights[0]
+    for part, weight in list(zip(parts, weights, strict=True))[1:-1]:
+        total += weight
+        mixed = materials.Blend(first=mixed, second=part, weight=weight / max(total, TINY))
+    return {"first": mixed, "second": parts[-1], "weight": weights[-1]}
+
+
+def _diffuse_transmission(props: Properties) -> Parameters:
+    return {"transmittance": reflectance(props, "transmittance", 0.5), "reflectance": 0.0}
+
+
 def _share(props: Properties, name: str) -> Any:
     value = real(props, name, 0.5)
     return value if isinstance(value, Texture) else min(max(value, 0.0), 1.0)
@@ -332,6 +386,8 @@ PLUGINS: dict[str, tuple[type[Material], Callable[[Properties], Parameters]]] = 
     "fluorescent": (materials.Fluorescent, fluorescent),
     "hair": (materials.Hair, hair),
     "measured": (materials.Measured, _measured),
+    "difftrans": (materials.DiffuseTransmission, _diffuse_transmission),
+    "mixturebsdf": (materials.Blend, _mixture),
     "null": (materials.Null, _null),
     "twosided": (materials.TwoSided, _two_sided),
     "mask": (materials.Mask, _mask),

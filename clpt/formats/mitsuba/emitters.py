@@ -17,6 +17,7 @@ from clpt.formats.mitsuba.media import around
 from clpt.formats.mitsuba.properties import Context, Properties, unknown
 from clpt.formats.mitsuba.sensors import from_focal_length
 from clpt.formats.mitsuba.spectra import TOP_DOWN, emission, reflectance
+from clpt.formats.mitsuba.sun import sun_direction
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene import lights
 from clpt.scene.lights import Light
@@ -33,14 +34,15 @@ def emitter(element: Element, context: Context) -> Light | None:
             return None
         raise element.error("an area light must stand in a <shape>, or have an id for references")
     if element.type not in PLUGINS:
-        raise unknown(element, [*PLUGINS, *ON_SHAPES])
+        return context.stand_in(unknown(element, [*PLUGINS, *ON_SHAPES]), element, None)
     return _make(element, context, *PLUGINS[element.type])
 
 
-def area(element: Element, context: Context) -> Light:
+def area(element: Element, context: Context) -> Light | None:
     """Make the light that an <emitter> inside a shape describes."""
     if element.type not in ON_SHAPES:
-        raise element.error("only an area light can stand in a <shape>")
+        error = element.error("only an area light can stand in a <shape>")
+        return context.stand_in(error, element, None)
     return _make(element, context, *ON_SHAPES[element.type])
 
 
@@ -54,9 +56,9 @@ def _make(
     props.ignore("sampling_weight")
     around(props)  # a ray to it knows its medium from where it begins
     with element.locating():
-        made = cls(**within(cls, read(props), props), motion=props.motion)
+        light = cls(**within(cls, read(props), props), motion=props.motion)
     props.finish()
-    return made
+    return light
 
 
 def _area(props: Properties) -> Parameters:
@@ -164,26 +166,43 @@ def _envmap(props: Properties) -> Parameters:
     }
 
 
-def _sky(props: Properties) -> Parameters:
-    """Mitsuba's skies, whose up is +z; their turbidity as haze after Angstrom (Preetham 1999)."""
+def _sun_direction(props: Properties) -> Any:
+    """Take the direction to the sun (3,): of the file, or in old files of a date and a place."""
     element = props.element
+    if "sun_direction" not in props.named and props.context.old:
+        return sun_direction(props)
     if "sun_direction" not in props.named:
         raise element.error(
             "needs a 'sun_direction'; of a place and a time, compute it: that of the sun in the "
             "emitter's own space, +z up"
         )
     d = np.array(props.vector("sun_direction", None))
-    place = props.placement()
     if not np.any(d):
         raise element.error("the sun_direction has no length")
-    d = np.linalg.inv(place[:3, :3]) @ d  # it is given in the world
-    elevation = float(np.degrees(np.arctan2(d[2], np.hypot(d[0], d[1]))))
+    return d
+
+
+def _sky(props: Properties) -> Parameters:
+    """Mitsuba's skies; their turbidity as haze after Angstrom (Preetham 1999).
+
+    Up is +z; in Mitsuba 0.x +y, src/emitters/sunsky/sunmodel.h.
+    """
+    element, old = props.element, props.context.old
+    dated = old and "sun_direction" not in props.named
+    d = _sun_direction(props)
+    own = props.placement()
+    if not dated:
+        d = np.linalg.inv(own[:3, :3]) @ d  # the file gives it in the world
+    place = own if old else own @ transforms.rotate([1, 0, 0], 90.0)  # +y up
+    east, above, south = d if old else (d[0], d[2], -d[1])
+    elevation = float(np.degrees(np.arctan2(above, np.hypot(east, south))))
     turbidity = props.number("turbidity", 3.0)
     if not 1.0 <= turbidity <= 10.0:
         raise element.error("'turbidity' must lie between 1 and 10")
     haze = max(0.04608 * turbidity - 0.04586, 0.0) * 0.55**-1.3
     props.ignore("sun_aperture", "complex_sun", "sun_aperture_scale")
-    ground = reflectance(props, "albedo", 0.3)
+    ground = reflectance(props, "albedo", 0.15 if old else 0.3)
+    scale = props.number("scale", 1.0) if old else 1.0
     if isinstance(ground, Texture):
         raise element.error("'albedo' cannot be a texture")
     props.context.warn(
@@ -192,13 +211,27 @@ def _sky(props: Properties) -> Parameters:
     )  # fmt: skip
     return {
         "sun_elevation": elevation,
-        "sun_azimuth": float(np.degrees(np.arctan2(d[0], -d[1]))),
+        "sun_azimuth": float(np.degrees(np.arctan2(east, south))),
         "aerosol": min(haze, 2.0),
         "ground": ground,
-        "sun_scale": props.number("sun_scale", 1.0),
-        "sky_scale": props.number("sky_scale", 1.0),
-        "to_world": place @ transforms.rotate([1, 0, 0], 90.0),  # +y up
+        "sun_scale": 0.0 if element.type == "sky" else scale * props.number("sun_scale", 1.0),
+        "sky_scale": 0.0 if element.type == "sun" else scale * props.number("sky_scale", 1.0),
+        "to_world": place,
     }
+
+
+def _old_sky(props: Properties) -> Parameters:
+    """Read Mitsuba 0.x's `sky` and `sun`: parts of its `sunsky`."""
+    if not props.context.old:
+        raise unknown(props.element, [*PLUGINS, *ON_SHAPES])
+    return _sky(props)
+
+
+def _collimated(props: Properties) -> Parameters:
+    raise props.element.error(
+        "is a beam without width, which no camera sees and no light path meets: take a 'spot' of a "
+        "small cutoff_angle"
+    )
 
 
 ON_SHAPES: dict[str, tuple[type[Light], Callable[[Properties], Parameters]]] = {
@@ -213,5 +246,8 @@ PLUGINS: dict[str, tuple[type[Light], Callable[[Properties], Parameters]]] = {
     "constant": (lights.Constant, _constant),
     "envmap": (lights.Envmap, _envmap),
     "sunsky": (lights.Sky, _sky),
+    "sky": (lights.Sky, _old_sky),
+    "sun": (lights.Sky, _old_sky),
+    "collimated": (lights.Directional, _collimated),
     "ies": (lights.Goniometric, _ies),
 }

@@ -81,7 +81,7 @@ def _read(element: Element, context: Context) -> Volume:
     path, to_world = props.file(), props.placement()
     with element.locating():
         values, box = vol.read_channels(path)
-    if props.flag("use_grid_bbox", False):
+    if props.flag("use_grid_bbox", context.old):  # 0.6: src/volume/gridvolume.cpp
         to_world = to_world @ box
     if props.text("wrap_mode", "clamp", ("clamp", "repeat", "mirror")) != "clamp":
         context.warn(element, "at its ends the grid goes on as 'clamp'")

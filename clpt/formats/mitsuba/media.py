@@ -7,16 +7,19 @@ from typing import Any
 
 import numpy as np
 
+from clpt.errors import UnknownKindError
 from clpt.formats.mitsuba import grids, spectra
 from clpt.formats.mitsuba.fluorescence import dye, fluorescent
 from clpt.formats.mitsuba.limits import within
-from clpt.formats.mitsuba.properties import Context, Properties, unknown
+from clpt.formats.mitsuba.properties import Context, Properties, numbers, unknown
 from clpt.formats.mitsuba.xml import Element
+from clpt.formats.pbrt.coated_albedo import MEDIA as MEASURED
 from clpt.scene import media, phases
 from clpt.scene.media import Grid, Homogeneous, Medium
 from clpt.scene.phases import Phase
 from clpt.scene.textures import Texture
 from clpt.scene.volumes import Volume
+from clpt.spectra import RGBUnbounded
 
 
 def medium(element: Element, context: Context) -> Medium:
@@ -60,7 +63,7 @@ def _made(element: Element, context: Context, plugins: dict[str, Any]) -> Any:
 
 
 def _homogeneous(props: Properties) -> Medium:
-    """A medium that is the same everywhere, but for what grids say of its albedo or scattering."""
+    """A medium that is the same everywhere, or has its albedo or its scattering on a grid."""
     if (density := grids.grid(props, "sigma_t")) is not None:
         raise density.error('a density on a grid needs a medium of the type "heterogeneous"')
     albedo, weight = grids.grid(props, "albedo"), _weight(props)
@@ -84,17 +87,52 @@ def _even(props: Properties) -> Homogeneous:
     props.ignore("has_spectral_extinction", "sample_emitters")  # both are found
     blend = _blend_on_grid(props)
     child = props.object("phase")
-    found = phases.Isotropic() if child is None else blend or phase(child, props.context)
-    given = {
-        "sigma_t": spectra.coefficient(props, "sigma_t", 1.0),
-        "albedo": spectra.reflectance(props, "albedo", 0.75),
+    parameters = _old_coefficients(props) if props.context.old else None
+    if parameters is None:
+        parameters = {
+            "sigma_t": spectra.coefficient(props, "sigma_t", 1.0),
+            "albedo": spectra.reflectance(props, "albedo", 0.75),
+        }
+    isotropic: Phase = phases.Isotropic()
+    parameters |= {
         "scale": props.number("scale", 1.0),
-        "phase": found,
+        "phase": isotropic if child is None else blend or phase(child, props.context),
         "name": props.element.attributes.get("id", ""),
     }
     if "emission" in props.named:
-        given["emission"] = spectra.emission(props, "emission")
-    return Homogeneous(**within(Homogeneous, given, props))
+        parameters["emission"] = spectra.emission(props, "emission")
+    return Homogeneous(**within(Homogeneous, parameters, props))
+
+
+def _old_coefficients(props: Properties) -> dict[str, Any] | None:
+    """Take Mitsuba 0.6's `sigma_a` and `sigma_s`, or a preset (src/medium/materials.h).
+
+    None where the file gives `sigma_t` or `albedo`. The preset Skin1 is the default.
+    """
+    if props.element.type != "homogeneous":
+        return None
+    names = ("sigma_a", "sigma_s")
+    if any(name in props.named for name in names):
+        return {name: spectra.coefficient(props, name) for name in names}
+    if any(name in props.named for name in ("sigma_t", "albedo")):
+        return None
+    name = props.text("material", "skin1")
+    presets = {_plain_name(known): values for known, values in MEASURED.items()}
+    if _plain_name(name) not in presets:
+        raise UnknownKindError("medium", name, MEASURED, **props.element.location())
+    scattering, absorption = presets[_plain_name(name)]
+    props.context.warn(
+        props.element, f"has the measured coefficients of {name} per metre, times its scale"
+    )
+    per_metre = {"sigma_a": absorption, "sigma_s": scattering}
+    return {
+        name: RGBUnbounded(*(1000.0 * value for value in values))
+        for name, values in per_metre.items()
+    }
+
+
+def _plain_name(name: str) -> str:
+    return "".join(name.lower().split()).replace("_", "")
 
 
 def _weight(props: Properties) -> Element | None:
@@ -182,6 +220,21 @@ def _blend(props: Properties) -> Phase:
     return phases.Blend(weight=min(max(share, 0.0), 1.0), first=first, second=second)
 
 
+def _mixed_phase(props: Properties) -> Phase:
+    """Read Mitsuba 0.6's `mixturephase`: nested blends by `weights`, which are divided by their
+    sum."""
+    child = props.take("weights")
+    parts = [phase(one, props.context) for one in props.objects("phase")]
+    weights = [] if child is None else numbers(child, "value")
+    if not parts or len(weights) != len(parts) or min(weights) < 0.0 or not sum(weights) > 0.0:
+        raise props.element.error("needs 'weights', a number above 0 for each <phase> in it")
+    mixed, total = parts[0], weights[0]
+    for part, weight in list(zip(parts, weights, strict=True))[1:]:
+        total += weight
+        mixed = phases.Blend(first=mixed, second=part, weight=weight / total if total else 0.5)
+    return mixed
+
+
 def _halves(props: Properties) -> list[Phase]:
     parts = [phase(one, props.context) for one in props.objects("phase")]
     if len(parts) != 2:
@@ -203,6 +256,8 @@ def _heterogeneous(props: Properties) -> Medium:
     """
     context, more = props.context, _more(props)
     sigma_t, weight = grids.grid(props, "sigma_t"), _weight(props)
+    if context.old and sigma_t is None:
+        return _homogeneous(props)  # in 0.6 the shape bounds it
     albedo = grids.grid(props, "albedo")
     tint = None if albedo is None else grids.colours(albedo, context)
     share = None if weight is None else grids.one_channel(weight, context)
@@ -300,6 +355,7 @@ MEDIA: dict[str, Callable[[Properties], Medium]] = {
     "mixture": _mixture,
 }
 PHASES: dict[str, Callable[[Properties], Phase]] = {
+    "mixturephase": _mixed_phase,
     "isotropic": lambda props: phases.Isotropic(),
     "hg": lambda props: phases.HenyeyGreenstein(g=props.number("g", 0.8)),
     "rayleigh": lambda props: phases.Rayleigh(),

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from clpt.formats.missing import GREY, grey_for
 from clpt.formats.mitsuba.xml import MAX_NESTING, Document, Element
 from clpt.scene.motion import Keys
 
+OLD_VALUES, OLD_OBJECTS = {"blackbody"}, {"subsurface"}  # of Mitsuba 0.x alone
 VALUES = {
     "integer", "float", "string", "boolean", "vector", "point", "rgb", "srgb", "spectrum",
     "transform", "animation",
@@ -32,17 +33,20 @@ UNSUPPORTED = {
     "timed_sunsky", "distant", "irradiancemeter", "radiancemeter", "batch", "specfilm",
     "stokes",
 }  # fmt: skip
+LEFT_OUT = VALUES | OLD_VALUES | {"texture"}  # parameters that old files may have in vain
+MOST_NOTES, MOST_LINES = 16, 3  # notes of a warning, and lines of a note
 FLAT_SIZE = 1e-5  # thickness over size of a shape that is flattened
 SEPARATOR = re.compile(r"[\s,]+")
 LARGEST_INTEGER = 2**31 - 1
+T = TypeVar("T")
 
 
 class Context:
     """State that all parts of the loader share: the document, its ids, the objects made, warnings.
 
     layers: of the film, which integrators ask for; rooms: the corners of the box that each endless
-    medium fills, by the id of its element; endless: media of which that is still to be known;
-    volumes: what was read of grids.
+    medium fills, by the id of its element; endless: media whose boxes are still unknown;
+    volumes: the grids that were read; old: whether the file is of Mitsuba 0.x.
     """
 
     def __init__(
@@ -52,6 +56,11 @@ class Context:
         rooms: Mapping[int, tuple[NDArray[Any], NDArray[Any]]] = MappingProxyType({}),
     ):
         self.document, self.missing, self.rooms = document, missing, rooms
+        self.old = document.is_old
+        self.left_out: dict[str, list[int]] = {}
+        self.replaced: dict[str, list[int]] = {}
+        for element, old, new in document.renamed:
+            self.read_as(element, f"{element.tag} {old!r}", new)
         self.endless: dict[int, Any] = {}
         self.volumes: dict[tuple[str, int], Any] = {}
         self.warnings: list[str] = []
@@ -59,12 +68,20 @@ class Context:
         self.ids: dict[str, Element] = {}
         self._made: dict[int, Any] = {}
         self._open = 0  # how many objects are being made, in each other
+        self._named: dict[int, Element] = {}  # the object of each <ref> of an old file
         for element in document.root.walk():
             name = element.attributes.get("as" if element.tag == "alias" else "id")
-            if name is not None and element.tag != "ref":
-                if name in self.ids:
-                    raise element.error(f"the id {name!r} is already used in this scene")
-                self.ids[name] = self.resolve(element)
+            if name is None:
+                continue
+            if element.tag == "ref":
+                if self.old and name in self.ids:
+                    self._named[id(element)] = self.ids[name]
+                continue
+            if name in self.ids and not self.old:
+                raise element.error(f"the id {name!r} is already used in this scene")
+            if name in self.ids:
+                self.warn(element, f"the id {name!r} is given again: this object counts from here")
+            self.ids[name] = self.resolve(element)
 
     def resolve(self, element: Element) -> Element:
         """Return the object that a <ref> names; any other element is returned as it is.
@@ -76,7 +93,7 @@ class Context:
         name = element.attribute("id")
         if name not in self.ids:
             raise element.error(f"there is no object with the id {name!r}")
-        return self.ids[name]
+        return self._named.get(id(element), self.ids[name])
 
     def once(self, element: Element, make: Callable[[Element], Any]) -> Any:
         """Return make(element), the same object for every reference to the element.
@@ -100,6 +117,40 @@ class Context:
         """Warn of what the picture will lack."""
         self.warnings.append(f"{element.file.name}:{element.line}: {element.label()}: {message}")
 
+    def leave_out(self, element: Element, words: str) -> None:
+        """Note words of an old file that change no expected picture, for `grouped`."""
+        self.left_out.setdefault(words, []).append(element.line)
+
+    def read_as(self, element: Element, words: str, today: str) -> None:
+        """Note a plugin of an old file for which another stands, for `grouped`."""
+        self.replaced.setdefault(f"{words} as {today}", []).append(element.line)
+
+    def stand_in(self, error: SceneError, element: Element, grey: T) -> T:
+        """Return what stands for an unknown plugin where missing ones are grey; else raise."""
+        if self.missing == "error":
+            raise error
+        self.warn(element, f"{error.message}; {'grey stands for it' if grey else 'left out'}")
+        return grey
+
+    def grouped(self) -> list[str]:
+        """Return one warning of all notes, or none."""
+        version = self.document.root.attributes.get("version", "")
+        groups = (("read", self.replaced), ("left out", self.left_out))
+        texts = [f"{verb}: {_with_lines(notes)}" for verb, notes in groups if notes]
+        name = self.document.root.file.name
+        return [f"{name}: of Mitsuba {version}: {'; '.join(texts)}"] if texts else []
+
+
+def _with_lines(notes: Mapping[str, Sequence[int]]) -> str:
+    """Return notes with the lines of the first few places of each."""
+    shown = []
+    for words, places in list(notes.items())[:MOST_NOTES]:
+        lines = sorted(set(places))
+        more = " and more" if len(lines) > MOST_LINES else ""
+        shown.append(f"{words} (line {', '.join(map(str, lines[:MOST_LINES]))}{more})")
+    more = f", and {len(notes) - MOST_NOTES} more" if len(notes) > MOST_NOTES else ""
+    return ", ".join(shown) + more
+
 
 class Properties:
     """The children of an object element; `finish` refuses those that nothing has read."""
@@ -111,18 +162,32 @@ class Properties:
         self.read: list[str] = []
         self.motion: Keys | None = None  # of an <animation> that was taken as a transform
         for child in element.children:
-            if child.tag == "alias":
-                continue
-            if child.tag not in VALUES and child.tag not in OBJECTS:
-                raise child.error("is not supported")
-            if not child.name and child.tag in VALUES and not child.type:
-                raise child.error("needs the attribute 'name'")
-            if child.name in self.named:
+            if child.tag != "alias" and self._is_known(child):
+                self._add(child)
+
+    def _is_known(self, child: Element) -> bool:
+        """Whether the version of the file has an element; else SceneError, told in old files."""
+        if child.tag in VALUES or child.tag in OBJECTS:
+            return True
+        if self.context.old and (child.tag in OLD_VALUES or child.tag in OLD_OBJECTS):
+            return True
+        if not self.context.old:
+            raise child.error("is not supported")
+        self.context.leave_out(child, f"element <{child.tag}>")
+        return False
+
+    def _add(self, child: Element) -> None:
+        is_value = child.tag in VALUES or child.tag in OLD_VALUES
+        if not child.name and is_value and not child.type:
+            raise child.error("needs the attribute 'name'")
+        if child.name in self.named:
+            if not self.context.old:
                 raise child.error(f"{child.name!r} is given twice")
-            if child.name and (child.tag in VALUES or child.tag in ("texture", "volume", "ref")):
-                self.named[child.name] = child
-            else:
-                self.nested.append(child)
+            self.context.warn(child, f"{child.name!r} is given twice: the later value counts")
+        if child.name and (is_value or child.tag in ("texture", "volume", "ref")):
+            self.named[child.name] = child
+        else:
+            self.nested.append(child)
 
     def take(self, name: str) -> Element | None:
         """Take a parameter's element, or None where it is not given."""
@@ -282,9 +347,15 @@ class Properties:
         return matrix
 
     def finish(self) -> None:
-        """Raise UnusedParameterError or SceneError for what nothing has read."""
+        """Raise UnusedParameterError or SceneError for what nothing has read.
+
+        Parameters of old files are told instead.
+        """
         label = f"{self.element.tag} {self.element.type!r}".replace(" ''", "")
         for name, child in self.named.items():
+            if self.context.old and self.context.resolve(child).tag in LEFT_OUT:
+                self.context.leave_out(child, f"{name!r} of {label}")
+                continue
             raise UnusedParameterError(label, name, set(self.read), **child.location())
         for child in self.nested:
             self.context.resolve(child)

@@ -31,6 +31,8 @@ LENS_CHOICES = {
 }  # fmt: skip
 FILMS = ("hdrfilm", "clptfilm")
 SAMPLERS = ("independent", "stratified", "multijitter", "orthogonal", "ldsampler")
+HOLDERS = ("adaptive", "irrcache", "multichannel")  # integrators of Mitsuba 0.6 around another
+NO_LIGHT = ("ao", "field", "motion")  # integrators of Mitsuba 0.6 whose values are no light
 REPLAYED_DEPTH = 6  # default of what differentiates
 DEFAULT_SAMPLER = "independent"
 LAYERS = {  # of the values that the integrator aov names
@@ -225,8 +227,10 @@ def from_focal_length(props: Properties) -> float:
 
 
 def _film(element: Element, context: Context) -> Film:
-    if element.type not in FILMS:
+    if element.type not in FILMS and not context.old:
         raise unknown(element, FILMS)
+    if element.type not in FILMS:
+        context.read_as(element, f"film {element.type!r}", "hdrfilm")
     props = Properties(element, context)
     # How a file is stored is decided when it is written.
     props.ignore("file_format", "pixel_format", "component_format", "sample_border", "compensate")
@@ -281,9 +285,9 @@ def _filter(element: Element, context: Context) -> Filter:
     if element.type not in makers:
         raise unknown(element, makers)
     with element.locating():
-        made = makers[element.type]()
+        chosen = makers[element.type]()
     props.finish()
-    return made
+    return chosen
 
 
 def _lanczos(lobes: float) -> Filter:
@@ -302,8 +306,10 @@ def _sampler(element: Element | None, context: Context) -> tuple[str, int, int]:
     """Return the sampler's name, the samples of a pixel and the seed."""
     if element is None:
         return DEFAULT_SAMPLER, 4, 0
-    if element.type not in SAMPLERS:
+    if element.type not in SAMPLERS and not context.old:
         raise unknown(element, SAMPLERS)
+    if element.type not in SAMPLERS:
+        context.read_as(element, f"sampler {element.type!r}", DEFAULT_SAMPLER)
     props = Properties(element, context)
     spp, seed = props.integer("sample_count", 4, 1), props.integer("seed", 0)
     props.ignore("jitter", "strength")
@@ -317,14 +323,30 @@ def integrator(element: Element, context: Context) -> Integrator:
 
 
 def _integrator(element: Element, context: Context) -> Integrator:
-    if element.type not in INTEGRATORS:
+    kind = element.type
+    if kind not in INTEGRATORS and (not context.old or kind in NO_LIGHT):
         raise unknown(element, INTEGRATORS)
     props = Properties(element, context)
     props.ignore("block_size", "samples_per_pass", "timeout")
     with element.locating():
-        made = INTEGRATORS[element.type](props)
+        if kind in HOLDERS and context.old:
+            chosen = _inner(props)
+        elif kind in INTEGRATORS:
+            chosen = INTEGRATORS[kind](props)
+        else:
+            context.read_as(element, f"integrator {kind!r}", "path")
+            chosen = _path(props)
     props.finish()
-    return made
+    return chosen
+
+
+def _inner(props: Properties) -> Integrator:
+    """Make the integrator that one of Mitsuba 0.6 holds: its picture, faster or in parts."""
+    nested = props.object("integrator")
+    if nested is None:
+        raise props.element.error("needs a nested <integrator>")
+    props.context.read_as(props.element, f"integrator {props.element.type!r}", nested.type)
+    return integrator(nested, props.context)
 
 
 def _depths(props: Properties, usual: int = -1) -> dict[str, Any]:

@@ -16,18 +16,20 @@ from clpt.formats import volumes
 from clpt.formats.meshes import mesh, strands
 from clpt.formats.mitsuba import serialized
 from clpt.formats.mitsuba.bsdfs import bsdf
+from clpt.formats.mitsuba.creases import creased
 from clpt.formats.mitsuba.emitters import area
 from clpt.formats.mitsuba.media import side
 from clpt.formats.mitsuba.properties import Context, NoArea, Properties, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.geometry.normals import smooth_normals
 from clpt.scene import shapes
-from clpt.scene.materials import Diffuse
+from clpt.scene.materials import Diffuse, Material, Null
 from clpt.scene.shapes import Group, Instance, Shape
 
 Parameters = dict[str, Any]
 SDF_PIECES = 4  # of the side of a cell
 UNEVEN = 1e-3  # relative stretch of round shapes that a transform may have
+METER = "a sensor on a shape gives a number and no picture: clpt has none"
 STRETCH = "stretch"  # no parameter: a transform that the shape takes as an instance
 
 
@@ -44,8 +46,18 @@ def shapes_of(elements: Iterable[Element], context: Context) -> list[Shape]:
             made += shapes_of(_merged(element, context), context)
         else:
             with suppress(NoArea):
-                made.append((_instance if element.type == "instance" else shape)(element, context))
+                made += _single(element, context)
     return made
+
+
+def _single(element: Element, context: Context) -> list[Shape]:
+    """Make the shape of an element; none of an unknown kind where missing ones are grey."""
+    if element.type == "instance":
+        return [_instance(element, context)]
+    if element.type not in PLUGINS:
+        known = (*PLUGINS, "shapegroup", "instance", "merge")
+        return context.stand_in(unknown(element, known), element, [])
+    return [shape(element, context)]
 
 
 def _merged(element: Element, context: Context) -> list[Element]:
@@ -60,17 +72,18 @@ def _merged(element: Element, context: Context) -> list[Element]:
 
 def shape(element: Element, context: Context) -> Shape:
     """Make the shape that a <shape> describes, which is no group and no instance."""
-    if element.type not in PLUGINS:
-        raise unknown(element, (*PLUGINS, "shapegroup", "instance", "merge"))
     cls, read = PLUGINS[element.type]
     props = Properties(element, context)
     props.ignore("silhouette_sampling_weight")
     material, emitter = props.object("bsdf"), props.object("emitter")
+    for sensor in props.objects("sensor"):
+        raise sensor.error(METER)
+    media = {name: side(props, name) for name in ("interior", "exterior")}
+    default = _default_material(emitter, in_medium=context.old and any(media.values()))
     parameters: Parameters = {
-        "material": _default_material(emitter) if material is None else bsdf(material, context),
+        "material": default if material is None else bsdf(material, context),
         "emission": None if emitter is None else area(emitter, context),
-        "interior": side(props, "interior"),
-        "exterior": side(props, "exterior"),
+        **media,
         "flip_normals": props.flag("flip_normals", False),
         "name": element.attributes.get("id", ""),
     }
@@ -119,8 +132,13 @@ def _group(element: Element, context: Context) -> Group:
     return context.once(element, make)
 
 
-def _default_material(emitter: Element | None) -> Diffuse:
-    """Return the material of a shape without a bsdf: grey, but black where it emits."""
+def _default_material(emitter: Element | None, in_medium: bool) -> Material:
+    """Return the material of a shape without a bsdf: grey, but black where it emits.
+
+    in_medium: whether Mitsuba 0.6 lets light through, as at the border of a medium: shape.cpp.
+    """
+    if in_medium:
+        return Null()
     return Diffuse() if emitter is None else Diffuse(reflectance=0.0)
 
 
@@ -195,6 +213,7 @@ def _mesh(props: Properties, suffix: str, *, flip_v: bool) -> Parameters:
     """Read a mesh into world space, where Mitsuba makes the normals that the file lacks."""
     path = props.file()
     flat = props.flag("face_normals", False)
+    crease = props.number("max_smooth_angle", -1.0) if props.context.old else -1.0
     to_world = props.placement(thin=True)
     if path.suffix.lower() != suffix:
         raise props.element.error(f"{path.name!r} is not a {suffix} file")
@@ -209,6 +228,8 @@ def _mesh(props: Properties, suffix: str, *, flip_v: bool) -> Parameters:
         raise props.element.error(f"{path.name}: {error.message}") from None
     for warning in warnings:
         props.context.warn(props.element, f"{path.name}: {warning}")
+    if crease >= 0.0 and not flat:
+        whole = creased(whole, crease)
     vertices = transforms.transform_points(to_world, whole.vertices).astype(np.float32)
     uvs = whole.uvs
     if uvs is not None and flip_v:

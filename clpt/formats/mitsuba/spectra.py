@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from clpt import spectra
+from clpt import images, spectra
 from clpt.errors import UnknownKindError
 from clpt.formats.colour import colour
+from clpt.formats.missing import GREY
 from clpt.formats.mitsuba.properties import (
     Context,
     Properties,
@@ -25,7 +26,15 @@ from clpt.formats.mitsuba.properties import (
 )
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene.roles import COEFFICIENT, EMISSION, FACTOR, INDEX, REFLECTANCE, Spectral
-from clpt.scene.textures import ATTRIBUTES, Bitmap, Checkerboard, MeshAttribute, Product, Texture
+from clpt.scene.textures import (
+    ATTRIBUTES,
+    Bitmap,
+    Checkerboard,
+    MeshAttribute,
+    Mix,
+    Product,
+    Texture,
+)
 from clpt.spectra import (
     LED,
     RGB,
@@ -43,6 +52,9 @@ from clpt.spectra.spectrum import WIDEST, Outside
 
 LUMINANCE = (0.212671, 0.715160, 0.072169)  # of Rec. 709, as Mitsuba has it
 VOLUMES = ("constvolume", "gridvolume")
+WRAPS = ("repeat", "clamp", "mirror", "zero")
+CHANNELS = ("luminance", "r", "g", "b", "a")
+GRID_TEXELS = 1024  # of a side of the image of a `gridtexture`
 TOP_DOWN = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
 
 
@@ -179,7 +191,9 @@ def _spectrum(child: Element, role: Spectral, props: Properties, name: str) -> A
         value = number(child)
         return colour(role, [value] * 3) if role is EMISSION else value
     if child.tag in ("rgb", "srgb"):
-        return colour(role, _colour(child))
+        return colour(role, _colour(child, props.context))
+    if child.tag == "blackbody":
+        return _old_blackbody(child)
     if child.tag not in ("spectrum", "texture"):
         raise child.error("must be a number, a colour, a spectrum or a texture")
     if child.type:
@@ -193,22 +207,49 @@ def _spectrum(child: Element, role: Spectral, props: Properties, name: str) -> A
             return spectra.read_absorption(path)
         return spectra.read_table(path, outside)
     text = child.attribute("value")
+    if ":" not in text and props.context.old:
+        return _old_numbers(child, role)
     if ":" not in text:
         return Constant(numbers(child, "value", 1)[0])
-    points = numbers(_with_value(child, text.replace(":", " ")), "value")
+    points = numbers(_with_attribute(child, "value", text.replace(":", " ")), "value")
     if len(points) % 2:
         raise child.error("value must be pairs like 400:0.1, 700:0.5")
     return Tabulated(points[0::2], points[1::2], outside)
 
 
-def _with_value(child: Element, value: str) -> Element:
-    return Element(child.tag, {**child.attributes, "value": value}, child.file, child.line)
+def _old_numbers(child: Element, role: Spectral) -> Any:
+    """Read a <spectrum> of Mitsuba 0.x without wavelengths: src/librender/scenehandler.cpp.
+
+    One number is a multiple of D65 in a light. Three are linear RGB, as the public builds have
+    three samples of a spectrum.
+    """
+    values = numbers(child, "value")
+    if len(values) not in (1, 3):
+        raise child.error(f"value must be 1 or 3 numbers, not {len(values)}")
+    if len(values) == 1 and role is not EMISSION:
+        return Constant(values[0])
+    return colour(role, values * (3 // len(values)))
 
 
-def _colour(child: Element) -> list[float]:
-    """Return linear r, g and b of <rgb value="r, g, b"> or <srgb value="#rrggbb">."""
+def _old_blackbody(child: Element) -> Spectrum:
+    """Read the <blackbody temperature="5000K" scale="1"> of Mitsuba 0.x."""
+    bare = child.attribute("temperature").strip().rstrip("kK")
+    temperature = numbers(_with_attribute(child, "temperature", bare), "temperature", 1)[0]
+    scale = numbers(child, "scale", 1)[0] if "scale" in child.attributes else 1.0
+    return Blackbody(temperature, scale)
+
+
+def _with_attribute(child: Element, name: str, value: str) -> Element:
+    return Element(child.tag, {**child.attributes, name: value}, child.file, child.line)
+
+
+def _colour(child: Element, context: Context) -> list[float]:
+    """Return linear r, g and b of <rgb value="r, g, b"> or <srgb value="#rrggbb">.
+
+    An <rgb value="#rrggbb"> of Mitsuba 0.x is linear.
+    """
     text = child.attribute("value").strip()
-    if child.tag == "srgb" and text.startswith("#"):
+    if (child.tag == "srgb" or context.old) and text.startswith("#"):
         try:
             encoded = np.frombuffer(bytes.fromhex(text[1:]), np.uint8) / 255.0
         except ValueError:
@@ -253,7 +294,7 @@ def _d65(props: Properties) -> Any:
     if found:
         return _scaled(texture(found[0], props), props.number("scale", 1.0))
     child = props.take("color")
-    rgb = _colour(child) if child is not None else [1.0, 1.0, 1.0]
+    rgb = _colour(child, props.context) if child is not None else [1.0, 1.0, 1.0]
     scale = props.number("scale", 1.0)
     return colour(EMISSION, [scale * value for value in rgb])
 
@@ -266,7 +307,7 @@ def _needed_colour(props: Properties) -> list[float]:
     child = props.take("color")
     if child is None:
         raise props.element.error("needs the parameter 'color'")
-    return _colour(child)
+    return _colour(child, props.context)
 
 
 def _raw_constant(props: Properties) -> Any:
@@ -374,24 +415,36 @@ def _texture(element: Element, outer: Properties) -> Texture:
 
 
 def _bitmap(props: Properties) -> Bitmap:
-    wraps = {"repeat": "repeat", "clamp": "clamp", "mirror": "mirror"}
     props.ignore("format", "accel")
-    return Bitmap(
+    both = props.text("wrap_mode", "repeat", WRAPS)
+    along_u = along_v = both
+    channel = "luminance"
+    if props.context.old:
+        along_u, along_v = (props.text(f"wrap_mode_{axis}", both, WRAPS) for axis in "uv")
+        channel = props.text("channel", channel, CHANNELS)
+    gamma = props.number("gamma", -1.0)  # Mitsuba 0.6's exponent of the texels; -1: sRGB
+    bitmap = Bitmap(
         image=props.image(),
-        raw=props.flag("raw", _linear(props)),
+        raw=props.flag("raw", gamma == 1.0),
         filter=_filter(props),
-        wrap=wraps[props.text("wrap_mode", "repeat", tuple(wraps))],
+        wrap=along_u,
+        wrap_v=None if along_v == along_u else along_v,
+        channel=channel,
         to_uv=TOP_DOWN @ _to_uv(props),
     )
+    if gamma in (-1.0, 0.0, 1.0) or bitmap.raw or bitmap.image is GREY:
+        return bitmap
+    if gamma < 0.0:
+        raise props.element.error(f"gamma must be above 0, or -1 for sRGB, not {gamma:g}")
+    return replace(bitmap, image=_powers(bitmap.image, gamma), raw=True)
 
 
-def _linear(props: Properties) -> bool:
-    """Take Mitsuba 0.6's exponent of the texels: 1 says that they are no sRGB."""
-    gamma = props.number("gamma", -1.0)
-    if gamma not in (-1.0, 1.0):
-        message = f"texels are sRGB, not powers of {gamma:g}"
-        props.context.warn(props.named["gamma"], message)
-    return gamma == 1.0
+def _powers(image: Any, gamma: float) -> Any:
+    """Return the texels of an image file to the power of gamma, alpha as it is: float32."""
+    texels = images.read(image, linear=False).copy()
+    colours = texels[..., : 3 if texels.shape[2] > 3 else texels.shape[2]]
+    np.power(np.maximum(colours, 0.0), np.float32(gamma), out=colours)
+    return texels
 
 
 def _filter(props: Properties) -> str:
@@ -410,7 +463,8 @@ def _checkerboard(props: Properties) -> Checkerboard:
 
 
 def _mesh_attribute(props: Properties) -> Texture:
-    name, scale = props.text("name", ""), props.number("scale", 1.0)
+    usual = "vertex_color" if props.context.old else ""
+    name, scale = props.text("name", usual), props.number("scale", 1.0)
     if not name.startswith(ATTRIBUTES):
         message = f"'name' must begin with {' or '.join(ATTRIBUTES)}, not {name!r}"
         raise props.element.error(message)
@@ -428,13 +482,41 @@ def _to_uv(props: Properties) -> np.ndarray:
         return matrix[np.ix_([0, 1, 3], [0, 1, 3])]
     # Mitsuba 0.6's, in the order in which Mitsuba 3 reads these.
     offsets = [props.number(name, 0.0) for name in ("uoffset", "voffset")]
-    scales = [props.number(name, 1.0) for name in ("uscale", "vscale")]
+    both = props.number("uvscale", 1.0)
+    scales = [props.number(name, both) for name in ("uscale", "vscale")]
     uv = np.eye(3)
-    uv[:2, 2], uv[0, 0], uv[1, 1] = np.multiply(scales, offsets), *scales
+    moved = offsets if props.context.old else np.multiply(scales, offsets)
+    uv[:2, 2], uv[0, 0], uv[1, 1] = moved, *scales  # 0.6: src/librender/texture.cpp
     return uv
 
 
+def _scale(props: Properties) -> Any:
+    """Read Mitsuba 0.6's `scale`: a texture or a colour, times a number or a colour."""
+    factors = factor(props, "scale", 1.0)
+    inner = nested_textures(props)
+    if len(inner) > 1 or not (inner or "value" in props.named):
+        raise props.element.error("needs one nested texture, or a 'value'")
+    first = texture(inner[0], props) if inner else factor(props, "value", 1.0)
+    return Product(first=first, second=factors)
+
+
+def _grid(props: Properties) -> Mix:
+    """Read Mitsuba 0.6's `gridtexture`: lines around the edges of each unit of uv."""
+    width = min(max(props.number("line_width", 0.01), 0.0), 0.5)
+    edges = np.arange(GRID_TEXELS + 1) / GRID_TEXELS
+    clear = np.clip(edges, width, 1.0 - width)
+    covered = 1.0 - np.diff(clear) * GRID_TEXELS
+    lines = 1.0 - np.outer(1.0 - covered, 1.0 - covered)
+    return Mix(
+        first=factor(props, "color0", 0.2),
+        second=factor(props, "color1", 0.4),
+        amount=Bitmap(image=lines[..., None].astype(np.float32), raw=True, to_uv=_to_uv(props)),
+    )
+
+
 TEXTURES: dict[str, Callable[[Properties], Any]] = {
+    "scale": _scale,
+    "gridtexture": _grid,
     "bitmap": _bitmap,
     "checkerboard": _checkerboard,
     "mesh_attribute": _mesh_attribute,

@@ -25,6 +25,7 @@ VARIABLE = re.compile(r"\\\$|\$(?:\{(\w+)\}|(\w*))")
 # Before Mitsuba 2, names were written in camel case.
 HUMP = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
 RENAMED = {"lookAt": "lookat"}
+OLD_VERSION = re.compile(r"\s*[01]\.\d")
 
 
 @dataclass(eq=False)
@@ -72,13 +73,20 @@ class Element(Located):
 class Document:
     """An expanded scene file: its root, and the folders of file names: the scene's, its <path>s.
 
-    camera: a number or id by which one of several sensors is chosen; variables: values by name.
+    camera: a number or id by which one of several sensors is chosen; variables: values by name;
+    renamed: plugins of old files, each with its old and its new name.
     """
 
     root: Element
     folders: list[Path]
     camera: str | None = None
     variables: Mapping[str, str] = field(default_factory=dict)
+    renamed: list[tuple[Element, str, str]] = field(default_factory=list)
+
+    @property
+    def is_old(self) -> bool:
+        """Whether the file is written for Mitsuba 0.x, whose defaults are others."""
+        return OLD_VERSION.match(self.root.attributes.get("version", "")) is not None
 
     def find_file(self, element: Element, name: str) -> Path:
         """Resolve a file name that `element` gives: <path>s come first, the last one before all.

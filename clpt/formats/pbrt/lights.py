@@ -174,7 +174,7 @@ def _goniometric(params: Parameters, state: State) -> Light:
     )
     return lights.Goniometric(
         intensity=intensity,
-        image=Bitmap(image=around, raw=True),
+        image=Bitmap(image=around, raw=True, wrap_v="clamp"),
         to_world=transforms.translate(position),
     )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from clpt import bvh
+from clpt.device.source import TWIN
 from clpt.render.flow import flags
 from clpt.render.records import Features
 from clpt.scene.materials import Dielectric
@@ -17,8 +18,8 @@ def when(holds: object, *files: str) -> tuple[str, ...]:
 
 
 def either(holds: object, file: str) -> tuple[str, ...]:
-    """Return a file where a condition holds, else its twin that does nothing, `<name>_none.cl`."""
-    return (file if holds else f"{file.removesuffix('.cl')}_none.cl",)
+    """Return a file where a condition holds, else its twin that does nothing."""
+    return (file if holds else f"{file}{TWIN}",)
 
 
 def _grid_meet(features: Features) -> str:
@@ -71,15 +72,14 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         *_screen_motion(f),
     ),
     "generated/layers.cl": lambda f, _: (
-        when(
+        *when(
             f.film.layers.words > 0,
             "generated/layer_args.cl",
             *_screen_motion(f),
             *either(f.screen_motion, "film/screen_motion_record.cl"),
             *either(f.motion.camera, "cameras/camera_axis.cl"),
-            "film/layers_record.cl",
-        )
-        or ("film/layers_record_none.cl",)
+        ),
+        *either(f.film.layers.words > 0, "film/layers_record.cl"),
     ),
     "generated/path_covers.cl": lambda f, _: either(f.film.alpha, "film/covers.cl"),
     "generated/path_start.cl": lambda f, _: either(
@@ -109,7 +109,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         *(
             ("generated/lights.cl", "lights/met_light.cl")
             if f.media.grids.emissive or f.lights.bodies
-            else when(f.media.grids.present, "lights/receiver_none.cl")
+            else when(f.media.grids.present, f"lights/receiver.cl{TWIN}")
         ),
         *when(f.media.grids.present, "media/grid_flight.cl"),
     ),
@@ -173,7 +173,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/light_medium.cl": lambda f, _: (
         ("generated/textures.cl", "generated/medium.cl")
         if f.light_media
-        else ("media/light_medium_none.cl",)
+        else (f"media/light_media.cl{TWIN}", f"media/medium_dims.cl{TWIN}")
     ),
     "generated/shading_frame.cl": lambda f, _: (
         ("generated/normal_map.cl", "materials/shading_frame_mapped.cl")
@@ -189,8 +189,8 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/trace.cl": lambda _, layout: (
         f"tracing/trace_{'lanes' if layout == 'brute' else 'one'}.cl",
     ),
-    "generated/curve_others.cl": lambda f, _: (
-        f"tracing/curve_others{'_none' * (f.geometry.analytic == ('curves',))}.cl",
+    "generated/curve_others.cl": lambda f, _: either(
+        f.geometry.analytic != ("curves",), "tracing/curve_others.cl"
     ),
     "generated/shape_traversal.cl": lambda f, layout: (
         (f"bvh/{bvh.shapes_layout(layout)}.cl", "bvh/shapes.cl") * bool(f.geometry.analytic)
@@ -247,7 +247,6 @@ _RIVALS = (
     "generated/camera.cl",
     "film/connect.cl",
     "generated/connect.cl",
-    "transport/rivals.cl",
 )
 
 
@@ -257,17 +256,18 @@ def _merges(features: Features, cls: type[Scatterer]) -> bool:
 
 
 def _escapes(features: Features, cls: type[Scatterer]) -> str:
-    """Return the end of the name of the file about rays that leave sealed media."""
+    """Return the file about rays that leave sealed media."""
     if not features.media.escapes:
-        return "_none"
-    return "" if cls.is_phase else "_out" if cls is Dielectric else "_end"
+        return f"integrator/steps/escapes.cl{TWIN}"
+    end = "" if cls.is_phase else "_out" if cls is Dielectric else "_end"
+    return f"integrator/steps/escapes{end}.cl"
 
 
 # likewise, for a scene's features and the kind of material that a program shades
 MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...]]] = {
     "generated/rivals.cl": lambda f, cls: (
-        when(f.transport.balanced and not flags.is_null(f, cls), *_RIVALS)
-        or ("transport/rivals_none.cl",)
+        *when(weighs := f.transport.balanced and not flags.is_null(f, cls), *_RIVALS),
+        *either(weighs, "transport/rivals.cl"),
     ),
     "generated/rival_steps.cl": lambda f, cls: (
         *either(f.transport.merged, "transport/rivals_merging.cl"),
@@ -297,7 +297,7 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
             "transport/guiding/guided_vertex.cl",
         )
         if flags.is_guided(f, cls) and not f.transport.light_paths
-        else ("transport/guiding/guide_none.cl",)
+        else (f"transport/guiding/guided_vertex.cl{TWIN}",)
     ),
     "generated/path_steps.cl": lambda f, cls: (
         *either(cls.kind in f.materials.shining, "integrator/steps/met_emission.cl"),
@@ -306,7 +306,7 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
         *either(f.lights.kinds and not cls.delta, "integrator/steps/next_event.cl"),
         *either(not flags.is_null(f, cls), "integrator/steps/roulette.cl"),
         *either(not flags.is_null(f, cls), "integrator/steps/scatters.cl"),
-        f"integrator/steps/escapes{_escapes(f, cls)}.cl",
+        _escapes(f, cls),
     ),
     "generated/light_path_steps.cl": lambda f, cls: (
         *either(f.transport.joined and not cls.delta, "integrator/steps/join_camera.cl"),
@@ -315,9 +315,7 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
         "integrator/steps/adjoint_weight.cl",
         *either(not flags.is_null(f, cls), "integrator/steps/light_path_roulette.cl"),
     ),
-    "generated/scout.cl": lambda f, cls: when(
-        f.film.layers.words > 0, *either(f.scouts and not cls.is_phase, "film/scout.cl")
-    ),
+    "generated/scout.cl": lambda f, cls: either(f.scouts and not cls.is_phase, "film/scout.cl"),
     "generated/vertex_steps.cl": lambda f, cls: (
         *either(f.names_surfaces, "transport/vertex_names.cl"),
         *(

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from clpt.device.source import TWIN
 from clpt.render.flow import choices, flags, stages
 from clpt.render.records import Features
 from clpt.render.records.dispatch import function
@@ -60,7 +61,7 @@ def _key(features: Features, cls: type[Scatterer]) -> object:
     """Return a key that is equal for kinds of one vertex; whether they shine does not matter."""
     own = flags.of_material(features, cls)
     files = {
-        name: tuple(file.replace("met_emission_none", "met_emission") for file in chosen)
+        name: tuple(file.replace(f"met_emission.cl{TWIN}", "met_emission.cl") for file in chosen)
         for name, chosen in choices.material_files(features, cls).items()
     }
     rest = (item for item in own.items() if item[0] not in RUN_TIME)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from clpt.device.source import TWIN
 from clpt.geometry import shape_records
 from clpt.render.records import Features
 from clpt.render.records import light_rows as light_records
@@ -74,7 +75,7 @@ def dispatch_text(features: Features, densities: str = "") -> str:
     """
     present, others, surfaces = kinds_of(features), others_of(features), surfaces_of(features)
     includes = ["shapes/surface_flags.cl", "shapes/shape.cl", "lights/light.cl", "core/mis.cl"]
-    includes += [f"lights/receiver{'_none' * (not features.lights.gloss)}.cl"]
+    includes += [f"lights/receiver.cl{'' if features.lights.gloss else TWIN}"]
     includes += ["lights/light_choice.cl"]
     includes += ["generated/textures.cl", "generated/medium.cl"] if features.lights.volumes else []
     includes += [f"generated/light/{kind}.cl" for kind in others]

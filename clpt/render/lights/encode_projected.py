@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from clpt.render.lights.power import aspect, unsheared
 from clpt.render.materials.encoder import Encoder
 from clpt.scene.lights import SPOT_EDGES, Goniometric, Light, Projector, Spot
+from clpt.scene.params import fields_of
 from clpt.scene.pixels import pixels, spectral_image
 from clpt.scene.roles import REFLECTANCE
 from clpt.scene.textures import Bitmap, Texture
@@ -31,7 +32,8 @@ def members(lamp: Light, encoder: Encoder) -> dict[str, ArrayLike]:
         axes = _place(lamp.to_world, "projector.to_world", half, half / aspect(lamp))
         return {**axes, **_image(lamp.image, encoder)}
     if isinstance(lamp, Goniometric):
-        return {**_place(lamp.to_world, "goniometric.to_world"), **_image(lamp.image, encoder)}
+        place = _place(lamp.to_world, "goniometric.to_world")
+        return {**place, **_image(with_poles(lamp.image), encoder)}
     assert isinstance(lamp, Spot)
     half = float(np.tan(np.radians(lamp.cutoff)))
     return {
@@ -41,6 +43,22 @@ def members(lamp: Light, encoder: Encoder) -> dict[str, ArrayLike]:
         "smooth": SPOT_EDGES.index(lamp.edge),
         "factor": encoder.store.append("light_params", encoder.factor_words(lamp.image)),
     }
+
+
+def with_poles(image: object) -> object:
+    """Return an image around a point, and all that it is made of, so that it ends at the poles.
+
+    Bitmaps whose `wrap_v` is not set go on at their other end, where the opposite pole is. One that
+    `to_uv` moves along v or repeats stays as it is.
+    """
+    if isinstance(image, Bitmap):
+        corners = np.asarray(image.to_uv)[1] @ np.array([[0, 0, 1, 1], [0, 1, 0, 1], [1, 1, 1, 1]])
+        inside = bool((np.abs(corners - 0.5) <= 0.5 + 1e-6).all())
+        return dataclasses.replace(image, wrap_v="clamp") if inside and not image.wrap_v else image
+    if not isinstance(image, Texture):
+        return image
+    parts = {name: value for name, value in fields_of(image).items() if isinstance(value, Texture)}
+    return dataclasses.replace(image, **{name: with_poles(one) for name, one in parts.items()})
 
 
 def _image(image: object, encoder: Encoder) -> dict[str, ArrayLike]:

@@ -50,7 +50,7 @@ CLEAR = 0.05  # roughness alpha of what is clear: light paths can be joined to w
 RAYS = 256  # of the camera, that look for what is clear
 
 LEAST = 0.25  # of the power of all lights: where small ones in media have less, they do not count
-THIN, DENSE = 0.3, 5.0  # optical depths from a light to the camera, see bench/NOTES.md
+THIN, DENSE = 0.3, 5.0  # optical depths from a light to the camera, see bench/notes/media.md
 ALL_AROUND = 0.49 * np.pi  # [rad] from a light's axis: what shines so far is no spot
 
 Ball = tuple[NDArray[np.float64], float]  # centre and radius

@@ -23,7 +23,7 @@ BLOCK = 8  # side of a block of pixels
 TRIM = 0.001  # share of the pixels that is left out, the worst
 ODD = 0.01  # the same, where the noise of ordinary pixels is asked for
 SURE = 3.0  # standard deviations
-LIGHT_RAY, GUIDED_RAY = 1.15, 1.3  # time of a ray over one of `path`, see bench/NOTES.md
+LIGHT_RAY, GUIDED_RAY = 1.15, 1.3  # time of a ray over one of `path`, see bench/notes/guiding.md
 PHOTON_RAY = 1.5  # the same of `vcm`
 
 

@@ -14,8 +14,8 @@ from clpt.render.flow.scene_to_tables import Lowered
 from clpt.render.records import Features
 
 BRUTE_SHAPES = 32  # analytic shapes up to which a ray tests all of them
-INTERLEAVED_TRIANGLES = 1 << 20  # from which interleaved rays pay; measured, see bench/NOTES.md
-INTERLEAVED_PIECES = 1 << 14  # of curves; measured, see bench/NOTES.md
+INTERLEAVED_TRIANGLES = 1 << 20  # from which interleaved rays pay; see bench/notes/traversal.md
+INTERLEAVED_PIECES = 1 << 14  # of curves; see bench/notes/traversal.md
 FEW_OTHERS = 64  # shapes beside them that are no triangles, each of which is tested in all lanes
 SHARE = 512  # slots of a work-item of the loop on a CPU, which fit into the second cache of a core
 

@@ -12,3 +12,6 @@ inline mask dull_goes_on(mask next, mask null, Scattering scatter, BsdfSample bs
     }
     return next;
 }
+
+/* Twin, where no first surface plays. */
+#define dull_goes_on(next, null, scatter, bs, rival, beta) (next)

@@ -32,3 +32,6 @@ inline integer path_escapes(Scene scene, Slab path, Slab shadow, uint at, mask n
     store_path_escape(path, at, next, own);
     return sel_i(sent, (integer)(PATH_SHADOW), (integer)(0));
 }
+
+/* Twin, where no medium is sealed by a smooth boundary. */
+#define path_escapes(scene, path, shadow, at, next, v, scatter, bs, onward) ((integer)(0))

@@ -31,3 +31,9 @@ inline integer join_camera(Scene scene, Slab shadow, uint at, mask active, Verte
     store_shadow_through(shadow, at, shine, vertex_through(v, neg3(c.d)));
     return sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
 }
+
+/* Twin, where light paths leave photons alone, or a material sends light one way only. */
+typedef integer CameraJoint;
+#define join_camera_to(joint, scatter) ((scatter).wo)
+#define join_camera_seek(scene, v, scatter) ((integer)(0))
+#define join_camera(scene, shadow, at, active, v, scatter, rival, joint, arrives) ((integer)(0))

@@ -13,3 +13,6 @@ inline mask light_path_roulette(Scene scene, Slab path, uint at, mask next, mask
     }
     return next;
 }
+
+/* Twin, at null surfaces, where nothing is lost. */
+#define light_path_roulette(scene, path, at, next, null, v, scatter, beta) (next)

@@ -13,3 +13,6 @@ inline void merge_at_vertex(Scene scene, Slab path, uint at, mask met, Vertex v,
         store_path_radiance(path, at, merges, merged);
     }
 }
+
+/* Twin, where no photons are merged. */
+#define merge_at_vertex(scene, path, at, met, v, scatter, rival, ratio)

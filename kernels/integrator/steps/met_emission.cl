@@ -21,3 +21,6 @@ inline mask met_emission(Scene scene, Slab path, uint at, mask active, Vertex v 
     }
     return hidden;
 }
+
+/* Twin, on surfaces that do not shine. */
+#define met_emission(scene, path, at, active, v) mask_of(0)

@@ -6,3 +6,7 @@ inline real met_weight(Scene scene, Slab path, uint at, Vertex v, integer light,
     real emission = light_path_pdf(scene, light, v.o, v.d, v.t, v.s.n);
     return mis_weight_of_three(pdf, other, rival_of_dull(path_rival(path, at, v.depth) * emission, pdf));
 }
+
+/* Twin, where paths are not weighed against light paths. */
+#define met_weight(scene, path, at, v, light, pdf, other) \
+    sel((pdf) < 0.0f, (real)(1.0f), mis_weight(pdf, other))

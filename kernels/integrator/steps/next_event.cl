@@ -47,3 +47,10 @@ inline integer next_event_keep(Scene scene, Slab path, Slab shadow, uint at, mas
     store_shadow_through(shadow, at, e.shine, vertex_through(v, e.ls.wi));
     return sel_i(e.shine, (integer)(PATH_SHADOW), (integer)(0));
 }
+
+/* Twin, without lights, and at materials that send light one way only. */
+typedef integer NextEvent;
+#define next_event_wi(e, scatter) ((scatter).wo)
+#define next_event_seek(scene, next, v, scatter) ((integer)(0))
+#define next_event_weigh(scene, e, v, scatter, rival, guided, ratio) (e)
+#define next_event_keep(scene, path, shadow, at, active, v, e) ((integer)(0))

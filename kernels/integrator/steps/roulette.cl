@@ -14,3 +14,6 @@ inline mask path_roulette(Scene scene, Slab path, uint at, mask next, mask null,
     }
     return next;
 }
+
+/* Twin, at null surfaces, where nothing is lost. */
+#define path_roulette(scene, path, at, next, null, v, scatter, guided, eta, beta) (next)

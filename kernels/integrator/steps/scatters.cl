@@ -9,3 +9,6 @@ inline void path_scatters(Scene scene, Slab path, uint at, mask next, mask null,
     store_path_pdf(path, at, scatters, sel(delta, (real)(-1.0f), bs.pdf));
     if (!BSDF_DELTA) path_receiver_keep(path, at, next, vertex_receiver(scene, *v, scatter, neg3(v->d)));
 }
+
+/* Twin, at null surfaces, where a path has no new direction. */
+#define path_scatters(scene, path, at, next, null, v, scatter, rival, bs, onward)

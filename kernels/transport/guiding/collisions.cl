@@ -21,3 +21,6 @@ inline integer collision_row(Scene scene, Slab path, Slab hit, uint at, mask act
     vec3 p = madd3(load_path_d(path, at), load_hit_t(hit, at), load_path_o(path, at));
     return sel_i(collides, guide_row_of_collision(scene, p), row);
 }
+
+/* Twin, where there are no media. */
+#define collision_row(scene, path, hit, at, active, row, shared) (row)

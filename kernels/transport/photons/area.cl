@@ -65,3 +65,9 @@ inline real merging_wavelength(Scene scene, real u, integer pass)
     real inside = unit_interval(bits + hash_natural((natural)(scene.settings->seed)));
     return (to_real(merging_group(scene, u)) + inside) / (float)scene.settings->wavelength_groups;
 }
+
+/* Twin, where no photons are merged: each path has a time and wavelengths of its own. */
+#define PATH_BEGUN PATH_ALIVE /* the state in which a path begins at the camera */
+#define merging_moment(scene, u, own, pass) (own)
+#define merging_wavelength(scene, u, pass) (u)
+#define merging_pass(scene, light_path) (light_path)

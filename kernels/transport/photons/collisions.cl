@@ -28,3 +28,8 @@ inline void collision_photon(Slab path, Slab hit, uint at, Collision c, Photon *
     photon->rival = sel(c.met, load_path_rival(path, at), photon->rival);
     *group = *group | sel_i(c.met, (integer)(MERGING_IN_MEDIUM), (integer)(0));
 }
+
+/* Twin, where there are no media. */
+typedef integer Collision;
+#define collision_met(scene, path, hit, at, active) ((integer)(0))
+#define collision_photon(path, hit, at, c, photon, group)

@@ -115,6 +115,38 @@ def test_indices_and_numbers_out_of_range(read, build):
         read(made.mesh(attributes={"NORMAL": normals}))
 
 
+@pytest.mark.parametrize("place, value, message", [
+    ("materials[0].pbrMetallicRoughness.baseColorFactor", [1.0000001192092896, 1, 1, 1], None),
+    ("materials[0].pbrMetallicRoughness.metallicFactor", -1e-8, None),
+    ("materials[0].pbrMetallicRoughness.roughnessFactor", 1.0000001, None),
+    ("materials[0].alphaCutoff", -1e-9, None),
+    ("bufferViews[0].byteStride", 0, "byteStride of 0"),
+])  # fmt: skip
+def test_numbers_beyond_a_limit_by_rounding(read, build, place, value, message):
+    made = build(materials=[{"pbrMetallicRoughness": {}}]).mesh(material=0)
+    change(made.json, place, value)
+    scene = read(made)
+    assert scene.shapes[0].kind == "mesh"
+    assert message is None or any(message in text for text in scene.warnings)
+
+
+def test_numbers_beyond_a_limit_are_refused(read, build):
+    made = build(materials=[{"pbrMetallicRoughness": {"metallicFactor": 1.0001}}]).mesh(material=0)
+    with pytest.raises(SceneError, match=r"outside"):
+        read(made)
+
+
+def test_a_scene_that_names_a_child(read, build):
+    """The node stays where its parents put it, and is there once."""
+    nodes = [{"children": [1], "translation": [0, 0, 5]}, {"mesh": 0, "translation": [1, 0, 0]}]
+    for roots in ([1], [0, 1], [1, 0]):
+        scene = read(build(nodes=nodes, scenes=[{"nodes": roots}]).mesh())
+        shape, *studio = scene.shapes
+        assert len(studio) == 2
+        assert np.asarray(shape.to_world)[:3, 3].tolist() == [1.0, 0.0, 5.0]
+        assert any("another's child" in text for text in scene.warnings)
+
+
 def test_json_padded_by_zeros_is_named(read, build):
     """Spaces must pad it (glTF 4.4.3.2)."""
     data = build().mesh().glb()

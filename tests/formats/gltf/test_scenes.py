@@ -221,6 +221,13 @@ def test_pointers_animate_materials_lights_and_nodes(read, build):
     assert np.allclose(corners(read(made).shapes[0])[0, 0], 0.0)
 
 
+TEXTURES = (  # that a material does not have
+    "normalTexture", "occlusionTexture", "emissiveTexture/extensions/KHR_texture_transform",
+    "pbrMetallicRoughness/baseColorTexture", "extensions/KHR_materials_sheen/sheenColorTexture",
+    "extensions/KHR_materials_clearcoat/clearcoatNormalTexture",
+)  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("pointer", "message"),
     [
@@ -230,6 +237,7 @@ def test_pointers_animate_materials_lights_and_nodes(read, build):
         ("/accessors/0/count", "nothing is known to move"),
         ("/materials", "nothing is known to move"),
         ("/materials/0/name", "nothing is known to move"),
+        *((f"/materials/0/{place}/scale", "nothing is known to move") for place in TEXTURES),
         ("materials/0/emissiveFactor", "is no JSON pointer"),
     ],
 )
@@ -283,6 +291,21 @@ def test_skins(read, build):
     expected = [[0, 0, 0], [-1, 0, 0], [0, 0.25 * 2, 1]]
     assert np.allclose(corners(shape)[0], expected, atol=1e-6)
     assert np.allclose(shape.normals[:2], [[1, 0, 0], [-1, 0, 0]], atol=1e-6)
+
+
+@pytest.mark.parametrize("sets", [1, 2])
+def test_vertices_without_weights_follow_the_first_joint(read, build, sets):
+    """They do not leap to the origin, whatever other joints their zero weights name."""
+    made = build(nodes=[{"mesh": 0, "skin": 0}, {"translation": [5, 0, 0]}, {}])
+    made.json["scenes"] = [{"nodes": [0, 1, 2]}]
+    made.json["skins"] = [{"joints": [1, 2]}]
+    attributes = {}
+    for number in range(sets):
+        attributes[f"JOINTS_{number}"] = made.accessor([[1, 1, 1, 1]] * 3, "u1")
+        attributes[f"WEIGHTS_{number}"] = made.accessor([[0, 0, 0, 0], [0, 0, 0, 0], [1, 0, 0, 0]])
+    scene = read(made.mesh([[1, 0, 0], [2, 0, 0], [3, 0, 1]], attributes=attributes))
+    assert np.allclose(corners(scene.shapes[0])[0], [[6, 0, 0], [7, 0, 0], [3, 0, 1]], atol=1e-6)
+    assert any("2 vertices have no weights" in warning for warning in scene.warnings)
 
 
 def test_cameras(read, build):

@@ -67,6 +67,42 @@ def test_every_layout_and_tubes_show_the_same():
     assert np.abs(tubes - image).mean() < 0.03
 
 
+def u_of_mitsuba(along, normal) -> float:
+    """u of a point of a strand by the frame of Mitsuba's curves, whose guide is +z."""
+    tangent, normal = (np.array(v, float) / np.linalg.norm(v) for v in (along, normal))
+    turned = np.array([0.0, 0.0, 1.0]) - tangent * tangent[2]
+    if np.linalg.norm(turned) < 1e-9:
+        turned = np.array([0.0, 1.0, 0.0])
+    turned /= np.linalg.norm(turned)
+    return (
+        float(np.arctan2(turned @ normal, np.cross(turned, tangent) @ normal) / (2.0 * np.pi)) % 1.0
+    )
+
+
+@pytest.mark.parametrize("lit", [False, True], ids=["curves", "tubes"])
+@pytest.mark.parametrize("to_world", [np.eye(4), T.rotate((1, 1, 0), 70.0)], ids=["", "turned"])
+def test_u_begins_where_mitsubas_does(lit, to_world):
+    for along, normal in [
+        ((1, 0, 0), (0, 0, 1)), ((1, 0, 0), (0, 1, 0.3)), ((0, 1, 0), (1, 0, 0.2)),
+        ((1, 1, 0), (0, 0, 1)), ((0, 0, 1), (1, 0.5, 0)), ((0, 0, -1), (1, 0.5, 0)),
+        ((1, 2, 3), (3, 0, -1)),
+    ]:  # fmt: skip
+        end = 3.0 * np.array(along) / np.linalg.norm(along) @ to_world[:3, :3]
+        strand = Curves(
+            points=[(*-end, 0.3), (*end, 0.3)], basis="linear", to_world=to_world,
+            emission=lights.Area() if lit else None,
+        )  # fmt: skip
+        view = T.look_at(4.0 * np.array(normal), (0, 0, 0), along) @ T.scale([0.02, 0.02, 1.0])
+        seen = clpt.Scene(
+            camera=cameras.Orthographic(to_world=view),
+            film=integrators.Film(width=2, height=2, mode="rgb", layers=["uv"]), shapes=[strand],
+        )  # fmt: skip
+        with clpt.Renderer(seen) as renderer:
+            renderer.run(1)
+            u = renderer.layers()["uv"][..., 0]
+        np.testing.assert_allclose(u, u_of_mitsuba(along, normal), atol=0.03)
+
+
 def test_what_becomes_tubes():
     """What shines, what is stretched, and what is instanced often; the rest is met as it is."""
     shining = dataclasses.replace(CURVES, emission=lights.Area(radiance=(1.0, 1.0, 1.0)))

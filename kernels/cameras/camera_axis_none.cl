@@ -1,2 +1,0 @@
-/* Stands for cameras/camera_axis.cl where the camera stands still. */
-#define camera_axis_moved(scene, from, axis)

@@ -1,2 +1,0 @@
-/* Stands for film/layers.cl where there are none beside the picture. */
-#define layers_count(scene, path, at, layers, unseen)

@@ -1,3 +1,0 @@
-/* Stands for media/vertex_media.cl where there are no media. */
-typedef integer VertexMedia;
-#define vertex_media(scene, path, hit, at, active, row, front) ((integer)(0))

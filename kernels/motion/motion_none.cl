@@ -1,2 +1,0 @@
-/* Stands for motion/motion.cl where nothing moves. */
-#define motion_time(scene, u) ((real)(0.0f))

@@ -1,2 +1,0 @@
-/* Stands for shapes/triangle_uv.cl where no mesh has uv. */
-#define triangle_uv(scene, shape, space, c, s)

@@ -1,0 +1,295 @@
+"""Files of Mitsuba 0.3 to 0.6: the version decides over words and defaults.
+
+Expected values are those of Mitsuba 0.6's sources, which old_words.py and docs/mitsuba.md name.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from clpt import spectra
+from clpt.errors import SceneError
+from clpt.formats import load
+from clpt.formats.mitsuba import old_words, sensors
+from clpt.scene import integrators, lights, materials, textures
+from clpt.spectra import RGB, Blackbody, Constant, RGBIlluminant, RGBUnbounded
+
+QUOTED = '"reflectance"'
+NAMES = sorted({old for _, old, *_ in old_words.PLUGINS})
+
+
+def level(value) -> float:
+    """A number that a material may hold as an even spectrum."""
+    return value.value if isinstance(value, Constant) else value
+
+
+@pytest.fixture
+def read(tmp_path):
+    """Load the content of a <scene> of a version."""
+
+    def of(body: str, version: str = "0.6.0", **variables):
+        path = tmp_path / "scene.xml"
+        sensor = "" if "sensor" in body or "camera" in body else '<sensor type="perspective"/>'
+        path.write_text(f'<scene version="{version}">{body}{sensor}</scene>', "utf-8")
+        return load(path, **variables)
+
+    return of
+
+
+@pytest.fixture
+def material(read):
+    def of(bsdf: str, version: str = "0.6.0"):
+        return read(f'<shape type="cube">{bsdf}</shape>', version).shapes[0].material
+
+    return of
+
+
+def test_a_light_of_one_number_is_a_multiple_of_d65(read):
+    light = '<emitter type="constant"><spectrum name="radiance" value="2"/></emitter>'
+    assert read(light).lights[0].radiance == RGBIlluminant(2.0, 2.0, 2.0)
+    assert read(light, "3.0.0").lights[0].radiance == Constant(2.0)
+
+
+@pytest.mark.parametrize("version", ["0.3.0", "0.5.1", "0.6.0", "2.1.0", "3.0.0"])
+def test_the_border_of_a_medium_lets_light_through_in_old_files(read, version):
+    medium = '<medium name="{}" type="homogeneous"><float name="sigmaT" value="1"/></medium>'
+    for side in ("interior", "exterior"):
+        shape = read(f'<shape type="cube">{medium.format(side)}</shape>', version).shapes[0]
+        wanted = materials.Null if version.startswith("0") else materials.Diffuse
+        assert type(shape.material) is wanted
+
+
+def test_metals_are_copper_by_default(material):
+    for kind in ("conductor", "roughconductor"):
+        made = material(f'<bsdf type="{kind}"/>')
+        copper = spectra.metal("Cu")
+        grid = np.linspace(400.0, 700.0, 5)
+        for value, wanted in ((made.eta, copper[0]), (made.k, copper[1])):
+            assert np.allclose(value.sample(grid), wanted.sample(grid) / 1.000277, rtol=1e-4)
+        assert material(f'<bsdf type="{kind}"/>', "3.0.0").eta == Constant(0.0)
+
+
+def test_up_of_a_sky_is_y(read):
+    sky = '<emitter type="sunsky"><vector name="sunDirection" x="{}" y="{}" z="{}"/></emitter>'
+    assert read(sky.format(0, 1, 0)).lights[0].sun_elevation == pytest.approx(90.0)
+    made = read(sky.format(1, 1, 0)).lights[0]
+    assert (made.sun_elevation, made.sun_azimuth) == (pytest.approx(45.0), pytest.approx(90.0))
+    assert level(made.ground) == 0.15 and np.allclose(made.to_world, np.eye(4))
+    assert read(sky.format(0, 1, 0), "3.0.0").lights[0].sun_elevation == pytest.approx(0.0)
+
+
+def test_the_sun_of_a_date(read):
+    """By default it is 2010-07-10, 15:00 in Tokyo: direction (-.69176, .72030, .05138)."""
+    made = read('<emitter type="sunsky"/>').lights[0]
+    assert made.sun_elevation == pytest.approx(46.079, abs=1e-3)
+    assert made.sun_azimuth == pytest.approx(np.degrees(np.arctan2(-0.69176, 0.05138)), abs=1e-2)
+    noon = '<float name="hour" value="12"/><float name="latitude" value="0"/>'
+    noon += '<float name="longitude" value="0"/><float name="timezone" value="0"/>'
+    spring = '<integer name="month" value="3"/><integer name="day" value="20"/>'
+    made = read(f'<emitter type="sky">{noon}{spring}</emitter>').lights[0]
+    assert made.sun_elevation > 87.0 and (made.sky_scale, made.sun_scale) == (1.0, 0.0)
+    made = read('<emitter type="sun"><float name="scale" value="3"/></emitter>').lights[0]
+    assert (made.sky_scale, made.sun_scale) == (0.0, 3.0)
+    with pytest.raises(SceneError, match="unknown emitter 'sky'"):
+        read('<emitter type="sky"/>', "3.0.0")
+
+
+def medium(read, inner: str, kind: str = "homogeneous", version: str = "0.6.0"):
+    text = f'<shape type="cube"><medium name="interior" type="{kind}">{inner}</medium></shape>'
+    scene = read(text, version)
+    return scene.shapes[0].interior, scene.warnings
+
+
+def test_coefficients_of_media(read):
+    made, _ = medium(read, '<rgb name="sigmaA" value=".1,.2,.3"/><float name="scale" value="2"/>')
+    assert tuple(made.sigma_a.to_rgb()) == pytest.approx((0.1, 0.2, 0.3)) and made.scale == 2.0
+    made, warnings = medium(read, '<float name="scale" value="0.5"/>')
+    assert made.sigma_s == RGBUnbounded(740.0, 880.0, 1010.0) and made.scale == 0.5
+    assert any("skin1" in text for text in warnings)
+    made, _ = medium(read, '<string name="material" value="Whole milk"/>')
+    assert made.sigma_s == RGBUnbounded(2550.0, 3210.0, 3770.0)
+    with pytest.raises(SceneError, match="unknown medium 'ink'"):
+        medium(read, '<string name="material" value="ink"/>')
+    even = '<volume name="density" type="constvolume"><float name="value" value="0.1"/></volume>'
+    made, _ = medium(read, even + '<string name="method" value="woodcock"/>', "heterogeneous")
+    assert made.kind == "homogeneous" and made.sigma_t in (0.1, Constant(0.1))
+
+
+def test_colours_in_their_three_forms(material):
+    for text in ('spectrum {} value="0.2 0.4 0.6"', 'rgb {} value="#336699"'):
+        made = material(f'<bsdf type="diffuse"><{text.format("name=" + QUOTED)}/></bsdf>')
+        assert made.reflectance == RGB(0.2, 0.4, 0.6)
+        with pytest.raises(SceneError):
+            material(f'<bsdf type="diffuse"><{text.format("name=" + QUOTED)}/></bsdf>', "3.0.0")
+    made = material(f'<bsdf type="diffuse"><srgb name={QUOTED} value="#808080"/></bsdf>')
+    assert made.reflectance.to_rgb() == pytest.approx([0.2159] * 3, abs=1e-4)
+
+
+def test_black_bodies(read):
+    light = '<blackbody name="intensity" temperature="{}" scale="2"/>'
+    for text in ("3000", "3000K", "3000 k"):
+        made = read(f'<emitter type="point">{light.format(text)}</emitter>')
+        assert made.lights[0].intensity == Blackbody(3000.0, 2.0)
+
+
+def test_words_that_change_no_expected_picture_are_told_in_one_message(read):
+    scene = read(
+        '<integrator type="guided_path"><integer name="maxDepth" value="7"/>'
+        '<string name="budgetType" value="spp"/><boolean name="strictNormals" value="true"/>'
+        '</integrator><sensor type="perspective"><film type="ldrfilm"><float name="gamma" '
+        'value="2.2"/></film><sampler type="sobol"><integer name="scramble" value="1"/></sampler>'
+        '<integer name="ofAFork" value="1"/></sensor><mode value="x"/>'
+        '<shape type="cube"><bsdf type="diffuse"><float name="alpha" value="1"/></bsdf></shape>'
+    )
+    assert isinstance(scene.integrator, integrators.Path) and scene.integrator.max_depth == 7
+    (message,) = [text for text in scene.warnings if "of Mitsuba 0.6.0" in text]
+    for word in ("guided_path", "budget_type", "strict_normals", "ldrfilm", "gamma", "scramble",
+                 "of_afork", "<mode>", "alpha"):  # fmt: skip
+        assert word in message, word
+    assert len(scene.warnings) == 1
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_each_renamed_plugin_is_one_that_is_read(read, name):
+    for tag, old, new, source in old_words.PLUGINS:
+        if old != name:
+            continue
+        known = {"film": sensors.FILMS, "sampler": sensors.SAMPLERS,
+                 "integrator": sensors.INTEGRATORS}.get(tag)  # fmt: skip
+        assert source and (known is None or new in known)
+        if tag in ("integrator", "bsdf"):
+            read(f'<{tag} type="{old}"/>')
+            with pytest.raises(SceneError, match="unknown"):
+                read(f'<{tag} type="{old}"/>', "3.0.0")
+
+
+def test_integrators_that_hold_another(read):
+    inner = '<integrator type="direct"/>'
+    for name in sensors.HOLDERS:
+        made = read(f'<integrator type="{name}">{inner}</integrator>').integrator
+        assert isinstance(made, integrators.Direct)
+    for name in sensors.NO_LIGHT:
+        with pytest.raises(SceneError, match="unknown integrator"):
+            read(f'<integrator type="{name}"/>')
+
+
+def test_an_id_that_is_given_again(read):
+    bsdf = '<bsdf type="diffuse" id="m"><float name="reflectance" value="{}"/></bsdf>'
+    use = '<shape type="cube"><ref id="m"/></shape>'
+    scene = read(bsdf.format(0.25) + use + bsdf.format(0.75) + use)
+    assert [level(shape.material.reflectance) for shape in scene.shapes] == [0.25, 0.75]
+    assert any("given again" in text for text in scene.warnings)
+
+
+def test_words_of_0_3(read):
+    scene = read(
+        '<camera type="perspective"><transform name="toWorld"><lookAt ox="0" oy="0" oz="4" tx="0" '
+        'ty="0" tz="0" ux="0" uy="1" uz="0"/></transform></camera>'
+        '<luminaire type="constant"><rgb name="intensity" value="3,3,3"/></luminaire>'
+        '<shape type="cylinder"><point name="p1" x="0" y="0" z="1"/><point name="p2" x="0" y="0" '
+        'z="5"/><bsdf type="lambertian"/></shape>',
+        "0.3.0",
+    )
+    assert scene.camera.to_world[2, 3] == 4.0 and scene.lights[0].radiance.r == 3.0
+    assert scene.shapes[0].p0 == (0.0, 0.0, 1.0) and scene.shapes[0].p1 == (0.0, 0.0, 5.0)
+
+
+@pytest.fixture
+def grey(tmp_path):
+    Image.new("RGB", (2, 2), (128, 128, 128)).save(tmp_path / "grey.png")
+    return '<string name="filename" value="grey.png"/>'
+
+
+@pytest.mark.parametrize("version", ["0.6.0", "3.0.0"])
+def test_gamma_of_texels(material, grey, version):
+    for gamma in (-1.0, 1.0, 2.2, 1.8):
+        inner = f'{grey}<float name="gamma" value="{gamma}"/>'
+        image = f'<texture name="reflectance" type="bitmap">{inner}</texture>'
+        made = material(f'<bsdf type="diffuse">{image}</bsdf>', version).reflectance
+        assert made.raw == (gamma != -1.0)
+        if gamma > 1.0:
+            assert np.allclose(made.image, (128 / 255) ** gamma, atol=1e-6)
+
+
+def test_textures_of_old_files(material, grey):
+    image = f'<texture type="bitmap">{grey}</texture>'
+    scaled = f'<texture name="reflectance" type="scale"><float name="scale" value=".5"/>{image}'
+    made = material(f'<bsdf type="diffuse">{scaled}</texture></bsdf>').reflectance
+    assert isinstance(made, textures.Product) and level(made.second) == 0.5
+    shift = '<float name="uvscale" value="2"/><float name="uoffset" value=".25"/>'
+    image = f'<texture name="reflectance" type="checkerboard">{shift}</texture>'
+    made = material(f'<bsdf type="diffuse">{image}</bsdf>').reflectance
+    assert np.allclose(made.to_uv, [[2, 0, 0.25], [0, 2, 0], [0, 0, 1]])
+    lines = '<texture name="reflectance" type="gridtexture"/>'
+    made = material(f'<bsdf type="diffuse">{lines}</bsdf>').reflectance
+    assert made.amount.image.mean() == pytest.approx(1.0 - 0.98**2, abs=1e-4)
+
+
+def test_mixtures_of_any_number(material):
+    parts = "".join(
+        f'<bsdf type="diffuse"><float name="reflectance" value="{value}"/></bsdf>'
+        for value in (0.8, 0.2, 0.5)
+    )
+    text = '<bsdf type="mixturebsdf"><string name="weights" value="{}"/>{}</bsdf>'
+
+    def albedo(made) -> float:
+        if isinstance(made, materials.Blend):
+            return (1.0 - made.weight) * albedo(made.first) + made.weight * albedo(made.second)
+        return level(made.reflectance)
+
+    assert albedo(material(text.format("0.5, 0.25, 0.125", parts))) == pytest.approx(0.5125)
+    assert albedo(material(text.format("2 1 1", parts))) == pytest.approx(0.575)
+    with pytest.raises(SceneError, match="must be 3 numbers"):
+        material(text.format("0.5, 0.5", parts))
+
+
+def test_other_materials_of_old_files(material):
+    made = material('<bsdf type="difftrans"><float name="transmittance" value="0.4"/></bsdf>')
+    assert (level(made.transmittance), level(made.reflectance)) == (0.4, 0.0)
+    for name in ("phong", "as"):
+        text = f'<bsdf type="roughconductor"><string name="distribution" value="{name}"/></bsdf>'
+        assert material(text).distribution == "beckmann"
+        with pytest.raises(SceneError, match="none of"):
+            material(text, "3.0.0")
+
+
+def test_creases_stay_sharp(read, tmp_path):
+    """Two triangles at 53 degrees share an edge: smooth above that angle alone."""
+    roof = "v -1 0 0\nv 0 0 .5\nv 1 0 0\nv 0 1 .5\nv 0 -1 .5\nf 5 2 1\nf 2 5 3\n"
+    (tmp_path / "roof.obj").write_text(roof)
+    for angle, corners in ((20.0, 6), (80.0, 4)):
+        text = f'<float name="maxSmoothAngle" value="{angle}"/>'
+        name = '<string name="filename" value="roof.obj"/>'
+        mesh = read(f'<shape type="obj">{name}{text}</shape>').shapes[0]
+        assert len(mesh.vertices) == corners and len(mesh.faces) == 2
+        points = mesh.vertices[mesh.faces].astype(float)
+        flat = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
+        flat /= np.linalg.norm(flat, axis=1, keepdims=True)
+        near = np.einsum("fcx,fx->fc", mesh.normals[mesh.faces], flat)
+        assert np.allclose(near, 1.0) == (angle < 50.0)
+
+
+def test_meters_are_refused_by_name(read):
+    with pytest.raises(SceneError, match="a sensor on a shape gives a number"):
+        read('<shape type="cube"><sensor type="irradiancemeter"/></shape>')
+    with pytest.raises(SceneError, match="beam without width"):
+        read('<emitter type="collimated"/>')
+
+
+def test_unknown_kinds_are_errors_that_an_option_turns_into_grey(read):
+    shape = '<shape type="cube"><bsdf type="ofafork"/></shape><shape type="blob"/>'
+    light = '<emitter type="portal"/>'
+    for version in ("0.6.0", "3.0.0"):
+        with pytest.raises(SceneError, match="unknown"):
+            read(shape, version)
+        scene = read(shape + light, version, missing_textures="grey")
+        assert len(scene.shapes) == 1 and not scene.lights
+        assert type(scene.shapes[0].material) is materials.Diffuse
+        text = " ".join(scene.warnings)
+        assert all(word in text for word in ("ofafork", "blob", "portal", "grey stands for it"))
+
+
+def test_all_lights_are_kinds(read):
+    assert isinstance(read('<emitter type="sunsky"/>').lights[0], lights.Sky)
