@@ -76,7 +76,7 @@ def _overlaps(bodies: list[Shape], lamp: Box, cache: LoweringCache | None) -> bo
 def escape_lamps(
     index: SceneIndex, sealed: frozenset[Medium], cache: LoweringCache | None = None
 ) -> NDArray[np.float32]:
-    """Return the targets of escape rays (k, 5): centre and radius [m] of a ball around a lamp, and 0.
+    """Return the targets of escape rays (k, 5): balls around lamps, each centre, radius [m] and 0.
 
     k is 0 to MOST_AIMS, and 0 where no escape ray is sent. cache: it keeps the triangles of lamps.
     """
