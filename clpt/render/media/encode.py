@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ from clpt.render.records.tables import as_words
 from clpt.render.scene_index import SceneIndex
 from clpt.scene import materials as mt
 from clpt.scene import roles
-from clpt.scene.media import Lattice, Medium
+from clpt.scene.media import Grid, Lattice, Medium
 from clpt.scene.params import fields_of
 from clpt.scene.phases import Phase
 from clpt.scene.shapes import Shape
@@ -195,7 +195,7 @@ class MediumWords:
         apart = field == "albedo_grid" and not fields["albedo_with_density"]
         return np.array([-first if apart else first], np.int32).view(np.uint32)
 
-    def _black_body_factor(self, medium: Any) -> float:
+    def _black_body_factor(self, medium: Grid) -> float:
         """Return the radiance of a black body in a grid over its radiance in a vacuum: n^2.
 
         n: the index behind the medium's own boundaries, at the yellow line of sodium. A normalised
@@ -210,7 +210,7 @@ class MediumWords:
         samples = [float(index(value).sample(SODIUM)) for value in indices]
         return max((n for n in samples if n > 0.0), default=1.0) ** 2
 
-    def _glow_words(self, medium: Any, word: int) -> Words:
+    def _glow_words(self, medium: Lattice, word: int) -> Words:
         """Return the words behind a grid's row: its bricks' light and their rows of `lights`."""
         words = np.zeros(grids.GLOW_WORDS, np.uint32)
         light: Any = medium.light
@@ -222,14 +222,15 @@ class MediumWords:
         if not isinstance(glow, Glow):  # a cloud: none of its bricks is a light
             words[0] = store.append("images", rows.view(np.uint32))
             return words
-        source = medium.emission_grid
-        if medium.temperature is not None:
-            source = medium.temperature
-            factor = self._black_body_factor(medium)
-            table = black_bodies(medium, light.kelvin)
-            words[1] = 2 if medium.normalised else 1
+        grid = cast("Grid", medium)
+        source = grid.emission_grid
+        if grid.temperature is not None:
+            source = grid.temperature
+            factor = self._black_body_factor(grid)
+            table = black_bodies(grid, light.kelvin)
+            words[1] = 2 if grid.normalised else 1
             words[4] = store.append_floats("distributions", factor * table[:, 1:])
-            brightness = factor * medium.brightness
+            brightness = factor * grid.brightness
             words[3], words[5] = as_words([brightness, (len(table) - 1) / light.kelvin])
         if source is not None:
             words[2] = store.append("images", cache(grids.bricks, source))

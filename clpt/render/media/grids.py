@@ -60,26 +60,28 @@ def row(medium: Lattice, encoder: Encoder) -> Words:
     checked.
     """
     counts = brick_counts(medium.size)
-    density: Any = fields_of(medium).get("density")
+    fields = fields_of(medium)
     if medium.noise is not None:
         first = _reserve(encoder.store, _cloud_density(medium), counts)
     elif medium.is_mixture:
         first = encoder.store.append("images", bricks(mixed(medium, encoder)[0]))
-    elif _is_read_in_place(medium, density):
-        first = _reserve(encoder.store, density.view(), counts)
+    elif _is_read_in_place(medium):
+        first = _reserve(encoder.store, fields["density"].view(), counts)
     else:
-        first = encoder.store.append("images", encoder.cache(bricks, density, medium.bits))
+        words = encoder.cache(bricks, fields["density"], medium.bits)
+        first = encoder.store.append("images", words)
     numbers = np.concatenate([to_lattice(medium).ravel(), np.array(medium.size) + 0.5])
     first_and_counts = np.array([first, *counts], np.uint32)
     return np.concatenate([first_and_counts, as_words(numbers)])
 
 
-def _is_read_in_place(medium: Lattice, density: Any) -> bool:
+def _is_read_in_place(medium: Lattice) -> bool:
     """Return whether kernels pack a density from the caller's buffer.
 
     They do for float32 on a device, z fastest, in 16 bits a point, without colours or light.
     """
-    values = (fields_of(medium).get(name) for name in ON_POINTS)
+    fields = fields_of(medium)
+    density, values = fields["density"], (fields[name] for name in ON_POINTS)
     plain = medium.bits == 16 and medium.light is None and all(v is None for v in values)
     return plain and (
         isinstance(density, cl_array.Array)
