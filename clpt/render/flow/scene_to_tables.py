@@ -27,8 +27,7 @@ from clpt.render.geometry.encode_attributes import lower_attributes
 from clpt.render.geometry.find import Geometry, Owner, spheres_move
 from clpt.render.lights.encode import LightRows, has_tree, light_rows
 from clpt.render.lights.find import Sources
-from clpt.render.materials import gloss
-from clpt.render.materials.encode import MaterialWords
+from clpt.render.materials.encode import MaterialWords, gloss_word
 from clpt.render.materials.encoder import Encoder
 from clpt.render.media.bodies import BodyWords
 from clpt.render.media.encode import MediumWords, medium_aims
@@ -342,7 +341,7 @@ def _asks_gloss(found: Analysis) -> bool:
     index = found.index
     tree = not index.light_paths and has_tree(found.sources.every, TREE_FROM)
     leaves = (leaf for shape in index.shapes for leaf in mt.parts(shape.material))
-    return tree and any(gloss.word(leaf) for leaf in leaves)
+    return tree and any(gloss_word(leaf) for leaf in leaves)
 
 
 def _lower_medium_aims(index: SceneIndex, encoder: Encoder, lights: LightRows) -> int:
