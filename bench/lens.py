@@ -19,8 +19,7 @@ import pyopencl as cl
 from bench import machine
 from clpt import device
 from clpt.records import SETTINGS, TABLES
-from clpt.render.camera.encode import lower_camera
-from clpt.render.camera.lens import glasses
+from clpt.render.camera.encode import encode_camera
 from clpt.render.flow import stages
 from clpt.render.flow.signatures import scene_text
 from clpt.render.records import CameraFeatures
@@ -52,8 +51,8 @@ kernel void trace(SCENE_ARGS, global const float *given, global float *made, uin
 
 def rate(on: device.Device, lens: Lens, lanes: int) -> float:
     """Rays in a second of processor time."""
-    rows = glasses(lens)
-    _, words = lower_camera(lens, 90, 60, range(len(rows)))
+    rows = lens.dispersive_glasses
+    words = encode_camera(lens, 90, 60, range(len(rows)))
     camera = CameraFeatures("lens", disperses=True, losses=lens.reflects)
     files = {
         "generated/scene.cl": scene_text(),

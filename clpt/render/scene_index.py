@@ -9,12 +9,11 @@ from typing import Any
 from clpt.geometry import instancing, shapes
 from clpt.geometry.instancing import Placed, Prototype
 from clpt.geometry.motion import Motions
-from clpt.render.camera import find as cameras
 from clpt.render.film import filters
 from clpt.render.records import GridFeatures, custom_materials
 from clpt.scene import Film, Scene
 from clpt.scene import materials as mt
-from clpt.scene.cameras import Camera, Lens
+from clpt.scene.cameras import Camera
 from clpt.scene.integrators import Auto, Direct, Integrator, ParticleTracer, Path, Vcm
 from clpt.scene.layers import LAYERS
 from clpt.scene.lights import Light
@@ -154,8 +153,8 @@ class SceneIndex:
     def lit_ghosts(self) -> bool:
         """Whether light paths are ghosts of the lens, of light straight from lights."""
         camera, integrator, before = self.scene.camera, self.scene.integrator, self.lit_before
-        wanted = isinstance(camera, Lens) and camera.ghosts > 0.0
-        ghosts = isinstance(camera, Lens) and (wanted if before is None else before)
+        wanted = camera.has_ghosts
+        ghosts = camera.traced_lens is not None and (wanted if before is None else before)
         alone = isinstance(integrator, (Path, Direct)) and not integrator.guiding
         return ghosts and alone and not self.light_layers and not self.emitting
 
@@ -180,9 +179,9 @@ class SceneIndex:
     def joined(self) -> bool:
         """Whether paths that start at lights are joined to the camera."""
         if not isinstance(self.scene.integrator, Vcm):
-            return cameras.is_connected(self.scene.camera, self.scene.film.mode)
+            return self.scene.camera.is_connected(self.mode)
         wanted = self.scene.integrator.light_tracing
-        return wanted and cameras.is_connected(self.scene.camera, self.scene.film.mode)
+        return wanted and self.scene.camera.is_connected(self.mode)
 
     @property
     def merged(self) -> bool:

@@ -343,7 +343,7 @@ def test_images_are_chosen_by_what_they_send(name):
     value = r[5] / r[4]
     assert (r[4] > 0.0).all()
     assert value.std() < 0.1 * value.mean()
-    mean = image_lights.mean_radiance(lamp, image_lights.content(lamp, scene.encoder.look))
+    mean = image_lights.mean_radiance(image_lights.content(lamp, scene.encoder.look))
     assert value.mean() == pytest.approx(4.0 * np.pi * mean, rel=0.02)
 
 

@@ -21,8 +21,7 @@ from clpt.errors import SceneError
 from clpt.geometry import shapes as geometry
 from clpt.images.spectral_exr import SpectralImage
 from clpt.lenses import Prescription, Surface
-from clpt.render.camera.check import check_camera
-from clpt.render.camera.find import CONNECTED
+from clpt.render.camera.encode import check_camera
 from clpt.render.flow.check import check
 from clpt.render.geometry.check import check_shapes
 from clpt.render.lights.check import check_light
@@ -550,7 +549,7 @@ def _any_scene(choose: Callable[[int], int]) -> Scene:
     self.rigid = True
     lamps = [self.kind(PLACED_LIGHTS) for _ in self.several(3)]
     lamps += [lights.Point(position=(0.0, 0.0, 2.0 + i)) for i in range(self.one([0] * 7 + [17]))]
-    camera = self.kind([cls for cls in cameras.KINDS if not traced or cls.kind in CONNECTED])
+    camera = self.kind([cls for cls in cameras.KINDS if not traced or cls.connects])
     plain = {} if isinstance(integrator, integrators.HAVE_LAYERS) else {"layers": ()}
     return Scene(
         camera=camera,

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from clpt.geometry.instancing import distinct
-from clpt.render.camera.encode import lower_camera
-from clpt.render.camera.find import dispersive_glasses
+from clpt.render.camera.encode import encode_camera
 from clpt.render.edit.rebuild import ranges
 from clpt.render.edit.scene_edit import Replacements
 from clpt.render.lights.aims import is_sharp
@@ -18,7 +17,7 @@ from clpt.render.materials.check import check_material
 from clpt.render.materials.encode import gloss_word
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene import Scene
-from clpt.scene.cameras import Camera, Lens
+from clpt.scene.cameras import Camera
 from clpt.scene.materials import CLEAR, COMPOSITES, Material
 from clpt.scene.params import fields_of
 
@@ -42,11 +41,12 @@ def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> Callable[[], N
         return "bodies that overlap know each other's indices"
     camera = None
     if scene.camera is not former.camera:
-        if dispersive_glasses(scene.camera) != dispersive_glasses(former.camera):
+        if scene.camera.dispersive_glasses != former.camera.dispersive_glasses:
             return "the camera's lens is of another glass"
         film, rows_ = scene.film, lowered.glass_rows
-        kind, camera = lower_camera(scene.camera, film.width, film.height, rows_)
-        if kind != lowered.features.camera.kind or len(camera) != len(lowered.tables["camera"]):
+        camera = encode_camera(scene.camera, film.width, film.height, rows_)
+        kind = lowered.features.camera.kind
+        if scene.camera.kind != kind or len(camera) != len(lowered.tables["camera"]):
             return "the camera is of another kind"
         if _reflects(scene.camera) != _reflects(former.camera):
             return "the camera's lens reflects, or no more"
@@ -64,8 +64,7 @@ def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> Callable[[], N
 
 
 def _reflects(camera: Camera) -> tuple[bool, bool]:
-    """Return whether a camera's lens reflects in its kernels, and whether it has ghosts."""
-    return (camera.reflects, camera.ghosts > 0.0) if isinstance(camera, Lens) else (False, False)
+    return camera.reflects, camera.has_ghosts
 
 
 def _write(on_device: DeviceScene, camera: Any, rows: list[tuple[int, Any]]) -> None:

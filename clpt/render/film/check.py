@@ -8,7 +8,6 @@ from clpt.scene import Scene
 from clpt.scene.integrators import HAVE_LAYERS, Box, Vcm
 from clpt.scene.layers import LAYERS
 
-WITH_AXIS = ("perspective", "thin_lens", "orthographic")
 LARGEST = 1 << 26  # pixels of a film; its tiles are divided in float32, see kernels/film/film.cl
 
 
@@ -35,7 +34,7 @@ def _check_layers(scene: Scene) -> None:
         names = ", ".join(cls.kind for cls in HAVE_LAYERS)
         message = f"only the integrators {names} have layers, not {how.kind}"
         raise SceneError(message, where="film.layers")
-    if scene.camera.kind not in WITH_AXIS:
+    if not scene.camera.has_axis:
         for name, instead in (("z", ": ask for depth"), ("motion", "")):
             if name in film.layers:
                 message = f"the camera {scene.camera.kind} has no axis for {name}{instead}"

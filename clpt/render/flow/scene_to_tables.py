@@ -14,8 +14,7 @@ from clpt.geometry import shape_records, shapes
 from clpt.geometry.instancing import Instances
 from clpt.geometry.refining import is_refined
 from clpt.records import SHAPE_BITS
-from clpt.render.camera import find as cameras
-from clpt.render.camera.encode import lower_camera
+from clpt.render.camera.encode import encode_camera
 from clpt.render.film import encode_filters as filters
 from clpt.render.film.colour import sensor
 from clpt.render.flow import features as needs
@@ -45,6 +44,7 @@ from clpt.render.textures.image_files import ImageFiles
 from clpt.render.transport import photons
 from clpt.scene import Scene
 from clpt.scene import materials as mt
+from clpt.scene.cameras import CONNECTED
 from clpt.scene.fingerprint import named_files
 from clpt.scene.integrators import DEEPEST, Film, Integrator
 from clpt.scene.lights import Point
@@ -66,7 +66,7 @@ class Lowered:
     instances: what trees are built of, see `Geometry`. tables: every other read-only array by name;
     where an instance's tree begins is filled in when trees are built. zero_copy: tables that are
     the caller's buffers. owners: of each row of `shapes`. layer_names: what layers tell of.
-    glass_rows: of the camera, see `lower_camera`. integrator: of the scene, or what was chosen;
+    glass_rows: of the camera, see `encode_camera`. integrator: of the scene, or what was chosen;
     reason: why, "" where there was no choice; candidates: see `SceneIndex`; samples: of the
     whole film, as the scene asks for. encoder: what made the tables, for values that are edited.
     cache: what the next lowering need not make again. around: media at the camera, or the matter of
@@ -212,7 +212,7 @@ def _encode_surfaces(found: Analysis, encoder: Encoder) -> _Surfaces:
     materials = _begin_materials(found, encoder)
     moves = spheres_move(index)
     geometry = lower_geometry(found.geometry, encoder, materials, spheres_move=moves)
-    media = MediumWords(index, encoder, materials, found.sealed, found.sources.glows)
+    media = MediumWords(index, encoder, materials, found.sealed, found.sources.volumes)
     lights = _lower_lights(index, encoder, geometry, found.sources, media)
     near = _lower_medium_aims(index, encoder, lights)
     around = _lower_bodies(found, geometry, encoder, materials, media)
@@ -246,7 +246,7 @@ def _encode_views(
     counts = geometry.single_count, geometry.keys
     lower_attributes(geometry.owners, encoder.textures, encoder.cache, *counts)
     store.append("shapes", shape_words(geometry.rows))
-    glasses = _lower_camera(index, encoder)
+    glasses = _encode_camera(index, encoder)
     ambient = _lower_ambient(index, encoder)
     return _Views(profile, density_row, tabulated, aims, glasses, ambient)
 
@@ -401,12 +401,12 @@ def _lower_lights(
     return lights
 
 
-def _lower_camera(index: SceneIndex, encoder: Encoder) -> tuple[int, ...]:
+def _encode_camera(index: SceneIndex, encoder: Encoder) -> tuple[int, ...]:
     """Append the camera; return the rows in `spectra` of its glasses that disperse."""
     camera, film = index.camera, index.film
-    glasses = cameras.dispersive_glasses(camera)
+    glasses = camera.dispersive_glasses
     rows = tuple(encoder.spectra.row(glass) for glass in glasses) if index.spectral else ()
-    _, words = lower_camera(camera, film.width, film.height, rows)
+    words = encode_camera(camera, film.width, film.height, rows)
     encoder.store.append_floats("camera", words)
     return rows
 
@@ -423,7 +423,7 @@ def _warnings(index: SceneIndex) -> list[str]:
     """Return warnings of parts of the scene that are not rendered as it says."""
     film, integrator = index.film, index.integrator
     warnings = list(index.warnings)
-    if index.mode == "rgb" and cameras.dispersive_glasses(index.camera):
+    if index.mode == "rgb" and index.camera.dispersive_glasses:
         warnings.append(f"{index.camera.kind}.glass: in RGB mode all wavelengths have one focus")
     if index.mode == "rgb" and any(map(_disperses, index.shapes)):
         warnings.append("in rgb mode glass does not disperse: ask for the spectral mode")
@@ -478,9 +478,9 @@ def _left_to_the_camera(index: SceneIndex) -> list[str]:
     camera, integrator = index.camera, index.integrator
     kind, warnings = integrator.kind, []
     if integrator.light_tracing and not index.joined:
-        names = " and ".join(cameras.CONNECTED)
+        names = " and ".join(CONNECTED)
         reason = f"a {camera.kind} camera cannot be joined to a point"
-        if camera.kind in cameras.CONNECTED:
+        if camera.kind in CONNECTED:
             reason = "its glass disperses"
         name = "light_tracing" if kind == "vcm" else "light_paths"
         warnings.append(f"{kind}.{name}: left aside, as {reason}; {names} can, without such glass")

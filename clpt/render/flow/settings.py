@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from clpt.records import SETTINGS
 from clpt.render.film.colour import film_scale, output_matrix
 from clpt.render.geometry.find import Geometry
-from clpt.render.lights.encode import LightRows
-from clpt.render.lights.level import light_level
+from clpt.render.lights.encode import LightRows, light_level
 from clpt.render.records import LayerFeatures
 from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.find import Density

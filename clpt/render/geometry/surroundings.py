@@ -24,7 +24,6 @@ from clpt.geometry import shapes, winding
 from clpt.geometry.motion import AT_ONCE, corners
 from clpt.geometry.triangles import at_time
 from clpt.geometry.winding import box
-from clpt.render.camera.find import origin_of
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Camera
 from clpt.scene.media import Medium
@@ -219,8 +218,8 @@ def stands_still(bounding: Sequence[Shape]) -> bool:
 
 
 def camera_origin(camera: Camera, film: Film, time: float) -> NDArray[np.float64]:
-    """The point from which a camera sees at a time [s], see `origin_of`."""
-    origin = origin_of(camera, film.width, film.height)
+    """The point from which a camera sees at a time [s], see `Camera.view_point`."""
+    origin = camera.view_point(film.width, film.height)
     if camera.motion is None:
         return origin
     matrix = camera.motion.at(time)

@@ -11,12 +11,10 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Words
 from clpt.records import MEDIUM_BITS
+from clpt.render.lights.bodies import BodyLight
 from clpt.render.lights.bounds import Bounds
-from clpt.render.lights.bricks import Glow, black_bodies, brick_counts
+from clpt.render.lights.bricks import BrickLights, black_bodies, brick_counts
 from clpt.render.lights.encode import LightRows
-from clpt.render.lights.encode_bodies import BodyLight
-from clpt.render.lights.encode_bricks import BrickLights
-from clpt.render.lights.glow import GlowingBody
 from clpt.render.materials.encode import MaterialWords
 from clpt.render.materials.encoder import Encoder
 from clpt.render.media import grids
@@ -81,12 +79,12 @@ class MediumWords:
         encoder: Encoder,
         materials: MaterialWords,
         sealed: frozenset[Medium] = frozenset(),
-        glows: Mapping[Medium, Glow | GlowingBody] = MappingProxyType({}),
+        glows: Mapping[Medium, BrickLights | BodyLight] = MappingProxyType({}),
     ):
         self._index, self._encoder, self._materials = index, encoder, materials
         self._sealed, self._glows = sealed, glows
         self._words: dict[Medium, int] = {}
-        self.lights: list[BrickLights | BodyLight] = []  # of the media that have a word
+        self.lights: list[tuple[int, BrickLights | BodyLight]] = []  # by their medium's word
         self._light_row = len(index.lights)  # in `lights`, of the next brick or body
         self._has_media = bool(index.media)  # False for an integrator that sees none
 
@@ -109,7 +107,7 @@ class MediumWords:
         """Append the row of a medium to `materials`; return the medium's word."""
         spectral, lattice, emitting = self._index.spectral, medium.lattice, self._index.emitting
         glow = self._glows.get(medium)
-        body = glow if isinstance(glow, GlowingBody) else None
+        body = glow if isinstance(glow, BodyLight) else None
         rows = []
         if emitting:
             light = medium.light or Constant(0.0)
@@ -124,7 +122,7 @@ class MediumWords:
         word = self._bits(medium) | before + self._encoder.store.size("materials")
         if body is not None:
             self._light_row += 1
-            self.lights.append(BodyLight(word, body))
+            self.lights.append((word, body))
         if lattice is not None:
             rows += self._lattice_words(lattice, word)
         self._encoder.store.append("materials", np.concatenate([*rows, *mixture_rows]))
@@ -219,7 +217,7 @@ class MediumWords:
             return words
         rows = np.full(np.prod(brick_counts(medium.size)), -1, np.int32)
         glow = self._glows.get(medium)
-        if not isinstance(glow, Glow):  # a cloud: none of its bricks is a light
+        if not isinstance(glow, BrickLights):  # a cloud: none of its bricks is a light
             words[0] = store.append("images", rows.view(np.uint32))
             return words
         grid = cast("Grid", medium)
@@ -239,5 +237,5 @@ class MediumWords:
         rows[glow.numbers] = 1 + self._light_row + np.arange(len(glow.numbers))
         words[0] = store.append("images", rows.view(np.uint32))
         self._light_row += len(glow.numbers)
-        self.lights.append(BrickLights(word, glow))
+        self.lights.append((word, glow))
         return words

@@ -6,12 +6,12 @@ from typing import NoReturn
 
 from clpt.errors import SceneError
 from clpt.geometry import shapes
-from clpt.render.camera.find import CONNECTED, dispersive_glasses
 from clpt.render.geometry.find import assembled
 from clpt.render.media import light_media
 from clpt.render.records.lowering_cache import LoweringCache
 from clpt.render.scene_index import SceneIndex
 from clpt.scene import Scene
+from clpt.scene.cameras import CONNECTED
 from clpt.scene.integrators import ParticleTracer
 from clpt.scene.lights import DirectionalArea, Point
 from clpt.scene.materials import parts
@@ -31,12 +31,12 @@ def check_light_paths(scene: Scene, shapes_: list[Shape]) -> None:
                 )
         return
     spectral = scene.film.mode == "spectral"
-    if scene.camera.kind not in CONNECTED:
+    if not scene.camera.connects:
         names = " and ".join(CONNECTED)
         _refuse(f"the cameras {names}, not {scene.camera.kind}", "camera")
     if scene.film.alpha:
         _refuse("a film without alpha", "film.alpha")
-    if spectral and dispersive_glasses(scene.camera):
+    if spectral and scene.camera.dispersive_glasses:
         _refuse("a lens whose glass does not disperse", "camera.glass")
     for i, light in enumerate(scene.lights):
         if isinstance(light, Point) and not light.falloff:

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.geometry import analytic, shape_records, shapes, triangles
-from clpt.render.camera import find as cameras
 from clpt.render.geometry import surroundings
 from clpt.render.geometry.find import Emitter, Geometry
 from clpt.render.lights import bounds as light_bounds
@@ -136,7 +135,7 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
     integrator, without = index.integrator, Path(light_paths=0)
     if not index.lights_reach:
         return without, index.lit_media
-    if not cameras.is_connected(index.camera, index.mode):
+    if not index.camera.is_connected(index.mode):
         return without, "points cannot be joined to this camera"
     fewest = FEWEST - index.free_panes  # a pane on the way costs no depth
     if 0 <= integrator.max_depth < fewest:
@@ -248,11 +247,11 @@ def _covered(
 
 def _sees_clear(index: SceneIndex, geometry: Geometry) -> bool:
     """Whether mirrors and clear things fill enough of the picture: as if nothing hid them."""
-    view = cameras.view_of(index.camera, index.film.width, index.film.height)
+    view = index.camera.view_of(index.film.width, index.film.height)
     assert view is not None, "a camera that can be joined has a point"
     directions = _cone(view.axis, math.cos(view.angle), RAYS)
     for pieces in sharp_pieces(geometry, index.motions.shapes, lambda one: is_sharp(one, CLEAR)):
-        met = _covered(pieces, view.place, directions)
+        met = _covered(pieces, view.origin, directions)
         directions = np.delete(directions, met, axis=1)
         if directions.shape[1] <= (1.0 - SEEN) * RAYS:
             return True
