@@ -6,6 +6,7 @@ its sides, else into the media at some points just before it: these must agree.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -17,7 +18,6 @@ from clpt import transforms
 from clpt.geometry import analytic, shapes, winding
 from clpt.render.geometry import surroundings
 from clpt.render.geometry.find import Emitter, Geometry
-from clpt.render.lights import bounds as light_bounds
 from clpt.render.lights.find import Sources, row_order
 from clpt.render.media.bodies import BodyWords, matter_of
 from clpt.render.media.encode import MediumWords
@@ -30,6 +30,7 @@ POINTS = 6  # before a shape that emits
 OFFSET = 1e-4  # of these points from the shape, over its size
 INFINITY = 1e4  # radii of the scene: the distance of a point that stands for infinity
 CROSSES = "{} comes into another medium while the shutter is open"
+STRADDLES = "{} lies in more than one medium, or does not know its bounds"
 
 Around = tuple[Any, ...]  # media, or the matter of bodies; the first one counts
 
@@ -138,11 +139,16 @@ def _around_lamp(
     if unknown:
         raise Unknown(unknown.format(name))
     if lamp.reach == "placed":
-        bounds = light_bounds.of_lamp(lamp)
-        surrounding = boundaries.around(bounds.low[0], index.motions.lamps.get(i))
-        if surrounding is None:
+        bounds, keys = lamp.bounds(), index.motions.lamps.get(i)
+        if bounds is None:
+            raise Unknown(STRADDLES.format(name), name)
+        corners = itertools.product(*zip(bounds.low, bounds.high, strict=True))
+        first, *others = (boundaries.around(np.array(p), keys) for p in dict.fromkeys(corners))
+        if first is None or None in others:
             raise Unknown(CROSSES.format(name), name)
-        return surrounding
+        if any(other != first for other in others):
+            raise Unknown(STRADDLES.format(name), name)
+        return first
     surrounding = boundaries.around(far, None)
     if surrounding or surrounding is None:
         reason = f"the light of {name} comes from infinity, where a medium has no end"
