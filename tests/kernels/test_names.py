@@ -13,8 +13,8 @@ from clpt.scene import KINDS
 
 ALTERNATIVES = (  # files, of each row of which a program has one at most
     ("bvh/*_keyed.cl",),
-    ("transport/rival_area*.cl",),
-    ("transport/rival_pdf*.cl",),
+    ("transport/mis_merging_area*.cl",),
+    ("transport/mis_pdf*.cl",),
     ("media/grid_collision*.cl",),
     ("bvh/query*.cl",),
     ("bvh/shapes_*.cl",),

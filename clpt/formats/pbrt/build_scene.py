@@ -23,7 +23,7 @@ from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.shapes import Geometry, displaced, geometry, with_uvs
 from clpt.formats.pbrt.state import Definition, State
 from clpt.formats.pbrt.textures import textured
-from clpt.scene.lights import Light
+from clpt.scene.lights import Area, Light
 from clpt.scene.materials import Diffuse, Mask, Material, Null, TwoSided
 from clpt.scene.media import Medium
 from clpt.scene.params import Kind, fields_of
@@ -101,8 +101,7 @@ def _shape(definition: Definition, form: Geometry | None) -> Shape | None:
         emission = None
     if not isinstance(opacity, float) or opacity < 1.0:
         surface = Mask(material=surface, opacity=opacity)
-        if emission is not None:
-            state.warn(params, "'alpha' hides its surface, but not its light")
+        emission = _masked(emission, opacity, params, state)
     if _has_texture(surface) or _has_texture(emission):
         if form.kind is Curves:
             state.warn(params, "textures run around and along curves, not along and across")
@@ -126,6 +125,23 @@ def _moving(shape: Shape, state: State) -> Shape:
     return replace(shape, to_world=own, motion=keys)
 
 
+def _masked(
+    emission: Light | None, opacity: float | Texture, source: Parameters, state: State
+) -> Light | None:
+    """Return the light of a shape with an alpha: what is not there does not shine.
+
+    By pbrt's rule an alpha of 0 all over hides a lamp and leaves it all its light.
+    """
+    if emission is None:
+        return None
+    if isinstance(opacity, float) and opacity <= 0.0:
+        message = "an 'alpha' of 0 hides its surface, not its light, which the camera sees here"
+        state.warn(source, message)
+        return emission
+    light = cast(Area, emission)  # as there is no other
+    return replace(light, radiance=Product(first=light.radiance, second=opacity))
+
+
 def _material(source: Parameters, state: State) -> Material:
     """Return the material of the state, made once for all shapes."""
     current = state.material
@@ -145,7 +161,7 @@ def _body(source: Parameters, state: State) -> Medium | None:
     `subsurface`."""
     current = state.material
     if isinstance(current, str):
-        current = state.shared.materials.get(current)
+        current = state.latest(state.shared.materials.get(current))
     if current is None or current.kind != "subsurface":
         return None
     params, defined_in = current.params, current.state
@@ -193,17 +209,20 @@ def _emission(state: State, form: Geometry) -> Light | None:
 
 def lights(contents: Contents) -> list[Light]:
     """Make all lights that are on no shape. Raises SceneError."""
-    made = []
+    lamps = []
     for each in contents.lights:
-        made.append(light(each.kind, each.params, each.state))
-        _warn_of_unused(each.params, each.state)
-    return made
+        lamp = light(each.kind, each.params, each.state)
+        if lamp is not None:
+            lamps.append(lamp)
+            _warn_of_unused(each.params, each.state)
+    return lamps
 
 
 def check_unused_materials(contents: Contents) -> None:
     """Make the named materials that no shape has, for their errors and warnings."""
-    for name, definition in contents.shared.materials.items():
-        definition.state.named_material(name, definition.params)
+    for name, versions in contents.shared.materials.items():
+        for definition in versions:
+            definition.state.material_of(name, definition)
 
 
 def check_options(options: Sequence[Definition]) -> None:
