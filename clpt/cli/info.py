@@ -8,10 +8,20 @@ from typing import Any
 
 import click
 
-from ..formats import locate
+from ..errors import SceneError, one_line
+from ..formats import blockers, locate
 from .options.loading_options import loading_options
 from .options.scene_path import ScenePath
 from .process import terminal
+
+
+def all_of(first: SceneError, errors: list[SceneError]) -> SceneError:
+    """Print all errors of a file, if there are several; return the error to end with."""
+    if len(errors) < 2:
+        return first
+    for error in errors:
+        click.echo(one_line(str(error)), err=True)
+    return SceneError(f"{len(errors)} things above keep it from being read", file=first.file)
 
 
 @click.command()
@@ -21,6 +31,7 @@ from .process import terminal
 def info(scene: Path, variables: dict[str, Any], as_json: bool) -> None:
     """Show what the file or folder SCENE holds, without rendering it.
 
+    Of a scene of Mitsuba or PBRT that cannot be read, all reasons are listed, with file and line.
     Of a film, a checkpoint or an image, what it says of itself: see `clpt inspect` for its values.
     """
     locate(scene)
@@ -39,7 +50,10 @@ def info(scene: Path, variables: dict[str, Any], as_json: bool) -> None:
 
         contents = dict(read_contents(scene).facts)
     else:
-        loaded = load(scene, **variables)
+        try:
+            loaded = load(scene, **variables)
+        except SceneError as error:
+            raise all_of(error, blockers.collect(locate(scene), **variables)) from None
         from .files.scene_contents import summary, tidy
 
         contents = summary(loaded)

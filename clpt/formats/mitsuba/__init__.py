@@ -10,10 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from clpt.choices import Missing
+from clpt.formats.blockers import attempt
 from clpt.formats.mitsuba import dicts, old_words, sensors
 from clpt.formats.mitsuba.bsdfs import bsdf
 from clpt.formats.mitsuba.emitters import emitter
@@ -97,7 +99,9 @@ def _with_layers(film: Film, how: Integrator, props: Properties, context: Contex
 def _scene(path: Path, document: Document, context: Context) -> Scene:
     props = Properties(document.root, context)
     shapes = shapes_of(props.objects("shape"), context)
-    emitters = [emitter(element, context) for element in props.objects("emitter")]
+    emitters = [
+        attempt(partial(emitter, element, context), None) for element in props.objects("emitter")
+    ]
     lights = [light for light in emitters if light is not None]
     for element in props.objects("bsdf"):
         bsdf(element, context)
@@ -114,7 +118,9 @@ def _scene(path: Path, document: Document, context: Context) -> Scene:
         context.warn(props.element, f"the first of several cameras is used; there are: {names}")
     props.finish()
     camera = framing_camera(shapes) if first is None else first.camera
-    how = _default() if integrator is None else sensors.integrator(integrator, context)
+    how = _default()
+    if integrator is not None:
+        how = attempt(lambda: sensors.integrator(integrator, context), how)
     film = sensors.default_film() if first is None else first.film
     return Scene(
         camera=camera,
@@ -152,10 +158,17 @@ def _sensors(props: Properties, context: Context) -> list[sensors.Sensor]:
     all_sensors: list[sensors.Sensor] = []
     for element in props.objects("sensor"):
         is_batch = element.type == "batch"
-        all_sensors += sensors.batch(element, context) if is_batch else [sensor(element, context)]
+        if is_batch:
+            all_sensors += attempt(partial(sensors.batch, element, context), [])
+        else:
+            all_sensors += attempt(partial(_one_sensor, element, context), [])
     if not all_sensors:
         context.warn(props.element, "has no sensor; a camera that sees everything is used")
     return all_sensors
+
+
+def _one_sensor(element: Element, context: Context) -> list[sensors.Sensor]:
+    return [sensor(element, context)]
 
 
 def _chosen(all_sensors: Sequence[sensors.Sensor], document: Document) -> int | None:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from clpt import measured, spectra
+from clpt.formats.blockers import attempt
 from clpt.formats.missing import EVEN, GREY
 from clpt.formats.mitsuba.fluorescence import fluorescent
 from clpt.formats.mitsuba.hair import at_yellow, hair
@@ -55,7 +56,8 @@ AIR = 1.000277  # the default of `ext_eta`: src/bsdfs/ior.h
 
 def bsdf(element: Element, context: Context) -> Material:
     """Make the material that a <bsdf> describes, once for all references to it."""
-    return context.once(element, lambda _: _bsdf(element, context))
+    grey: Material = materials.Diffuse()
+    return context.once(element, lambda _: attempt(lambda: _bsdf(element, context), grey))
 
 
 def _bsdf(element: Element, context: Context) -> Material:

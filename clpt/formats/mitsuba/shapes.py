@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.errors import SceneError
 from clpt.formats import volumes
+from clpt.formats.blockers import attempt
 from clpt.formats.meshes import mesh, strands
 from clpt.formats.mitsuba import serialized
 from clpt.formats.mitsuba.bsdfs import bsdf
@@ -46,7 +48,7 @@ def shapes_of(elements: Iterable[Element], context: Context) -> list[Shape]:
             made += shapes_of(_merged(element, context), context)
         else:
             with suppress(NoArea):
-                made += _single(element, context)
+                made += attempt(partial(_single, element, context), [])
     return made
 
 

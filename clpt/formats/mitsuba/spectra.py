@@ -14,6 +14,7 @@ import numpy as np
 
 from clpt import images, spectra
 from clpt.errors import UnknownKindError
+from clpt.formats.blockers import attempt
 from clpt.formats.colour import colour
 from clpt.formats.missing import GREY
 from clpt.formats.mitsuba.properties import (
@@ -331,7 +332,8 @@ def _plugin(child: Element, role: Spectral, outer: Properties) -> Any:
 
 def texture(element: Element, outer: Properties) -> Texture:
     """Make the texture that an element describes, once for all references."""
-    return outer.context.once(element, lambda _: _texture(element, outer))
+    grey: Texture = Bitmap(image=GREY)
+    return outer.context.once(element, lambda _: attempt(lambda: _texture(element, outer), grey))
 
 
 def _texture(element: Element, outer: Properties) -> Texture:

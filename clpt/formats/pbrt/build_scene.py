@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextvars
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
@@ -13,6 +15,7 @@ import numpy as np
 from clpt import transforms
 from clpt.errors import did_you_mean
 from clpt.files import budget
+from clpt.formats.blockers import attempt
 from clpt.formats.pbrt.curves import joined
 from clpt.formats.pbrt.files import Contents
 from clpt.formats.pbrt.layered import body
@@ -33,7 +36,7 @@ from clpt.scene.textures import MeshAttribute, Product, Texture
 
 Progress = Callable[[float, str], None]
 SHARES = "face_power"  # the attribute of a mesh whose parts shine unequally
-GREY = TwoSided(front=Diffuse(reflectance=0.5))
+GREY: Material = TwoSided(front=Diffuse(reflectance=0.5))
 
 
 def shapes(contents: Contents, progress: Progress | None) -> list[Shape]:
@@ -70,9 +73,11 @@ def _make_all(definitions: list[Definition], progress: Progress | None) -> list[
     workers = min(8, os.cpu_count() or 1)
     with ThreadPoolExecutor(workers) as pool:
         try:
-            geometries = pool.map(budget.carried(geometry), definitions)
+            context = contextvars.copy_context()
+            tried = budget.carried(partial(_geometry, context))
+            geometries = pool.map(tried, definitions)
             for definition, body in zip(definitions, geometries, strict=True):
-                made.append(_shape(definition, body))
+                made.append(attempt(partial(_shape, definition, body), None))
                 if progress is not None:
                     count = len(definitions)
                     progress(len(made) / count, f"{len(made)} of {count} shapes")
@@ -80,6 +85,11 @@ def _make_all(definitions: list[Definition], progress: Progress | None) -> list[
             pool.shutdown(cancel_futures=True)
             raise
     return made
+
+
+def _geometry(context: contextvars.Context, definition: Definition) -> Geometry | None:
+    """Return the geometry of a shape, in a thread of its own that collects errors as its parent."""
+    return context.copy().run(attempt, lambda: geometry(definition), None)
 
 
 def _shape(definition: Definition, form: Geometry | None) -> Shape | None:
@@ -160,7 +170,7 @@ def _body(source: Parameters, state: State) -> Medium | None:
 
 def make_material(kind: str, params: Parameters, state: State, name: str) -> Material:
     """Make a material, and warn of parameters that it does not have."""
-    made = material(kind, params, state, name)
+    made = attempt(lambda: material(kind, params, state, name), GREY)
     _warn_of_unused(params, state)
     return made
 
@@ -195,7 +205,7 @@ def lights(contents: Contents) -> list[Light]:
     """Make all lights that are on no shape. Raises SceneError."""
     lamps = []
     for each in contents.lights:
-        lamp = light(each.kind, each.params, each.state)
+        lamp = attempt(partial(light, each.kind, each.params, each.state), None)
         if lamp is not None:
             lamps.append(lamp)
             _warn_of_unused(each.params, each.state)
