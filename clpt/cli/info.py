@@ -4,15 +4,26 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..errors import SceneError, one_line
-from ..formats import blockers, locate
+from ..formats import errors_of, load, locate
 from .options.loading_options import loading_options
 from .options.scene_path import ScenePath
 from .process import terminal
+
+if TYPE_CHECKING:
+    from ..scene import Scene
+
+
+def read(scene: Path, variables: dict[str, Any]) -> Scene:
+    """Return the scene of a file. Raises SceneError behind the list of all its errors."""
+    try:
+        return load(scene, **variables)
+    except SceneError as error:
+        raise all_of(error, errors_of(locate(scene), **variables)) from None
 
 
 def all_of(first: SceneError, errors: list[SceneError]) -> SceneError:
@@ -36,7 +47,6 @@ def info(scene: Path, variables: dict[str, Any], as_json: bool) -> None:
     """
     locate(scene)
     # Imported where they are needed: help needs none of them, and some bring OpenCL.
-    from ..formats import load
     from ..images import READERS
     from .files.targets import is_film
 
@@ -50,10 +60,7 @@ def info(scene: Path, variables: dict[str, Any], as_json: bool) -> None:
 
         contents = dict(read_contents(scene).facts)
     else:
-        try:
-            loaded = load(scene, **variables)
-        except SceneError as error:
-            raise all_of(error, blockers.collect(locate(scene), **variables)) from None
+        loaded = read(scene, variables)
         from .files.scene_contents import summary, tidy
 
         contents = summary(loaded)

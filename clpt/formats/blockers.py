@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from contextvars import ContextVar
-from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from clpt.errors import SceneError
 
@@ -33,20 +33,12 @@ def note(error: SceneError) -> bool:
     return True
 
 
-def collect(path: Path, **variables: Any) -> list[SceneError]:
-    """Return the errors of a file, in the order in which they are met, each once.
-
-    path: of a scene of any format; of Mitsuba's and PBRT's materials, textures, shapes, lights and
-    parameters each have their own. variables: see clpt.load.
-    """
-    from clpt.formats import load
-
+@contextmanager
+def collecting() -> Iterator[list[SceneError]]:
+    """Collect the errors of what is read inside; the list grows as they are met."""
     errors: list[SceneError] = []
     token = _found.set(errors)
     try:
-        load(path, **variables)
-    except SceneError as error:
-        errors.append(error)
+        yield errors
     finally:
         _found.reset(token)
-    return list({str(error): error for error in errors}.values())

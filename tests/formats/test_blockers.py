@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from clpt.cli import cli as main
 from clpt.errors import SceneError
-from clpt.formats import blockers, load
+from clpt.formats import blockers, errors_of, load
 
 XML = """<scene version="3.0.0">
 <sensor type="fisheye"/>
@@ -48,7 +48,7 @@ def path(request, tmp_path):
 
 
 def test_all_errors_are_collected(path):
-    errors = blockers.collect(path)
+    errors = errors_of(path)
     assert len(errors) == len(WORDS[path.name])
     for word, line in WORDS[path.name].items():
         (error,) = [one for one in errors if word in one.message]
@@ -66,15 +66,15 @@ def test_info_lists_them(path):
 
 def test_a_file_without_errors_has_none(tmp_path):
     (tmp_path / "a.xml").write_text('<scene version="3.0.0"><shape type="cube"/></scene>')
-    assert blockers.collect(tmp_path / "a.xml") == []
+    assert errors_of(tmp_path / "a.xml") == []
 
 
 def test_hostile_files_have_a_limited_list(tmp_path):
     many = "".join(f'<bsdf type="a{i}"/>' for i in range(3 * blockers.MOST))
     (tmp_path / "a.xml").write_text(f'<scene version="3.0.0">{many}</scene>')
-    assert len(blockers.collect(tmp_path / "a.xml")) == blockers.MOST + 1
+    assert len(errors_of(tmp_path / "a.xml")) == blockers.MOST + 1
 
 
 def test_other_formats_have_their_first(tmp_path):
     (tmp_path / "a.json").write_text(json.dumps({"shapes": [{"type": "blob"}]}))
-    assert len(blockers.collect(tmp_path / "a.json")) == 1
+    assert len(errors_of(tmp_path / "a.json")) == 1

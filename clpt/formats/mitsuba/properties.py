@@ -202,14 +202,14 @@ class Properties:
         for name, child in list(self.named.items()):
             if child.tag == "ref" and self.context.resolve(child).tag == tag:
                 self.nested.append(self.named.pop(name))
-        matching, rest = [], []
+        matching, others = [], []
         for child in self.nested:
             target = self.context.resolve(child)
             if target.tag == tag:
                 matching.append(target)
             else:
-                rest.append(child)
-        self.nested = rest
+                others.append(child)
+        self.nested = others
         return matching
 
     def object(self, tag: str) -> Element | None:
