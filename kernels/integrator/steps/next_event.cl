@@ -29,7 +29,8 @@ inline NextEvent next_event_weigh(Scene scene, NextEvent e, Vertex v, Scattering
 {
     BsdfPair pair = bsdf_pair(scatter.bsdf, scatter.wo, e.wi, ratio);
     Spectrum f = spectrum_scale(pair.f, shading_frame_share(scatter.shading, e.ls.wi));
-    real w = event_weight(scene, mis_ratio, v.s, e.ls, e.begins, pair, guided_pdf(guided, e.ls.wi, pair.pdf MERGE_PASSED));
+    real p = guided_pdf(guided, e.ls.wi, pair.pdf MERGE_PASSED);
+    real w = event_weight(scene, mis_ratio, v.s, e.ls, e.begins, pair, p);
     e.shine = e.shine & (e.ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
     w = w / sel(e.shine, fabs(e.ls.pdf), (real)(1.0f));
     e.value = spectrum_scale(spectrum_mul(spectrum_mul(v.beta, f), e.ls.radiance), w);
