@@ -15,7 +15,7 @@ from clpt.geometry.instancing import Instances
 from clpt.geometry.refining import is_refined
 from clpt.records import SHAPE_BITS
 from clpt.render.camera.encode import encode_camera
-from clpt.render.film import encode_filters as filters
+from clpt.render.film import filters
 from clpt.render.film.colour import sensor
 from clpt.render.flow import features as needs
 from clpt.render.flow.find import Analysis, Before, analyse
@@ -210,7 +210,7 @@ class _Surfaces:
 def _encode_surfaces(found: Analysis, encoder: Encoder) -> _Surfaces:
     """Append shapes, materials, media and lights."""
     index = found.index
-    filters.lower_filter(index.film.filter, encoder.store, index.splatting)
+    filters.encode_filter(index.film.filter, encoder.store, index.splatting)
     materials = _begin_materials(found, encoder)
     moves = spheres_move(index)
     geometry = lower_geometry(found.geometry, encoder, materials, spheres_move=moves)
@@ -311,7 +311,7 @@ def _lower_profile(index: SceneIndex, encoder: Encoder) -> int:
     """Append the filter's values for light paths, if any; return their place in `distributions`."""
     if not index.weighed:
         return 0
-    return filters.lower_profile(index.film.filter, encoder.store, index.splatting)
+    return filters.encode_profile(index.film.filter, encoder.store, index.splatting)
 
 
 def _lower_density(index: SceneIndex, encoder: Encoder, wavelengths: Density) -> tuple[int, bool]:
