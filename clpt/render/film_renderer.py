@@ -426,7 +426,7 @@ class FilmRenderer(FilmOwner, Pictures):
     @property
     @synchronized
     def form(self) -> PictureForm:  # type: ignore[override]
-        """How the film's words become a picture."""
+        """The form of the picture."""
         form = self._maker.home.form
         with_noise = form.adaptive or self._known.adaptive is not None
         return dataclasses.replace(form, adaptive=with_noise)

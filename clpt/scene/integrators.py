@@ -285,12 +285,12 @@ class Filter(Kind):
 
     @property
     def reach(self) -> int:
-        """How many pixels beside its own a sample may serve, along an axis to each side."""
+        """The number of pixels beside its own that a sample may serve, to each side of an axis."""
         return max(math.ceil(self.half_width - 0.5), 0)
 
     @property
     def taps(self) -> int:
-        """How many pixels of an axis have a point in their filters at most."""
+        """The largest number of pixels of an axis whose filters hold a point."""
         return math.ceil(2.0 * self.half_width)
 
     def profile(self, distances: Floats) -> Floats:

@@ -1,6 +1,6 @@
 /* By which wavelengths light came that leaves a fluorescent surface (Mojzik et al. 2018, for paths from the camera). A
  * matrix lies in `distributions`, on a grid of RERADIATION_STEP nm from lambda_min
- * (clpt/render/spectra/reradiation.py): at each node how much light to expect, then the integral of each
+ * (clpt/render/spectra/encode.py): at each node how much light to expect, then the integral of each
  * row times that, then of each row its values [1/nm] and the normalised running integral of the product. */
 #include "core/grid.cl"
 #include "generated/reradiation_sizes.cl"

@@ -4,7 +4,7 @@
  * every column the densities, two halves in a word; the integrals along both rows up to there, two words; of cells of
  * even shares of these integrals, at which part of the columns they begin and end, two 16383ths in a word; then of
  * every row the integral of all above, which ends at 1; and of cells of even shares of that where they begin and end
- * (clpt/render/spectra/warp_tables.py). What is read together stands together. */
+ * (clpt/render/spectra/measurements.py). What is read together stands together. */
 #include "core/rows.cl"
 
 typedef struct {

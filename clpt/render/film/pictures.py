@@ -25,7 +25,7 @@ LIGHT_LAYERS = ("layers", "light_layers", "mattes")  # words of layers, as `Film
 
 @dataclass(frozen=True)
 class PictureForm:
-    """How a film's words become a picture.
+    """The conversion of a film's words to a picture.
 
     to_output: (3, 3), rows of the matrix from the sums to the output space; light_paths: all paths
     start at lights; weighed: light paths are weighted against paths from the camera; weights:

@@ -32,7 +32,7 @@ _IMAGE_TYPES: dict[Any, np.dtype] = {
 
 @dataclass(frozen=True)
 class Screen:
-    """How light becomes the colours of a screen, see `Renderer.resolve`; space: of the film.
+    """Exposure and transfer for a screen, see `Renderer.resolve`; space: of the film.
 
     Raises DeviceError for a view beside a tone curve or a transfer, UnknownKindError for names.
     """

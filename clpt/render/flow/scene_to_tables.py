@@ -21,8 +21,7 @@ from clpt.render.flow import features as needs
 from clpt.render.flow.find import Analysis, Before, analyse
 from clpt.render.flow.layer_names import lower_names
 from clpt.render.flow.settings import Found, settings_of
-from clpt.render.geometry.encode import lower_geometry, shape_words
-from clpt.render.geometry.encode_attributes import lower_attributes
+from clpt.render.geometry.encode import encode_attributes, encode_geometry, shape_words
 from clpt.render.geometry.find import Geometry, Owner, spheres_move
 from clpt.render.lights.encode import LightRows, has_tree, light_rows
 from clpt.render.lights.find import Sources
@@ -213,7 +212,7 @@ def _encode_surfaces(found: Analysis, encoder: Encoder) -> _Surfaces:
     filters.encode_filter(index.film.filter, encoder.store, index.splatting)
     materials = _begin_materials(found, encoder)
     moves = spheres_move(index)
-    geometry = lower_geometry(found.geometry, encoder, materials, spheres_move=moves)
+    geometry = encode_geometry(found.geometry, encoder, materials, spheres_move=moves)
     media = MediumWords(index, encoder, materials, found.sealed, found.sources.volumes)
     lights = _lower_lights(index, encoder, geometry, found.sources, media)
     near = _lower_medium_aims(index, encoder, lights)
@@ -246,7 +245,7 @@ def _encode_views(
     density_row, tabulated = _lower_density(index, encoder, wavelengths)
     aims = store.append_floats("distributions", found.aims)
     counts = geometry.single_count, geometry.keys
-    lower_attributes(geometry.owners, encoder.textures, encoder.cache, *counts)
+    encode_attributes(geometry.owners, encoder.textures, encoder.cache, *counts)
     store.append("shapes", shape_words(geometry.rows))
     glasses = _encode_camera(index, encoder)
     ambient = _lower_ambient(index, encoder)
