@@ -328,7 +328,7 @@ def selection(which: str | int | None = None) -> Choice:
     """Return the device that `choose` would open, with the reason. Raises DeviceError."""
     infos = devices()
     if not infos:
-        raise DeviceError(f"no OpenCL device: {runtimes.ADVICE}")
+        raise DeviceError(f"no OpenCL device: {runtimes.advice()}")
     if which is None and os.environ.get(ENVIRONMENT, "").strip():
         which = os.environ[ENVIRONMENT].strip()
         request = f"{ENVIRONMENT}={which}"

@@ -215,8 +215,12 @@ class Perspective(Camera):
     fov_axis: str = choice("x", "which side `fov` spans", ("x", "y", "smaller", "larger"))
     near: float = real(1e-2, "nearest distance seen", "m", low=0.0)
     far: float = real(1e4, "farthest distance seen", "m", low=0.0)
-    offset_x: float = real(0.0, "of the principal point, in widths of the film")
-    offset_y: float = real(0.0, "of the principal point, in heights of the film")
+    offset_x: float = real(
+        0.0, "the principal point lies at 1/2 less this from the left, in widths of the film"
+    )
+    offset_y: float = real(
+        0.0, "the principal point lies at 1/2 less this from the top, in heights of the film"
+    )
 
     def extent(self, width: float, height: float) -> tuple[float, float]:
         """Return width and height of the film at a distance of 1 m [m].

@@ -1,7 +1,7 @@
 /* The throughput that arrives at a vertex, dimmed by the medium on the way. */
 inline Spectrum vertex_arriving(Scene scene, Slab path, uint at, mask active, Vertex v)
 {
-    real through = v.t + sel(active, load_path_lead(path, at), (real)(0.0f));
+    real through = v.t + sel(active, load_path_ray_offset(path, at), (real)(0.0f));
     Spectrum left = medium_transmittance(scene, MEDIUM_LEFT(v.media.medium), through, v.lambdas);
     return spectrum_mul(v.beta, left);
 }

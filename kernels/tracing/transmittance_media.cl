@@ -49,7 +49,7 @@ inline Spectrum trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, rea
             medium = way_onward(scene, row, bodies, active, front, medium);
             last = sel_i(active, medium, last);
             /* Continue exactly along d: off the line, the ray would miss its end and a sphere shade itself. */
-            real on = h.t * (1.0f + SURFACE_ROUNDING) + surface_lead(s, d);
+            real on = h.t * (1.0f + SURFACE_ROUNDING) + surface_ray_offset(s, d);
             o = sel3(active, madd3(d, on, o), o);
             t = sel(active, t - on, t);
             surfaces++;

@@ -123,9 +123,11 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/infinite_weight.cl": lambda f, _: either(
         f.transport.balanced, "lights/infinite_weight.cl"
     ),
-    "generated/rival_dull.cl": lambda f, _: either(f.dull_paths_end, "transport/rival_dull.cl"),
+    "generated/diffuse_roulette.cl": lambda f, _: either(
+        f.dull_paths_end, "transport/diffuse_roulette.cl"
+    ),
     "generated/emit_steps.cl": lambda f, _: (
-        *either(f.transport.aimed, "transport/aimed_rival.cl"),
+        *either(f.transport.aimed, "transport/mis_ratio_aimed.cl"),
         *either(f.transport.balanced, "lights/light_kept.cl"),
     ),
     "generated/medium_steps.cl": lambda f, _: either(f.media.present, "media/medium_flies.cl"),
@@ -241,7 +243,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     ),
 }
 
-_RIVALS = (
+_MIS_RATIO = (
     "generated/merging.cl",
     "cameras/camera.cl",
     "generated/camera.cl",
@@ -265,16 +267,16 @@ def _escapes(features: Features, cls: type[Scatterer]) -> str:
 
 # likewise, for a scene's features and the kind of material that a program shades
 MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...]]] = {
-    "generated/rivals.cl": lambda f, cls: (
-        *when(weighs := f.transport.balanced and not flags.is_null(f, cls), *_RIVALS),
-        *either(weighs, "transport/rivals.cl"),
+    "generated/mis_ratio.cl": lambda f, cls: (
+        *when(weighs := f.transport.balanced and not flags.is_null(f, cls), *_MIS_RATIO),
+        *either(weighs, "transport/mis_ratio.cl"),
     ),
-    "generated/rival_steps.cl": lambda f, cls: (
-        *either(f.transport.merged, "transport/rivals_merging.cl"),
-        *either(f.transport.joined and not cls.delta, "transport/rivals_camera.cl"),
+    "generated/mis_ratio_steps.cl": lambda f, cls: (
+        *either(f.transport.merged, "transport/mis_ratio_merging.cl"),
+        *either(f.transport.joined and not cls.delta, "transport/mis_ratio_camera.cl"),
     ),
-    "generated/rival_area.cl": lambda f, cls: (
-        f"transport/rival_area{'_along' * cls.is_phase}.cl",
+    "generated/mis_merging_area.cl": lambda f, cls: (
+        f"transport/mis_merging_area{'_along' * cls.is_phase}.cl",
     ),
     "generated/hero_steps.cl": lambda f, cls: (
         *either(
@@ -284,10 +286,10 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
         *(
             either(
                 flags.is_chromatic(f, cls) and (f.told_dispersion or cls.is_phase),
-                "transport/rival_pdf.cl",
+                "transport/mis_pdf.cl",
             )
             if f.transport.balanced and not flags.is_null(f, cls)
-            else ("transport/rival_pdf_unasked.cl",)
+            else ("transport/mis_pdf_unused.cl",)
         ),
     ),
     "generated/pair.cl": lambda f, cls: ("materials/pair.cl",),
@@ -310,7 +312,7 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
     ),
     "generated/light_path_steps.cl": lambda f, cls: (
         *either(f.transport.joined and not cls.delta, "integrator/steps/join_camera.cl"),
-        *either(flags.asks_chance(f, cls), "transport/rival_chosen.cl"),
+        *either(flags.asks_chance(f, cls), "transport/mis_ratio_chosen.cl"),
         *either(f.dull_paths_end and not cls.delta, "integrator/steps/dull_goes_on.cl"),
         "integrator/steps/adjoint_weight.cl",
         *either(not flags.is_null(f, cls), "integrator/steps/light_path_roulette.cl"),

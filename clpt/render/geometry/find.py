@@ -252,18 +252,18 @@ class _Builder:
         if times:
             keyed = self.cache(spheres.keyed, shape, times, by=(*by, times))
             self.many.append(spheres.swept(keyed))
-            budget.take_made((keyed, self.many[-1]), shapes.where(shape))
+            budget.take_arrays((keyed, self.many[-1]), shapes.where(shape))
             return keyed[:, 0], Stored(many=keyed)
         balls = self.cache(spheres.balls, shape, by=by)
         self.many.append(spheres.boxes([balls]))
-        budget.take_made((balls, self.many[-1]), shapes.where(shape))
+        budget.take_arrays((balls, self.many[-1]), shapes.where(shape))
         return balls, Stored(many=balls)
 
     def _add_curves(self, shape: Shape, row: np.ndarray) -> Stored:
         row["prim"] = self.single_count + sum(map(len, self.many))
         pieces = self.cache(strands.pieces, shape, by=shapes.geometry(shape))
         self.many.append(strands.boxes(pieces))
-        budget.take_made((pieces, self.many[-1]), shapes.where(shape))
+        budget.take_arrays((pieces, self.many[-1]), shapes.where(shape))
         return Stored(many=pieces)
 
     def _add_triangles(
@@ -278,7 +278,7 @@ class _Builder:
         else:
             arrays = self.cache(triangles.counted, shape, by=by)
         vertices, faces, normals, uvs, flat = arrays
-        budget.take_made((vertices, faces, normals, uvs), shapes.where(shape))
+        budget.take_arrays((vertices, faces, normals, uvs), shapes.where(shape))
         self.flat += flat
         row["prim"] = self.face_count
         row["flags"] |= SHAPE_BITS["normals"] if normals is not None else 0
