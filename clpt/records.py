@@ -1,9 +1,9 @@
 """Every record that the host shares with the device. Read this first.
 
-Three slabs hold the state of all paths, one slot a path: `Path`, `Hit` and `Shadow`. The scene lies
-in tables of 4-byte words: `TABLES` lists them once, and the kernels' `Scene` struct and arguments
-follow from it. A member's text is what it means, with its unit. `CONSTANTS` are the bits and other
-numbers that both sides know, each a file `generated/<name>.cl` of kernels.
+Three slabs hold the state of all paths: `Path`, `Hit` and `Shadow`, with a slot for each path. The
+scene lies in tables of 4-byte words: `TABLES` lists them once, and the kernels' `Scene` struct and
+arguments follow from it. A member's text is what it means, with its unit. `CONSTANTS` are the bits
+and other numbers that both sides know, each a file `generated/<name>.cl` of kernels.
 """
 
 from __future__ import annotations
