@@ -20,7 +20,7 @@ from clpt.scene.shapes import Shape
 
 
 def check_light_paths(scene: Scene, shapes_: list[Shape]) -> None:
-    """Raise SceneError for a directional_area light, or parts that particle_tracer cannot render."""
+    """Raise SceneError for a directional_area light, or parts that particle_tracer refuses."""
     if not isinstance(scene.integrator, ParticleTracer):
         for shape in shapes_:
             if isinstance(shape.emission, DirectionalArea):
