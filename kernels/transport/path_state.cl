@@ -9,7 +9,7 @@
 #define MOST_NULL_SURFACES 1024
 
 /* Dimensions of a sample, in pairs: an even dimension and the next are well spread together. Film and first light
- * point, then DIMENSIONS_A_VERTEX per surface, null surfaces too; beyond these a pair per surface of _TEXEL ... _AIM. */
+ * point, then DIMENSIONS_A_VERTEX per surface, null surfaces too; beyond these a pair a surface for _TEXEL to _AIM. */
 #define DIMENSION_FILM 0
 #define DIMENSION_VERTEX 1
 #define DIMENSIONS_A_VERTEX 4
