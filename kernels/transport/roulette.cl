@@ -1,4 +1,4 @@
-/* Russian roulette by the throughput ratio. A path with a third of its light continues, but for a small chance that ends
+/* Russian roulette by the throughput ratio. A path with a third of its light continues, but for a chance that ends
  * paths between surfaces that absorb nothing. Media have no such chance, as paths there have hundreds of collisions:
  * survivors would be few and bright. The numbers were measured: bench/notes/samplers.md. */
 #define ROULETTE_FREE (BSDF_IS_PHASE ? 1.5f : 3.0f)
