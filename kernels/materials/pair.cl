@@ -9,7 +9,7 @@ inline BsdfPair bsdf_pair(Bsdf m, vec3 wo, vec3 wi, Spectrum ratio)
     return pair;
 }
 
-/* Sets the densities by which a sample is weighed against paths from the other end. */
+/* Sets the densities for MIS weights against paths from the other end. */
 inline void pair_of_sample(Bsdf m, vec3 wo, BsdfSample *s)
 {
     s->p = mis_pdf(m, wo, s->wi);

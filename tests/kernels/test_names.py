@@ -13,12 +13,9 @@ from clpt.scene import KINDS
 
 ALTERNATIVES = (  # files, of each row of which a program has one at most
     ("bvh/*_keyed.cl",),
-    ("media/black_body_*.cl",),
-    ("media/flight_medium*.cl",),
     ("transport/mis_merging_area*.cl",),
     ("transport/mis_pdf*.cl",),
-    ("media/grid_meet*.cl",),
-    ("media/way_*.cl",),
+    ("media/grid_collision*.cl",),
     ("bvh/query*.cl",),
     ("bvh/shapes_*.cl",),
     ("bvh/mask8*.cl",),
@@ -30,7 +27,7 @@ ALTERNATIVES = (  # files, of each row of which a program has one at most
     ("materials/boundary_*.cl",),
     ("materials/thin_film*.cl",),
     ("materials/boundary_bare.cl", "materials/layers_*.cl"),
-    ("materials/shading_frame*.cl", "media/phase_frame.cl"),
+    ("materials/shading_frame.cl*", "media/phase_frame.cl"),
     ("lights/kept_*.cl",),
     ("cameras/first_ray*.cl",),
     ("media/vertex_bodies.cl", "media/vertex_media.cl"),

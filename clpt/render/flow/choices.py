@@ -22,13 +22,13 @@ def either(holds: object, file: str) -> tuple[str, ...]:
     return (file if holds else f"{file}{TWIN}",)
 
 
-def _grid_meet(features: Features) -> str:
+def _grid_collision(features: Features) -> tuple[str, ...]:
     """Return the file about collisions in grids."""
     grids = features.media.grids
     if grids.mixed:
-        return "grid_meet_mixed"
+        return ("media/grid_collision_mixed.cl",)
     varied = features.ratios and (grids.coloured or grids.tinted)
-    return "grid_meet_coloured" if varied else "grid_meet"
+    return either(varied, "media/grid_collision.cl")
 
 
 # name: the files that stand for it, for a scene's features and the layout of its triangles
@@ -141,36 +141,33 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         *either(f.media.grids.mixed, "media/grid_mixed.cl"),
     ),
     "generated/grid_glow.cl": lambda f, _: (
-        *when(f.media.grids.hot, f"media/black_body_{f.spectra.mode}.cl"),
+        *when(f.media.grids.hot, *either(f.spectra.spectral, "media/black_body.cl")),
         *either(f.media.grids.hot, "media/grid_glow.cl"),
     ),
     "generated/flight_steps_of_grids.cl": lambda f, _: (
         *either(f.ratios, "media/grid_weigh.cl"),
         *either(f.media.grids.emissive, "media/grid_gather.cl"),
-        f"media/{_grid_meet(f)}.cl",
+        *_grid_collision(f),
     ),
     "generated/brick_weight.cl": lambda f, _: either(f.lights.bricks, "media/brick_weight.cl"),
     "generated/body_weight.cl": lambda f, _: either(f.lights.bodies, "media/body_weight.cl"),
     "generated/aim_cone.cl": lambda f, _: either(f.media.aim_cones, "media/aim_cone.cl"),
     "generated/grid_origin.cl": lambda f, _: either(f.media.grids.emissive, "media/grid_origin.cl"),
-    "generated/flight_medium.cl": lambda f, _: (
-        f"media/flight_medium{'_bodies' * f.media.bodies}.cl",
-    ),
+    "generated/flight_medium.cl": lambda f, _: either(f.media.bodies, "media/flight_medium.cl"),
     "generated/flight_steps.cl": lambda f, _: (
-        f"media/flight_medium{'_bodies' * f.media.bodies}.cl",
-        *either(f.media.grids.present, "media/near_grids.cl"),
-        *either(f.media.aims and not f.transport.light_paths, "media/flight_near.cl"),
+        *either(f.media.bodies, "media/flight_medium.cl"),
+        *either(f.media.grids.present, "media/flight_grids.cl"),
+        *either(f.media.aims and not f.transport.light_paths, "media/equiangular.cl"),
         *either(f.media.dyed, "media/flight_dye.cl"),
         *either(f.ratios, "media/flight_weight.cl"),
         *either(f.media.emissive, "media/flight_emission.cl"),
-        *either(f.media.grids.present, "media/flight_grids.cl"),
     ),
     "generated/light_of_flight.cl": lambda f, _: either(
         bool(f.film.layers.lights) and not f.transport.light_paths, "media/flight_light_layers.cl"
     ),
     "generated/way_steps.cl": lambda f, _: (
-        *either(f.media.grids.present, "media/grid_way.cl"),
-        f"media/way_{'bodies' if f.media.bodies else 'shapes'}.cl",
+        *either(f.media.grids.present, "media/grid_shadow.cl"),
+        *either(f.media.bodies, "media/shadow_boundary.cl"),
     ),
     "generated/light_medium.cl": lambda f, _: (
         ("generated/textures.cl", "generated/medium.cl")
@@ -178,9 +175,8 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         else (f"media/light_media.cl{TWIN}", f"media/medium_dims.cl{TWIN}")
     ),
     "generated/shading_frame.cl": lambda f, _: (
-        ("generated/normal_map.cl", "materials/shading_frame_mapped.cl")
-        if f.materials.normal_mapped
-        else ("materials/shading_frame.cl",)
+        *when(f.materials.normal_mapped, "generated/normal_map.cl"),
+        *either(f.materials.normal_mapped, "materials/shading_frame.cl"),
     ),
     "generated/transmittance.cl": lambda f, _: (f"tracing/transmittance{_passing(f)}.cl",),
     "generated/shadow_ray.cl": lambda f, _: (
