@@ -124,7 +124,7 @@ CAMERA = f"""{VERTEX}
 
 FROM_LIGHT = ("mis_ratio", "merge_ratio", "sharp", "joined", "photon")
 LIGHT = f"""{VERTEX}
-    Receiver receiver = {v3(0.0f, 0.0f, 0.0f)};
+    Receiver receiver = {{v3(0.0f, 0.0f, 0.0f)}};
     MisRatio here = mis_ratio_of_light_path(world, path, 0, v, receiver);
     real joined = 0.0f;
 #if JOINS_CAMERA
