@@ -103,7 +103,8 @@ inline Rival rival_of_camera(Scene scene, Slab path, uint at, Vertex v, Sampler 
 /* Whether a ray may meet a row of `lights`. */
 inline mask rival_light_met(Scene scene, integer row)
 {
-    return (row < scene.settings->infinite_count) | (light_at(scene, row).shape >= 0);
+    mask shape = (light_at(scene, row).shape >= 0) & light_shows(scene, row, mask_of(1));
+    return (row < scene.settings->infinite_count) | shape;
 }
 
 /* The density of a light path that comes from a point of a light. It is asked for before the material is: what it needs
