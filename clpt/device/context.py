@@ -321,7 +321,7 @@ def selection(which: str | int | None = None) -> Choice:
     """Return the device that `choose` would open, and why. Raises DeviceError."""
     found = devices()
     if not found:
-        raise DeviceError(f"no OpenCL device: {runtimes.ADVICE}")
+        raise DeviceError(f"no OpenCL device: {runtimes.advice()}")
     if which is None and os.environ.get(ENVIRONMENT, "").strip():
         which = os.environ[ENVIRONMENT].strip()
         asked = f"{ENVIRONMENT}={which}"

@@ -33,6 +33,9 @@ import pyopencl as cl
 from clpt.device import disk_cache
 from clpt.files import output_files, ownership
 
+if sys.platform != "win32":
+    import resource
+
 log = logging.getLogger(__name__)
 
 ADVICE = (
@@ -48,6 +51,17 @@ CACHES = (
 _NVIDIA = "~/.nv/ComputeCache"  # where its driver has it else
 _SYSTEM = Path("/etc/OpenCL/vendors")
 _WHEEL, _LIBRARY = "intel-opencl-rt", "libintelocl.so"
+
+
+def advice() -> str:
+    """Return what to do where there is no device: a limit may keep drivers from being loaded."""
+    if sys.platform == "win32":
+        return ADVICE
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if limit == resource.RLIM_INFINITY:
+        return ADVICE
+    told = f"the limit of {limit >> 20:,} MiB of address space (ulimit -v) may keep drivers out"
+    return f"{told}; raise it, or {ADVICE}"
 
 
 def platforms() -> list[cl.Platform]:

@@ -25,10 +25,26 @@ if sys.platform != "win32":
 
 PARTIAL = ".clpt-partial-"  # begins the name of a file that is not complete
 
+LONGEST = 255  # bytes of a file's name
+
 # Locks of some network file systems are of one machine: those of others are told by their names.
 _HERE = f"{PARTIAL}{hashlib.sha256(platform.node().encode()).hexdigest()[:8]}-"
 _FORGOTTEN = 86400.0  # [s] without a change after which nobody writes a file that has no lock
 _looked_at: set[Path] = set()  # folders, for what was left in them
+
+
+def beside(path: Path, ending: str, most: int = LONGEST) -> Path:
+    """Return the name of a file beside another: its name without suffix, and an ending.
+
+    A name that would have more than `most` bytes is cut, and has a part of its checksum instead, so
+    that different names stay different.
+    """
+    stem, room = path.stem, most - len(os.fsencode(ending))
+    if len(os.fsencode(stem)) > room:
+        mark = "-" + hashlib.sha256(os.fsencode(stem)).hexdigest()[:8]
+        start = os.fsencode(stem)[: room - len(mark)]
+        stem = start.decode("utf-8", "ignore") + mark
+    return path.with_name(stem + ending)
 
 
 @contextmanager

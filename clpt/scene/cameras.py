@@ -192,8 +192,12 @@ class Perspective(Camera):
     fov_axis: str = choice("x", "which side `fov` spans", ("x", "y", "smaller", "larger"))
     near: float = real(1e-2, "nearest distance seen", "m", low=0.0)
     far: float = real(1e4, "farthest distance seen", "m", low=0.0)
-    offset_x: float = real(0.0, "of the principal point, in widths of the film")
-    offset_y: float = real(0.0, "of the principal point, in heights of the film")
+    offset_x: float = real(
+        0.0, "the principal point lies at 1/2 less this from the left, in widths of the film"
+    )
+    offset_y: float = real(
+        0.0, "the principal point lies at 1/2 less this from the top, in heights of the film"
+    )
 
     def record_members(self, width: int, height: int) -> dict[str, ArrayLike]:
         """Return its matrix, the film's extent at a distance of 1 m, and its planes."""

@@ -54,6 +54,15 @@ def test_a_render_goes_on_with_more_samples(folder, capsys):
         assert file.parts[0].name() == "picture"
 
 
+@pytest.mark.parametrize("length", [244, 248, 255])
+def test_pictures_with_long_names_have_checkpoints(folder, length):
+    name = "x" * (length - 4) + ".npy"
+    for more in (), ("--checkpoint", "1h"), ("--spp", "5", "--resume"):
+        assert render("--spp", "3", *more, output=name) == 0
+    assert images.read(name).shape[:2] == (16, 24)
+    assert len([one for one in folder.iterdir() if ".resume.exr" in one.name]) == 2
+
+
 def test_what_differs_is_named_and_nothing_begins_anew(folder, capsys):
     assert render("--spp", "3", "--checkpoint", "1h") == 0
     before = (folder / "a.resume.exr").read_bytes()

@@ -23,7 +23,7 @@ from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.shapes import Geometry, displaced, geometry, with_uvs
 from clpt.formats.pbrt.state import Definition, State
 from clpt.formats.pbrt.textures import textured
-from clpt.scene.lights import Light
+from clpt.scene.lights import Area, Light
 from clpt.scene.materials import Diffuse, Mask, Material, Null, TwoSided
 from clpt.scene.media import Medium
 from clpt.scene.params import Kind, fields_of
@@ -101,8 +101,7 @@ def _shape(definition: Definition, form: Geometry | None) -> Shape | None:
         emission = None
     if not isinstance(opacity, float) or opacity < 1.0:
         surface = Mask(material=surface, opacity=opacity)
-        if emission is not None:
-            state.warn(params, "'alpha' hides its surface, but not its light")
+        emission = _masked(emission, opacity, params, state)
     if _has_texture(surface) or _has_texture(emission):
         if form.kind is Curves:
             state.warn(params, "textures run around and along curves, not along and across")
@@ -124,6 +123,23 @@ def _moving(shape: Shape, state: State) -> Shape:
         return shape
     own = transforms.inverse(state.ctm) @ np.asarray(shape.to_world)
     return replace(shape, to_world=own, motion=keys)
+
+
+def _masked(
+    emission: Light | None, opacity: float | Texture, source: Parameters, state: State
+) -> Light | None:
+    """Return the light of a shape with an alpha: what is not there does not shine.
+
+    By pbrt's rule an alpha of 0 all over hides a lamp and leaves it all its light.
+    """
+    if emission is None:
+        return None
+    if isinstance(opacity, float) and opacity <= 0.0:
+        message = "an 'alpha' of 0 hides its surface, not its light, which the camera sees here"
+        state.warn(source, message)
+        return emission
+    light = cast(Area, emission)  # as there is no other
+    return replace(light, radiance=Product(first=light.radiance, second=opacity))
 
 
 def _material(source: Parameters, state: State) -> Material:

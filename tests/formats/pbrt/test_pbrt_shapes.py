@@ -11,6 +11,7 @@ from clpt.formats import load
 from clpt.geometry import triangles
 from clpt.scene import shapes, subdivision
 from clpt.scene.materials import Mask, Null, TwoSided
+from clpt.scene.textures import Product
 
 QUAD = '"point3 P" [0 0 0 2 0 0 2 1 0 0 1 0] "integer indices" [0 1 2 0 2 3]'
 TEXTURED = 'Texture "t" "spectrum" "checkerboard"\nMaterial "diffuse" "texture reflectance" "t"\n'
@@ -190,6 +191,23 @@ def test_subdivided_shapes(one, scene):
     assert len(one(f'Shape "loopsubdiv" {text} "integer levels" 2').faces) == 16
     with pytest.raises(SceneError, match=r"loopsubdiv.*'levels' must be 0 to 10"):
         scene(f'Shape "loopsubdiv" {text} "integer levels" 11')
+
+
+def test_a_lamp_does_not_shine_where_alpha_masks_it(scene):
+    """But an alpha of 0 all over leaves it all its light, which is told."""
+    lamp = 'AreaLightSource "diffuse" "rgb L" [1 1 1] Shape "sphere" "{} alpha" {}'
+    texture = 'Texture "t" "float" "checkerboard" "float tex1" 0 "float tex2" 1 '
+    for kind, value, masks in (
+        ("float", "0.5", True),
+        ("texture", '"t"', True),
+        ("float", "0", False),
+    ):
+        made = scene(texture + lamp.format(kind, value))
+        radiance = made.shapes[0].emission.radiance
+        assert isinstance(radiance, Product) == masks
+        shared = not masks or radiance.second is made.shapes[0].material.opacity
+        assert shared or radiance.second.value == made.shapes[0].material.opacity
+        assert any("hides its surface" in warning for warning in made.warnings) != masks
 
 
 def test_alpha(one, scene):
