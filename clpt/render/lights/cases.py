@@ -167,7 +167,6 @@ def _sample_text(features: Features) -> str:
     """`light_sample`: a light that is chosen by `pick`, and a direction to it."""
     others, surfaces = others_of(features), surfaces_of(features)
     kinds, moving = [*others, *surfaces], features.motion.lights
-    weighed = features.transport.balanced
     head = (
         "LightSample light_sample(Scene scene, vec3 p, Receiver receiver, real pick, vec2 u, "
         "Wavelengths lambdas)"
@@ -210,19 +209,22 @@ def _sample_text(features: Features) -> str:
             "Spectrum le = emission_load(scene, l.radiance, point, lambdas);",
             "s = light_sample_sel(l.shape >= 0, area_sample(q, point.p, le), s);",
         ]
-    pmf = "pmf" if features.lights.tree else "l.pmf"
-    rows.append(f"s = light_chosen(s, {pmf});")
-    if features.lights.unseen:
-        rows.append(f"s = area_unseen(s, {mode_text(UNSEEN)});")
-    lights, layers = features.lights, features.film.layers
-    if weighed or layers.light_groups or lights.volumes or lights.unseen:
-        rows.append("s.row = row;")
-    if weighed:
-        chance = f"sel({mode_text(UNSEEN)}, fabs(s.pdf), {pmf})" if lights.unseen else pmf
-        rows.append(f"s.chance = {chance};")
+    return function(head, *rows, *_chosen_text(features), "return s;")
+
+
+def _chosen_text(features: Features) -> list[str]:
+    """What the sample `s` of the light `l` in row `row` keeps of its choice."""
+    lights, weighed = features.lights, features.transport.balanced
+    pmf = "pmf" if lights.tree else "l.pmf"
+    chance = f"sel({mode_text(UNSEEN)}, fabs(s.pdf), {pmf})" if lights.unseen else pmf
+    kept = weighed or features.film.layers.light_groups or lights.volumes or lights.unseen
+    rows = [f"s = light_chosen(s, {pmf});"]
+    rows += [f"s = area_unseen(s, {mode_text(UNSEEN)});"] * lights.unseen
+    rows += ["s.row = row;"] if kept else []
+    rows += [f"s.chance = {chance};"] if weighed else []
     if features.transport.aimed:
-        rows.append(f"s.n = {'q.n' if surfaces else NOWHERE};")
-    return function(head, *rows, "return s;")
+        rows.append(f"s.n = {'q.n' if surfaces_of(features) else NOWHERE};")
+    return rows
 
 
 def _pdf_text(features: Features) -> str:
