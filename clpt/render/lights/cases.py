@@ -213,7 +213,7 @@ def _sample_text(features: Features) -> str:
 
 
 def _chosen_text(features: Features) -> list[str]:
-    """What the sample `s` of the light `l` in row `row` keeps of its choice."""
+    """Return lines by which the sample `s` of the light `l` in row `row` keeps its choice."""
     lights, weighed = features.lights, features.transport.balanced
     pmf = "pmf" if lights.tree else "l.pmf"
     chance = f"sel({mode_text(UNSEEN)}, fabs(s.pdf), {pmf})" if lights.unseen else pmf
