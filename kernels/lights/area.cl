@@ -1,6 +1,6 @@
 /* Light from a shape: LightRow.emission_mode is 0 where it leaves the front, evenly in all directions, 1 where it
- * leaves along the normal only (particle_tracer's), 2 where it leaves both sides. With 4 beside that no ray sees it: only
- * next-event estimation and light paths find it, as they find delta lights. */
+ * leaves along the normal only (particle_tracer's), 2 where it leaves both sides. With 4 beside that no ray sees it:
+ * next-event estimation and light paths alone find it, as they find delta lights. */
 inline ShapeSample area_turned(ShapeSample q, mask both)
 {
     q.n = sel3(both & (dot3(q.n, q.wi) > 0.0f), neg3(q.n), q.n);
