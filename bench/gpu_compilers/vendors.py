@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from clpt.device import registers
+from clpt.device import native_programs
 
 FOLDER = "GPU_COMPILERS"  # the variable that names where they were unpacked
 PLACES = ("usr/lib/llvm-19/bin", "usr/bin", "nvidia/*/bin", "usr/lib/clc")
@@ -181,16 +181,16 @@ def nvidia(text: str, device: str, folder: Path, limits: tuple[int, ...]) -> Fig
         out = f"k{limit or ''}.cubin"
         said = run(folder, "ptxas", "-v", "-O3", f"-arch={device}", *limited, "k.ptx", "-o", out)
         (folder / f"{out}.txt").write_text(said, encoding="utf-8")
-        return out, registers.told(said)
+        return out, native_programs.registers_used(said)
 
-    cubin, _ = registers.fewest(limits, build)
+    cubin, _ = native_programs.with_fewest_registers(limits, build)
     seconds = time.perf_counter() - began
     said = (folder / f"{cubin}.txt").read_text(encoding="utf-8")
     counts = (-1, -1, -1)
     if find("nvdisasm"):
         lines = run(folder, "nvdisasm", "-c", cubin)
         counts = counted(SASS_NAME.findall(lines), SASS)
-    used, spilled = registers.told(said)
+    used, spilled = native_programs.registers_used(said)
     return Figures(
         used,
         most(r"(\d+) bytes stack frame", said),

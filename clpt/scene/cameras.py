@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import InitVar, dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -143,6 +144,28 @@ class Camera(Kind):
             matrix = self.motion.at((shutter.open + shutter.close) / 2.0) @ matrix
         return View(matrix[:3, 3], matrix[:3, 2], extent[0], math.atan(math.hypot(*extent) / 2.0))
 
+    def half_height(self, aspect: float) -> float:
+        """Return half the height of the film at a distance of 1, or across parallel rays [m].
+
+        aspect: the film's width over its height. 1 for a camera without a film in front of it.
+        """
+        return 1.0
+
+    def pixel_camera(self, width: int, height: int, x: int, y: int) -> Camera | None:
+        """Return a camera whose film of one pixel is the pixel (x, y) of a film; None if none is.
+
+        width, height: of the film [pixels].
+        """
+        return None
+
+    def moved(self, motion: NDArray[np.float64]) -> Camera:
+        """Return the camera after a motion of the world (4, 4) that takes it along."""
+        return dataclasses.replace(self, to_world=motion @ np.asarray(self.to_world, float))
+
+    def enlarged(self, factor: float) -> Camera | None:
+        """Return a camera of parallel rays with a film `factor` as wide; None for other cameras."""
+        return None
+
     def is_connected(self, mode: str) -> bool:
         """Return whether light paths can be joined to it, in the mode of a film."""
         return self.connects and (mode == "rgb" or not self.dispersive_glasses)
@@ -199,18 +222,44 @@ class Perspective(Camera):
         0.0, "the principal point lies at 1/2 less this from the top, in heights of the film"
     )
 
-    def record_members(self, width: int, height: int) -> dict[str, ArrayLike]:
-        """Return its matrix, the film's extent at a distance of 1 m, and its planes."""
-        _check_planes(self)
+    def extent(self, width: float, height: float) -> tuple[float, float]:
+        """Return width and height of the film at a distance of 1 m [m].
+
+        width, height: of the film [pixels]. All that depends on the field of view follows from it.
+        """
         side = 2.0 * np.tan(np.radians(self.fov) / 2.0)
         smaller, larger = ("x", "y") if width <= height else ("y", "x")
         if width == height:
             larger = "x"
         axis = {"smaller": smaller, "larger": larger}.get(self.fov_axis, self.fov_axis)
         pixel = side / (width if axis == "x" else height)
+        return pixel * width, pixel * height
+
+    def half_height(self, aspect: float) -> float:
+        """Return half the height of the film at a distance of 1 m [m]."""
+        return 0.5 * float(self.extent(aspect, 1.0)[1])
+
+    def pixel_camera(self, width: int, height: int, x: int, y: int) -> Camera | None:
+        """Return a camera that sees a pixel alone; None if the pixel's angle is too small."""
+        wanted = np.array(self.extent(width, height)) / [width, height]
+        fov = math.degrees(2.0 * math.atan(0.5 * wanted[0]))
+        if fov < 1e-3:
+            return None
+        pixel = dataclasses.replace(
+            self,
+            fov=fov,
+            fov_axis="x",
+            offset_x=0.5 - width * (0.5 - self.offset_x) + x,
+            offset_y=0.5 - height * (0.5 - self.offset_y) + y,
+        )
+        return pixel if np.allclose(pixel.extent(1, 1), wanted, rtol=1e-6, atol=0.0) else None
+
+    def record_members(self, width: int, height: int) -> dict[str, ArrayLike]:
+        """Return its matrix, the film's extent at a distance of 1 m, and its planes."""
+        _check_planes(self)
         return {
             "to_world": self.rigid_matrix(),
-            "extent": [pixel * width, pixel * height],
+            "extent": list(self.extent(width, height)),
             "offset": [self.offset_x, self.offset_y],
             "near": self.near,
             "far": self.far,
@@ -357,6 +406,22 @@ class Orthographic(Camera):
     near: float = real(1e-2, "nearest distance seen", "m", low=0.0)
     far: float = real(1e4, "farthest distance seen", "m", low=0.0)
 
+    def half_height(self, aspect: float) -> float:
+        """Return half the height of the film [m]."""
+        return float(np.linalg.norm(np.asarray(self.to_world, float)[:3, 1])) / aspect
+
+    def pixel_camera(self, width: int, height: int, x: int, y: int) -> Camera:
+        """Return a camera that sees a pixel alone."""
+        centre = [1.0 - (2 * x + 1) / width, (height - (2 * y + 1)) / width, 0.0]
+        scale = np.diag([1.0 / width, 1.0 / width, 1.0, 1.0])
+        matrix = np.asarray(self.to_world, float) @ transforms.translate(centre) @ scale
+        return dataclasses.replace(self, to_world=matrix)
+
+    def enlarged(self, factor: float) -> Camera:
+        """Return the camera with a film `factor` as wide and as high."""
+        scale = np.diag([factor, factor, 1.0, 1.0])
+        return dataclasses.replace(self, to_world=np.asarray(self.to_world, float) @ scale)
+
     def record_members(self, width: int, height: int) -> dict[str, ArrayLike]:
         """Return its matrix, the film's aspect and its planes."""
         _check_planes(self)
@@ -390,6 +455,18 @@ class Matrix(Camera):
 
     view: Matrix4 = host(np.eye(4), "world to eye, (4, 4), eye space looks along -z")
     projection: Matrix4 = host(np.eye(4), "eye to clip, (4, 4)")
+
+    def moved(self, motion: NDArray[np.float64]) -> Camera:
+        """Return the camera after a motion of the world (4, 4) that takes it along."""
+        view = np.asarray(self.view, float) @ np.linalg.inv(motion)
+        return dataclasses.replace(self, view=view)
+
+    def pixel_camera(self, width: int, height: int, x: int, y: int) -> Camera:
+        """Return a camera that sees a pixel alone."""
+        zoom = np.eye(4)
+        zoom[0, 0], zoom[0, 3] = width, width - (2 * x + 1)
+        zoom[1, 1], zoom[1, 3] = height, (2 * y + 1) - height
+        return dataclasses.replace(self, projection=zoom @ np.asarray(self.projection, float))
 
     def record_members(self, width: int, height: int) -> dict[str, ArrayLike]:
         """Return a ray's direction and its homogeneous near point, both affine in film x and y.

@@ -1,6 +1,6 @@
-/* How much of the light between two points passes, where some surfaces transmit a part of it as if nothing were there,
- * and media dim it between them. Each surface is met in turn; it may be where one medium ends and another begins.
- * key: of the random numbers in media on grids; into: the medium where it must end, 0 for any. */
+/* The transmittance between two points through media, and through surfaces that transmit a part of light unchanged.
+ * Surfaces are traced in turn; each may be a boundary between media.
+ * key: of the random numbers in media on grids; into: the medium at the end, 0 for any. */
 #include "shapes/shape.cl"
 #include "generated/textures.cl"
 #include "generated/mixture.cl"
@@ -12,7 +12,7 @@
 
 #include "generated/way_steps.cl"
 
-/* What is left of light after `way` metres along d in a medium. */
+/* The transmittance of `way` metres along d in a medium. */
 inline Spectrum way_transmittance(Scene scene, integer medium, vec3 o, vec3 d, real way, natural key, mask active,
                                   Wavelengths lambdas)
 {
@@ -48,7 +48,7 @@ inline Spectrum trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, rea
             active = active & (passage_most(own) > 0.0f);
             medium = way_onward(scene, row, bodies, active, front, medium);
             last = sel_i(active, medium, last);
-            /* On along d: beside it, the ray would miss its end, and a round light would shade itself. */
+            /* Continue exactly along d: off the line, the ray would miss its end and a sphere shade itself. */
             real on = h.t * (1.0f + SURFACE_ROUNDING) + surface_lead(s, d);
             o = sel3(active, madd3(d, on, o), o);
             t = sel(active, t - on, t);

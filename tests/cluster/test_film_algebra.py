@@ -437,7 +437,7 @@ def test_a_worker_s_renderer_keeps_no_choice_of_another_scene():
     job = tasks._Job(without, [dev.choose()], {})
     for scene in (with_ball, without):
         job.block(0, 1, None, lambda: True)
-        assert job.shows(scene)
+        assert job.try_scene(scene)
         assert job.renderer._form.weighed == (scene is with_ball)
         made = tasks._Job(scene, [dev.choose()], {})
         blocks = [

@@ -48,7 +48,6 @@ from clpt.scene import materials as mt
 from clpt.scene.cameras import CONNECTED
 from clpt.scene.fingerprint import named_files
 from clpt.scene.integrators import DEEPEST, Film, Integrator
-from clpt.scene.lights import Point
 from clpt.scene.media import Lattice
 from clpt.scene.params import Kind, params
 from clpt.scene.roles import INDEX
@@ -499,7 +498,7 @@ def _left_to_the_camera(index: SceneIndex) -> list[str]:
             f"{kind}.light_paths: none start at lights[{i}], whose light does not fall with "
             "distance"
             for i, light in enumerate(index.lights)
-            if isinstance(light, Point) and not light.falloff
+            if light.reach == "placed" and not light.falloff
         ]
     return warnings
 

@@ -11,11 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt.arrays import Faces, Floats, Points
 from clpt.geometry import analytic
-from clpt.scene import lights
 from clpt.scene.lights import Light
 from clpt.scene.shapes import Shape
-
-NARROW = 0.02  # [rad] around a cone of directions that is known to hold all light
 
 
 @dataclass(frozen=True)
@@ -62,21 +59,10 @@ def concatenated(parts: Sequence[Bounds]) -> Bounds:
 
 def of_lamp(lamp: Light) -> Bounds:
     """Return the bounds (1) of a light that is not on a shape."""
-    if isinstance(lamp, lights.Point) and lamp.falloff:
-        return _one(np.asarray(lamp.position, np.float64))
-    if isinstance(lamp, (lights.Spot, lights.Projector, lights.Goniometric)):
-        matrix = np.asarray(lamp.to_world, np.float64)
-        place, axis = matrix[:3, 3], matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
-        if isinstance(lamp, lights.Spot):
-            return _one(place, axis, np.radians(lamp.cutoff), NARROW)
-        if isinstance(lamp, lights.Projector):
-            return _one(place, axis, np.pi / 2.0, NARROW)
-        return _one(place)
-    if lamp.reach == "placed" and not isinstance(lamp, lights.Point):
-        own: Any = lamp
-        position = own.to_world[:3, 3] if hasattr(lamp, "to_world") else own.position
-        return _one(np.asarray(position, np.float64))
-    return _one(np.zeros(3), placed=False)
+    bounds = lamp.bounds()
+    if bounds is None:
+        return _one(np.zeros(3), placed=False)
+    return _one(bounds.low, bounds.axis, bounds.theta_o, bounds.theta_e, high=bounds.high)
 
 
 def of_shape(shape: Shape, two_sided: bool) -> Bounds:

@@ -14,7 +14,6 @@ from clpt.errors import SceneError
 from clpt.render.lights.check import placement, record_of, three, unit, unsheared
 from clpt.render.lights.find import emissions_of
 from clpt.render.lights.images import lower_image
-from clpt.render.lights.power import aspect
 from clpt.render.lights.sky import lower_sky
 from clpt.render.materials.encoder import Encoder
 from clpt.render.records import light_rows as light_records
@@ -123,7 +122,7 @@ def _projected_members(lamp: Light, encoder: Encoder) -> dict[str, ArrayLike]:
     """
     if isinstance(lamp, lights.Projector):
         half = float(np.tan(np.radians(lamp.fov) / 2.0))
-        axes = _place(lamp.to_world, "projector.to_world", half, half / aspect(lamp))
+        axes = _place(lamp.to_world, "projector.to_world", half, half / lamp.image_aspect)
         return {**axes, **_image(lamp.image, encoder)}
     if isinstance(lamp, lights.Goniometric):
         place = _place(lamp.to_world, "goniometric.to_world")

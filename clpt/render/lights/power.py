@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Floats
 from clpt.render.spectra.look import Look
-from clpt.scene import lights
-from clpt.scene.lights import Light, Projector
-from clpt.scene.pixels import pixels
+from clpt.scene.lights import Light
+from clpt.scene.params import fields_of, params
 from clpt.scene.roles import REFLECTANCE
 from clpt.scene.textures import (
     Bitmap,
@@ -30,20 +29,12 @@ from clpt.scene.textures import (
 def power(lamp: Light, strength: float, scene_radius: float, look: Look) -> float:
     """Estimate the power of a light off all shapes in the scene, mean of channels [W/nm].
 
-    strength: the mean of its intensity, irradiance or radiance. An unknown light shines to all
-    sides, or on the whole disk of the scene.
+    strength: the mean of its intensity, irradiance or radiance.
     """
-    if isinstance(lamp, lights.Goniometric):
-        return 4.0 * np.pi * strength * brightness(lamp.image, look)
-    if isinstance(lamp, lights.Projector):
-        return image_area(lamp) * strength * brightness(lamp.image, look)
-    if isinstance(lamp, lights.Spot):
-        edge = np.radians([min(lamp.beam_width, lamp.cutoff), lamp.cutoff])
-        return 2.0 * np.pi * (1.0 - float(np.cos(edge).mean())) * strength
-    if lamp.reach == "placed":
-        return 4.0 * np.pi * strength
-    disk = np.pi * scene_radius**2
-    return disk * strength if lamp.reach == "distant" else 4.0 * np.pi * disk * strength
+    declared = params(type(lamp)).get("image")
+    passes = declared is not None and declared.role is REFLECTANCE
+    image_mean = brightness(fields_of(lamp)["image"], look) if passes else 1.0
+    return lamp.sampling_power(strength, scene_radius, image_mean)
 
 
 def importance(lamp: Light, strength: float, power: float) -> float:
@@ -73,20 +64,6 @@ def brightness(value: Any, look: Look) -> float:
         first, second = (brightness(part, look) for part in (value.first, value.second))
         return (1.0 - share) * first + share * second
     return look.brightness(value)
-
-
-def image_area(lamp: Projector) -> float:
-    """Return the area of a projector's image a metre before it [m^2]."""
-    half = float(np.tan(np.radians(lamp.fov) / 2.0))
-    return 4.0 * half * half / aspect(lamp)
-
-
-def aspect(lamp: Projector) -> float:
-    """Return the width of a projector's image over its height."""
-    if lamp.aspect > 0.0 or not isinstance(lamp.image, Bitmap):
-        return lamp.aspect or 1.0
-    height, width = pixels(lamp.image, REFLECTANCE).shape[:2]
-    return width / height
 
 
 LOOKS = 1 << 18  # at a texture, all triangles together

@@ -6,6 +6,7 @@ else into what is at some points just before it: these must agree.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -18,7 +19,6 @@ from clpt.geometry import analytic, shapes, winding
 from clpt.geometry.motion import Motions
 from clpt.render.geometry import surroundings
 from clpt.render.geometry.find import Emitter, Geometry
-from clpt.render.lights import bounds as light_bounds
 from clpt.render.lights.find import Sources, row_order
 from clpt.render.media.bodies import matter_of
 from clpt.render.records.lowering_cache import LoweringCache
@@ -32,6 +32,7 @@ POINTS = 6  # of a shape that shines
 BEFORE = 1e-4  # how far before it they are, over its size
 AFAR = 1e4  # radii of the scene: a place that stands for infinity
 CROSSES = "{} comes into another medium while the shutter is open"
+STRADDLES = "{} lies in more than one medium, or does not know its bounds"
 
 Around = tuple[Any, ...]  # media, or the matter of bodies
 
@@ -125,11 +126,16 @@ def _around_lamp(
     if unknown:
         raise Unknown(unknown.format(name))
     if lamp.reach == "placed":
-        bounds = light_bounds.of_lamp(lamp)
-        inside = known.along(bounds.low[0], known.motions.lamps.get(i))
-        if inside is None:
+        bounds, keys = lamp.bounds(), known.motions.lamps.get(i)
+        if bounds is None:
+            raise Unknown(STRADDLES.format(name), name)
+        corners = itertools.product(*zip(bounds.low, bounds.high, strict=True))
+        first, *others = (known.along(np.array(corner), keys) for corner in dict.fromkeys(corners))
+        if first is None or None in others:
             raise Unknown(CROSSES.format(name), name)
-        return inside
+        if any(other != first for other in others):
+            raise Unknown(STRADDLES.format(name), name)
+        return first
     found = known.along(afar, None)
     if found or found is None:
         reason = f"the light of {name} comes from infinity, where a medium has no end"

@@ -13,7 +13,7 @@ from clpt.render.scene_index import SceneIndex
 from clpt.scene import Scene
 from clpt.scene.cameras import CONNECTED
 from clpt.scene.integrators import ParticleTracer
-from clpt.scene.lights import DirectionalArea, Point
+from clpt.scene.lights import DirectionalArea
 from clpt.scene.materials import parts
 from clpt.scene.media import Medium
 from clpt.scene.shapes import Shape
@@ -39,7 +39,7 @@ def check_light_paths(scene: Scene, shapes_: list[Shape]) -> None:
     if spectral and scene.camera.dispersive_glasses:
         _refuse("a lens whose glass does not disperse", "camera.glass")
     for i, light in enumerate(scene.lights):
-        if isinstance(light, Point) and not light.falloff:
+        if light.reach == "placed" and not light.falloff:
             _refuse("a point light whose irradiance falls with distance", f"lights[{i}]")
     for shape in shapes_:
         _check_surface(shape, spectral)

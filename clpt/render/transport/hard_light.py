@@ -296,11 +296,14 @@ def _small_rows(lit: Lit) -> Iterator[tuple[str, NDArray[np.float64] | None, flo
             small = sky_light.sun_share(lamp, lit.look) >= SUN
         else:
             small = lamp.reach in ("placed", "distant") and lamp.falloff
+        bounds, place = lamp.bounds(), None
+        if bounds is not None:
+            place = motions.halfway(motions.lamps.get(i), (bounds.low + bounds.high) / 2.0)
+            far = max(float(np.linalg.norm(place - middle)), NEAR * radius)
+            small = small and float(((bounds.high - bounds.low) ** 2).sum()) < SMALL * far**2
+        elif lamp.reach == "placed":
+            small = False
         if small:
-            place = None
-            if lamp.reach == "placed":
-                bounds = light_bounds.of_lamp(lamp)
-                place = motions.halfway(motions.lamps.get(i), (bounds.low + bounds.high)[0] / 2.0)
             yield f"lights[{i}]", place, float(share[row]), slice(row, row + 1)
     ends = (*sources.first, len(share))[1:]
     for emitter, first, end in zip(geometry.emitters, sources.first, ends, strict=True):

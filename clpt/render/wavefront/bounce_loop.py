@@ -17,7 +17,7 @@ import pyopencl as cl
 from numpy.typing import NDArray
 
 from clpt import device
-from clpt.device.timing import Timings
+from clpt.device.stream import Timings
 from clpt.render.flow import bounce, programs, signatures
 from clpt.render.flow.scene_to_tables import Lowered
 from clpt.render.records import Features
