@@ -169,9 +169,9 @@ WARPS = {"sm_75": 32, "sm_80": 64, "sm_86": 48, "sm_89": 48, "sm_90": 64}
 
 
 def nvidia(text: str, device: str, folder: Path, limits: tuple[int, ...]) -> Figures:
-    """By clang, as PTX for the oldest device of all, and NVIDIA's assembler for this one.
+    """Compile by clang to PTX for the oldest device, and by NVIDIA's assembler for this device.
 
-    Divisions and roots are as exact as OpenCL C asks, 2.5 and 3 ulp: exact ones are calls.
+    Divisions and roots are as exact as OpenCL C asks, 2.5 and 3 ulp: exact operations are calls.
     """
     began = time.perf_counter()
     (folder / "k.ptx").write_text(_ptx(text), encoding="utf-8")
@@ -203,9 +203,9 @@ def nvidia(text: str, device: str, folder: Path, limits: tuple[int, ...]) -> Fig
 
 
 def fits(text: str, device: str) -> int:
-    """Return the fewest registers, in eights, with which NVIDIA's assembler spills nothing.
+    """Return the fewest registers, in eights, that NVIDIA's assembler needs without spills.
 
-    Left alone it takes more than it needs; a driver is told by `-cl-nv-maxrregcount`.
+    By default it takes more than it needs; `-cl-nv-maxrregcount` limits a driver.
     """
     with tempfile.TemporaryDirectory() as folder:
         Path(folder, "k.ptx").write_text(_ptx(text), encoding="utf-8")
@@ -259,7 +259,7 @@ def amd(text: str, device: str, folder: Path, limits: tuple[int, ...]) -> Figure
     return Figures(
         most(r"\bVGPRs: (\d+)", said),
         most(r"ScratchSize \[bytes/lane\]: (\d+)", said),
-        most(r"VGPRs Spill: (\d+)", said),  # scalar ones go to vector registers
+        most(r"VGPRs Spill: (\d+)", said),  # scalars spill to vector registers
         least(r"Occupancy \[waves/SIMD\]: (\d+)", said),
         size_of((folder / "k.o").read_bytes()),
         *counts,
@@ -303,12 +303,12 @@ def words(tokens: str, number: int) -> list[list[int]]:
 
 
 def most(pattern: str, said: str) -> int:
-    """The largest of the numbers that a compiler tells, one a kernel; 0 for none."""
+    """Return the largest number of a compiler's report over kernels; 0 without numbers."""
     return max(map(int, re.findall(pattern, said)), default=0)
 
 
 def least(pattern: str, said: str) -> int:
-    """The smallest of the numbers that a compiler tells, one a kernel; 0 for none."""
+    """Return the smallest number of a compiler's report over kernels; 0 without numbers."""
     return min(map(int, re.findall(pattern, said)), default=0)
 
 

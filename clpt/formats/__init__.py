@@ -6,7 +6,7 @@ import difflib
 import importlib
 import itertools
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -44,7 +44,7 @@ MOST_COMPARED, CLOSE = 4096, 0.7  # names of a folder, and how near one is that 
 MOST_NAMED = 8  # scenes of a folder that a message names
 ARGUMENTS = ("kinds", "progress", "missing_textures", "budget")  # of `load`, beside variables
 
-__all__ = ["FORMATS", "load", "locate", "save"]
+__all__ = ["FORMATS", "load", "load_dict", "locate", "save"]
 
 
 def load(
@@ -64,7 +64,7 @@ def load(
     and time; of both `camera` is the number or name of one of several. `progress` is called with
     the share that is read, from 0 to 1, and a text, for files of many shapes.
     `missing_textures`: "grey" puts grey in the place of images that are not there, and of unknown
-    materials of Mitsuba; it leaves out unknown shapes and lights. Each has a warning.
+    materials of Mitsuba and PBRT; it leaves out unknown shapes and lights. Each has a warning.
     `budget`: what the load may take of memory and time; a file that asks for more is refused.
     Raises SceneError with the file and, where it is known, the line.
     """
@@ -116,6 +116,29 @@ def _load(
     if kind == "meshes.framing":
         return loader(path, missing_textures)
     return loader(path)
+
+
+def load_dict(
+    scene: Mapping[str, Any],
+    /,
+    *,
+    folder: str | Path = "",
+    missing_textures: Missing = "error",
+    budget: Budget | None = None,
+) -> Scene:
+    """Make a scene of a dictionary as Mitsuba 3's `load_dict` takes it.
+
+    Its values are numbers, texts, sequences of three numbers, transforms (any object with a
+    `matrix` (4, 4), such as clpt.ScalarTransform4f), arrays of images (h, w) or (h, w, c) and of
+    volumes (z, y, x) or (z, y, x, c), and dictionaries with a `type`. `folder` is that of relative
+    file names, by default the current one. `missing_textures` and `budget` are those of `load`.
+    Raises SceneError with the name of the entry.
+    """
+    loader = importlib.import_module("clpt.formats.mitsuba").load_dict
+    with budgets.opened(budget):
+        built: Scene = loader(scene, Path(folder), missing_textures)
+    built.warnings[:] = [one_line(text, LONGEST_WARNING) for text in built.warnings]
+    return built
 
 
 def save(scene: Scene, path: str | Path, /) -> None:

@@ -8,13 +8,13 @@ instead.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from clpt.choices import Missing
-from clpt.formats.mitsuba import old_words, sensors
+from clpt.formats.mitsuba import dicts, old_words, sensors
 from clpt.formats.mitsuba.bsdfs import bsdf
 from clpt.formats.mitsuba.emitters import emitter
 from clpt.formats.mitsuba.grids import Bounds
@@ -29,7 +29,7 @@ from clpt.scene.integrators import Film, Integrator
 from clpt.scene.media import Medium
 from clpt.scene.shapes import Instance, Shape
 
-__all__ = ["load"]
+__all__ = ["load", "load_dict"]
 
 # What may stand in the scene itself only for others to refer to.
 REFERENCED = ("spectrum", "volume", "film", "sampler", "rfilter", "medium", "phase")
@@ -45,6 +45,21 @@ def load(path: Path, missing: Missing = "error", /, **variables: object) -> Scen
     document = parse(path, variables)
     if document.is_old:
         document.renamed = old_words.rename(document.root)
+    return _from_document(path, document, missing)
+
+
+def load_dict(scene: Mapping[str, Any], folder: Path, missing: Missing = "error", /) -> Scene:
+    """Make a scene of Mitsuba 3's dictionary; `folder`: of its file names; missing: see clpt.load.
+
+    Raises SceneError with the names of the entry for anything broken or not supported.
+    """
+    root = dicts.tree(scene, folder)
+    if root.tag != "scene":
+        raise root.error("the outermost 'type' must be 'scene'")
+    return _from_document(Path("dict"), Document(root, [folder]), missing)
+
+
+def _from_document(path: Path, document: Document, missing: Missing) -> Scene:
     context = Context(document, missing)
     scene = _scene(path, document, context)
     if not context.endless:

@@ -78,9 +78,16 @@ def _kept(
 def _read(element: Element, context: Context) -> Volume:
     props = Properties(element, context)
     props.ignore("raw", "accel")
-    path, to_world = props.file(), props.placement()
-    with element.locating():
-        values, box = vol.read_channels(path)
+    to_world, array = props.placement(), props.array("data", "grid")
+    if array is None:
+        path = props.file()
+        with element.locating():
+            values, box = vol.read_channels(path)
+    else:  # (z, y, x) or (z, y, x, channels), as Mitsuba's tensors
+        values, box = (
+            (array if array.ndim == 4 else array[..., None]).transpose(2, 1, 0, 3),
+            np.eye(4),
+        )
     if props.flag("use_grid_bbox", context.old):  # 0.6: src/volume/gridvolume.cpp
         to_world = to_world @ box
     if props.text("wrap_mode", "clamp", ("clamp", "repeat", "mirror")) != "clamp":

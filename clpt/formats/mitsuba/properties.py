@@ -31,7 +31,6 @@ OBJECTS = {
 UNSUPPORTED = {
     "measured", "measured_polarized", "sdfgrid", "ellipsoids", "ellipsoidsmesh",
     "timed_sunsky", "distant", "irradiancemeter", "radiancemeter", "batch", "specfilm",
-    "stokes",
 }  # fmt: skip
 LEFT_OUT = VALUES | OLD_VALUES | {"texture"}  # parameters that old files may have in vain
 MOST_NOTES, MOST_LINES = 16, 3  # notes of a warning, and lines of a note
@@ -167,7 +166,7 @@ class Properties:
 
     def _is_known(self, child: Element) -> bool:
         """Whether the version of the file has an element; else SceneError, told in old files."""
-        if child.tag in VALUES or child.tag in OBJECTS:
+        if child.tag in VALUES or child.tag in OBJECTS or child.array is not None:
             return True
         if self.context.old and (child.tag in OLD_VALUES or child.tag in OLD_OBJECTS):
             return True
@@ -177,7 +176,7 @@ class Properties:
         return False
 
     def _add(self, child: Element) -> None:
-        is_value = child.tag in VALUES or child.tag in OLD_VALUES
+        is_value = child.tag in (*VALUES, *OLD_VALUES) or child.array is not None
         if not child.name and is_value and not child.type:
             raise child.error("needs the attribute 'name'")
         if child.name in self.named:
@@ -275,7 +274,12 @@ class Properties:
         return self.context.document.find_file(child, child.attribute("value"))
 
     def image(self) -> Path | NDArray[np.float32]:
-        """Take the name of an image; grey where there is none and missing ones are grey."""
+        """Take the name of an image; grey where there is none and missing ones are grey.
+
+        A dictionary may have an array in its place, (h, w) or (h, w, c).
+        """
+        if (array := self.array("data", "bitmap")) is not None:
+            return np.asarray(array if array.ndim == 3 else array[..., None])
         child = self.named.get("filename")
         try:
             return self.file()
@@ -284,6 +288,17 @@ class Properties:
                 raise
             self.context.warn(self.element, grey_for(child.attributes.get("value")))
             return GREY
+
+    def array(self, *names: str) -> NDArray[Any] | None:
+        """Take the first array of these names, which only dictionaries have; None without."""
+        for name in names:
+            child = self.named.get(name)
+            if child is not None and child.array is not None:
+                self.take(name)
+                if child.array.ndim not in (2, 3, 4):
+                    raise child.error(f"cannot be an array of {child.array.ndim} axes")
+                return child.array
+        return None
 
     def vector(self, name: str, default: Sequence[float] | None) -> Any:
         """Take a point or a vector."""

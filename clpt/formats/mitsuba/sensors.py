@@ -30,6 +30,7 @@ LENS_CHOICES = {
     "coating": tuple(lenses.COATINGS), "exposure": params(cameras.Lens)["exposure"].choices,
 }  # fmt: skip
 FILMS = ("hdrfilm", "clptfilm")
+FILTERS = ("box", "tent", "gaussian", "mitchell", "catmullrom", "lanczos")
 SAMPLERS = ("independent", "stratified", "multijitter", "orthogonal", "ldsampler")
 HOLDERS = ("adaptive", "irrcache", "multichannel")  # integrators of Mitsuba 0.6 around another
 NO_LIGHT = ("ao", "field", "motion")  # integrators of Mitsuba 0.6 whose values are no light
@@ -444,6 +445,13 @@ def _no_light() -> Integrator:
     return integrators.Path(max_depth=1, light_paths=0)
 
 
+def _stokes(props: Properties) -> Integrator:
+    """Its picture is that of the nested integrator: light has no polarisation here."""
+    nested = props.object("integrator")
+    props.context.warn(props.element, "its vectors of polarisation are left out")
+    return _path(props) if nested is None else integrator(nested, props.context)
+
+
 def _moment(props: Properties) -> Integrator:
     nested = props.object("integrator")
     if nested is None:
@@ -461,6 +469,7 @@ INTEGRATORS: dict[str, Callable[[Properties], Integrator]] = {
     "aov": _aov,
     "depth": _depth,
     "moment": _moment,
+    "stokes": _stokes,
     "volpath": _volume_path,
     "volpathmis": _volume_path,
     "prb": _replayed(free_panes=False),

@@ -24,6 +24,7 @@ from clpt.formats.mitsuba.properties import (
     triple,
     unknown,
 )
+from clpt.formats.mitsuba.spectrum_plugins import PLAIN
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene.roles import COEFFICIENT, EMISSION, FACTOR, INDEX, REFLECTANCE, Spectral
 from clpt.scene.textures import (
@@ -36,15 +37,11 @@ from clpt.scene.textures import (
     Texture,
 )
 from clpt.spectra import (
-    LED,
     RGB,
     Blackbody,
-    Cauchy,
     Constant,
-    Lines,
     RGBIlluminant,
     RGBUnbounded,
-    Sellmeier,
     Spectrum,
     Tabulated,
 )
@@ -268,18 +265,6 @@ def _colour(child: Element, context: Context) -> list[float]:
     return encoded.tolist()
 
 
-def _uniform(props: Properties) -> Spectrum:
-    return Constant(props.number("value", 1.0))
-
-
-def _blackbody(props: Properties) -> Spectrum:
-    return Blackbody(
-        props.number("temperature", 5000.0),
-        props.number("scale", 1.0),
-        props.flag("normalised", False),
-    )
-
-
 def nested_textures(props: Properties) -> list[Element]:
     """Take the textures that stand in an object, whatever their names."""
     tags = {name: props.context.resolve(child).tag for name, child in props.named.items()}
@@ -325,66 +310,11 @@ def _raw_constant(props: Properties) -> Any:
     return RGBUnbounded(*triple(child, "value", 0.0).tolist())
 
 
-def _irregular(props: Properties) -> Spectrum:
-    return Tabulated(_list(props, "wavelengths"), _list(props, "values"))
-
-
-def _regular(props: Properties) -> Spectrum:
-    values = _list(props, "values")
-    low, high = props.number("wavelength_min", 360.0), props.number("wavelength_max", 830.0)
-    return Tabulated(np.linspace(low, high, len(values)), values)
-
-
-def _illuminant(props: Properties) -> Spectrum:
-    return spectra.illuminant(props.text("name", "D65"), props.number("scale", 1.0))
-
-
-def _lines(props: Properties) -> Spectrum:
-    return Lines(
-        _list(props, "wavelengths"),
-        _list(props, "powers"),
-        props.number("width", 1.0),
-        props.number("scale", 1.0),
-    )
-
-
-def _led(props: Properties) -> Spectrum:
-    return LED(props.number("peak", 530.0), props.number("width", 20.0), props.number("scale", 1.0))
-
-
-def _glass(props: Properties) -> Spectrum:
-    return spectra.glass(props.text("name", "bk7"))
-
-
-def _sellmeier(props: Properties) -> Spectrum:
-    return Sellmeier(tuple(_list(props, "b")), tuple(_list(props, "c")), props.number("a", 1.0))
-
-
-def _cauchy(props: Properties) -> Spectrum:
-    return Cauchy(props.number("a", 1.5), props.number("b", 0.0), props.number("c", 0.0))
-
-
-def _list(props: Properties, name: str) -> list[float]:
-    child = props.take(name)
-    if child is None:
-        raise props.element.error(f"needs the parameter {name!r}")
-    return numbers(child, "value")
-
-
 PLUGINS: dict[str, Callable[[Properties], Any]] = {
-    "uniform": _uniform,
-    "blackbody": _blackbody,
+    **PLAIN,
     "d65": _d65,
     "srgb": _srgb,
     "rawconstant": _raw_constant,
-    "irregular": _irregular,
-    "regular": _regular,
-    "illuminant": _illuminant,
-    "lines": _lines,
-    "led": _led,
-    "glass": _glass,
-    "sellmeier": _sellmeier,
-    "cauchy": _cauchy,
 }
 
 

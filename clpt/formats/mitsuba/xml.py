@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import Any
 from xml.parsers import expat
 
+from numpy.typing import NDArray
+
 from clpt.errors import SceneError, nearest
 from clpt.files import budget, input_files
 from clpt.formats.located import Located
@@ -30,13 +32,14 @@ OLD_VERSION = re.compile(r"\s*[01]\.\d")
 
 @dataclass(eq=False)
 class Element(Located):
-    """One XML element: tag, attributes, children, and its location."""
+    """One XML element: tag, attributes, children, and its location; of a dictionary an array."""
 
     tag: str
     attributes: dict[str, str]
     file: Path
     line: int
     children: list[Element] = field(default_factory=list)
+    array: NDArray[Any] | None = None
 
     @property
     def type(self) -> str:

@@ -1,7 +1,7 @@
-"""Scenes in PBRT version 4's format.
+"""Scenes in the format of PBRT versions 2, 3 and 4.
 
-What is not supported is an error or a warning that names the file, the line and the directive.
-docs/pbrt.md says what is read and how.
+A feature that is not supported is an error or a warning that names the file, the line and the
+directive. docs/pbrt.md has the tables.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from clpt.choices import Missing
-from clpt.formats.pbrt import build_scene, camera_film, films, reader
+from clpt.formats.pbrt import build_scene, camera_film, films, old_materials, reader
 from clpt.formats.pbrt.build_scene import Progress
 from clpt.formats.pbrt.files import Contents
 from clpt.formats.pbrt.params import Parameters
@@ -32,15 +32,18 @@ def load(path: Path, progress: Progress | None = None, missing: Missing = "error
     shared.walks = all(one.kind in ("infinite", "portal") for one in contents.lights)
     options = contents.options
     camera = options.get("Camera") or _default_camera(path, contents)
-    exposure = camera_film.exposure_time(camera.params)
-    film = films.film(options.get("Film"), options.get("PixelFilter"), exposure)
+    exposure = camera_film.exposure_time(camera.params, shared.old)
+    film = films.film(options.get("Film"), options.get("PixelFilter"), exposure, shared.old)
+    integrator = options.get("Integrator")
+    if shared.old:
+        shared.mirrors = old_materials.has_mirrors(contents)
     chosen = options.get("Sampler")
     sampler, spp, seed = films.sampler(chosen)
     scene = Scene(
         camera=camera_film.camera(camera, film, films.diagonal(options.get("Film"))),
         shapes=build_scene.shapes(contents, progress),
         lights=build_scene.lights(contents),
-        integrator=films.integrator(options.get("Integrator"), film),
+        integrator=films.integrator(integrator, film),
         sampler=sampler,
         film=film,
         spp=spp,

@@ -157,7 +157,7 @@ def _body(source: Parameters, state: State) -> Medium | None:
     `subsurface`."""
     current = state.material
     if isinstance(current, str):
-        current = state.shared.materials.get(current)
+        current = state.latest(state.shared.materials.get(current))
     if current is None or current.kind != "subsurface":
         return None
     params, defined_in = current.params, current.state
@@ -205,17 +205,20 @@ def _emission(state: State, form: Geometry) -> Light | None:
 
 def lights(contents: Contents) -> list[Light]:
     """Make all lights that are on no shape. Raises SceneError."""
-    made = []
+    lamps = []
     for each in contents.lights:
-        made.append(light(each.kind, each.params, each.state))
-        _warn_of_unused(each.params, each.state)
-    return made
+        lamp = light(each.kind, each.params, each.state)
+        if lamp is not None:
+            lamps.append(lamp)
+            _warn_of_unused(each.params, each.state)
+    return lamps
 
 
 def check_unused_materials(contents: Contents) -> None:
     """Make the named materials that no shape has, for their errors and warnings."""
-    for name, definition in contents.shared.materials.items():
-        definition.state.named_material(name, definition.params)
+    for name, versions in contents.shared.materials.items():
+        for definition in versions:
+            definition.state.material_of(name, definition)
 
 
 def check_options(options: Sequence[Definition]) -> None:

@@ -38,14 +38,15 @@ def camera(definition: Definition, film: Film, diagonal: float) -> cameras.Camer
         known = (*CAMERAS, "realistic")
         raise UnknownKindError("camera", definition.kind, known, **definition.params.location())
     params, state = definition.params, definition.state
-    exposure_time(params)
+    exposure_time(params, state.shared.old)
     with params.locating():
         if definition.kind == "realistic":
             made = _realistic(params, state, film, diagonal)
         else:
             made = CAMERAS[definition.kind](params, state, film)
         made = _moving(made, state)
-        shutter = Shutter(*_shutter(params))
+        opens, closes = _shutter(params)
+        shutter = Shutter(opens, max(opens, closes))
     return replace(made, medium=medium(state.outside, params, state), shutter=shutter)
 
 
@@ -58,10 +59,12 @@ def _moving(camera: cameras.Camera, state: State) -> cameras.Camera:
     return replace(camera, to_world=own, motion=Keys(state.shared.times, keys))
 
 
-def exposure_time(params: Parameters) -> float:
-    """Take the time [s] for which the shutter is open."""
+def exposure_time(params: Parameters, old: bool) -> float:
+    """Take the time [s] for which the shutter is open; 1 in old files, which do not count it."""
     opens, closes = _shutter(params)
     time = closes - opens
+    if old:
+        return 1.0
     if not time > 0.0:
         raise params.error("the shutter does not open: 'shutterclose' must be above 'shutteropen'")
     return float(time)
@@ -135,7 +138,8 @@ def _orthographic(params: Parameters, state: State, film: Film) -> cameras.Camer
 
 def _spherical(params: Parameters, state: State, film: Film) -> cameras.Camera:
     mappings = ("equalarea", "equirectangular")
-    if params.choice("mapping", "equalarea", mappings) == "equalarea":
+    usual = mappings[1] if state.shared.old else mappings[0]
+    if params.choice("mapping", usual, mappings) == "equalarea":
         state.warn(params, "'equalarea' is not supported: the picture is equirectangular")
     _window(params, film)
     params.ignore("lensradius", "focaldistance")

@@ -20,6 +20,7 @@ from clpt.formats.pbrt.params import ALIASES, TYPES, Parameter
 
 WORD = re.compile(rb'(?:[ \t\r\n]+|#[^\n]*)*("[^"\n]*"|[\[\]]|[^ \t\r\n\[\]"#]+)?')
 OLD_TYPES = ("color", "xyz")
+COMMA = re.compile(rb'("[^"\n]*")|,')
 UPGRADE = "PBRT version 3's; convert the file by pbrt-v4's --upgrade"
 
 
@@ -34,6 +35,13 @@ class Lexer:
         self.at = 0  # after the blanks before the next word
         self._ahead: bytes | None = None
         self._counted, self._line = 0, 1
+        self.old = False
+
+    def take_old(self) -> None:
+        """Read words of versions 2 and 3, where commas between numbers are blanks."""
+        self.old = True
+        if b"," in self.data:
+            self.data = COMMA.sub(lambda match: match[1] or b" ", self.data)
 
     @property
     def line(self) -> int:
@@ -98,6 +106,8 @@ class Lexer:
             shown = " ".join(declaration)[:60]
             raise self.error(f'{where}: "{shown}" is not a type and a name')
         kind, name = declaration
+        if kind in OLD_TYPES and self.old:
+            return Parameter(kind, name, self._values(), self.path, line, where)
         if kind in OLD_TYPES:
             raise self.error(f"{where}: the type {kind!r} is {UPGRADE}")
         if kind not in TYPES:

@@ -10,7 +10,7 @@ import numpy as np
 
 from clpt import measured
 from clpt.errors import SceneError, UnknownKindError
-from clpt.formats.pbrt import coated_albedo
+from clpt.formats.pbrt import coated_albedo, old_materials
 from clpt.formats.pbrt.hair import hair
 from clpt.formats.pbrt.layered import both, coat, coated_diffuse, index_at_550, subsurface
 from clpt.formats.pbrt.map_values import map_values
@@ -29,22 +29,20 @@ PLAIN: dict[str, Any] = {
     "flip_invalid": False,
     "shadowing": False,
 }  # pbrt uses a bent normal as it comes
-OLD = {
-    "matte": "diffuse", "plastic": "coateddiffuse", "metal": "conductor", "mirror": "conductor",
-    "glass": "dielectric", "uber": "coateddiffuse", "substrate": "coateddiffuse",
-    "translucent": "diffusetransmission", "kdsubsurface": "subsurface", "disney": "coateddiffuse",
-    "fourier": "measured",
-}  # fmt: skip
 
 
 def material(kind: str, params: Parameters, state: State, name: str = "") -> Material:
     """Make what a `Material` or `MakeNamedMaterial` directive describes. Raises SceneError."""
-    if kind in OLD:
-        raise params.error(
-            f"{kind!r} is a material of pbrt-v3; pbrt --upgrade converts it to {OLD[kind]!r}"
-        )
+    if state.shared.old and old_materials.is_known(kind):
+        with params.locating():
+            made = old_materials.material(kind, params, state)
+            return replace(_bumped(made, params, state), name=name)
+    if old_materials.is_known(kind) and kind not in MAKERS:
+        raise params.error(f"{kind!r} is a material of pbrt-v3, but the file is of version 4")
     if kind not in MAKERS:
-        raise UnknownKindError("material", kind, MAKERS, **params.location())
+        known = old_materials.MAKERS if state.shared.old else MAKERS
+        state.stand_in(UnknownKindError("material", kind, known, **params.location()), params)
+        return both(materials.Diffuse(name=name))
     with params.locating():
         return replace(_bumped(MAKERS[kind](params, state), params, state), name=name)
 

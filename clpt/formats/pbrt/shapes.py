@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from clpt import transforms
 from clpt.errors import SceneError, UnknownKindError
@@ -28,7 +28,7 @@ from clpt.scene.shapes import Shape
 from clpt.scene.textures import Bitmap
 
 Parts = dict[str, Any]
-QUADRICS = ("cylinder", "disk", "sphere")
+QUADRICS = ("cylinder", "disk", "sphere", "cone", "hyperboloid", "paraboloid")
 OLD = ("cone", "hyperboloid", "paraboloid", "heightfield", "nurbs")
 ALIKE = 1e-3  # relative difference of areas that is none
 MOST_SPLITS = 10  # of a curve, each in two
@@ -85,14 +85,16 @@ class Geometry:
 def geometry(definition: Definition) -> Geometry | None:
     """Read what a Shape directive describes; None where it is empty. Raises SceneError."""
     params, kind, state = definition.params, definition.kind, definition.state
-    if kind in OLD:
-        raise params.error(f"the shape {kind!r} is PBRT version 3's; use a mesh")
-    if kind not in SHAPES:
-        raise UnknownKindError("shape", kind, SHAPES, **params.location())
+    known = SHAPES if not state.shared.old else SHAPES | OLD_SHAPES
+    if kind in OLD and kind not in known:
+        raise params.error(f"the shape {kind!r} is not supported; use a mesh")
+    if kind not in known:
+        state.stand_in(UnknownKindError("shape", kind, known, **params.location()), params)
+        return None
     with params.locating():
         if transforms.is_singular(state.ctm):
             raise SceneError("its transform flattens space")
-        made = SHAPES[kind](params, state)
+        made = known[kind](params, state)
         if made is not None:
             turned = kind in QUADRICS and transforms.flips_handedness(state.ctm)
             made.parts.setdefault("to_world", state.ctm)
@@ -319,11 +321,49 @@ def _curve(params: Parameters, state: State) -> Geometry | None:
         cubics = np.arange(len(parts["faces"])) // (2 * curves.PIECES)
         return _with_pieces(made, cubics, split)
     current = state.material
-    material = state.shared.materials.get(current) if isinstance(current, str) else current
+    if isinstance(current, str):
+        current = state.latest(state.shared.materials.get(current))
     flat = params.one("type", "string", "flat") == "flat"
-    if not flat or (material is not None and material.kind == "hair"):  # there is no difference
+    if not flat or (current is not None and current.kind == "hair"):  # there is no difference
         return Geometry(kind, parts, split=split)
     return Geometry(kind, parts, ["a flat curve is shaded as a round one"], split=split)
+
+
+def _cone(params: Parameters, state: State) -> Geometry | None:
+    radius, height = params.above_zero("radius", 1.0), params.above_zero("height", 1.0)
+    return _revolved(params, [[radius, 0.0, 0.0], [0.0, 0.0, height]])
+
+
+def _paraboloid(params: Parameters, state: State) -> Geometry | None:
+    radius = params.above_zero("radius", 1.0)
+    low, high = sorted((params.one("zmin", "float", 0.0), params.one("zmax", "float", 1.0)))
+    if not 0.0 <= low < high:
+        raise SceneError("'zmin' and 'zmax' must differ, and not be negative")
+    z = np.linspace(low, high, surfaces.ALONG + 1)
+    r = radius * np.sqrt(z / high)
+    return _revolved(params, np.stack([r, np.zeros_like(r), z], axis=1))
+
+
+def _hyperboloid(params: Parameters, state: State) -> Geometry | None:
+    ends = [params.one("p1", "point3", (0.0,) * 3), params.one("p2", "point3", (1.0,) * 3)]
+    parts = np.linspace(0.0, 1.0, surfaces.ALONG + 1)[:, None]
+    return _revolved(params, (1.0 - parts) * ends[0] + parts * ends[1])
+
+
+def _revolved(params: Parameters, profile: ArrayLike) -> Geometry | None:
+    turn = surfaces.phi_max(params)
+    return Geometry(shapes.Mesh, surfaces.revolved_mesh(np.asarray(profile, np.float64), turn))
+
+
+def _heightfield(params: Parameters, state: State) -> Geometry | None:
+    """A grid of heights over the unit square: pbrt-v3, src/shapes/heightfield.cpp."""
+    columns, rows = (params.one(name, "integer", 0) for name in ("nu", "nv"))
+    heights = params.several("Pz", "float")
+    if min(columns, rows) < 2 or heights is None or len(heights) != columns * rows:
+        raise SceneError("needs 'nu' and 'nv' of at least 2, and nu times nv numbers 'Pz'")
+    u, v, faces = surfaces.grid(columns - 1, rows - 1)
+    points = np.stack([u, v, heights], axis=1)
+    return _with_pieces(_mesh(points, faces, None, np.stack([u, v], axis=1)))
 
 
 SHAPES: dict[str, Callable[[Parameters, State], Geometry | None]] = {
@@ -335,4 +375,10 @@ SHAPES: dict[str, Callable[[Parameters, State], Geometry | None]] = {
     "plymesh": _ply,
     "sphere": _sphere,
     "trianglemesh": _triangles,
+}
+OLD_SHAPES: dict[str, Callable[[Parameters, State], Geometry | None]] = {
+    "cone": _cone,
+    "heightfield": _heightfield,
+    "hyperboloid": _hyperboloid,
+    "paraboloid": _paraboloid,
 }

@@ -30,6 +30,7 @@ from clpt.spectra import (
 SPACES = {"srgb": "rec709", "rec2020": "rec2020", "dci-p3": "display_p3"}
 ACES = "aces2065-1"
 AP0 = ((0.7347, 0.2653), (0.0, 1.0), (0.0001, -0.077))  # SMPTE ST 2065-1
+WIEN = 2.8977721e6  # wavelength [nm] of a black body's maximum, times its temperature [K]
 CUT = 1e-3  # by how much a colour may be changed without a warning
 SPECTRUM_TYPES = ("rgb", "spectrum", "blackbody")
 GLASSES = {  # what pbrt's tables hold, which is not always what their name says
@@ -65,13 +66,24 @@ def value_of(given: Parameter, role: Spectral, state: State) -> Any:
         return given.numbers(1)[0]
     if given.type == "rgb":
         return _rgb(given, role, state)
+    if given.type == "blackbody" and state.shared.old:
+        return _peaked(given)
     if given.type == "blackbody":
         made: Spectrum = Blackbody(given.numbers(1)[0], normalised=True)
     elif given.is_text:
         made = _named(given.text(), role, state)
     else:
         made = _pairs(given.numbers(), role)
-    return _of_luminance_one(made) if role is EMISSION else made
+    return _of_luminance_one(made) if role is EMISSION and not state.shared.old else made
+
+
+def _peaked(given: Parameter) -> Spectrum:
+    """Return a black body whose maximum is the second number: pbrt-v3, src/core/paramset.cpp."""
+    values = given.numbers()
+    if len(values) not in (1, 2) or not values[0] > 0.0:
+        raise SceneError("a black body is a temperature [K] above 0 and a scale")
+    peak = Blackbody(values[0]).sample(np.array([WIEN / values[0]]))[0]
+    return Blackbody(values[0], (values[1] if len(values) == 2 else 1.0) / float(peak))
 
 
 def to_rec709(rgb: object, space: str, *, light: bool) -> Any:
@@ -92,6 +104,9 @@ def _rgb(given: Parameter, role: Spectral, state: State) -> Any:
     rgb = given.numbers(3)
     if min(rgb) < 0.0:
         raise SceneError("a colour cannot be negative")
+    if role is REFLECTANCE and max(rgb) > 1.0 and state.shared.old:
+        state.warn(given, "exceeds 1 and is cut off")
+        rgb = [min(value, 1.0) for value in rgb]
     if role is REFLECTANCE and max(rgb) > 1.0:
         raise SceneError("a colour that is reflected cannot exceed 1")
     ours = to_rec709(rgb, state.colour_space, light=role is EMISSION)

@@ -38,7 +38,9 @@ from clpt.scene.textures import (
 )
 from clpt.spectra import Spectrum
 
+Values = Any  # a number, a colour or a texture
 IDENTITY_UV = np.eye(3)
+SRGB = "sRGB"
 WRAPS = {"repeat": "repeat", "black": "zero", "clamp": "clamp", "octahedralsphere": "clamp"}
 FLOATS = (".exr", ".hdr", ".pfm")  # whose numbers are no colours where a float is asked for
 FILTERS = {"point": "nearest", "bilinear": "bilinear", "trilinear": "trilinear", "ewa": "trilinear"}
@@ -91,11 +93,26 @@ def _constant(form: str, params: Parameters, state: State) -> Any:
 
 
 def _scale(form: str, params: Parameters, state: State) -> Any:
+    if state.shared.old:
+        names = ("tex1", "tex2")
+        first, second = (_argument(form, params, name, state, 1.0) for name in names)
+        return _product(first, second)
     first = _argument(form, params, "tex", state, 1.0)
     second = textured(params, "scale", REAL, state, 1.0)
     if not isinstance(first, Texture) and not isinstance(second, Texture):
         return map_values(first, lambda v: v * second)
     return first if second == 1.0 else Product(first=first, second=second)
+
+
+def _product(first: Values, second: Values) -> Values:
+    """Return the product of two values or textures, as in versions 2 and 3."""
+    if isinstance(first, Texture) or isinstance(second, Texture):
+        return Product(first=first, second=second)
+    if not isinstance(first, Spectrum) and not isinstance(second, Spectrum):
+        product = np.multiply(first, second)
+        return tuple(product.tolist()) if product.ndim else float(product)
+    pair = (v.to_rgb("unbounded") if isinstance(v, Spectrum) else v for v in (first, second))
+    return tuple(np.broadcast_to(np.multiply(*pair), 3).tolist())
 
 
 def _mix(form: str, params: Parameters, state: State) -> Any:
@@ -156,26 +173,40 @@ def _imagemap(form: str, params: Parameters, state: State) -> Any:
     if wrap == "octahedralsphere":
         state.warn(params, "wrap 'octahedralsphere' is taken as 'clamp'")
     params.one("maxanisotropy", "float", 8.0)
+    params.ignore(*(("trilinear",) if state.shared.old else ()))
+    usual = "trilinear" if state.shared.old else "bilinear"
     made = Bitmap(
         image=GREY if file is None else file,
-        filter=FILTERS[params.choice("filter", "bilinear", FILTERS)],
+        filter=FILTERS[params.choice("filter", usual, FILTERS)],
         wrap=WRAPS[wrap],
-        channel="r" if form == "float" else "luminance",
+        channel="r" if form == "float" and not state.shared.old else "luminance",
         raw=form == "float" and file is not None and file.suffix.lower() in FLOATS,
         **_mapping(params, state),
     )
-    bilinear = params.choice("filter", "bilinear", FILTERS) in ("bilinear", "trilinear")
-    encoding = params.one("encoding", "string", "sRGB")
-    if (
-        file is not None and file.suffix.lower() == ".png"
-    ):  # pbrt ignores the encoding of other files
+    bilinear = params.choice("filter", usual, FILTERS) in ("bilinear", "trilinear")
+    encoding = _old_encoding(params) if state.shared.old else params.one("encoding", "string", SRGB)
+    suffixes = (".png", ".tga") if state.shared.old else (".png",)
+    if file is not None and file.suffix.lower() in suffixes:  # pbrt ignores it in other files
         made = _decoded(made, encoding)
+    if state.shared.old:
+        bilinear = False  # its number is the luminance
     if file is not None and form == "float" and bilinear:
         made = _number(made, state)
     scale, invert = params.one("scale", "float", 1.0), params.one("invert", "bool", False)
     if file is None or (scale == 1.0 and not invert):
         return made
     return map_values(made, lambda v: np.maximum(1.0 - scale * v if invert else scale * v, 0.0))
+
+
+def _old_encoding(params: Parameters) -> str:
+    """Take the `gamma` of version 3, a truth, or of version 2, an exponent."""
+    parameter = params.find("gamma", "bool", "float")
+    if parameter is None:
+        return SRGB
+    if parameter.type == "float":
+        gamma = parameter.numbers(1)[0]
+        return "linear" if gamma == 1.0 else f"gamma {gamma:g}"
+    return SRGB if parameter.truth() else "linear"
 
 
 def _number(bitmap: Bitmap, state: State) -> Bitmap:
@@ -207,7 +238,7 @@ def _number(bitmap: Bitmap, state: State) -> Bitmap:
 
 
 def _decoded(bitmap: Bitmap, encoding: str) -> Bitmap:
-    if encoding == "sRGB":
+    if encoding == SRGB:
         return bitmap
     bitmap = replace(bitmap, raw=True)
     if encoding == "linear":

@@ -253,7 +253,7 @@ def test_materials_may_be_named_before_they_are_made(scene):
     ("text", "message"),
     [
         ('Shape "spheer"', "unknown shape 'spheer'; did you mean 'sphere'"),
-        ('Shape "cone"', "version 3"),
+        ('Shape "cone"', "not supported; use a mesh"),
         ('Shape "trianglemesh"', "needs the parameter 'point3 P'"),
         (
             'Shape "trianglemesh" "point3 P" [0 0 0 1 0 0 0 1 0] "integer indices" [0 1 9]',
