@@ -13,7 +13,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if sys.argv[:1] == ["-m"] and "clpt" in sys.orig_argv:  # python -m clpt: Python has put the current
-    # folder first, from which nothing is imported unless clpt itself is there
+    # folder first; it stays only if clpt lies there
     _home = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
     sys.path[:1] = [path for path in sys.path[:1] if path == _home]
 

@@ -17,7 +17,7 @@ from clpt.scene.cameras import Camera
 from clpt.scene.integrators import Auto, Direct, Integrator, ParticleTracer, Path, Vcm
 from clpt.scene.layers import LAYERS
 from clpt.scene.lights import Light
-from clpt.scene.media import Grid, Lattice, Medium, Mixture
+from clpt.scene.media import Grid, Medium
 from clpt.scene.phases import LEAVES
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.shapes import Shape
@@ -106,12 +106,12 @@ class SceneIndex:
         media, emitting = self.media, self.emitting
         grids = [medium for medium in media if isinstance(medium, Grid)]
         return GridFeatures(
-            present=any(isinstance(medium, Lattice) for medium in media),
-            emissive=any(isinstance(medium, Lattice) for medium in emitting),
+            present=any(medium.lattice is not None for medium in media),
+            emissive=any(medium.lattice is not None for medium in emitting),
             hot=any(one.temperature is not None for one in emitting if isinstance(one, Grid)),
             tinted=any(one.albedo_grid is not None for one in grids),
             coloured=any(one.color_grid is not None for one in grids),
-            mixed=max((len(one.parts) for one in media if isinstance(one, Mixture)), default=0),
+            mixed=max((len(medium.parts) for medium in media if medium.is_mixture), default=0),
             bytes=any(one.bits == 8 for one in grids),
         )
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import InitVar, dataclass
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 from clpt.errors import SceneError
 from clpt.measured import Measurement, MerlTable
@@ -125,6 +125,8 @@ class Material(Scatterer):
     from the folder of the module that defines the class.
     """
 
+    bounds_body: ClassVar[bool] = False  # its shapes enclose bodies, which may have a priority
+
     name: str = host("", "for messages and for references in scene files")
 
     # of a kind without such parameters
@@ -225,6 +227,7 @@ class Dielectric(Material):
     delta = True
     uses_lobe_sample = True
     refracts = True
+    bounds_body = True
 
     int_ior: IndexLike = index(1.5046, "inside index, number, glass name or spectrum")
     ext_ior: IndexLike = index(1.000277, "outside index")
@@ -271,6 +274,7 @@ class RoughDielectric(Material):
 
     uses_lobe_sample = True
     refracts = True
+    bounds_body = True
     chromatic = True
     lobes_apart = True
 

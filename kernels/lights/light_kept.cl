@@ -1,4 +1,4 @@
-/* The light of a path that is weighed, for its first vertex, see transport/rivals.cl. */
+/* The light of a path that is weighed, for its first vertex, see transport/mis_ratio.cl. */
 inline void light_kept(Slab path, uint at, mask go, LightRay r)
 {
     store_path_light(path, at, go, r.row);

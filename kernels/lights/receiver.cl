@@ -1,7 +1,7 @@
 /* What a surface does with light that comes to it, as far as the tree over lights asks for that.
  *
  * Its gloss is that of GGX microfacets of one roughness and one share in what is reflected, a guess of the host:
- * clpt/render/materials/gloss.py. Lights below a node of the tree count by that lobe, wider by the size of the
+ * clpt/render/materials/encode.py. Lights below a node of the tree count by that lobe, wider by the size of the
  * node. Liu et al. 2019, "Adaptive BRDF-Oriented Multiple Importance Sampling of Many Lights", and Tokuyoshi et al.
  * 2024, "Hierarchical Light Sampling with Accurate Spherical Gaussian Lighting", do so with other lobes. By the half
  * vector it has its shape where light grazes, too, and costs one division. */

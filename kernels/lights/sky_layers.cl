@@ -6,7 +6,7 @@ inline void sky_layers(Scene scene, Slab path, uint at, PathEnd end, Wavelengths
     Spectrum beta = sky_dimmed(scene, path, at, v.seen, lambdas, load_path_beta(path, at));
     for (int row = 0; row < scene.settings->infinite_count; row++) {
         real w;
-        Spectrum radiance = infinite_met(scene, row, v.from, v.receiver, v.d, v.pdf, v.rival, lambdas, &w);
+        Spectrum radiance = infinite_met(scene, row, v.from, v.receiver, v.d, v.pdf, v.mis_ratio, lambdas, &w);
         Spectrum light = spectrum_mul(beta, spectrum_scale(radiance, w));
         light_layers_add(scene, path, at, v.seen, end.depth, (integer)(row), light, light_layers);
     }

@@ -20,7 +20,7 @@ inline Boundary dielectric_boundary(Layers layers, real cos_i, Spectrum eta, Spe
     b.p = spectrum_mean(b.r);
     return b;
 }
-/* The same with one index for all wavelengths: a facet that all of them meet at the same cosine. */
+/* The same with a common index for all wavelengths, which meet a facet at the same cosine. */
 inline Boundary facet_boundary(Layers layers, real cos_i, real eta, Spectrum outside)
 {
     Boundary b;

@@ -45,8 +45,8 @@ inline Admittance admittance_of(real eta, real k, real from, real c)
     return m;
 }
 
-/* One polarisation's wave at the top of what has been stacked: the amplitude that comes back, and
- * the share of power that goes down to a base that does not absorb. */
+/* The wave of a polarisation at the top of a stack: the reflected amplitude, and the share of power that
+ * reaches a base that does not absorb. */
 typedef struct { Complex r; real t; } Wave;
 
 /* Puts a medium on top. The powers' ratio Re Y' / Re Y is dealt out over all boundaries as |Y'| / |Y|,
@@ -70,7 +70,7 @@ inline Wave wave_through(Wave w, real turns, real left)
     return w;
 }
 
-/* All that is stacked so far, at one wavelength. */
+/* A stack of layers at a wavelength. */
 typedef struct { Admittance top; Wave s, p; } Stack;
 
 inline Stack stack_on(real eta, real k, real from, real c)

@@ -1,5 +1,5 @@
-/* What light of a brick counts that a flight gathers at t, against its choice by next-event estimation; row: 1 + that
- * of `lights`. */
+/* The MIS weight of emission that a flight gathers in a brick at distance t, against next-event estimation; row: 1 +
+ * the brick's row of `lights`. */
 inline real brick_weight(Scene scene, integer row, mask active, GridOrigin origin, real t)
 {
     mask sought = active & (row > 0) & (origin.pdf >= 0.0f);

@@ -1,4 +1,5 @@
-/* What a flight weighs over all wavelengths of its path; f: of light that comes so far, pdf: of the distance. */
+/* The weight of a flight over all wavelengths of its path; f: transmittance, times scattering at a collision; pdf:
+ * of the distance at each wavelength. */
 inline Spectrum flight_weight(Slab path, uint at, mask flies, Spectrum ratio, Spectrum f, Spectrum pdf)
 {
     Spectrum pdfs = spectrum_mul(ratio, pdf);

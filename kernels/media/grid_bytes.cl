@@ -1,7 +1,7 @@
-/* Numbers of grids, some of which have 8 bits for each and some 16. */
+/* Numbers on grids, with 8 or 16 bits each. */
 #define grid_packed(name) sel_i(((name) & MEDIUM_BYTES) != 0, (integer)(2), (integer)(1))
 
-/* The number `at` of a brick, over the highest; word: where it is. */
+/* The number at index `at` of a brick over the brick's highest; word: the word that holds it. */
 inline real grid_number_at(integer packed, integer word, integer at)
 {
     mask small = packed == 2;

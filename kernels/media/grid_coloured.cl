@@ -1,4 +1,4 @@
-/* Colours of the extinction on a grid. */
+/* Extinction with colours on a grid. */
 inline void grid_coloured(Scene scene, integer name, GridWalk w, mask active, natural bits, Wavelengths lambdas,
                            Medium *m)
 {

@@ -1,4 +1,4 @@
-/* Albedos on a grid. */
+/* Scattering with albedos on a grid. */
 inline void grid_tinted(Scene scene, integer name, GridWalk w, mask active, natural bits, Wavelengths lambdas,
                           Medium *m)
 {

@@ -1,4 +1,4 @@
-/* The medium along w, which leads away from a vertex, and the bodies that a ray to a light begins in there. */
+/* The medium along a direction w away from a vertex, and the bodies where a shadow ray along w begins. */
 #include "media/vertex_dims.cl"
 
 inline integer vertex_medium(Vertex v, vec3 w)

@@ -87,7 +87,7 @@ inline real motion_length_back(Motion m, vec3 d)
 #endif
 }
 
-/* Of one of the scene's shapes, by its number. */
+/* Of a shape of the scene, by its number. */
 inline Motion motion_of_shape(Scene scene, integer number)
 {
     integer first = as_int(scene.distributions[MOTION_ROW + 2]);

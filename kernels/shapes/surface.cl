@@ -64,7 +64,7 @@ inline vec3 surface_offset(Surface s, vec3 w)
 }
 
 /* How far along the unit vector `w` that is, where it does not graze the surface. */
-inline real surface_lead(Surface s, vec3 w)
+inline real surface_ray_offset(Surface s, vec3 w)
 {
     return rounding_step(s.p, s.size) / max_r(fabs(dot3(s.n, w)), (real)(0.01f));
 }

@@ -39,10 +39,10 @@ inline LightRay first_light_ray(Scene *scene, Sampler sampler, integer sample, W
                       sampler_pair(sampler, (natural)(DIMENSION_LENS)), *lambdas);
 }
 
-/* The rival of a light path that begins, see transport/rivals.cl. */
-inline real first_rival(Scene scene, LightRay r)
+/* The mis_ratio of a light path that begins, see transport/mis_ratio.cl. */
+inline real first_mis_ratio(Scene scene, LightRay r)
 {
-    return aimed_rival((real)(1.0f / scene.settings->light_paths), r);
+    return mis_ratio_aimed((real)(1.0f / scene.settings->light_paths), r);
 }
 
 /* Puts a ray from a light into the slots that `go` on, and, where the camera sees lights, one from it to the camera
@@ -76,10 +76,10 @@ inline integer begin_light_path(Scene scene, Slab path, Slab shadow, uint at, ma
     store_path_medium(path, at, go, light_medium(scene, lit));
     store_path_bodies(path, at, go, light_bodies(scene, lit));
     store_path_around(path, at, go, (integer)(0));
-    store_path_lead(path, at, go, (real)(0.0f));
+    store_path_ray_offset(path, at, go, (real)(0.0f));
     store_path_ratio(path, at, go, spectrum_of(1.0f));
-    store_path_pending(path, at, go, (real)(0.0f));
-    store_path_rival(path, at, go, first_rival(scene, r));
+    store_path_merge_ratio(path, at, go, (real)(0.0f));
+    store_path_mis_ratio(path, at, go, first_mis_ratio(scene, r));
     light_kept(path, at, go, r);
     integer state = sel_i(alive, (integer)(PATH_ALIVE), (integer)(0));
     return state + light_joined(scene, shadow, at, ended, go, sampler, s, r, lambdas);

@@ -100,14 +100,14 @@ inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_i
     store_path_radiance(path, at, go, spectrum_of((real)(0.0f)));
     store_path_pdf(path, at, go, -b.ray.far);
     store_path_eta(path, at, go, (real)(1.0f));
-    store_path_rival(path, at, go, (real)(settings->light_paths));
+    store_path_mis_ratio(path, at, go, (real)(settings->light_paths));
     store_path_expected(path, at, go, (real)(0.0f));
-    store_path_pending(path, at, go, (real)(0.0f));
+    store_path_merge_ratio(path, at, go, (real)(0.0f));
     store_path_nulls(path, at, go, (integer)(0));
     store_path_null_distance(path, at, go, (real)(0.0f));
     store_path_medium(path, at, go, (integer)(settings->camera_medium));
     store_path_around(path, at, go, (integer)(0));
-    store_path_lead(path, at, go, (real)(0.0f));
+    store_path_ray_offset(path, at, go, (real)(0.0f));
     store_path_escape_width(path, at, go, (real)(0.0f));
     store_path_bodies(path, at, go, (integer)(settings->camera_bodies));
     store_path_ratio(path, at, go, camera_start());

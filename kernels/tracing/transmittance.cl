@@ -25,7 +25,7 @@ inline Passage trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real
             transmittance = passage_sel(active, passage_mul(transmittance, own), transmittance);
             active = active & (passage_most(own) > 0.0f);
             /* Continue exactly along d: off the line, the ray would miss its end and a sphere shade itself. */
-            real on = h.t * (1.0f + SURFACE_ROUNDING) + surface_lead(s, d);
+            real on = h.t * (1.0f + SURFACE_ROUNDING) + surface_ray_offset(s, d);
             o = sel3(active, madd3(d, on, o), o);
             t = sel(active, t - on, t);
             surfaces++;

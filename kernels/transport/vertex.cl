@@ -126,7 +126,7 @@ inline mask vertex_continues(Scene scene, Vertex v, mask null)
 inline void vertex_leave(Slab path, uint at, mask next, mask null, Vertex v, vec3 d, Spectrum beta)
 {
     if (BSDF_IS_NULL || BSDF_IS_PANE) { /* the camera's ray has its end, and lights are weighed by what was before */
-        real pdf = load_path_pdf(path, at), onward = v.t + surface_lead(v.s, d);
+        real pdf = load_path_pdf(path, at), onward = v.t + surface_ray_offset(v.s, d);
         store_path_pdf(path, at, next & null & (v.depth == 0), pdf + onward);
         store_path_null_distance(path, at, next & null, load_path_null_distance(path, at) + onward);
     }
@@ -135,7 +135,7 @@ inline void vertex_leave(Slab path, uint at, mask next, mask null, Vertex v, vec
     store_path_beta(path, at, next, beta);
     store_path_medium(path, at, next, vertex_medium(v, d));
     store_path_around(path, at, next, vertex_around(v, d));
-    store_path_lead(path, at, next, surface_lead(v.s, d));
+    store_path_ray_offset(path, at, next, surface_ray_offset(v.s, d));
     store_path_bodies(path, at, next, vertex_through(v, d));
 }
 
@@ -153,5 +153,5 @@ inline void hide_light(Slab path, uint at, mask hidden, Vertex v) /* the camera'
     store_path_pdf(path, at, hidden, load_path_pdf(path, at) + v.t);
     store_path_null_distance(path, at, hidden, load_path_null_distance(path, at) + v.t);
     store_path_cone(path, at, hidden, cone_word(v.cone));
-    store_path_rival(path, at, hidden, (real)(0.0f)); /* the light is in the way of what light paths bring there */
+    store_path_mis_ratio(path, at, hidden, (real)(0.0f)); /* the light is in the way of what light paths bring there */
 }

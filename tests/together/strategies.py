@@ -26,7 +26,6 @@ from clpt.render.flow.check import check
 from clpt.render.geometry.check import check_shapes
 from clpt.render.lights.check import check_light
 from clpt.render.materials.check import check_material
-from clpt.render.media.bodies import BENDS, OPEN
 from clpt.render.textures.check import check_textures
 from clpt.scene import (
     Scene,
@@ -566,9 +565,9 @@ def _any_scene(choose: Callable[[int], int]) -> Scene:
 
 def _as_body(self: Drawer, shape: Any) -> Any:
     """A shape that overlaps others by a priority, where it is one that can."""
-    if isinstance(shape, (*OPEN, shapes.Instance)):
+    if shape.is_open or isinstance(shape, shapes.Instance):
         return shape
-    if not isinstance(shape.material, (*BENDS, materials.Null)):
+    if not (shape.material.bounds_body or shape.material.is_null):
         return shape
     return dataclasses.replace(shape, priority=self.one([0, 1, 2]), exterior=None)
 

@@ -13,8 +13,8 @@ from clpt.render.camera.encode import encode_camera
 from clpt.render.edit.rebuild import ranges
 from clpt.render.edit.scene_edit import Replacements
 from clpt.render.lights.aims import is_sharp
-from clpt.render.materials import gloss
 from clpt.render.materials.check import check_material
+from clpt.render.materials.encode import gloss_word
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
@@ -58,7 +58,7 @@ def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> Callable[[], N
             return f"parameters of a {new.kind} come from elsewhere, such as a texture or a table"
         rows += changed
         if before := lowered.features.lights.gloss:
-            word = np.array([gloss.word(new)], np.uint32)
+            word = np.array([gloss_word(new)], np.uint32)
             rows += [(row - before, word) for row, _ in changed]
     return lambda: _write(on_device, camera, rows)
 

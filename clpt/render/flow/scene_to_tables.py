@@ -26,13 +26,12 @@ from clpt.render.geometry.encode_attributes import lower_attributes
 from clpt.render.geometry.find import Geometry, Owner, spheres_move
 from clpt.render.lights.encode import LightRows, has_tree, light_rows
 from clpt.render.lights.find import Sources
-from clpt.render.materials import gloss
-from clpt.render.materials.encode import MaterialWords
+from clpt.render.materials.encode import MaterialWords, gloss_word
 from clpt.render.materials.encoder import Encoder
-from clpt.render.media.device_grids import DeviceGrid
+from clpt.render.media.bodies import BodyWords
 from clpt.render.media.encode import MediumWords, medium_aims
-from clpt.render.media.encode_bodies import BodyWords
-from clpt.render.media.encode_light_media import light_media_words
+from clpt.render.media.grids import DeviceGrid
+from clpt.render.media.light_media import light_media_words
 from clpt.render.motion.encode import lower_motion
 from clpt.render.records import Features, GeometryFeatures, LayerFeatures, SpectraFeatures
 from clpt.render.records.device_arrays import is_table
@@ -48,7 +47,6 @@ from clpt.scene import materials as mt
 from clpt.scene.cameras import CONNECTED
 from clpt.scene.fingerprint import named_files
 from clpt.scene.integrators import DEEPEST, Film, Integrator
-from clpt.scene.media import Lattice
 from clpt.scene.params import Kind, params
 from clpt.scene.roles import INDEX
 from clpt.scene.shapes import Mesh, Shape
@@ -342,13 +340,13 @@ def _asks_gloss(found: Analysis) -> bool:
     index = found.index
     tree = not index.light_paths and has_tree(found.sources.every, TREE_FROM)
     leaves = (leaf for shape in index.shapes for leaf in mt.parts(shape.material))
-    return tree and any(gloss.word(leaf) for leaf in leaves)
+    return tree and any(gloss_word(leaf) for leaf in leaves)
 
 
 def _lower_medium_aims(index: SceneIndex, encoder: Encoder, lights: LightRows) -> int:
     """Append the lamps near which flights through media end; return how many."""
-    homogeneous = (one for one in index.media if not isinstance(one, Lattice))
-    near = medium_aims(lights) if any(one.scatters for one in homogeneous) else ()
+    homogeneous = (medium for medium in index.media if medium.lattice is None)
+    near = medium_aims(lights) if any(medium.scatters for medium in homogeneous) else ()
     encoder.store.append("media", np.array(near, np.float32).view(np.uint32))
     return len(near)
 
@@ -466,7 +464,8 @@ def _of_motion(index: SceneIndex) -> list[str]:
     warnings: list[str] = []
     for i in index.motions.shapes:
         shape = index.listed[i]
-        if any(isinstance(one, Lattice) for s in shape.members for one in (s.interior, s.exterior)):
+        media = (medium for s in shape.members for medium in (s.interior, s.exterior))
+        if any(medium is not None and medium.lattice is not None for medium in media):
             warnings.append(
                 f"{shapes.where(shape)}.motion: its boundary moves, the grid of its medium stays"
             )

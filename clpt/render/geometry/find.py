@@ -254,11 +254,11 @@ class _Builder:
         if times:
             keyed = self.cache(spheres.keyed, shape, times, by=(*by, times))
             self.many.append(spheres.swept(keyed))
-            budget.take_made((keyed, self.many[-1]), shapes.where(shape))
+            budget.take_arrays((keyed, self.many[-1]), shapes.where(shape))
             return keyed[:, 0], Stored(many=keyed)
         balls = self.cache(spheres.balls, shape, by=by)
         self.many.append(spheres.boxes([balls]))
-        budget.take_made((balls, self.many[-1]), shapes.where(shape))
+        budget.take_arrays((balls, self.many[-1]), shapes.where(shape))
         return balls, Stored(many=balls)
 
     def _add_curves(self, shape: Shape, row: np.ndarray) -> Stored:
@@ -266,7 +266,7 @@ class _Builder:
         row["prim"] = self.single_count + sum(map(len, self.many))
         found = self.cache(strands.pieces, shape, by=shapes.geometry(shape))
         self.many.append(strands.boxes(found))
-        budget.take_made((found, self.many[-1]), shapes.where(shape))
+        budget.take_arrays((found, self.many[-1]), shapes.where(shape))
         return Stored(many=found)
 
     def _add_triangles(
@@ -281,7 +281,7 @@ class _Builder:
         else:
             made = self.cache(triangles.counted, shape, by=by)
         vertices, faces, normals, uvs, flat = made
-        budget.take_made((vertices, faces, normals, uvs), shapes.where(shape))
+        budget.take_arrays((vertices, faces, normals, uvs), shapes.where(shape))
         self.flat += flat
         row["prim"] = self.face_count
         row["flags"] |= SHAPE_BITS["normals"] if normals is not None else 0

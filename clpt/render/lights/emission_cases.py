@@ -57,16 +57,16 @@ def dispatch_text(features: Features) -> str:
 
 
 def densities_text(features: Features) -> str:
-    """Return what kernels/transport/rivals.cl asks of the light in a row, seen along wi.
+    """Return what kernels/transport/mis_ratio.cl asks of the light in a row, seen along wi.
 
     light_emit_pdf(scene, row, wi, t): how densely light_emit sends rays against wi to a surface
     across it at distance t; over the cosine at a light on a shape. Of that, what is left where
     squared distances cancel: [1/(m^2 sr)], and of a light at a point per t^2 [1/m^2], in units of
-    Settings.rival_area.
+    Settings.mis_area_unit.
     light_found_pdf(scene, row, p, receiver, wi, t, n): the density with which next-event
     estimation at p finds that point of the light [1/sr]; n: the normal there. Of a delta light it
     is the chance of its row. Where the tree asks for gloss it is without that chance, which is
-    known later, see kernels/transport/rival_chosen.cl.
+    known later, see kernels/transport/mis_ratio_chosen.cl.
     light_path_pdf(scene, row, p, wi, t, n): light_emit_pdf of light that is aimed, too.
     """
     present, moving = kinds_of(features), features.motion.lights
@@ -81,7 +81,7 @@ def densities_text(features: Features) -> str:
             *motion,
             *("wi = motion_back_unit(motion, wi);",) * moving,
         ),
-        "value * l.pmf * scene.settings->rival_area",
+        "value * l.pmf * scene.settings->mis_area_unit",
     )
     found = Function(
         "real light_found_pdf(Scene scene, integer row, vec3 p, Receiver receiver, vec3 wi, "

@@ -145,7 +145,7 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
     sharp = _first_with((one for one in index.shapes if not _hides(one)), is_sharp)
     if sharp is None:
         return without, "nothing is specular"
-    if _first_with((one for one in index.shapes if one.emission is None), _is_dull) is None:
+    if _first_with((one for one in index.shapes if one.emission is None), _is_diffuse) is None:
         return without, "there is nothing dull for a caustic to be seen on"
     small = list(_small_lights(lit))
     if not small:
@@ -210,7 +210,7 @@ def _is_enclosed(geometry: Geometry, place: NDArray[np.float64] | None) -> bool:
         return False
     covered = np.zeros(DIRECTIONS, bool)
     directions = _cone(np.array([0.0, 0.0, 1.0]), -1.0, DIRECTIONS)
-    for pieces in sharp_pieces(geometry, (), lambda one: is_sharp(one) and not _is_dull(one)):
+    for pieces in sharp_pieces(geometry, (), lambda one: is_sharp(one) and not _is_diffuse(one)):
         covered[_covered(pieces, place, directions)] = True
     return bool(covered.mean() > BULB)
 
@@ -268,12 +268,12 @@ def _first_with(all_: Iterable[Shape], wanted: Callable[[mt.Material], object]) 
     return None
 
 
-def _is_dull(material: mt.Material) -> bool:
+def _is_diffuse(material: mt.Material) -> bool:
     """Whether light paths can be joined to the camera on a material, or on one inside it."""
     if isinstance(material, mt.NormalMapped) or not material.reversible:
         return False
     if isinstance(material, mt.COMPOSITES):
-        return any(_is_dull(part) for _, part in mt.inner(material))
+        return any(_is_diffuse(part) for _, part in mt.inner(material))
     return not material.delta and not is_sharp(material)
 
 

@@ -133,7 +133,7 @@ inline vec3 guide_direction(global const uint *guide, Guided g, vec2 u, real *de
 /* A direction that may be next. */
 typedef struct {
     vec3 wi;
-    real guided, material; /* densities of both ways to find it [1/sr]; guided is 0 where this way does not lead */
+    real guided, material; /* densities of both techniques [1/sr]; guided is 0 where the guide cannot sample it */
     real weight;           /* of what it brings by the mean of the wavelengths: the chance that it is taken, unscaled */
 } Candidate;
 

@@ -25,7 +25,7 @@ inline void collision_photon(Slab path, Slab hit, uint at, Collision c, Photon *
     vec3 p = madd3(load_path_d(path, at), load_hit_t(hit, at), load_path_o(path, at));
     photon->p = sel3(c.met, p, photon->p);
     photon->normal = sel_n(c.met, as_natural(c.medium), photon->normal);
-    photon->rival = sel(c.met, load_path_rival(path, at), photon->rival);
+    photon->mis_ratio = sel(c.met, load_path_mis_ratio(path, at), photon->mis_ratio);
     *group = *group | sel_i(c.met, (integer)(MERGING_IN_MEDIUM), (integer)(0));
 }
 

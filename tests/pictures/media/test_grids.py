@@ -18,8 +18,7 @@ from clpt import spectra
 from clpt import transforms as tf
 from clpt.errors import SceneError
 from clpt.formats.volumes import vol
-from clpt.render.media import device_grids
-from clpt.render.media import encode_grids as grids
+from clpt.render.media import grids
 from clpt.scene import Film, Scene, media
 from clpt.scene.cameras import Orthographic
 from clpt.scene.integrators import Box
@@ -211,7 +210,7 @@ def assert_same_bricks(renderer: clpt.Renderer, values: np.ndarray) -> None:
     assert np.array_equal(there[:, 1], here[:, 1])
     for (begin, _), (own, most) in zip(there, here, strict=True):
         begin += grid.first
-        points = found[begin : begin + device_grids.POINT_WORDS]
+        points = found[begin : begin + grids.POINT_WORDS]
         assert np.array_equal(points, host[own : own + len(points)] if most else 0 * points)
 
 

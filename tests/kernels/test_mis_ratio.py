@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tests.kernels.rival_probe import LAMPS, LIGHT_PATHS, vertex_probe
+from tests.kernels.mis_probe import LAMPS, LIGHT_PATHS, vertex_probe
 
 PATHS = 1 << 15  # of each length
-SHARP = 8.0  # SHARP_PDF of transport/rivals.cl [1/sr]
-DULL, DULL_SHARE = 1.0, 0.125  # of transport/rival_dull.cl, DULL_PDF and DULL_SHARE
+SHARP = 8.0  # SHARP_PDF of transport/mis_ratio.cl [1/sr]
+DULL, DIFFUSE_SHARE = 1.0, 0.125  # of transport/diffuse_roulette.cl, DIFFUSE_PDF and DIFFUSE_SHARE
 SHARED = (
     50  # paths that every way that there is must share with others, so that the test can see it
 )
@@ -116,7 +116,7 @@ def exact_weights(paths: Paths, joined: bool, merged: bool, dull: bool) -> Array
     for i in range(k - 2, 0, -1):
         light.insert(0, light[0] * p_back[i] * to_light[i - 1] / a.square[i - 1])
     if dull:
-        few = np.where(~a.delta[-1] & (a.p[-1] <= DULL), DULL_SHARE, 1)
+        few = np.where(~a.delta[-1] & (a.p[-1] <= DULL), DIFFUSE_SHARE, 1)
         light[:-1] = [one * few for one in light[:-1]]
 
     density = np.zeros((k + 1, n))
@@ -139,14 +139,18 @@ def kernel_weights(paths: Paths, joined: bool, merged: bool, dull: bool) -> Arra
     weights = np.zeros((k + 1, n))
     common = {name: getattr(a, name) for name in ("importance", "seen", "found", "lamp", "area")}
 
-    def start(rival: Array | float, sharp: float) -> dict[str, Array]:
-        return {"rival": np.zeros(n) + rival, "pending": np.zeros(n), "sharp": np.full(n, sharp)}
+    def start(mis_ratio: Array | float, sharp: float) -> dict[str, Array]:
+        return {
+            "mis_ratio": np.zeros(n) + mis_ratio,
+            "merge_ratio": np.zeros(n),
+            "sharp": np.full(n, sharp),
+        }
 
     def vertex(i: int) -> dict[str, Array]:
         return {name: getattr(a, name)[i] for name in ("delta", "ends", "gathers")}
 
     def carried(made: dict[str, Array]) -> dict[str, Array]:
-        return {name: made[name] for name in ("rival", "pending", "sharp")}
+        return {name: made[name] for name in ("mis_ratio", "merge_ratio", "sharp")}
 
     photons = np.full((k - 1, n), -1.0)
     state, alive = start(1 / (LIGHT_PATHS * a.gain), 0.0), np.ones(n, bool)

@@ -1,8 +1,8 @@
-/* Collisions in grids that are made of parts. */
+/* Collisions in mixtures. */
 
-/* The part of a mixture with which light collides where `bits` choose: its phase function, and what it scatters where
- * the density of the bricks is 1. Each has its chance by how much it scatters of the hero wavelength, which `ratio` and
- * `hero` choose. Other media are of one part. */
+/* The part of a mixture with which light collides at the point that `bits` choose: its phase function, and its
+ * scattering where the density of the bricks is 1. The probability of a part is its share of the scattering at the
+ * hero wavelength, which `ratio` and `hero` choose. Other media are returned unchanged. */
 inline Medium grid_part_met(Scene scene, integer name, Medium m, GridWalk w, natural bits, Spectrum ratio, real hero,
                             mask active, Wavelengths lambdas)
 {
@@ -14,7 +14,7 @@ inline Medium grid_part_met(Scene scene, integer name, Medium m, GridWalk w, nat
         sum += own;
         real chance = own / max_r(sum, (real)(1e-30f)), rest = max_r(1.0f - chance, (real)(1e-30f));
         mask taken = (shares != 0) & (u < chance);
-        /* What is left of u is as good as new. */
+        /* u is rescaled to a new random number. */
         u = sel(taken, u / max_r(chance, (real)(1e-30f)), (u - chance) / rest);
         u = clamp_r(u, (real)(0.0f), (real)(0.99999994f));
         m.sigma_s = spectrum_sel(taken, part.sigma_s, m.sigma_s);
@@ -23,15 +23,15 @@ inline Medium grid_part_met(Scene scene, integer name, Medium m, GridWalk w, nat
     return m;
 }
 
-/* A collision where a medium is as dense as `density`: whether it is a real one, by *more, and what it weighs; own: the
- * medium there; passed: see grid_flight. */
-inline mask grid_meet(Scene scene, integer name, Medium m, Medium own, GridWalk w, real density, real passed, real most,
-                      mask dims, mask meets, natural *more, Wavelengths lambdas, GridFlight *f)
+/* A collision where the density is `density`: *more decides whether it is real or a null collision. The weight of the
+ * flight follows. own: the medium there; passed: see grid_flight. Returns the lanes with a real collision. */
+inline mask grid_collide(Scene scene, integer name, Medium m, Medium own, GridWalk w, real density, real passed,
+                         real most, mask dims, mask meets, natural *more, Wavelengths lambdas, GridFlight *f)
 {
     Spectrum scatters = spectrum_scale(own.sigma_s, density);
     Spectrum lacks = GRIDS_VARY ? spectrum_sub(m.sigma_t, spectrum_scale(own.sigma_t, density))
                                 : spectrum_scale(m.sigma_t, 1.0f - density);
-    /* What happens is chosen by the hero wavelength, and weighed over all as distances are. */
+    /* The hero wavelength chooses the event; it is weighed over all wavelengths, as distances are. */
     grid_weigh(m, passed, spectrum_of(1.0f), spectrum_sel(dims, spectrum_of(1.0f), m.sigma_t), meets, f);
     Spectrum whole = spectrum_add(spectrum_add(scatters, lacks), spectrum_of(1e-30f));
     real hero = unit_interval(hash_natural(*more ^ 0x1b873593u));
@@ -47,4 +47,3 @@ inline mask grid_meet(Scene scene, integer name, Medium m, Medium own, GridWalk 
     grid_weigh(m, (real)(0.0f), spectrum_sel(dims, kept, value), pdf, meets, f);
     return real_one;
 }
-

@@ -1,4 +1,4 @@
-"""What transport/rivals.cl asks of a scene, given as numbers, and a vertex of a path from each end.
+"""Probes transport/mis_ratio.cl: a vertex of a path from each end, in a scene given as numbers.
 
 A vertex here does what kernels/integrator/path.cl and particle_tracer.cl do with the weights.
 """
@@ -17,14 +17,14 @@ from tests.kernels.scene_harness import SceneProbe
 LIGHT_PATHS = 3  # a sample
 LAMPS = ("infinite", "on a shape", "at a point")  # rows of lights: a ray meets the first two
 
-# The types and functions that the renderer's text has before transport/rivals.cl, of such numbers.
+# The types and functions before transport/mis_ratio.cl in the renderer's text.
 WORLD = """
 typedef struct {
     global const Settings *settings;
     real importance, emission, found, area;
     mask seen, turns;
 } World;
-typedef struct { real rival, pending; integer light; } Carried;
+typedef struct { real mis_ratio, merge_ratio; integer light; } Carried;
 typedef struct { vec3 p, n; } Surface;
 typedef struct { Surface s; vec3 d; real t; integer state, depth, row; } Vertex;
 typedef struct { vec3 d; mask seen; real importance; } CameraPoint;
@@ -60,30 +60,30 @@ inline Lamp lamp(integer row)
 #define light_found_pdf(scene, row, p, receiver, wi, t, n) (scene).found
 #define common_light_begins_pdf(scene, row, p, receiver, wi, t, n, there) \
     (*(there) = (scene).found, (scene).emission)
-#define load_path_rival(path, at) (path).rival
-#define load_path_pending(path, at) (path).pending
+#define load_path_mis_ratio(path, at) (path).mis_ratio
+#define load_path_merge_ratio(path, at) (path).merge_ratio
 #define load_path_light(path, at) (path).light
 #define load_path_sample(path, at) ((integer)(0))
 #define load_path_null_distance(path, at) ((real)(0.0f))
-#define store_path_pending(path, at, m, value)
+#define store_path_merge_ratio(path, at, m, value)
 #define load_path_sampled_hemisphere(path, at) v3(0.0f, 0.0f, 0.0f)
 #include "lights/receiver.cl#none"
-#include "transport/rivals.cl"
+#include "transport/mis_ratio.cl"
 #undef Scene
 #undef Slab
 """
 
 GIVEN = (
-    *("rival", "pending", "sharp", "depth"),  # what the path carries
+    *("mis_ratio", "merge_ratio", "sharp", "depth"),  # what the path carries
     *("arrives", "leaves", "p", "p_back", "delta", "ends", "gathers"),  # the vertex; cosines first
     *("importance", "seen", "emission", "found", "lamp", "area"),  # the two ends, and merging
-    "photon",  # the rival of one that is here
+    "photon",  # the mis_ratio of one that is here
 )
 VERTEX = f"""
     World world = {{scene.settings, importance, emission, found, area * gathers}};
     world.seen = seen > 0.5f;
     world.turns = ends > 0.5f;
-    Carried path = {{rival, pending, to_integer(lamp_row)}};
+    Carried path = {{mis_ratio, merge_ratio, to_integer(lamp_row)}};
     Surface s = {{v3(0.0f, 0.0f, 0.0f), v3(0.0f, 0.0f, 1.0f)}};
     integer state = sel_i(sharp > 0.5f, (integer)(PATH_SHARP), (integer)(0));
     Vertex v = {{s, slanted(-arrives), (real)(1.0f), state, to_integer(depth), (integer)(0)}};
@@ -92,54 +92,56 @@ VERTEX = f"""
     real number = (real)({LIGHT_PATHS}.0f);
 """
 
-FROM_CAMERA = ("rival", "pending", "sharp", "met", "chosen", "merged")
+FROM_CAMERA = ("mis_ratio", "merge_ratio", "sharp", "met", "chosen", "merged")
 CAMERA = f"""{VERTEX}
     Sampler none = {{(natural)(0u), (natural)(0u)}};
-    Rival here = rival_of_camera(world, path, 0, v, none);
+    MisRatio here = mis_ratio_of_camera_path(world, path, 0, v, none);
     mask hit = lamp_row < 1.5f;
 
     LightSample ls;
     ls.wi = onward;
     ls.chance = found;
     ls.pdf = sel(hit, found, (real)(-1.0f));
-    real third = rival_of_light_sample(world, here, s, ls, event_begins(world, s, ls), p, p_back);
+    real begins = event_begins(world, s, ls);
+    real third = mis_ratio_of_light_sample(world, here, s, ls, begins, p, p_back);
     real chosen = mis_weight_of_three(ls.pdf, p, third);
 
-    rival = rival_to_light(here, s, onward, is_delta, p, p_back);
+    mis_ratio = mis_ratio_to_light(here, s, onward, is_delta, p, p_back);
     real kept = sel(is_delta, (real)(-1.0f), p);
-    third = rival_of_dull(sel(depth > 0.5f, rival, (real)(0.0f)) * emission, kept);
+    third = after_diffuse_roulette(sel(depth > 0.5f, mis_ratio, (real)(0.0f)) * emission, kept);
     real met = mis_weight_of_three(kept, found, third);
     met = sel(hit, met, (real)(0.0f));
 
     real merged = 0.0f;
 #if MERGES
     merged = photon_weight(photon, here.arrives, number, area, p, p_back);
-    mask gathers_here = merging_here(state, v.depth) & !rival_sharp(mask_of(0), p, p_back);
+    mask gathers_here = merging_here(state, v.depth) & !mis_specular(mask_of(0), p, p_back);
     merged = sel(gathers_here, merged, (real)(0.0f));
-    pending = rival_pending(here, s, onward, is_delta, p, p_back);
-    sharp = sel(rival_sharp(is_delta, p, p_back), sharp, (real)(0.0f));
+    merge_ratio = merge_ratio_to_light(here, s, onward, is_delta, p, p_back);
+    sharp = sel(mis_specular(is_delta, p, p_back), sharp, (real)(0.0f));
 #endif
 """
 
-FROM_LIGHT = ("rival", "pending", "sharp", "joined", "photon")
+FROM_LIGHT = ("mis_ratio", "merge_ratio", "sharp", "joined", "photon")
 LIGHT = f"""{VERTEX}
-    Rival here = rival_of_emission(world, path, 0, v, v3(0.0f, 0.0f, 0.0f));
+    MisRatio here = mis_ratio_of_light_path(world, path, 0, v, v3(0.0f, 0.0f, 0.0f));
     real joined = 0.0f;
 #if JOINS_CAMERA
     CameraPoint c = camera_point(world);
     c.d = neg3(onward);
-    joined = 1.0f / (1.0f + rival_of_joint(world, here, s, c, p_back, p));
-    joined = sel(c.seen & !here.first & !rival_ends(world, v), joined, (real)(0.0f));
+    joined = 1.0f / (1.0f + mis_square_of_connection(world, here, s, c, p_back, p));
+    joined = sel(c.seen & !here.first & !ends_light_paths(world, v), joined, (real)(0.0f));
 #endif
 #if MERGES
-    photon = sel(sharp > 0.5f, photon_rival(rival, dot3(s.n, v.d)), (real)(-1.0f));
-    pending = rival_merged(here, s, onward, is_delta, p, p_back);
-    sharp = sel(rival_sharp(is_delta, p, p_back), (real)(1.0f), sharp);
+    photon = sel(sharp > 0.5f, photon_mis_ratio(mis_ratio, dot3(s.n, v.d)), (real)(-1.0f));
+    merge_ratio = merge_ratio_to_camera(here, s, onward, is_delta, p, p_back);
+    sharp = sel(mis_specular(is_delta, p, p_back), (real)(1.0f), sharp);
 #endif
-#ifdef DULL_SHARE
-    here.arrives /= sel(here.first & !is_delta & is_dull(p_back), (real)(DULL_SHARE), (real)(1.0f));
+#ifdef DIFFUSE_SHARE
+    mask plays = here.first & !is_delta & is_diffuse_pdf(p_back);
+    here.arrives /= sel(plays, (real)(DIFFUSE_SHARE), (real)(1.0f));
 #endif
-    rival = rival_to_camera(here, s, onward, is_delta, p, p_back);
+    mis_ratio = mis_ratio_to_camera(here, s, onward, is_delta, p, p_back);
 """
 
 
@@ -147,9 +149,9 @@ class VertexProbe:
     """A vertex of paths, from the camera or from the light; others: features of the scene.
 
     Called with every name of GIVEN, each (n,). Returns those of FROM_CAMERA or FROM_LIGHT, each
-    (n,): `rival`, `pending` and `sharp` are carried on; `met`, `chosen`, `joined`, `merged` are
-    weights, 0 where the program leaves that way out; `photon`: the rival of the photon that the
-    light path leaves here, -1 without one.
+    (n,): `mis_ratio`, `merge_ratio` and `sharp` are carried on; `met`, `chosen`, `joined`, `merged`
+    are weights, 0 where the program leaves that way out; `photon`: the mis_ratio of the
+    photon that the light path leaves here, -1 without a photon.
     """
 
     def __init__(self, from_light: bool, joined: bool, merged: bool, dull: bool):
@@ -173,17 +175,17 @@ class VertexProbe:
             lanes=1,
             virtual={
                 **lights.virtual_files(),
-                "generated/rival_dull.cl": either(dull, "transport/rival_dull.cl"),
-                "generated/rival_steps.cl": (
-                    *either(merged, "transport/rivals_merging.cl"),
-                    *either(joined, "transport/rivals_camera.cl"),
-                    "transport/rival_pdf.cl#none",
+                "generated/diffuse_roulette.cl": either(dull, "transport/diffuse_roulette.cl"),
+                "generated/mis_ratio_steps.cl": (
+                    *either(merged, "transport/mis_ratio_merging.cl"),
+                    *either(joined, "transport/mis_ratio_camera.cl"),
+                    "transport/mis_pdf.cl#none",
                 ),
-                "generated/rival_area.cl": ("transport/rival_area.cl",),
+                "generated/mis_merging_area.cl": ("transport/mis_merging_area.cl",),
                 "world.cl": WORLD,
             },
             defines={name: int(holds) for name, holds in flags.items()},
-            settings={"light_paths": LIGHT_PATHS, "infinite_count": 1, "rival_area": 1.0},
+            settings={"light_paths": LIGHT_PATHS, "infinite_count": 1, "mis_area_unit": 1.0},
         )
 
     def __call__(self, **given: NDArray[np.floating]) -> dict[str, NDArray[np.float32]]:
