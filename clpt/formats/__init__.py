@@ -14,7 +14,7 @@ from clpt.choices import Missing
 from clpt.errors import LONGEST_WARNING, SceneError, nearest, one_line
 from clpt.files import budget as budgets
 from clpt.files.budget import Budget
-from clpt.formats import own_scenes
+from clpt.formats import blockers, own_scenes
 
 if TYPE_CHECKING:  # a name of a file is looked up without the kinds of scenes
     from clpt.scene import Scene
@@ -116,6 +116,20 @@ def _load(
     if kind == "meshes.framing":
         return loader(path, missing_textures)
     return loader(path)
+
+
+def errors_of(path: str | Path, /, **variables: Any) -> list[SceneError]:
+    """Return the errors of a file, in the order in which they are met, each once.
+
+    path: of a scene of any format; of Mitsuba's and PBRT's materials, textures, shapes, lights and
+    parameters each have their own. variables: see `load`.
+    """
+    with blockers.collecting() as errors:
+        try:
+            load(path, **variables)
+        except SceneError as error:
+            errors.append(error)
+    return list({str(error): error for error in errors}.values())
 
 
 def load_dict(

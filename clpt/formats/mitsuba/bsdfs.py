@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from clpt import measured, spectra
+from clpt.formats.blockers import attempt
 from clpt.formats.missing import EVEN, GREY
 from clpt.formats.mitsuba.fluorescence import fluorescent
 from clpt.formats.mitsuba.hair import at_yellow, hair
@@ -55,7 +56,8 @@ AIR = 1.000277  # the default of `ext_eta`: src/bsdfs/ior.h
 
 def bsdf(element: Element, context: Context) -> Material:
     """Make the material that a <bsdf> describes, once for all references to it."""
-    return context.once(element, lambda _: _bsdf(element, context))
+    grey: Material = materials.Diffuse()
+    return context.once(element, lambda _: attempt(lambda: _bsdf(element, context), grey))
 
 
 def _bsdf(element: Element, context: Context) -> Material:
@@ -194,20 +196,20 @@ def _layer(element: Element, context: Context) -> materials.Layer:
     if element.type != "layer":
         raise element.error("only a <bsdf> of the type 'layer' can stand here")
     props = Properties(element, context)
-    given = props.named.get("eta")
+    values = props.named.get("eta")
     with element.locating():
-        if given is not None and given.tag == "string":
+        if values is not None and values.tag == "string":
             eta = spectra.glass(props.text("eta", ""))
         else:
             eta = index(props, "eta", spectra.glass("water"))
-        made = materials.Layer(
+        result = materials.Layer(
             eta=eta,
             k=index(props, "k", 0.0),
             thickness=props.number("thickness", 400.0),
             profile=real(props, "profile", 1.0),
         )
     props.finish()
-    return made
+    return result
 
 
 def _distribution(props: Properties) -> str:
@@ -280,18 +282,18 @@ def _grating(props: Properties) -> Parameters:
     """Ours, see docs/mitsuba_plugins.md: names are those of clpt.scene.materials.Grating."""
     kind = materials.Grating
     declared, usual = params(kind), defaults(kind)
-    given: Parameters = {
+    values: Parameters = {
         name: props.text(name, usual[name], declared[name].choices) for name in ("mode", "profile")
     }
     for name in ("period", "angle", "depth", "fill"):
-        given[name] = real(props, name, usual[name])
-    given["orders"] = float(props.integer("orders", int(kind.orders)))
+        values[name] = real(props, name, usual[name])
+    values["orders"] = float(props.integer("orders", int(kind.orders)))
     child = props.take("efficiencies")
     if child is not None:
-        given["efficiencies"] = numbers(child, "value")
+        values["efficiencies"] = numbers(child, "value")
     if "ior" in props.named:
-        given["ior"] = ior(props, "ior", "bk7")
-    return {**given, **_metal(props), "reflectance": reflectance(props, "reflectance", 1.0)}
+        values["ior"] = ior(props, "ior", "bk7")
+    return {**values, **_metal(props), "reflectance": reflectance(props, "reflectance", 1.0)}
 
 
 def _measured(props: Properties) -> Parameters:
@@ -409,25 +411,25 @@ def _bent(props: Properties) -> Parameters:
 
 
 def _normal_map(props: Properties) -> Parameters:
-    given = _bent(props)
+    values = _bent(props)
     if "normalmap" not in props.named:
         raise props.element.error("needs the texture 'normalmap'")
-    made = factor(props, "normalmap", None)
-    if isinstance(made, (Constant, RGBUnbounded)):
-        made = Bitmap(image=made.to_rgb("unbounded").astype(np.float32)[None, None], raw=True)
-    if isinstance(made, Bitmap) and made.image is GREY:
-        made = replace(made, image=EVEN)
-    if not isinstance(made, Bitmap):
+    result = factor(props, "normalmap", None)
+    if isinstance(result, (Constant, RGBUnbounded)):
+        result = Bitmap(image=result.to_rgb("unbounded").astype(np.float32)[None, None], raw=True)
+    if isinstance(result, Bitmap) and result.image is GREY:
+        result = replace(result, image=EVEN)
+    if not isinstance(result, Bitmap):
         raise props.element.error("'normalmap' must be a bitmap, or one colour")
-    return {**given, "map": made}
+    return {**values, "map": result}
 
 
 def _bump_map(props: Properties) -> Parameters:
-    given = _bent(props)
-    found = nested_textures(props)
-    if len(found) != 1:
-        raise props.element.error(f"needs one texture of heights, not {len(found)}")
-    return {**given, "height": texture(found[0], props), "scale": props.number("scale", 1.0)}
+    values = _bent(props)
+    matches = nested_textures(props)
+    if len(matches) != 1:
+        raise props.element.error(f"needs one texture of heights, not {len(matches)}")
+    return {**values, "height": texture(matches[0], props), "scale": props.number("scale", 1.0)}
 
 
 def _nested(props: Properties, low: int, high: int) -> list[Material]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.choices import Missing
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
+from clpt.formats.blockers import note
 from clpt.formats.missing import GREY, grey_for
 from clpt.formats.mitsuba.xml import MAX_NESTING, Document, Element
 from clpt.scene.motion import Keys
@@ -171,7 +172,10 @@ class Properties:
         if self.context.old and (child.tag in OLD_VALUES or child.tag in OLD_OBJECTS):
             return True
         if not self.context.old:
-            raise child.error("is not supported")
+            error = child.error("is not supported")
+            if note(error):
+                return False
+            raise error
         self.context.leave_out(child, f"element <{child.tag}>")
         return False
 
@@ -198,14 +202,14 @@ class Properties:
         for name, child in list(self.named.items()):
             if child.tag == "ref" and self.context.resolve(child).tag == tag:
                 self.nested.append(self.named.pop(name))
-        matching, rest = [], []
+        matching, others = [], []
         for child in self.nested:
             target = self.context.resolve(child)
             if target.tag == tag:
                 matching.append(target)
             else:
-                rest.append(child)
-        self.nested = rest
+                others.append(child)
+        self.nested = others
         return matching
 
     def object(self, tag: str) -> Element | None:
@@ -371,7 +375,9 @@ class Properties:
             if self.context.old and self.context.resolve(child).tag in LEFT_OUT:
                 self.context.leave_out(child, f"{name!r} of {label}")
                 continue
-            raise UnusedParameterError(label, name, set(self.read), **child.location())
+            error = UnusedParameterError(label, name, set(self.read), **child.location())
+            if not note(error):
+                raise error
         for child in self.nested:
             self.context.resolve(child)
             raise child.error(f"cannot stand in {label}")

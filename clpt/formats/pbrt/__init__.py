@@ -29,7 +29,7 @@ def load(path: Path, progress: Progress | None = None, missing: Missing = "error
     shared = contents.shared
     shared.missing = missing
     shared.make_material = build_scene.make_material
-    shared.walks = all(one.kind in ("infinite", "portal") for one in contents.lights)
+    shared.walks = all(item.kind in ("infinite", "portal") for item in contents.lights)
     options = contents.options
     camera = options.get("Camera") or _default_camera(path, contents)
     exposure = camera_film.exposure_time(camera.params, shared.old)
@@ -52,7 +52,7 @@ def load(path: Path, progress: Progress | None = None, missing: Missing = "error
         extra={"format": "pbrt", "sampler": chosen.kind if chosen else sampler.kind},
     )
     build_scene.check_unused_materials(contents)
-    build_scene.check_options([one for name, one in options.items() if name != "Accelerator"])
+    build_scene.check_options([item for name, item in options.items() if name != "Accelerator"])
     scene.warnings = build_scene.deduplicated(shared.warnings)
     return scene
 

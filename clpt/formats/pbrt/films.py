@@ -76,13 +76,13 @@ def _colour(params: Parameters, state: State, exposure: float) -> dict[str, Any]
     balance = params.one("whitebalance", "float", 0.0)
     if state.shared.old:
         exposure = params.above_zero("scale", 1.0)
-    given: dict[str, Any] = {"exposure": exposure * params.above_zero("iso", 100.0) / 100.0}
+    values: dict[str, Any] = {"exposure": exposure * params.above_zero("iso", 100.0) / 100.0}
     if sensor != "cie1931":
         state.warn(params, f"the sensor {sensor!r} is not known: cie1931 is used")
         balance = balance or DAYLIGHT
     if balance > 0.0:
-        given["white_balance"] = balance
-    return {**given, "output_space": SPACES[state.colour_space]}
+        values["white_balance"] = balance
+    return {**values, "output_space": SPACES[state.colour_space]}
 
 
 def _bands(params: Parameters) -> dict[str, Any]:
@@ -185,8 +185,8 @@ def sampler(definition: Definition | None) -> tuple[Sampler, int, int | None]:
     seed = params.one("seed", "integer", None)
     if not 0 < spp < 2**31:
         raise params.error(f"there must be at least one sample in a pixel, not {spp}")
-    made = integrators.Zsobol() if definition.kind == "zsobol" else integrators.Sobol()
-    return made, spp, None if seed is None else seed % 2**31
+    result = integrators.Zsobol() if definition.kind == "zsobol" else integrators.Sobol()
+    return result, spp, None if seed is None else seed % 2**31
 
 
 LIGHT_PATHS = ("path", "volpath", "simplepath", "simplevolpath", "randomwalk")

@@ -56,27 +56,27 @@ def area_light(kind: str, params: Parameters, state: State, area: float = 0.0) -
     with params.locating():
         two_sided = params.one("twosided", "bool", False)
         file = params.one("filename", "string", "")
-        given = _light_colour(params, "L", state)
-        if file and given is not None:
+        values = _light_colour(params, "L", state)
+        if file and values is not None:
             raise SceneError("give either 'L' or 'filename', not both")
         image = _image(file, state) if file else None
         mean = 1.0 if image is None else float(luminance(image).mean(dtype=np.float64))
         scale = _power_scale(params, state, (2.0 if two_sided else 1.0) * np.pi * area * mean)
         if image is None:
-            return lights.Area(radiance=_bright(given, scale), two_sided=two_sided)
+            return lights.Area(radiance=_bright(values, scale), two_sided=two_sided)
         shown = Bitmap(image=image * np.float32(scale), raw=True, wrap="clamp")
         return lights.Area(radiance=shown, two_sided=two_sided)
 
 
 def _light_colour(params: Parameters, name: str, state: State) -> Any:
     """Take a light's spectrum; in versions 2 and 3 times a `scale` that may be a colour."""
-    given = spectrum(params, name, EMISSION, state)
+    values = spectrum(params, name, EMISSION, state)
     if not state.shared.old:
-        return given
+        return values
     factor = spectrum(params, "scale", EMISSION, state)
     if factor is None:
-        return given
-    parts = [WHITE if part is None else part for part in (given, factor)]
+        return values
+    parts = [WHITE if part is None else part for part in (values, factor)]
     if isinstance(factor, float):
         return scaled(parts[0], factor)
     first, second = (np.asarray(part.to_rgb("unbounded")) for part in parts)
@@ -88,10 +88,10 @@ def _old_scale(params: Parameters, state: State) -> float:
     return 1.0 if state.shared.old else float(params.one("scale", "float", 1.0))
 
 
-def _bright(given: Any, scale: float) -> Any:
+def _bright(values: Any, scale: float) -> Any:
     if scale < 0.0:
         raise SceneError(f"a light cannot be negative: scale {scale:g}")
-    return scaled(WHITE if given is None else given, scale)
+    return scaled(WHITE if values is None else values, scale)
 
 
 def _power_scale(params: Parameters, state: State, per_unit: float) -> float:
@@ -156,15 +156,17 @@ def _distant(params: Parameters, state: State) -> Light:
 
 def _infinite(params: Parameters, state: State) -> Light:
     scale, lux = _old_scale(params, state), params.one("illuminance", "float", -1.0)
-    given = _light_colour(params, "L", state)
+    values = _light_colour(params, "L", state)
     file = params.one("filename", "string", "")
     if params.several("portal", "point3") is not None:
         state.warn(params, "'portal' only guides sampling in pbrt's way; all directions shine here")
     if not file:
-        return lights.Constant(radiance=_bright(given, scale * lux / np.pi if lux > 0.0 else scale))
+        return lights.Constant(
+            radiance=_bright(values, scale * lux / np.pi if lux > 0.0 else scale)
+        )
     if state.shared.old:
-        return _lat_long(_image(file, state), given, state)
-    if given is not None:
+        return _lat_long(_image(file, state), values, state)
+    if values is not None:
         raise SceneError("give either 'L' or 'filename', not both")
     image = _square(file, state)
     if lux > 0.0:

@@ -55,12 +55,12 @@ def is_known(kind: str) -> bool:
 
 def has_mirrors(contents: Contents) -> bool:
     """Return whether some material sends light on in one direction."""
-    definitions = [one for versions in contents.shared.materials.values() for one in versions]
+    definitions = [item for versions in contents.shared.materials.values() for item in versions]
     parts = [contents.shapes, *contents.objects.values()]
-    used = [one.state.material for part in parts for one in part]
-    definitions += [one for one in used if isinstance(one, Definition)]
+    used = [item.state.material for part in parts for item in part]
+    definitions += [item for item in used if isinstance(item, Definition)]
     return any(
-        one.kind in MIRRORS or "Kr" in one.params or "Kt" in one.params for one in definitions
+        item.kind in MIRRORS or "Kr" in item.params or "Kt" in item.params for item in definitions
     )
 
 

@@ -97,10 +97,10 @@ def directive(name: str) -> str:
     return "" if name in _LEFT_OUT else _DIRECTIVES.get(name, name)
 
 
-def definition(name: str, kind: str, given: list[Parameter]) -> tuple[str, list[Parameter]]:
+def definition(name: str, kind: str, values: list[Parameter]) -> tuple[str, list[Parameter]]:
     """Return the kind and the parameters of a directive in the words of version 4."""
     kept = []
-    for parameter in given:
+    for parameter in values:
         if (name, parameter.name) not in _IGNORED:
             new = _PARAMETERS.get((name, parameter.name), parameter.name)
             kept.append(_retyped(replace(parameter, name=new)))

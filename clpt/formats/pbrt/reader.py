@@ -43,8 +43,8 @@ class _Reader(TransformDirectives):
     def run(self) -> Contents:
         self.go_through(self.path)
         if self.stack:
-            what, _, location = self.stack[-1]
-            raise SceneError(f"the {what}Begin at {location} has no end", file=self.path)
+            label, _, location = self.stack[-1]
+            raise SceneError(f"the {label}Begin at {location} has no end", file=self.path)
         if not self.in_world:
             raise SceneError("has no WorldBegin, so it holds no scene", file=self.path)
         return self.contents
@@ -136,20 +136,20 @@ class _Reader(TransformDirectives):
     def transform_end(self) -> None:
         self._end("Transform" if self.contents.shared.old else "Attribute")
 
-    def _begin(self, what: str) -> None:
+    def _begin(self, label: str) -> None:
         self.only(True)
         location = f"{self.lexer.path.name}:{self.lexer.line}"
-        self.stack.append((what, self.state, location))
+        self.stack.append((label, self.state, location))
         self.state = self.state.copy()
 
-    def _end(self, what: str) -> None:
+    def _end(self, label: str) -> None:
         if not self.stack:
-            raise SceneError(f"no {what}Begin stands before it")
+            raise SceneError(f"no {label}Begin stands before it")
         began, state, location = self.stack.pop()
-        if began != what:
+        if began != label:
             raise SceneError(f"the {began}Begin at {location} must end first")
         state.file_folder = self.state.file_folder
-        if what == "Transform":
+        if label == "Transform":
             kept = self.state.copy()
             kept.ctm, kept.end, kept.active = state.ctm, state.end, state.active
             state = kept
@@ -205,27 +205,27 @@ class _Reader(TransformDirectives):
     def _definition(self, label: str, target: str = "", words: str = "a type") -> Definition:
         kind, line = self.lexer.string(words), self.lexer.line
         label = label.replace("{}", kind)
-        given = self.lexer.parameters(label)
-        if len({parameter.name for parameter in given}) < len(given):
-            given = self._last(given)
+        values = self.lexer.parameters(label)
+        if len({parameter.name for parameter in values}) < len(values):
+            values = self._last(values)
         shared = self.contents.shared
         if shared.old:
             with self.locating():
-                kind, given = old_words.definition(self.name, kind, given)
+                kind, values = old_words.definition(self.name, kind, values)
         defaults = self.state.defaults.get(target, ())
-        params = Parameters(label, self.lexer.path, line, given, defaults)
+        params = Parameters(label, self.lexer.path, line, values, defaults)
         shared.count += 1
         self.state.number = shared.count
         state = self.state.copy()
-        for parameter in given:
+        for parameter in values:
             if parameter.name == "filename" and parameter.is_text:
                 self.contents.shared.files.update(dict.fromkeys(parameter.texts(), state))
         return Definition(kind, params, state)
 
-    def _last(self, given: list[Parameter]) -> list[Parameter]:
+    def _last(self, values: list[Parameter]) -> list[Parameter]:
         """Return the last of parameters of one name, as pbrt does (src/pbrt/paramdict.cpp)."""
         last: dict[str, Parameter] = {}
-        for parameter in given:
+        for parameter in values:
             if parameter.name in last:
                 self.warn(f"{parameter.name!r} is given twice: the later value counts")
             last[parameter.name] = parameter

@@ -94,7 +94,7 @@ class State:
         """Return the last definition of a name before this state, else its first, else None."""
         if not versions:
             return None
-        at = bisect_left(versions, self.number, key=lambda one: one.state.number)
+        at = bisect_left(versions, self.number, key=lambda item: item.state.number)
         return versions[max(at - 1, 0)]
 
     def motion(self) -> Keys | None:

@@ -25,10 +25,10 @@ UPWARD = transforms.scale([1.0, 1.0, -1.0])  # ours counts a sphere's v from abo
 
 def phi_max(params: Parameters) -> float:
     """Take the part of a turn [degrees] that there is."""
-    given = float(params.one("phimax", "float", 360.0))
-    if not 0.0 < given <= 360.0:
-        raise SceneError(f"'phimax' must lie between 0 and 360, not {given:g}")
-    return given
+    values = float(params.one("phimax", "float", 360.0))
+    if not 0.0 < values <= 360.0:
+        raise SceneError(f"'phimax' must lie between 0 and 360, not {values:g}")
+    return values
 
 
 def is_even(matrix: transforms.Matrix, axes: int) -> bool:

@@ -54,15 +54,15 @@ def textured(
     A texture is made once for all parameters that name it. Raises SceneError with the location.
     """
     form = "float" if role is REAL else "spectrum"
-    given = params.find(name, "texture", "float", *(SPECTRUM_TYPES if form == "spectrum" else ()))
-    if given is None:
+    values = params.find(name, "texture", "float", *(SPECTRUM_TYPES if form == "spectrum" else ()))
+    if values is None:
         return default
-    if given.type != "texture":
+    if values.type != "texture":
         used = role if isinstance(role, Spectral) else TEXTURE  # a number is one in any
-        with given.locating():
-            return value_of(given, used, state)
-    definition = state.texture(form, given.text(), given)
-    return state.shared.once(definition, given, lambda: _texture(form, definition))
+        with values.locating():
+            return value_of(values, used, state)
+    definition = state.texture(form, values.text(), values)
+    return state.shared.once(definition, values, lambda: _texture(form, definition))
 
 
 def _texture(form: str, definition: Definition) -> Any:
@@ -70,10 +70,10 @@ def _texture(form: str, definition: Definition) -> Any:
     if kind not in MAKERS:
         raise UnknownKindError("texture", kind, MAKERS, **params.location())
     with params.locating():
-        made = MAKERS[kind](form, params, state)
+        result = MAKERS[kind](form, params, state)
     for extra in params.unused():
         state.warn(extra, "is not known here and is left out")
-    return made
+    return result
 
 
 def normals(file: str, state: State) -> Bitmap:
@@ -175,7 +175,7 @@ def _imagemap(form: str, params: Parameters, state: State) -> Any:
     params.one("maxanisotropy", "float", 8.0)
     params.ignore(*(("trilinear",) if state.shared.old else ()))
     usual = "trilinear" if state.shared.old else "bilinear"
-    made = Bitmap(
+    result = Bitmap(
         image=GREY if file is None else file,
         filter=FILTERS[params.choice("filter", usual, FILTERS)],
         wrap=WRAPS[wrap],
@@ -187,15 +187,15 @@ def _imagemap(form: str, params: Parameters, state: State) -> Any:
     encoding = _old_encoding(params) if state.shared.old else params.one("encoding", "string", SRGB)
     suffixes = (".png", ".tga") if state.shared.old else (".png",)
     if file is not None and file.suffix.lower() in suffixes:  # pbrt ignores it in other files
-        made = _decoded(made, encoding)
+        result = _decoded(result, encoding)
     if state.shared.old:
         bilinear = False  # its number is the luminance
     if file is not None and form == "float" and bilinear:
-        made = _number(made, state)
+        result = _number(result, state)
     scale, invert = params.one("scale", "float", 1.0), params.one("invert", "bool", False)
     if file is None or (scale == 1.0 and not invert):
-        return made
-    return map_values(made, lambda v: np.maximum(1.0 - scale * v if invert else scale * v, 0.0))
+        return result
+    return map_values(result, lambda v: np.maximum(1.0 - scale * v if invert else scale * v, 0.0))
 
 
 def _old_encoding(params: Parameters) -> str:
