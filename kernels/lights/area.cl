@@ -1,6 +1,5 @@
-/* Light from a shape: LightRow.emission_mode is 0 where it leaves the front, evenly in all directions, 1 where it
- * leaves along the normal only (particle_tracer's), 2 where it leaves both sides. With 4 beside that no ray sees it:
- * next-event estimation and light paths alone find it, as they find delta lights. */
+/* LightRow.emission_mode: 0 from the front evenly, 1 along the normal only (particle_tracer), 2 from both sides; plus 4
+ * where no ray sees it. */
 inline ShapeSample area_turned(ShapeSample q, mask both)
 {
     q.n = sel3(both & (dot3(q.n, q.wi) > 0.0f), neg3(q.n), q.n);
@@ -14,7 +13,7 @@ inline LightSample area_unseen(LightSample s, mask unseen)
     return s;
 }
 
-/* The sample ends a rounding off the surface, so that the surface does not shade it. p: the point [m]. */
+/* The sample ends a rounding off the surface, else the surface would shade it. p: the point [m]. */
 inline LightSample area_sample(ShapeSample q, vec3 p, Spectrum radiance)
 {
     real cosine = -dot3(q.n, q.wi);

@@ -37,7 +37,6 @@ typedef integer Guided;
 #define onward_sample(scatter, guide, guided, ratio) \
     direction_sample(scatter, sampler_pair((scatter).sampler, (scatter).dimension + DIMENSION_BSDF), ratio)
 
-/* The next direction, of the material. */
 inline BsdfSample direction_sample(Scattering scatter, vec2 uv, Spectrum *ratio)
 {
     return hero_sample(scatter.bsdf, scatter.wo, v3(uv.x, uv.y, scatter.choice.y), ratio);
