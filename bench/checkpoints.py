@@ -50,10 +50,10 @@ def parts(renderer: clpt.Renderer, path: Path, times: int) -> dict[str, float]:
         renderer._wavefront.stream.wait()
 
     hold()
-    saved = renderer._saved_film(held=True)
+    saved = renderer.saved_film(held=True)
     works = {
         "copy": hold,
-        "to_host": lambda: renderer._saved_film(held=True),
+        "to_host": lambda: renderer.saved_film(held=True),
         "file": lambda: film_file.write(path, saved),
     }
     times_of: dict[str, list[float]] = {name: [] for name in works}

@@ -277,7 +277,7 @@ TABLES: dict[str, tuple[str, str]] = {
     "faces": ("uint", "three vertices per triangle"),
     "attributes": (
         "uint",
-        "values of meshes per vertex or face, see clpt.render.geometry.encode_attributes",
+        "values of meshes per vertex or face, see clpt.render.geometry.encode",
     ),
     "shapes": ("uint", "ShapeRow per shape"),
     "instances": ("uint", "InstanceRow per instance"),

@@ -9,7 +9,6 @@ from typing import Any
 from clpt.geometry import instancing, shapes
 from clpt.geometry.instancing import Placed, Prototype
 from clpt.geometry.motion import Motions
-from clpt.render.film import filters
 from clpt.render.records import GridFeatures, custom_materials
 from clpt.scene import Film, Scene
 from clpt.scene import materials as mt
@@ -222,13 +221,13 @@ class SceneIndex:
         film = self.scene.film
         wanted = film.filtering != "importance" and self.scene.noise is None
         wanted = wanted and not self.light_layers
-        reaches = filters.reach(film.filter) > 0 and wanted
+        reaches = film.filter.reach > 0 and wanted
         return reaches or self.light_paths
 
     @property
     def spread(self) -> tuple[int, int]:
         """The spread of light along an axis [pixels]: how many it may serve, and how far away."""
-        return filters.taps(self.scene.film.filter), filters.reach(self.scene.film.filter)
+        return self.film.filter.taps, self.film.filter.reach
 
     @property
     def filter_taps(self) -> int:

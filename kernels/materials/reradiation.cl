@@ -1,6 +1,6 @@
 /* Samples the incident wavelengths of light from a fluorescent surface (Mojzik et al. 2018, for camera paths). A
  * matrix lies in `distributions`, on a grid of RERADIATION_STEP nm from lambda_min
- * (clpt/render/spectra/reradiation.py): at each node the expected light, then the integral of each
+ * (clpt/render/spectra/encode.py): at each node the expected light, then the integral of each
  * row times that, then of each row its values [1/nm] and the normalised running integral of the product. */
 #include "core/grid.cl"
 #include "generated/reradiation_sizes.cl"

@@ -4,7 +4,7 @@
  * densities as two halves in a word; the integrals along both rows up to the column, two words; for cells with equal
  * shares of these integrals, the columns where they begin and end, as two 16383ths in a word; then for every row the
  * integral of all rows above, which ends at 1; and for cells with equal shares of that, the rows where they begin
- * and end (clpt/render/spectra/warp_tables.py). Words that are read together lie together. */
+ * and end (clpt/render/spectra/measurements.py). Words that are read together lie together. */
 #include "core/rows.cl"
 
 typedef struct {

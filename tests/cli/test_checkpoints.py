@@ -148,7 +148,7 @@ def test_a_host_without_room_for_a_film(folder, monkeypatch, capsys):
     def full(self, **_):
         raise MemoryError
 
-    monkeypatch.setattr(Renderer, "_saved_film", full)
+    monkeypatch.setattr(Renderer, "saved_film", full)
     command = ["render", killing.SCENE, "-o", "a.npy", *COMMON[:-1], "--spp", "30"]
     assert run([*command, "--checkpoint", "0.001s"]) == 0
     error = capsys.readouterr().err

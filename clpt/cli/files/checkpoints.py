@@ -205,7 +205,7 @@ class Checkpoints:
 
     def _begin_to_write(self) -> None:
         try:
-            saved = self._renderer._saved_film(held=True)
+            saved = self._renderer.saved_film(held=True)
         except MemoryError as error:
             self._failure = outputs.failure(self._path, error)
             return

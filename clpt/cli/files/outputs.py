@@ -100,7 +100,7 @@ def _rescue(
     for folder in folders:
         other = output_files.beside(folder / path.name, f"{label}{FILM}")
         with suppress(*FAILURES):
-            film_file.write(other, film._saved_film())
+            film_file.write(other, film.saved_film())
             return f"the film is in {other}, of which clpt merge makes the picture"
     return f"nor can it in {' or '.join(map(str, folders))}"
 
@@ -118,7 +118,7 @@ def write(
 ) -> None:
     """Write the picture so far, or the film. Raises SceneError, OSError."""
     if path.suffix.lower() == FILM and not isinstance(source, DenoisedPicture):
-        saved = source._saved_film(held=True)
+        saved = source.saved_film(held=True)
         if not saved.film.taken:
             raise SceneError("no pass has come to its end: there is no film yet", file=path)
         film_file.write(path, saved)

@@ -1,4 +1,4 @@
-"""Edits of parameters, the camera's and those of materials: a few words are written."""
+"""Edits of the parameters of the camera and of materials, as writes of a few words."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from clpt.scene.params import fields_of
 
 
 def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> Callable[[], None] | str:
-    """Return what enqueues the words in which a scene differs from the one on the device.
+    """Return a function that enqueues the words by which a scene differs from a former scene.
 
-    They may differ in the camera, which must be of the same kind, and in values of materials; else
-    this returns why more than that differs. What is returned may be called again where an error
-    has ended it. Raises SceneError as `lower` does.
+    The scenes may differ in the camera, of the same kind, and in values of materials. Else the
+    result is a text that says what differs. After an error the function may be called again.
+    Raises SceneError as `lower` does.
     """
     lowered = on_device.lowered
     pairs = [] if scene.shapes is former.shapes else _pairs(former, scene)
@@ -68,7 +68,7 @@ def _reflects(camera: Camera) -> tuple[bool, bool]:
 
 
 def _write(on_device: DeviceScene, camera: Any, rows: list[tuple[int, Any]]) -> None:
-    """Enqueue the words of a camera, if there is one, and of rows of materials."""
+    """Enqueue the words of a camera, unless it is None, and of rows of materials."""
     lowered, stream = on_device.lowered, on_device.stream
     tables = dict(lowered.tables)
     if camera is not None:
@@ -77,16 +77,16 @@ def _write(on_device: DeviceScene, camera: Any, rows: list[tuple[int, Any]]) -> 
     if rows:
         table = tables["materials"] = tables["materials"].copy()
         for first, new in rows:
-            own = table[first : first + len(new)]
-            for begin, end in ranges(own, new):
+            row = table[first : first + len(new)]
+            for begin, end in ranges(row, new):
                 buffer = on_device.tables["materials"]
                 stream.write(buffer, new[begin:end], 4 * (first + begin))
-            own[:] = new
+            row[:] = new
     on_device.lowered = dataclasses.replace(lowered, tables=tables)
 
 
 def _pairs(former: Scene, scene: Scene) -> list[tuple[Any, Any]] | None:
-    """The leaf materials that replace others, None where more than values differs."""
+    """Return pairs of old and new leaf materials; None if more than values differs."""
     pairs: Replacements = {}
     for old, new in zip(distinct(former.shapes), distinct(scene.shapes), strict=True):
         if not _pair(old.material, new.material, pairs):
@@ -96,7 +96,7 @@ def _pairs(former: Scene, scene: Scene) -> list[tuple[Any, Any]] | None:
 
 
 def _pair(old: Material, new: Material, pairs: Replacements) -> bool:
-    """Note which material replaces which; return whether they may differ in values only."""
+    """Note that a material replaces another; return whether only values may differ."""
     if id(old) in pairs:
         return pairs[id(old)][1] is new
     pairs[id(old)] = old, new
@@ -105,8 +105,8 @@ def _pair(old: Material, new: Material, pairs: Replacements) -> bool:
     if type(old) is not type(new):
         return False
     if not isinstance(old, COMPOSITES):
-        absorb = [one.absorption != CLEAR for one in (old, new)]
-        traits = [(one.transmits, one.uses_tangents) for one in (old, new)]
+        absorb = [material.absorption != CLEAR for material in (old, new)]
+        traits = [(material.transmits, material.uses_tangents) for material in (old, new)]
         return absorb[0] == absorb[1] and traits[0] == traits[1]
     others = fields_of(new)
     for name, a in fields_of(old).items():

@@ -15,14 +15,13 @@ from clpt.geometry.instancing import Instances
 from clpt.geometry.refining import is_refined
 from clpt.records import SHAPE_BITS
 from clpt.render.camera.encode import encode_camera
-from clpt.render.film import encode_filters as filters
+from clpt.render.film import filters
 from clpt.render.film.colour import sensor
 from clpt.render.flow import features as needs
 from clpt.render.flow.find import Analysis, Before, analyse
 from clpt.render.flow.layer_names import lower_names
 from clpt.render.flow.settings import Found, settings_of
-from clpt.render.geometry.encode import lower_geometry, shape_words
-from clpt.render.geometry.encode_attributes import lower_attributes
+from clpt.render.geometry.encode import encode_attributes, encode_geometry, shape_words
 from clpt.render.geometry.find import Geometry, Owner, spheres_move
 from clpt.render.lights.encode import LightRows, has_tree, light_rows
 from clpt.render.lights.find import Sources
@@ -207,10 +206,10 @@ class _Surfaces:
 def _encode_surfaces(found: Analysis, encoder: Encoder) -> _Surfaces:
     """Append shapes, materials, media and lights."""
     index = found.index
-    filters.lower_filter(index.film.filter, encoder.store, index.splatting)
+    filters.encode_filter(index.film.filter, encoder.store, index.splatting)
     materials = _begin_materials(found, encoder)
     moves = spheres_move(index)
-    geometry = lower_geometry(found.geometry, encoder, materials, spheres_move=moves)
+    geometry = encode_geometry(found.geometry, encoder, materials, spheres_move=moves)
     media = MediumWords(index, encoder, materials, found.sealed, found.sources.volumes)
     lights = _lower_lights(index, encoder, geometry, found.sources, media)
     near = _lower_medium_aims(index, encoder, lights)
@@ -243,7 +242,7 @@ def _encode_views(
     density_row, tabulated = _lower_density(index, encoder, wavelengths)
     aims = store.append_floats("distributions", found.aims)
     counts = geometry.single_count, geometry.keys
-    lower_attributes(geometry.owners, encoder.textures, encoder.cache, *counts)
+    encode_attributes(geometry.owners, encoder.textures, encoder.cache, *counts)
     store.append("shapes", shape_words(geometry.rows))
     glasses = _encode_camera(index, encoder)
     ambient = _lower_ambient(index, encoder)
@@ -308,7 +307,7 @@ def _lower_profile(index: SceneIndex, encoder: Encoder) -> int:
     """Append the filter's values for light paths, if any; return their place in `distributions`."""
     if not index.weighed:
         return 0
-    return filters.lower_profile(index.film.filter, encoder.store, index.splatting)
+    return filters.encode_profile(index.film.filter, encoder.store, index.splatting)
 
 
 def _lower_density(index: SceneIndex, encoder: Encoder, wavelengths: Density) -> tuple[int, bool]:

@@ -33,7 +33,7 @@ from clpt.render.edit.scene_edit import (
 )
 from clpt.render.film.developed import Developed
 from clpt.render.film.layers import white_paper
-from clpt.render.film.picture_form import PictureForm
+from clpt.render.film.pictures import PictureForm
 from clpt.render.film.saved_film import Origin
 from clpt.render.film.state import DIMENSIONS, FilmState, Ranges
 from clpt.render.flow.scene_to_tables import Lowered, lower
@@ -363,7 +363,7 @@ class DeviceFilm:
             return None
         chosen = {name: origin.settings.get(name) for name in WAY}
         alike = replace(own, settings={**own.settings, **chosen})
-        return None if alike.differences(origin) else origin.way
+        return None if alike.differences(origin) else origin.chosen_integrator
 
     def follow(self, way: Integrator, apply: Apply, share: Share | None = None) -> None:
         """Render in another way, if its film has another form; see `update`."""
