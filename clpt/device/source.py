@@ -17,7 +17,8 @@ from .text_rows import Row, rows_of
 
 _GENERATED = "generated/"  # prefix of files generated for a scene
 TWIN = "#none"  # suffix of the half of a file with the step that does nothing
-_TWIN = "\n/* Twin, "  # the start of that half
+_HEAD = re.compile(r"/\*.*?\*/", re.DOTALL)
+_STEP, _TWIN = "\n/* Step. */", "\n/* Twin, "  # the starts of both halves
 _QUOTED = re.compile(r'"([^"]+)"$')
 _LINE = re.compile(r'\s*#\s*line (\d+)(?: "([^"]+)")?')
 _PRIVATE = re.compile(  # at a line's start: a constant, or a function with an argument
@@ -147,14 +148,25 @@ def _text(folder: Path, name: str) -> str:
 
 
 def _half(folder: Path, name: str) -> Part:
-    """Return a file up to its twin or, for a name with TWIN, the twin. Raises OSError."""
+    """Return a file up to its twin or, for a name with TWIN, without its step. Raises OSError.
+
+    The text above the step belongs to both halves. Blank rows replace the other half and, of a
+    twin, the comments at the heads of the file and of the half.
+    """
     file = name.removesuffix(TWIN)
-    step, _, twin = _text(folder, file).partition(_TWIN)
+    text, _, twin = _text(folder, file).partition(_TWIN)
     if file == name:
-        return Part(step, f"kernels/{file}")
+        return Part(text.replace(_STEP, "\n"), f"kernels/{file}")
     if not twin:
         raise FileNotFoundError(name)
-    return Part(f"{_TWIN[1:]}{twin}", f"kernels/{file}", step.count("\n") + 2)
+    shared = text.partition(_STEP)[0] if _STEP in text else ""
+    head = _HEAD.match(shared)
+    described = head[0] if head else ""
+    about, _, functions = twin.partition("*/")
+    left_out = (text[len(shared) :], about)
+    blank = "\n" * sum(part.count("\n") for part in (_TWIN, *left_out))
+    above = "\n" * described.count("\n") + shared[len(described) :]
+    return Part(f"{above}{blank}{functions}", f"kernels/{file}")
 
 
 class _BadRow(Exception):

@@ -152,10 +152,7 @@ inline uint compact_item(uint2 *items)
 
 /* Empties the stack, so that the loops end by their conditions: after a return from inside, the threads of a GPU's
  * group would not reconverge. */
-inline void compact_end(CompactState *state, uint2 *items)
-{
-    state->group.y = state->waits = items->y = 0;
-}
+inline void compact_end(CompactState *state, uint2 *items) { state->group.y = state->waits = items->y = 0; }
 
 inline TriHit compact_hit(global const float *leaves, uint item, float t, float u, float v)
 {

@@ -17,10 +17,7 @@
 #define CURVE_FAR 1e37f /* more than any sum of areas */
 
 /* The bits of a cell's coordinate at their positions in the code, byte by byte. */
-inline ulong curve_spread(global const ulong *table, int cell)
-{
-    return table[cell & 255] | table[256 + (cell >> 8)];
-}
+inline ulong curve_spread(global const ulong *table, int cell) { return table[cell & 255] | table[256 + (cell >> 8)]; }
 
 /* low, scale: from a doubled centroid to its cell; tables: of two bytes of each axis. */
 kernel NO_VECTORIZE void curve_keys(global const float8 *restrict items, uint count, float4 low, float4 scale,
@@ -79,10 +76,7 @@ inline float8 curve_shift(float8 v, float first)
 }
 
 /* The bounds of the last 1 .. 8 items, with another item. */
-inline float8 curve_widen(float8 last, float next)
-{
-    return item_union(curve_shift(last, INFINITY), (float8)(next));
-}
+inline float8 curve_widen(float8 last, float next) { return item_union(curve_shift(last, INFINITY), (float8)(next)); }
 
 /* Puts `run` items in order, and finds for each the length of the run that ends with it, 0 without; counts the
  * runs. */

@@ -12,11 +12,7 @@
 
 typedef struct { float t, u, v; uint prim, tag; float nx, ny, nz, plane, side; } TriHit;
 
-inline float tri_side(float3 e1, float3 e2)
-{
-    float3 e = fmax(fabs(e1), fabs(e2));
-    return fmax(e.x, fmax(e.y, e.z));
-}
+inline float tri_side(float3 e1, float3 e2) { float3 e = fmax(fabs(e1), fabs(e2)); return fmax(e.x, fmax(e.y, e.z)); }
 
 /* The hit of a triangle by its corner v0 and its sides from there. */
 inline TriHit tri_hit(float t, float u, float v, uint prim, uint tag, float3 v0, float3 e1, float3 e2)

@@ -15,17 +15,9 @@ typedef struct { float8 bounds, span; } Extent;
 inline float8 item_union(float8 a, float8 b) { return a < b ? a : b; }
 
 /* Twice the centroid, and its negation; the fourth lanes are unused. */
-inline float8 item_centroid(float8 item)
-{
-    float4 c = item.lo - item.hi;
-    return (float8)(c, -c);
-}
+inline float8 item_centroid(float8 item) { float4 c = item.lo - item.hi; return (float8)(c, -c); }
 
-inline Extent extent_empty(void)
-{
-    Extent h = {(float8)(INFINITY), (float8)(INFINITY)};
-    return h;
-}
+inline Extent extent_empty(void) { Extent h = {(float8)(INFINITY), (float8)(INFINITY)}; return h; }
 
 inline Extent extent_add(Extent h, float8 item)
 {

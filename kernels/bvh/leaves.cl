@@ -48,11 +48,7 @@ inline float leaf_least(float8 row)
     return m.x < m.y ? m.x : m.y;
 }
 
-inline float8 leaf_min(float8 a, float8 b, float8 c)
-{
-    float8 m = a < b ? a : b;
-    return m < c ? m : c;
-}
+inline float8 leaf_min(float8 a, float8 b, float8 c) { float8 m = a < b ? a : b; return m < c ? m : c; }
 
 #define LEAF_ROW(p, axis) \
     (float8)(p[0].axis, p[1].axis, p[2].axis, p[3].axis, p[4].axis, p[5].axis, p[6].axis, p[7].axis)

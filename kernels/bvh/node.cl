@@ -15,10 +15,7 @@ inline uint node_count(float8 node) { return as_uint(node.s7); }
  * inside a side's plane, with no direction across it, count as inside. bounds: low corner and negated high corner;
  * reach: the largest coordinate of the scene. Order is kept: a box inside another stays inside, and the union of
  * larger boxes is the larger union. */
-inline float8 node_pad(float8 bounds, float reach)
-{
-    return bounds - fabs(bounds) * 0x1p-22f - reach * 0x1p-40f;
-}
+inline float8 node_pad(float8 bounds, float reach) { return bounds - fabs(bounds) * 0x1p-22f - reach * 0x1p-40f; }
 
 inline float8 node_make(float8 padded, uint link, uint count)
 {
@@ -28,8 +25,4 @@ inline float8 node_make(float8 padded, uint link, uint count)
     return node;
 }
 
-inline float node_half_area(float8 node)
-{
-    float4 e = node.hi - node.lo;
-    return e.x * e.y + e.y * e.z + e.z * e.x;
-}
+inline float node_half_area(float8 node) { float4 e = node.hi - node.lo; return e.x * e.y + e.y * e.z + e.z * e.x; }

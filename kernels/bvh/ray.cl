@@ -23,10 +23,7 @@ inline int ray_finite(float ox, float oy, float oz, float dx, float dy, float dz
 }
 
 /* 1 / d, finite for d = 0, so that a slab's planes never make NaN. */
-inline float ray_reciprocal(float d)
-{
-    return 1.0f / (fabs(d) > 1e-20f ? d : copysign(1e-20f, d));
-}
+inline float ray_reciprocal(float d) { return 1.0f / (fabs(d) > 1e-20f ? d : copysign(1e-20f, d)); }
 
 inline Ray ray_make(float ox, float oy, float oz, float dx, float dy, float dz, float tmin)
 {

@@ -66,10 +66,7 @@ inline float8 refit_block(Refit tree, uint block)
 }
 
 /* A binary node's padded bounds. */
-inline float8 refit_bounds(float8 node)
-{
-    return node.s0 < FLT_MAX ? (float8)(node.lo, -node.hi) : REFIT_NOTHING;
-}
+inline float8 refit_bounds(float8 node) { return node.s0 < FLT_MAX ? (float8)(node.lo, -node.hi) : REFIT_NOTHING; }
 
 inline void refit_node(global float8 *nodes, Refit tree, uint at)
 {

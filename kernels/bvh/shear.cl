@@ -53,7 +53,4 @@ inline float shear_edge(float px, float py, float qx, float qy)
 /* Whether the ray's line hits a triangle with nine coordinates `step` floats apart; its distance, and the barycentrics
  * of vertices 1 and 2. */
 inline int shear_intersect(const Shear *s, global const float *v, uint step, float *t, float *b1,
-                           float *b2)
-{
-    SHEAR_INTERSECT
-}
+                           float *b2) { SHEAR_INTERSECT }

@@ -85,11 +85,7 @@ inline float8 wide8_edge(float8 px, float8 py, float8 qx, float8 qy)
 /* The triangles of a block that the ray hits between tmin and t, and their distances times `det`. bvh/shear.cl tells
  * why no ray slips between two triangles. */
 inline Mask8 wide8_triangles(global const float *block, const Wide8Ray *r, float t, float8 *distance,
-                             float8 *det)
-{
-    global const float8 *b = (global const float8 *)block;
-    WIDE8_TRIANGLES
-}
+                             float8 *det) { global const float8 *b = (global const float8 *)block; WIDE8_TRIANGLES }
 
 /* The hit record of a triangle of a block, computed again in scalars. */
 inline TriHit wide8_hit(global const float *leaves, uint slot, float t, const Wide8Ray *r)

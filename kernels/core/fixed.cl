@@ -5,11 +5,7 @@ typedef struct { natural x, y, z; } Natural3;
 
 #define FIXED_LARGEST 0x1p44f /* of a term */
 
-inline Fixed fixed_zero(void)
-{
-    Fixed f = {(natural)(0u), (natural)(0u), (natural)(0u)};
-    return f;
-}
+inline Fixed fixed_zero(void) { Fixed f = {(natural)(0u), (natural)(0u), (natural)(0u)}; return f; }
 
 /* The carry of a sum of two words, with `term` as an addend: 1 if it exceeded 32 bits. */
 inline natural fixed_carry(natural sum, natural term) { return sel_n(sum < term, (natural)(1u), (natural)(0u)); }

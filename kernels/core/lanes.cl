@@ -78,11 +78,7 @@ typedef struct { real x, y, z, w; } vec4;
 inline real sel(mask m, real a, real b) { return m ? a : b; }
 inline integer sel_i(mask m, integer a, integer b) { return m ? a : b; }
 inline natural sel_n(mask m, natural a, natural b) { return m ? a : b; }
-inline vec3 sel3(mask m, vec3 a, vec3 b)
-{
-    vec3 r = {sel(m, a.x, b.x), sel(m, a.y, b.y), sel(m, a.z, b.z)};
-    return r;
-}
+inline vec3 sel3(mask m, vec3 a, vec3 b) { vec3 r = {sel(m, a.x, b.x), sel(m, a.y, b.y), sel(m, a.z, b.z)}; return r; }
 
 inline real min_r(real a, real b) { return a < b ? a : b; }
 inline real max_r(real a, real b) { return a > b ? a : b; }
@@ -116,11 +112,7 @@ inline int any_lane(mask m) { return LANE_BITS(m) != 0; }
 #elif LANES == 8
 inline int any_lane(mask m) { return as_ulong(__builtin_convertvector(m, char8)) != 0; }
 #else
-inline int any_lane(mask m)
-{
-    ulong2 q = as_ulong2(__builtin_convertvector(m, char16));
-    return (q.x | q.y) != 0;
-}
+inline int any_lane(mask m) { ulong2 q = as_ulong2(__builtin_convertvector(m, char16)); return (q.x | q.y) != 0; }
 #endif
 #undef any
 #define any(m) any_lane(m) /* OpenCL's own any() is slow on some runtimes */

@@ -6,26 +6,15 @@
 #define INV_4PI 0.0795774715459477f
 #define FAR 1e30f
 
-inline vec3 v3(real x, real y, real z)
-{
-    vec3 r = {x, y, z};
-    return r;
-}
-inline vec4 v4(real x, real y, real z, real w)
-{
-    vec4 r = {x, y, z, w};
-    return r;
-}
+inline vec3 v3(real x, real y, real z) { vec3 r = {x, y, z}; return r; }
+inline vec4 v4(real x, real y, real z, real w) { vec4 r = {x, y, z, w}; return r; }
 inline vec3 add3(vec3 a, vec3 b) { return v3(a.x + b.x, a.y + b.y, a.z + b.z); }
 inline vec3 sub3(vec3 a, vec3 b) { return v3(a.x - b.x, a.y - b.y, a.z - b.z); }
 inline vec3 scale3(vec3 a, real s) { return v3(a.x * s, a.y * s, a.z * s); }
 inline vec3 neg3(vec3 a) { return v3(-a.x, -a.y, -a.z); }
 inline vec3 madd3(vec3 a, real s, vec3 b) { return v3(a.x * s + b.x, a.y * s + b.y, a.z * s + b.z); } /* a s + b */
 inline real dot3(vec3 a, vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-inline vec3 cross3(vec3 a, vec3 b)
-{
-    return v3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
-}
+inline vec3 cross3(vec3 a, vec3 b) { return v3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x); }
 inline vec3 normalize3(vec3 a) { return scale3(a, 1.0f / sqrt(max_r(dot3(a, a), (real)(1e-35f)))); }
 inline real sqr(real x) { return x * x; }
 

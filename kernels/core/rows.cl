@@ -6,21 +6,9 @@
  * Otherwise processors with gathers read pairs of words: slower than a transposition, but 10 instructions instead of
  * 100 at each of many uses. */
 #if LANES == 1
-inline vec2 gather2(global const float *p, integer at)
-{
-    vec2 r = {p[at], p[at + 1]};
-    return r;
-}
-inline vec3 gather3(global const float *p, integer at)
-{
-    vec3 r = {p[at], p[at + 1], p[at + 2]};
-    return r;
-}
-inline vec4 gather4(global const float *p, integer at)
-{
-    vec4 r = {p[at], p[at + 1], p[at + 2], p[at + 3]};
-    return r;
-}
+inline vec2 gather2(global const float *p, integer at) { vec2 r = {p[at], p[at + 1]}; return r; }
+inline vec3 gather3(global const float *p, integer at) { vec3 r = {p[at], p[at + 1], p[at + 2]}; return r; }
+inline vec4 gather4(global const float *p, integer at) { vec4 r = {p[at], p[at + 1], p[at + 2], p[at + 3]}; return r; }
 #else
 typedef float2 Row2 __attribute__((aligned(4)));
 typedef float4 Row4 __attribute__((aligned(4)));

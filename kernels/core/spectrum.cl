@@ -1,10 +1,6 @@
 /* Arithmetic of spectra in both modes, component by component. FOURTH(value) is the last element of a list, in spectral
  * mode only; SPECTRUM_EACH(F) expands F(x) F(y) F(z) and, in that mode, F(w). */
-inline Spectrum spectrum_of(real v)
-{
-    Spectrum r = {v, v, v FOURTH(v)};
-    return r;
-}
+inline Spectrum spectrum_of(real v) { Spectrum r = {v, v, v FOURTH(v)}; return r; }
 inline Spectrum spectrum_add(Spectrum a, Spectrum b)
 {
     Spectrum r = {a.x + b.x, a.y + b.y, a.z + b.z FOURTH(a.w + b.w)};

@@ -25,11 +25,7 @@ inline Twofold twofold_add(Twofold a, Twofold b)
     return r;
 }
 
-inline Twofold twofold_neg(Twofold a)
-{
-    Twofold r = {-a.high, -a.low};
-    return r;
-}
+inline Twofold twofold_neg(Twofold a) { Twofold r = {-a.high, -a.low}; return r; }
 
 inline Twofold twofold_sqr(Twofold a)
 {

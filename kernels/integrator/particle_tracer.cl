@@ -29,7 +29,7 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
     }
 
     CameraJoint joint = join_camera_seek(scene, v, scatter);
-    bsdf_ask(scene, scatter, join_camera_to(joint, scatter), 1);
+    bsdf_ask(scene, scatter, joint.to, 1);
     v.state += join_camera(scene, shadow, at, active, v, scatter, mis_ratio, joint, arrives);
 
     vec2 uv = sampler_pair(sampler, scatter.dimension + DIMENSION_BSDF);

@@ -8,5 +8,7 @@ inline real infinite_weight(Scene scene, int row, vec3 p, vec3 d, real pdf, real
 }
 
 /* Twin, where paths are not weighed against light paths. */
-#define infinite_weight(scene, row, p, d, pdf, other, mis_ratio) \
-    sel((pdf) < 0.0f, (real)(1.0f), mis_weight(pdf, other))
+inline real infinite_weight(Scene scene, int row, vec3 p, vec3 d, real pdf, real other, real mis_ratio)
+{
+    return sel(pdf < 0.0f, (real)(1.0f), mis_weight(pdf, other));
+}

@@ -6,4 +6,4 @@ inline void light_kept(Slab path, uint at, mask go, LightRay r)
 }
 
 /* Twin, where light paths are not weighed. */
-#define light_kept(path, at, go, r)
+inline void light_kept(Slab path, uint at, mask go, LightRay r) {}

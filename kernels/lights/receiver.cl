@@ -18,8 +18,6 @@ typedef struct {
     real height;           /* share G1(wo) / (4 |cos|) */
 } Receiver;
 
-#define receiver_hemisphere(r) ((r).hemisphere)
-
 inline Receiver receiver_of(vec3 hemisphere, natural toward, natural gloss)
 {
     Receiver r = {hemisphere, toward, gloss, octahedral_unpack(toward)};
@@ -58,7 +56,11 @@ inline real receiver_reflects(Receiver r, vec3 wi, real sine, real cosine)
 }
 
 /* Twin, where only its `hemisphere` matters. */
-#define Receiver vec3
-#define receiver_hemisphere(r) (r)
-#define receiver_at(scene, row, hemisphere, away) (hemisphere)
-#define receiver_reflects(r, wi, sine, cosine) (cosine)
+typedef struct { vec3 hemisphere; } Receiver;
+
+inline Receiver receiver_at(Scene scene, integer row, vec3 hemisphere, vec3 away)
+{
+    Receiver r = {hemisphere};
+    return r;
+}
+inline real receiver_reflects(Receiver r, vec3 wi, real sine, real cosine) { return cosine; }

@@ -37,8 +37,11 @@ inline Spectrum sky_gather(Scene scene, Slab path, uint at, PathEnd end, Wavelen
 }
 
 /* To begin paths takes longer, as light is gathered there: lanes wait for others. */
-#define sky_due(end) path_end_of_half(end)
+inline int sky_due(PathEnd end) { return path_end_of_half(end); }
 
 /* Twin, in a scene without light from all around. */
-#define sky_gather(scene, path, at, end, lambdas, radiance) (radiance)
-#define sky_due(end) any((end).ended)
+inline Spectrum sky_gather(Scene scene, Slab path, uint at, PathEnd end, Wavelengths lambdas, Spectrum radiance)
+{
+    return radiance;
+}
+inline int sky_due(PathEnd end) { return any(end.ended); }

@@ -5,11 +5,7 @@
 
 typedef struct { int none; } Layers;
 
-inline Layers layers_none(void)
-{
-    Layers l = {0};
-    return l;
-}
+inline Layers layers_none(void) { Layers l = {0}; return l; }
 
 /* Two dielectrics, at cosine cos_i, signed; eta: index of the inside over the outside. */
 inline Boundary dielectric_boundary(Layers layers, real cos_i, Spectrum eta, Spectrum outside)

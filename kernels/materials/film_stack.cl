@@ -7,11 +7,7 @@
  * for s- and Y = q / n^2 for p-polarised light, a boundary's amplitude is (Y - Y') / (Y + Y'). */
 typedef struct { real re, im; } Complex;
 
-inline Complex complex_of(real re, real im)
-{
-    Complex r = {re, im};
-    return r;
-}
+inline Complex complex_of(real re, real im) { Complex r = {re, im}; return r; }
 inline Complex complex_add(Complex a, Complex b) { return complex_of(a.re + b.re, a.im + b.im); }
 inline Complex complex_sub(Complex a, Complex b) { return complex_of(a.re - b.re, a.im - b.im); }
 inline Complex complex_mul(Complex a, Complex b)

@@ -93,11 +93,7 @@ inline vec2 warp_sum_pairs(vec2 share, vec4 v)
     return r;
 }
 inline real warp_sum(vec2 share, vec2 v) { return share.x * v.x + share.y * v.y; }
-inline vec2 warp_added(vec2 a, vec2 b)
-{
-    vec2 r = {a.x + b.x, a.y + b.y};
-    return r;
-}
+inline vec2 warp_added(vec2 a, vec2 b) { vec2 r = {a.x + b.x, a.y + b.y}; return r; }
 
 /* The same of all slices; at: where the numbers of the first slice of the first row stand, stride: from row to row. */
 inline real warp_read(global const float *values, WarpSlices s, integer at, integer stride)

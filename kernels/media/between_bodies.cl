@@ -10,4 +10,4 @@ inline void bsdf_between_bodies(Scene scene, mask active, Vertex v, Bsdf *m)
 }
 
 /* Twin, where a material keeps its own exterior index. */
-#define bsdf_between_bodies(scene, active, v, m)
+inline void bsdf_between_bodies(Scene scene, mask active, Vertex v, Bsdf *m) {}

@@ -4,8 +4,10 @@
  * is lost. `media` holds two words for each shape, the number of its body first. Behind them follow two words for
  * each number: the name of the medium, and where the index stands in `materials`, 0 without an index. For number 0
  * the first word is the material word of a null surface. media/light_media.cl says what stands before. */
-#define camera_through(settings) ((integer)((settings)->camera_bodies)) /* the bodies where a shadow ray begins */
-#define light_through(scene, row) light_bodies(scene, row)
+
+/* The bodies where a shadow ray begins, at the camera and at a light. */
+inline integer camera_through(Scene scene) { return (integer)(scene.settings->camera_bodies); }
+inline integer light_through(Scene scene, integer row) { return light_bodies(scene, row); }
 
 inline integer bodies_top(integer bodies)
 {
@@ -61,5 +63,5 @@ inline integer bodies_beyond(BodyBoundary b, mask inward)
 }
 
 /* Twin, where bodies do not overlap: a shadow ray begins with the name of its medium. */
-#define camera_through(settings) ((integer)((settings)->camera_medium))
-#define light_through(scene, row) light_medium(scene, row)
+inline integer camera_through(Scene scene) { return (integer)(scene.settings->camera_medium); }
+inline integer light_through(Scene scene, integer row) { return light_medium(scene, row); }

@@ -13,4 +13,4 @@ inline Spectrum emission_mis_weighted(Scene scene, Slab path, uint at, mask flie
 }
 
 /* Twin, where no homogeneous medium is a light. */
-#define emission_mis_weighted(scene, path, at, flies, light) (light)
+inline Spectrum emission_mis_weighted(Scene scene, Slab path, uint at, mask flies, Spectrum light) { return light; }

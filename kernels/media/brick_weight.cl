@@ -13,4 +13,4 @@ inline real brick_weight(Scene scene, integer row, mask active, GridOrigin origi
 }
 
 /* Twin, where no brick is a light. */
-#define brick_weight(scene, row, active, origin, t) ((real)(1.0f))
+inline real brick_weight(Scene scene, integer row, mask active, GridOrigin origin, real t) { return (real)(1.0f); }

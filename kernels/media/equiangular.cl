@@ -85,7 +85,8 @@ inline Spectrum flight_near_pdf(FlightNear n, real t, mask collides, Spectrum pd
 }
 
 /* Twin, where no homogeneous medium holds a lamp, and for light paths: distances are sampled by transmittance alone. */
-typedef integer FlightNear;
-#define flight_near(scene, sampler, vertex, name, o, d, end, m, scatters, u) ((integer)(0))
-#define flight_near_end(n, t) (t)
-#define flight_near_pdf(n, t, collides, pdf) (pdf)
+typedef struct { mask aims; } FlightNear;
+inline FlightNear flight_near(Scene scene, Sampler sampler, integer vertex, integer name, vec3 o, vec3 d, real end,
+                              Medium m, mask scatters, real *u) { FlightNear n = {mask_of(0)}; return n; }
+inline real flight_near_end(FlightNear n, real t) { return t; }
+inline Spectrum flight_near_pdf(FlightNear n, real t, mask collides, Spectrum pdf) { return pdf; }

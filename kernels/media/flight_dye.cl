@@ -68,7 +68,8 @@ inline Spectrum flight_dye_pdf(FlightDye f, real t, mask collides, Spectrum pdf)
 }
 
 /* Twin, where no medium has a dye. */
-typedef integer FlightDye;
-#define flight_dye(name, m, end, scatters, u) ((integer)(0))
-#define flight_dye_end(f, t) (t)
-#define flight_dye_pdf(f, t, collides, pdf) (pdf)
+typedef struct { mask glows; } FlightDye;
+inline FlightDye flight_dye(integer name, Medium m, real end, mask scatters,
+                            real *u) { FlightDye f = {mask_of(0)}; return f; }
+inline real flight_dye_end(FlightDye f, real t) { return t; }
+inline Spectrum flight_dye_pdf(FlightDye f, real t, mask collides, Spectrum pdf) { return pdf; }

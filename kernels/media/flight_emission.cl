@@ -12,9 +12,12 @@ inline void flight_light(Scene scene, Slab path, uint at, mask flies, integer st
 {
     light = spectrum_mul(load_path_beta(path, at), emission_mis_weighted(scene, path, at, flies, light));
     store_path_radiance(path, at, flies, spectrum_add(load_path_radiance(path, at), light));
-    flight_light_layers(scene, path, at, flies, state, light);
+    flight_light_layers(scene, path, at, flies, state, light FLIGHT_PASSED);
 }
 
 /* Twin, where no medium emits. */
-#define flight_emission(scene, flies, name, m, end, lambdas) spectrum_of(0.0f)
-#define flight_light(scene, path, at, flies, state, light)
+inline Spectrum flight_emission(Scene scene, mask flies, integer name, Medium m, real end, Wavelengths lambdas)
+{
+    return spectrum_of(0.0f);
+}
+inline void flight_light(Scene scene, Slab path, uint at, mask flies, integer state, Spectrum light FLIGHT_ARGS) {}

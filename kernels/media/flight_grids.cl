@@ -2,7 +2,7 @@
 #include "generated/grid_origin.cl"
 
 /* No flight in a grid aims at a lamp (media/equiangular.cl). */
-#define flight_near_share(name, share) sel(((name) & MEDIUM_GRID) != 0, (real)(0.0f), share)
+inline real flight_near_share(integer name, real share) { return sel((name & MEDIUM_GRID) != 0, (real)(0.0f), share); }
 
 inline void flight_grids(Scene scene, Slab path, uint at, mask flies, integer name, FlightRay r, Spectrum ratio,
                          Wavelengths lambdas, Spectrum *light, Spectrum *weight, mask *collides, real *t, Medium *m)
@@ -24,5 +24,6 @@ inline void flight_grids(Scene scene, Slab path, uint at, mask flies, integer na
 }
 
 /* Twin, where no medium is on a grid. */
-#define flight_near_share(name, share) (share)
-#define flight_grids(scene, path, at, flies, name, r, ratio, lambdas, light, weight, collides, t, m)
+inline real flight_near_share(integer name, real share) { return share; }
+inline void flight_grids(Scene scene, Slab path, uint at, mask flies, integer name, FlightRay r, Spectrum ratio,
+                         Wavelengths lambdas, Spectrum *light, Spectrum *weight, mask *collides, real *t, Medium *m) {}

@@ -9,4 +9,7 @@ inline Spectrum flight_weight(Slab path, uint at, mask flies, Spectrum ratio, Sp
 }
 
 /* Twin, where extinction is the same at all wavelengths. */
-#define flight_weight(path, at, flies, ratio, f, pdf) spectrum_scale(f, 1.0f / max_r((pdf).x, (real)(1e-30f)))
+inline Spectrum flight_weight(Slab path, uint at, mask flies, Spectrum ratio, Spectrum f, Spectrum pdf)
+{
+    return spectrum_scale(f, 1.0f / max_r(pdf.x, (real)(1e-30f)));
+}

@@ -19,4 +19,5 @@ inline void grid_gather(Scene scene, integer name, Medium m, GridWalk w, GridBri
 }
 
 /* Twin, where no grid emits. */
-#define grid_gather(scene, name, m, w, b, to, passed, dims, bits, active, f, lambdas, origin)
+inline void grid_gather(Scene scene, integer name, Medium m, GridWalk w, GridBrick b, real to, real passed, mask dims,
+                        natural bits, mask active, GridFlight *f, Wavelengths lambdas, GridOrigin origin) {}

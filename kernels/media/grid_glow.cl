@@ -11,4 +11,7 @@ inline Spectrum grid_glow(Scene scene, integer at, real number, mask active, Wav
 }
 
 /* Twin, where no grid has a temperature. */
-#define grid_glow(scene, at, number, active, lambdas, light) (light)
+inline Spectrum grid_glow(Scene scene, integer at, real number, mask active, Wavelengths lambdas, Spectrum light)
+{
+    return light;
+}

@@ -43,4 +43,6 @@ inline void grid_mixed(Scene scene, integer name, GridWalk w, mask active, natur
 }
 
 /* Twin, where no medium is a mixture. */
-#define grid_mixed(scene, name, w, active, bits, lambdas, m)
+inline void grid_mixed(Scene scene, integer name, GridWalk w, mask active, natural bits, Wavelengths lambdas, Medium *m)
+{
+}

@@ -8,4 +8,4 @@ inline void grid_origin_load(Slab path, uint at, FlightRay r, GridOrigin *origin
 }
 
 /* Twin, where no grid emits. */
-#define grid_origin_load(path, at, r, origin)
+inline void grid_origin_load(Slab path, uint at, FlightRay r, GridOrigin *origin) {}

@@ -21,5 +21,9 @@ inline Spectrum grid_shadow_transmittance(Scene scene, integer medium, vec3 o, v
 }
 
 /* Twin, where no medium is on a grid. */
-#define grid_shadow_key(scene, path, at) ((natural)(0u))
-#define grid_shadow_transmittance(scene, medium, o, d, way, key, active, lambdas, transmittance) (transmittance)
+inline natural grid_shadow_key(Scene scene, Slab path, uint at) { return ((natural)(0u)); }
+inline Spectrum grid_shadow_transmittance(Scene scene, integer medium, vec3 o, vec3 d, real way, natural key,
+                                          mask active, Wavelengths lambdas, Spectrum transmittance)
+{
+    return transmittance;
+}

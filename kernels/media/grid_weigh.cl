@@ -37,5 +37,5 @@ inline void grid_weigh(Medium m, real thickness, Spectrum value, Spectrum pdf, m
     Spectrum weight = spectrum_scale(value, 1.0f / max_r(pdf.x, (real)(1e-30f)));
     f->weight = spectrum_sel(active, spectrum_mul(f->weight, weight), f->weight);
 }
-#define grid_hero(bits) ((real)(0.0f))
-#define grid_weigh_end(m, thickness, active, f)
+inline real grid_hero(natural bits) { return (real)(0.0f); }
+inline void grid_weigh_end(Medium m, real thickness, mask active, GridFlight *f) {}

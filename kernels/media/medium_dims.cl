@@ -5,4 +5,4 @@ inline Spectrum medium_dims(Scene scene, integer medium, real t, Wavelengths lam
 }
 
 /* Twin, where a shadow ray may go through several media: tracing/transmittance_media.cl multiplies as it is traced. */
-#define medium_dims(scene, medium, t, lambdas, value) (value)
+inline Spectrum medium_dims(Scene scene, integer medium, real t, Wavelengths lambdas, Spectrum value) { return value; }

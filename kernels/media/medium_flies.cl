@@ -70,8 +70,11 @@ inline ShapeMedia shape_media(Scene scene, integer shape)
 }
 
 /* The medium whose transmittance a vertex still applies: none where stage/flight.cl has applied it. */
-#define MEDIUM_LEFT(medium) sel_i(((medium) & MEDIUM_FLIES) != 0, (integer)(0), medium)
+inline integer medium_left(integer medium) { return sel_i((medium & MEDIUM_FLIES) != 0, (integer)(0), medium); }
 
 /* Twin, where dielectrics absorb and no shape has media. */
-#define medium_extinction(scene, medium, row, a, lambdas) (a)
-#define MEDIUM_LEFT(medium) (medium)
+inline Spectrum medium_extinction(Scene scene, integer medium, integer row, Spectrum a, Wavelengths lambdas)
+{
+    return a;
+}
+inline integer medium_left(integer medium) { return medium; }

@@ -15,8 +15,11 @@ inline Passage shadow_passage(Scene scene, integer row, integer *bodies, mask fr
 #define shadow_medium_beyond(scene, row, bodies, active, front, medium) shadow_medium(scene, bodies, active, medium)
 
 /* Twin, where bodies do not overlap: the interiors and exteriors of shapes tell its medium. */
-#define shadow_medium(scene, bodies, active, medium) (medium)
-#define shadow_passage(scene, row, bodies, front, surfaces, own) (own)
+inline integer shadow_medium(Scene scene, integer bodies, mask active, integer medium) { return medium; }
+inline Passage shadow_passage(Scene scene, integer row, integer *bodies, mask front, int surfaces, Passage own)
+{
+    return own;
+}
 
 inline integer shadow_medium_beyond(Scene scene, integer row, integer bodies, mask active, mask front, integer medium)
 {

@@ -2,7 +2,7 @@
 inline Spectrum vertex_arriving(Scene scene, Slab path, uint at, mask active, Vertex v)
 {
     real through = v.t + sel(active, load_path_ray_offset(path, at), (real)(0.0f));
-    Spectrum left = medium_transmittance(scene, MEDIUM_LEFT(v.media.medium), through, v.lambdas);
+    Spectrum left = medium_transmittance(scene, medium_left(v.media.medium), through, v.lambdas);
     return spectrum_mul(v.beta, left);
 }
 
@@ -14,4 +14,8 @@ inline mask vertex_inward(Vertex v, vec3 w)
 }
 
 /* `value` times the transmittance of t metres along w away from the vertex. */
-#define vertex_beyond(scene, v, w, t, lambdas, value) medium_dims(scene, vertex_medium(v, w), t, lambdas, value)
+inline integer vertex_medium(Vertex v, vec3 w);
+inline Spectrum vertex_beyond(Scene scene, Vertex v, vec3 w, real t, Wavelengths lambdas, Spectrum value)
+{
+    return medium_dims(scene, vertex_medium(v, w), t, lambdas, value);
+}

@@ -7,6 +7,8 @@ typedef struct {
     mask absorbs;    /* the surface is of an absorbing dielectric that names no media */
 } VertexMedia;
 
+/* Step. */
+
 inline VertexMedia vertex_media(Scene scene, Slab path, Slab hit, uint at, mask active, integer row, mask front)
 {
     VertexMedia m;
@@ -25,5 +27,8 @@ inline VertexMedia vertex_media(Scene scene, Slab path, Slab hit, uint at, mask 
 }
 
 /* Twin, for scenes without media. */
-typedef integer VertexMedia;
-#define vertex_media(scene, path, hit, at, active, row, front) ((integer)(0))
+inline VertexMedia vertex_media(Scene scene, Slab path, Slab hit, uint at, mask active, integer row, mask front)
+{
+    VertexMedia m = {0, 0, 0, 0, mask_of(0)};
+    return m;
+}

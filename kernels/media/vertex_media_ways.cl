@@ -15,5 +15,9 @@ inline integer vertex_around(Vertex v, vec3 w)
 inline integer vertex_through(Vertex v, vec3 w) { return vertex_medium(v, w); }
 
 /* Twin, for scenes without media. */
-#define vertex_arriving(scene, path, at, active, v) ((v).beta)
-#define vertex_beyond(scene, v, w, t, lambdas, value) (value)
+inline Spectrum vertex_arriving(Scene scene, Slab path, uint at, mask active, Vertex v) { return v.beta; }
+inline Spectrum vertex_beyond(Scene scene, Vertex v, vec3 w, real t, Wavelengths lambdas,
+                              Spectrum value) { return value; }
+inline integer vertex_medium(Vertex v, vec3 w) { return (integer)(0); }
+inline integer vertex_around(Vertex v, vec3 w) { return (integer)(0); }
+inline integer vertex_through(Vertex v, vec3 w) { return (integer)(0); }

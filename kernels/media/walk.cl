@@ -17,10 +17,7 @@ called int queue_walks(Slab path, Slab hit, int kind, int n, integer *ended, uin
     return n < WALK && 2 * count > LANES;
 }
 /* Resumes the lanes that paused. */
-called void queue_walked(Slab path, integer ended, uint block)
-{
-    store_path_state(path, block, ended != 0, ended);
-}
+called void queue_walked(Slab path, integer ended, uint block) { store_path_state(path, block, ended != 0, ended); }
 
 /* Takes all paths that wait for a phase function through the medium, then sorts their slots again. starts: of each
  * kind's queue; block: the first of LANES slots for a block. */
@@ -50,4 +47,5 @@ inline void bounce_walk(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, uint which, global uin
 }
 
 /* Twin, where no camera path is in a medium. */
-#define bounce_walk(slabs, scene, loop, which, queue, starts, first, end)
+inline void bounce_walk(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, uint which, global uint *queue, uint *starts, uint first,
+                        uint end) {}

@@ -30,7 +30,7 @@ inline Surface surface_load(Scene scene, Slab hit, uint at, mask active, vec3 o,
 {
     TraceHit h = {load_hit_t(hit, at), load_hit_u(hit, at), load_hit_v(hit, at), load_hit_n(hit, at),
                   load_hit_plane(hit, at), load_hit_side(hit, at), load_hit_prim(hit, at), load_hit_shape(hit, at)};
-    hit_space_load(h, hit, at);
+    hit_space_load(&h, hit, at);
     return surface_at(scene, h, active, o, d, front);
 }
 

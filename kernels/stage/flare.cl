@@ -53,9 +53,9 @@ inline integer begin_ghost(Scene scene, Slab path, Slab shadow, uint at, mask en
     shine = shine & !(away & mask_of(settings->alpha != 0)); /* the film sees no sky */
     real w = c.importance * grows / sel(shine, fabs(ls.pdf), (real)(1.0f));
     Spectrum value = spectrum_scale(spectrum_mul(ls.radiance, spectrum_mul(camera_start(), share)), w);
-    store_shadow_through(shadow, at, shine, camera_through(settings));
+    store_shadow_through(shadow, at, shine, camera_through(scene));
 #if USES_ABSORPTION
-    value = medium_dims(scene, MEDIUM_LEFT((integer)(settings->camera_medium)), ls.t, lambdas, value);
+    value = medium_dims(scene, medium_left((integer)(settings->camera_medium)), ls.t, lambdas, value);
 #endif
     store_shadow_o(shadow, at, shine, front.o);
     store_shadow_d(shadow, at, shine, ls.wi);

@@ -7,6 +7,8 @@ typedef struct {
     real spread; /* what it grows by, per metre */
 } Cone;
 
+/* Step. */
+
 #define CONE_SHARE 0.25f  /* of the width of a lobe: what differs within it is averaged by samples */
 #define CONE_WIDEST 0.4f  /* the most that a lobe adds, as a diffuse lobe does */
 #define CONE_UPPER ((int)0xffff0000) /* bits of a float that are kept */
@@ -52,6 +54,7 @@ inline real cone_footprint(Cone c, vec3 d, vec3 n, vec3 dpdu, vec3 dpdv)
 }
 
 /* Twin, where no image has levels to choose among. */
-typedef integer Cone;
-#define cone_after(word, t) (word)
-#define cone_footprint(c, d, n, dpdu, dpdv) ((real)(0.0f))
+inline integer cone_word(Cone c) { return (integer)(0); }
+inline integer cone_scattered(Cone c, real pdf, mask delta) { return (integer)(0); }
+inline Cone cone_after(integer word, real t) { Cone c = {(real)(0.0f), (real)(0.0f)}; return c; }
+inline real cone_footprint(Cone c, vec3 d, vec3 n, vec3 dpdu, vec3 dpdv) { return (real)(0.0f); }

@@ -21,5 +21,8 @@ inline ShapeHit curve_others(Scene scene, integer prim, mask active, vec3 o, vec
 }
 
 /* Twin, where there are none. */
-#define curve_others(scene, prim, active, o, d, t, hit) (hit)
+inline ShapeHit curve_others(Scene scene, integer prim, mask active, vec3 o, vec3 d, real t, ShapeHit hit)
+{
+    return hit;
+}
 #define CURVE_OTHERS 0

@@ -7,7 +7,8 @@
 #include "materials/bsdf.cl"
 #include "generated/smooth_boundary.cl"
 
-#define escape_waits(t) ((t) > 2.0f * FAR) /* whether a ray in the shadow slab is of this kind */
+/* Whether a ray in the shadow slab is of this kind. */
+inline mask escape_waits(real t) { return t > 2.0f * FAR; }
 
 /* `passes`, or for rays of this kind the lamps' light to o along d. The first surface must be a smooth boundary from
  * inside, which refracts the ray; the next surface may emit. */
@@ -48,5 +49,6 @@ inline Spectrum escape_light(TRACE_ARGS, Scene scene, Slab path, uint at, vec3 o
 }
 
 /* Twin, where no ray leaves a sealed medium toward a lamp. */
-#define escape_waits(t) mask_of(0)
-#define escape_light(trace, scene, path, at, o, d, t, active, passes) (passes)
+inline mask escape_waits(real t) { return mask_of(0); }
+inline Spectrum escape_light(TRACE_ARGS, Scene scene, Slab path, uint at, vec3 o, vec3 d, real t, mask active,
+                             Spectrum passes) { return passes; }

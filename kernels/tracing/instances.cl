@@ -19,10 +19,7 @@ inline InstanceFrame instance_frame(Scene scene, mask placed, integer instance)
 }
 
 /* A normal, by the inverse transpose, which keeps the front side but not the length. */
-inline vec3 instance_normal(InstanceFrame f, vec3 n)
-{
-    return madd3(f.x, n.x, madd3(f.y, n.y, scale3(f.z, n.z)));
-}
+inline vec3 instance_normal(InstanceFrame f, vec3 n) { return madd3(f.x, n.x, madd3(f.y, n.y, scale3(f.z, n.z))); }
 
 /* A vector, by the inverse (Cramer's rule). */
 inline vec3 instance_vector(InstanceFrame f, vec3 v)

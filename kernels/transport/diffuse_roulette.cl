@@ -17,4 +17,4 @@ inline real after_diffuse_roulette(real third, real p)
 }
 
 /* Twin, where all light paths continue from diffuse surfaces. */
-#define after_diffuse_roulette(third, p) (third)
+inline real after_diffuse_roulette(real third, real p) { return third; }

@@ -2,4 +2,4 @@
 inline real mis_pdf(Bsdf m, vec3 wo, vec3 wi) { return spectrum_mean(bsdf_pdfs(m, wo, wi)); }
 
 /* Twin, where all wavelengths have the same density. */
-#define mis_pdf(m, wo, wi) bsdf_pdf(m, wo, wi)
+inline real mis_pdf(Bsdf m, vec3 wo, vec3 wi) { return bsdf_pdf(m, wo, wi); }

@@ -62,15 +62,6 @@
  *
  * Whether a vertex is specular depends on the densities of both directions alone, and so is equal for both sides: a
  * delta lobe, or a density above SPECULAR_PDF (transport/photons/weight.cl). */
-#define MIS_RATIO_MOST 1e18f /* so that its square is finite */
-
-inline real mis_ratio_limited(real mis_ratio) { return min_r(mis_ratio, (real)(MIS_RATIO_MOST)); }
-
-/* Whether light paths end at a vertex: its scattering is not reversible. */
-inline mask ends_light_paths(Scene scene, Vertex v)
-{
-    return BSDF_ENDS_LIGHT_PATHS ? mask_of(1) : shading_frame_turns(scene, v.row);
-}
 
 /* MIS quantities of a path at a vertex. */
 typedef struct {
@@ -81,6 +72,17 @@ typedef struct {
     real merge_ratio; /* added to `arrives` at a specular vertex; of a light path, at the connection alone */
     real merges;      /* density of merging at the vertex over the path's density, 0 without merging */
 } MisRatio;
+
+/* Step. */
+#define MIS_RATIO_MOST 1e18f /* so that its square is finite */
+
+inline real mis_ratio_limited(real mis_ratio) { return min_r(mis_ratio, (real)(MIS_RATIO_MOST)); }
+
+/* Whether light paths end at a vertex: its scattering is not reversible. */
+inline mask ends_light_paths(Scene scene, Vertex v)
+{
+    return BSDF_ENDS_LIGHT_PATHS ? mask_of(1) : shading_frame_turns(scene, v.row);
+}
 
 #include "generated/diffuse_roulette.cl"
 #include "generated/mis_ratio_steps.cl"
@@ -177,8 +179,7 @@ inline real mis_square_of_connection(Scene scene, MisRatio r, Surface s, CameraP
 }
 
 /* MIS weight of a light sample of next-event estimation; p: its density by the material and a guide. */
-#define event_weight(scene, r, s, ls, begins, pair, p) mis_weight_of_event(scene, r, s, ls, begins, pair)
-inline real mis_weight_of_event(Scene scene, MisRatio r, Surface s, LightSample ls, real begins, BsdfPair pair)
+inline real event_weight(Scene scene, MisRatio r, Surface s, LightSample ls, real begins, BsdfPair pair, real p)
 {
     real third = mis_ratio_of_light_sample(scene, r, s, ls, begins, pair.p, pair.p_back);
     return mis_weight_of_three(ls.pdf, pair.p, third);
@@ -214,12 +215,23 @@ inline real mis_weight_of_connection(Scene scene, MisRatio r, Vertex v, BsdfPair
 }
 
 /* Twin, where paths are not weighed against light paths. */
-typedef integer MisRatio;
-#define mis_ratio_of_camera_path(scene, path, at, v, sampler) ((integer)(0))
-#define mis_ratio_of_light_path(scene, path, at, v, receiver) ((integer)(0))
-#define event_begins(scene, s, ls) ((real)(0.0f))
-#define event_weight(scene, mis_ratio, s, ls, begins, pair, p) \
-    sel((ls).pdf < 0.0f, (real)(1.0f), mis_weight((ls).pdf, p))
-#define keep_mis_ratio_to_light(path, at, scatters, mis_ratio, v, onward, delta, bs) ((bs).pdf)
-#define keep_mis_ratio_to_camera(scene, path, at, next, null, mis_ratio, v, onward, bs) (next)
-#define mis_weight_of_connection(scene, mis_ratio, v, pair, c, shine) ((real)(1.0f))
+inline MisRatio mis_ratio_nothing(void) { MisRatio r = {0.0f, 0.0f, mask_of(0), mask_of(0), 0.0f, 0.0f}; return r; }
+inline MisRatio mis_ratio_of_camera_path(Scene scene, Slab path, uint at, Vertex v, Sampler sampler)
+{
+    return mis_ratio_nothing();
+}
+inline MisRatio mis_ratio_of_light_path(Scene scene, Slab path, uint at, Vertex v, Receiver receiver)
+{
+    return mis_ratio_nothing();
+}
+inline real event_begins(Scene scene, Surface s, LightSample ls) { return (real)(0.0f); }
+inline real event_weight(Scene scene, MisRatio r, Surface s, LightSample ls, real begins, BsdfPair pair,
+                         real p) { return sel(ls.pdf < 0.0f, (real)(1.0f), mis_weight(ls.pdf, p)); }
+inline real keep_mis_ratio_to_light(Slab path, uint at, mask scatters, MisRatio r, Vertex *v, vec3 onward,
+                                    mask delta, BsdfSample bs) { return bs.pdf; }
+inline mask keep_mis_ratio_to_camera(Scene scene, Slab path, uint at, mask next, mask null, MisRatio r, Vertex *v,
+                                     vec3 onward, BsdfSample bs) { return next; }
+inline real mis_weight_of_connection(Scene scene, MisRatio r, Vertex v, BsdfPair pair, CameraPoint c, mask *shine)
+{
+    return (real)(1.0f);
+}

@@ -6,4 +6,4 @@ inline real mis_ratio_seen(Scene scene, Vertex v, Sampler sampler, real mis_rati
 }
 
 /* Twin, without connections of light paths to the camera. */
-#define mis_ratio_seen(scene, v, sampler, mis_ratio) ((real)(0.0f))
+inline real mis_ratio_seen(Scene scene, Vertex v, Sampler sampler, real mis_ratio) { return (real)(0.0f); }

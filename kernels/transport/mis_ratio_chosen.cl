@@ -11,4 +11,4 @@ inline MisRatio mis_ratio_chosen(Scene scene, Slab path, uint at, Vertex v, MisR
 }
 
 /* Twin, where the chance of a light does not depend on the direction of its light. */
-#define mis_ratio_chosen(scene, path, at, v, r, receiver) (r)
+inline MisRatio mis_ratio_chosen(Scene scene, Slab path, uint at, Vertex v, MisRatio r, Receiver receiver) { return r; }

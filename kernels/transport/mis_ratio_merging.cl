@@ -62,9 +62,14 @@ inline void keep_merge_ratio_to_camera(Slab path, uint at, mask m, mask null, Mi
 }
 
 /* Twin, without photon merging. */
-#define mis_ratio_arriving(r, delta, p, p_back) ((r).arrives)
-#define merge_ratio_here(scene, path, at, v) ((real)(0.0f))
-#define merge_ratio_of_photon(scene, path, at, v) ((real)(0.0f))
-#define merge_ratio_square(r, s, d, importance, p, p_back) ((real)(0.0f))
-#define keep_merge_ratio_to_light(path, at, m, r, v, onward, delta, p, p_back)
-#define keep_merge_ratio_to_camera(path, at, m, null, r, v, onward, delta, p, p_back)
+inline real mis_ratio_arriving(MisRatio r, mask delta, real p, real p_back) { return r.arrives; }
+inline real merge_ratio_here(Scene scene, Slab path, uint at, Vertex v) { return (real)(0.0f); }
+inline real merge_ratio_of_photon(Scene scene, Slab path, uint at, Vertex v) { return (real)(0.0f); }
+inline real merge_ratio_square(MisRatio r, Surface s, vec3 d, real importance, real p, real p_back)
+{
+    return (real)(0.0f);
+}
+inline void keep_merge_ratio_to_light(Slab path, uint at, mask m, MisRatio r, Vertex *v, vec3 onward, mask delta,
+                                      real p, real p_back) {}
+inline void keep_merge_ratio_to_camera(Slab path, uint at, mask m, mask null, MisRatio r, Vertex *v, vec3 onward,
+                                       mask delta, real p, real p_back) {}

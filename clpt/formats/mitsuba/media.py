@@ -21,6 +21,8 @@ from clpt.scene.textures import Texture
 from clpt.scene.volumes import Volume
 from clpt.spectra import RGBUnbounded
 
+SUBSURFACE = ("dipole", "singlescatter")
+
 
 def medium(element: Element, context: Context) -> Medium:
     """Make the medium that a <medium> describes, the same for every reference."""
@@ -104,12 +106,34 @@ def _even(props: Properties) -> Homogeneous:
     return Homogeneous(**within(Homogeneous, parameters, props))
 
 
+def body(element: Element, context: Context) -> tuple[Medium, Any, Any]:
+    """Read Mitsuba 0.6's <subsurface>: the medium of a body, its index and that around it.
+
+    Light walks in the body, where 0.6 takes a dipole for that (src/subsurface/dipole.cpp).
+    """
+    if element.type not in SUBSURFACE:
+        raise unknown(element, SUBSURFACE)
+    props = Properties(element, context)
+    props.ignore("irr_samples", "irr_indirect", "quality", "single_scattering")
+    coefficients = _old_coefficients(props) or {
+        "sigma_t": spectra.coefficient(props, "sigma_t", 1.0),
+        "albedo": spectra.reflectance(props, "albedo", 0.75),
+    }
+    phase = phases.HenyeyGreenstein(g=props.number("g", 0.0))
+    with element.locating():
+        medium = Homogeneous(**coefficients, scale=props.number("scale", 1.0), phase=phase)
+    indices = spectra.ior(props, "int_ior", "bk7"), spectra.ior(props, "ext_ior", "air")
+    props.finish()
+    context.read_as(element, f"subsurface {element.type!r}", "a body in which light walks")
+    return medium, *indices
+
+
 def _old_coefficients(props: Properties) -> dict[str, Any] | None:
     """Take Mitsuba 0.6's `sigma_a` and `sigma_s`, or a preset (src/medium/materials.h).
 
     None where the file gives `sigma_t` or `albedo`. The preset Skin1 is the default.
     """
-    if props.element.type != "homogeneous":
+    if props.element.type not in ("homogeneous", *SUBSURFACE):
         return None
     names = ("sigma_a", "sigma_s")
     if any(name in props.named for name in names):

@@ -20,12 +20,12 @@ from clpt.formats.mitsuba import serialized
 from clpt.formats.mitsuba.bsdfs import bsdf
 from clpt.formats.mitsuba.creases import creased
 from clpt.formats.mitsuba.emitters import area
-from clpt.formats.mitsuba.media import side
+from clpt.formats.mitsuba.media import body, side
 from clpt.formats.mitsuba.properties import Context, NoArea, Properties, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.geometry.normals import smooth_normals
 from clpt.scene import shapes
-from clpt.scene.materials import Diffuse, Material, Null
+from clpt.scene.materials import Dielectric, Diffuse, Material, Null
 from clpt.scene.shapes import Group, Instance, Shape
 
 Parameters = dict[str, Any]
@@ -86,6 +86,7 @@ def shape(element: Element, context: Context) -> Shape:
         "material": default if material is None else bsdf(material, context),
         "emission": None if emitter is None else area(emitter, context),
         **media,
+        **_body(props),
         "flip_normals": props.flag("flip_normals", False),
         "name": element.attributes.get("id", ""),
     }
@@ -132,6 +133,15 @@ def _group(element: Element, context: Context) -> Group:
         return Group(tuple(shapes_of(inner, context)), element.attributes.get("id", ""))
 
     return context.once(element, make)
+
+
+def _body(props: Properties) -> Parameters:
+    """Take Mitsuba 0.6's <subsurface>: a smooth boundary, and the medium inside."""
+    element = props.object("subsurface")
+    if element is None:
+        return {}
+    medium, inside, outside = body(element, props.context)
+    return {"material": Dielectric(int_ior=inside, ext_ior=outside), "interior": medium}
 
 
 def _default_material(emitter: Element | None, in_medium: bool) -> Material:

@@ -131,6 +131,8 @@ def _spot(params: Parameters, state: State) -> Light:
     beam = cone - params.one("conedeltaangle", "float", 5.0)
     if not 0.0 <= beam <= cone <= 180.0:
         raise SceneError("'conedeltaangle' must lie between 0 and 'coneangle'")
+    if state.shared.old:
+        state.warn(params, "its edge is smooth, not the fourth power of version 3")
     full, edge = np.cos(np.radians([beam, cone]))
     start, direction = _from_to(params, state)
     return lights.Spot(

@@ -68,13 +68,14 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     ),
     "generated/join_light.cl": lambda f, _: either(f.shows_lights, "lights/join_light.cl"),
     "generated/layer_sums.cl": lambda f, _: (
+        "generated/layer_args.cl",
         *either(f.film.layers.words > 0, "film/layers.cl"),
         *_screen_motion(f),
     ),
     "generated/layers.cl": lambda f, _: (
+        "generated/layer_args.cl",
         *when(
             f.film.layers.words > 0,
-            "generated/layer_args.cl",
             *_screen_motion(f),
             *either(f.screen_motion, "film/screen_motion_record.cl"),
             *either(f.motion.camera, "cameras/camera_axis.cl"),
@@ -90,7 +91,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/scout_choice.cl": lambda f, _: either(f.scouts, "film/scout_choice.cl"),
     "generated/mattes.cl": lambda f, _: either(f.film.layers.mattes, "film/mattes.cl"),
     "generated/light_layers.cl": lambda f, _: (
-        *when(f.film.layers.lights, "generated/light_layer_args.cl", "generated/sampler.cl"),
+        *when(f.film.layers.lights, "generated/sampler.cl"),
         *either(f.film.layers.lights, "film/light_layers.cl"),
     ),
     "generated/met_weight.cl": lambda f, _: (

@@ -160,7 +160,7 @@ def _pick_text(features: Features) -> list[str]:
 
 def _hemisphere(moving: bool) -> str:
     """The hemisphere by which an infinite light is sampled, which turns with one that moves."""
-    return "hemisphere" if moving else "receiver_hemisphere(receiver)"
+    return "hemisphere" if moving else "receiver.hemisphere"
 
 
 def _sample_text(features: Features) -> str:
@@ -183,7 +183,7 @@ def _sample_text(features: Features) -> str:
             "Motion motion = motion_of_light(scene, row, l);",
             "vec3 seen_from = p;",
             "p = motion_point_back(motion, p);",
-            "vec3 hemisphere = motion_back_unit(motion, receiver_hemisphere(receiver));",
+            "vec3 hemisphere = motion_back_unit(motion, receiver.hemisphere);",
         ]
     for kind in others:
         seen = _hemisphere(moving) if kind in INFINITE else "p"
@@ -295,7 +295,7 @@ def _infinite_text(features: Features) -> list[str]:
         rows += [
             "Motion motion = motion_of_light(scene, (integer)(row), l);",
             "d = motion_back_unit(motion, d);",
-            "vec3 hemisphere = motion_back_unit(motion, receiver_hemisphere(receiver));",
+            "vec3 hemisphere = motion_back_unit(motion, receiver.hemisphere);",
         ]
     for kind in kinds:
         rows += masked(

@@ -180,7 +180,7 @@ def _aimed_text(features: Features) -> list[str]:
 _BACK = (
     "vec3 rest = motion_point_back(motion, p), along = motion_back_unit(motion, wi);",
     "vec3 front = motion_front_back(motion, n);",
-    "vec3 side = motion_back_unit(motion, receiver_hemisphere(receiver));",
+    "vec3 side = motion_back_unit(motion, receiver.hemisphere);",
     "real far = t * motion_length_back(motion, wi);",
 )
 
@@ -190,7 +190,7 @@ def _pdf_arguments(kind: str, moving: bool) -> str:
     if kind in shape_records.RECORDS:
         return "rest, along, far, front" if moving else "p, wi, t, n"
     if kind in INFINITE:
-        return "scene, side, along" if moving else "scene, receiver_hemisphere(receiver), wi"
+        return "scene, side, along" if moving else "scene, receiver.hemisphere, wi"
     return ""
 
 

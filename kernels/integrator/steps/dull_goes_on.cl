@@ -14,4 +14,7 @@ inline mask dull_goes_on(mask next, mask null, Scattering scatter, BsdfSample bs
 }
 
 /* Twin, where no first surface plays. */
-#define dull_goes_on(next, null, scatter, bs, mis_ratio, beta) (next)
+inline mask dull_goes_on(mask next, mask null, Scattering scatter, BsdfSample bs, MisRatio *r, Spectrum *beta)
+{
+    return next;
+}

@@ -3,7 +3,8 @@ typedef struct {
     CameraPoint c;
     vec3 to; /* toward it, in shading.frame */
 } CameraJoint;
-#define join_camera_to(joint, scatter) ((joint).to)
+
+/* Step. */
 
 /* Chooses a point of the lens. */
 inline CameraJoint join_camera_seek(Scene scene, Vertex v, Scattering scatter)
@@ -33,7 +34,11 @@ inline integer join_camera(Scene scene, Slab shadow, uint at, mask active, Verte
 }
 
 /* Twin, where light paths leave photons alone, or a material sends light one way only. */
-typedef integer CameraJoint;
-#define join_camera_to(joint, scatter) ((scatter).wo)
-#define join_camera_seek(scene, v, scatter) ((integer)(0))
-#define join_camera(scene, shadow, at, active, v, scatter, mis_ratio, joint, arrives) ((integer)(0))
+inline CameraJoint join_camera_seek(Scene scene, Vertex v, Scattering scatter)
+{
+    CameraJoint joint;
+    joint.to = scatter.wo;
+    return joint;
+}
+inline integer join_camera(Scene scene, Slab shadow, uint at, mask active, Vertex v, Scattering scatter,
+                           MisRatio mis_ratio, CameraJoint joint, real arrives) { return (integer)(0); }

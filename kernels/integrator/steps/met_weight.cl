@@ -8,5 +8,7 @@ inline real met_weight(Scene scene, Slab path, uint at, Vertex v, integer light,
 }
 
 /* Twin, where paths are not weighed against light paths. */
-#define met_weight(scene, path, at, v, light, pdf, other) \
-    sel((pdf) < 0.0f, (real)(1.0f), mis_weight(pdf, other))
+inline real met_weight(Scene scene, Slab path, uint at, Vertex v, integer light, real pdf, real other)
+{
+    return sel(pdf < 0.0f, (real)(1.0f), mis_weight(pdf, other));
+}

@@ -11,4 +11,5 @@ inline void path_scatters(Scene scene, Slab path, uint at, mask next, mask null,
 }
 
 /* Twin, at null surfaces, where a path has no new direction. */
-#define path_scatters(scene, path, at, next, null, v, scatter, mis_ratio, bs, onward)
+inline void path_scatters(Scene scene, Slab path, uint at, mask next, mask null, Vertex *v, Scattering scatter,
+                          MisRatio mis_ratio, BsdfSample bs, vec3 onward) {}

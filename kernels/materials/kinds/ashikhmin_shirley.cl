@@ -3,11 +3,7 @@
  * + D F / (4 (wi.h) max(cos_i, cos_o)) [1/sr], F = ks + (1 - ks) (1 - wi.h)^5. */
 #include "materials/microfacet.cl"
 
-inline real ashikhmin_shirley_fifth(real x)
-{
-    real a = max_r(x, (real)(0.0f)), b = a * a;
-    return b * b * a;
-}
+inline real ashikhmin_shirley_fifth(real x) { real a = max_r(x, (real)(0.0f)), b = a * a; return b * b * a; }
 
 Spectrum ashikhmin_shirley_eval(AshikhminShirley m, vec3 wo, vec3 wi)
 {

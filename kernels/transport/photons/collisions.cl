@@ -1,10 +1,11 @@
 /* Photons of light paths that collide in media. */
-#include "transport/photons/media.cl"
-
 typedef struct {
     mask met;
     integer medium;
 } Collision;
+
+/* Step. */
+#include "transport/photons/media.cl"
 
 #include "transport/photons/part.cl"
 
@@ -30,6 +31,9 @@ inline void collision_photon(Slab path, Slab hit, uint at, Collision c, Photon *
 }
 
 /* Twin, where there are no media. */
-typedef integer Collision;
-#define collision_met(scene, path, hit, at, active) ((integer)(0))
-#define collision_photon(path, hit, at, c, photon, group)
+inline Collision collision_met(Scene scene, Slab path, Slab hit, uint at, mask *active)
+{
+    Collision c = {mask_of(0), (integer)(0)};
+    return c;
+}
+inline void collision_photon(Slab path, Slab hit, uint at, Collision c, Photon *photon, integer *group) {}

@@ -324,3 +324,13 @@ def test_coats(material):
     assert isinstance(metal, materials.CoatedConductor) and level(metal.coat_ior) == 1.5
     other = material(coat.format("coating", '<bsdf type="plastic"/>'))
     assert isinstance(other, materials.Plastic)
+
+
+def test_a_dipole_is_a_body_in_which_light_walks(read):
+    inner = '<string name="material" value="cream"/><float name="scale" value="2"/>'
+    shape = f'<shape type="sphere"><subsurface type="dipole">{inner}</subsurface></shape>'
+    made = read(shape).shapes[0]
+    assert isinstance(made.material, materials.Dielectric) and made.interior.scale == 2.0
+    assert made.interior.sigma_s == RGBUnbounded(7380.0, 5470.0, 3150.0)
+    with pytest.raises(SceneError, match="is not supported"):
+        read(shape, "3.0.0")
