@@ -61,11 +61,20 @@ def configure() -> None:
     for name in ("distributed", "tornado", "asyncio"):  # clpt reports the rest
         logging.getLogger(name).setLevel(max(logging.WARNING, logging.getLogger().level))
     logging.getLogger("asyncio").addFilter(_is_relevant)
+    logging.getLogger("distributed.worker").addFilter(_is_no_end)
 
 
 def _is_relevant(record: logging.LogRecord) -> bool:
     """Return False for a wait that Dask abandons when a cancelled film's worker is gone."""
     return not (record.exc_info and getattr(record.exc_info[0], "__name__", "") == "AllExit")
+
+
+def _is_no_end(record: logging.LogRecord) -> bool:
+    """Return whether a record is of something else than a scheduler that has ended.
+
+    A worker ends by itself then, and says so.
+    """
+    return not record.getMessage().startswith("Failed to communicate with scheduler")
 
 
 def run_worker(

@@ -65,6 +65,7 @@ class Light(Kind):
     reach: ClassVar[Reach] = "placed"
     falloff = True  # irradiance falls with the distance
     two_sided = False
+    visible = True
 
     motion: Keys | None = host(
         None, "moves it after its place, or None; an area light moves with its shape", form="keys"
@@ -202,6 +203,9 @@ class Area(PoweredLamp):
     radiance: Textured = emission(1.0, "emitted radiance", RADIANCE, textured=True)
     nits: float | None = _to_the_eye("its luminance", "cd/m^2")
     two_sided: bool = flag(False, "True: its back emits too")
+    visible: bool = flag(
+        True, "False: no ray sees it shine; as with a point, only what it shines on shows its light"
+    )
 
     def extent(self, area: float) -> float:
         """Return pi times the area that emits [m^2 sr]."""

@@ -25,6 +25,7 @@
 #include "generated/merging.cl"
 #include "generated/motion.cl"
 #include "generated/join_light.cl"
+#include "generated/light_path_endless.cl"
 #include "generated/emit_steps.cl"
 
 /* The ray with which a light path begins, and the wavelengths that it has; sets the scene's time. */
@@ -72,6 +73,7 @@ inline integer begin_light_path(Scene scene, Slab path, Slab shadow, uint at, ma
     store_path_beta(path, at, go, r.power);
     store_path_weight(path, at, go, 1.0f / max_r(strength, (real)(1e-37f)));
     store_path_nulls(path, at, go, (integer)(0));
+    light_path_begins(path, at, go);
     store_path_null_distance(path, at, go, (real)(0.0f));
     store_path_medium(path, at, go, light_medium(scene, lit));
     store_path_bodies(path, at, go, light_bodies(scene, lit));
@@ -92,6 +94,7 @@ STAGE(emit)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
     STAGE_AT
     PathEnd end = path_end(path, hit, at);
     if (path_end_of_half(end)) {
+        light_path_endless(path, at, end, counters);
         NextSample next = next_light_path(scene, path, at, BEGIN_PASSED, end);
         mask go = end.ended & !next.done;
         integer state = begin_light_path(scene, path, shadow, at, end.ended, go, next.pixel_index, next.sample);

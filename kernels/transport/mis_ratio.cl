@@ -107,7 +107,7 @@ inline MisRatio mis_ratio_of_camera_path(Scene scene, Slab path, uint at, Vertex
 /* Whether a ray may meet a row of `lights`. */
 inline mask light_can_be_met(Scene scene, integer row)
 {
-    return (row < scene.settings->infinite_count) | (light_at(scene, row).shape >= 0);
+    return (row < scene.settings->infinite_count) | light_shows(scene, row, light_at(scene, row).shape >= 0);
 }
 
 /* Density of a light path from the point of a light sample. It is computed before the material is loaded, as both

@@ -111,7 +111,7 @@ def _shape(definition: Definition, form: Geometry | None) -> Shape | None:
         emission = None
     if not isinstance(opacity, float) or opacity < 1.0:
         surface = Mask(material=surface, opacity=opacity)
-        emission = _masked(emission, opacity, params, state)
+        emission = _masked(emission, opacity)
     if _has_texture(surface) or _has_texture(emission):
         if form.kind is Curves:
             state.warn(params, "textures run around and along curves, not along and across")
@@ -135,20 +135,16 @@ def _moving(shape: Shape, state: State) -> Shape:
     return replace(shape, to_world=inner, motion=keys)
 
 
-def _masked(
-    emission: Light | None, opacity: float | Texture, source: Parameters, state: State
-) -> Light | None:
+def _masked(emission: Light | None, opacity: float | Texture) -> Light | None:
     """Return the light of a shape with an alpha: what is not there does not shine.
 
     By pbrt's rule an alpha of 0 all over hides a lamp and leaves it all its light.
     """
     if emission is None:
         return None
-    if isinstance(opacity, float) and opacity <= 0.0:
-        message = "an 'alpha' of 0 hides its surface, not its light, which the camera sees here"
-        state.warn(source, message)
-        return emission
     light = cast(Area, emission)  # as there is no other
+    if isinstance(opacity, float) and opacity <= 0.0:
+        return replace(light, visible=False)
     return replace(light, radiance=Product(first=light.radiance, second=opacity))
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import itertools
 import json
 import math
 import os
@@ -23,6 +24,7 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
+from clpt.choices import MOST_SAMPLES
 from clpt.errors import SceneError
 from clpt.files import input_files, output_files
 from clpt.images import exr_files
@@ -156,7 +158,16 @@ def _header(path: Path, text: object) -> dict[str, Any]:
     if header["format"] == 1:
         del header["shapes"]["words"][0]
         (header["counts"],) = header["counts"]
+    _check_ranges(path, header["taken"])
     return dict(header)
+
+
+def _check_ranges(path: Path, taken: list[list[int]]) -> None:
+    """Raise SceneError for ranges of samples that no render takes."""
+    ends = [-1, *(number for one in taken for number in one), MOST_SAMPLES + 1]
+    if not all(a < b for a, b in itertools.pairwise(ends)):
+        message = "no film of clpt: its ranges of samples must ascend, be apart, and lie within "
+        _fail(path, f"{message}0 to {MOST_SAMPLES}, not {taken}")
 
 
 def _picture(saved: SavedFilm) -> Any:

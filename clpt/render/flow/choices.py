@@ -127,6 +127,9 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/diffuse_roulette.cl": lambda f, _: either(
         f.dull_paths_end, "transport/diffuse_roulette.cl"
     ),
+    "generated/light_path_endless.cl": lambda f, _: either(
+        f.media.grids.present, "media/light_path_endless.cl"
+    ),
     "generated/emit_steps.cl": lambda f, _: (
         *either(f.transport.aimed, "transport/mis_ratio_aimed.cl"),
         *either(f.transport.balanced, "lights/light_kept.cl"),

@@ -80,6 +80,7 @@ def of_lights(lights: LightRows, gloss: int = 0) -> LightFeatures:
         infinite=lights.infinite > 0,
         visible=lights.visible,
         two_sided=lights.two_sided,
+        unseen=lights.unseen,
         tree=lights.tree is not None,
         few=len(lights.rows) <= FEW_LIGHTS,
         gloss=gloss,

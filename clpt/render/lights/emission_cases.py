@@ -7,6 +7,7 @@ from clpt.render.lights.cases import (
     NOWHERE,
     kind_test,
     kinds_of,
+    mode_text,
     others_of,
     pmf_text,
     point_text,
@@ -16,7 +17,7 @@ from clpt.render.lights.cases import (
 )
 from clpt.render.records import Features
 from clpt.render.records.dispatch import Case, Function, choose, function
-from clpt.render.records.light_rows import ALONG, BASES, BOTH, INFINITE, KINDS, PLACED
+from clpt.render.records.light_rows import ALONG, BASES, BOTH, INFINITE, KINDS, PLACED, UNSEEN
 
 
 def dispatch_text(features: Features) -> str:
@@ -113,7 +114,7 @@ def _emit_pdf(features: Features, kind: str) -> str:
     """The density of a kind in light_emit_pdf, but for its row's chance."""
     row = row_text(features, kind)
     if kind in shape_records.RECORDS:
-        sides = f" * sel(l.emission_mode == {BOTH}, (real)(0.5f), (real)(1.0f))"
+        sides = f" * sel({mode_text(BOTH)}, (real)(0.5f), (real)(1.0f))"
         sides *= features.lights.two_sided
         point = f"{kind}_point({row}, (vec2){{0.5f, 0.5f}})"
         if features.motion.lights:
@@ -140,7 +141,7 @@ def _start_pdf_text(features: Features) -> str:
             along = "motion_back_unit(motion, d)" if moving else "d"
             density = f"{kind}_emit_pdf({row_text(features, kind)}, {along})"
         elif kind in shape_records.RECORDS:
-            even = f"(l.emission_mode != {ALONG}) & (dot3(n, d) > 0.0f)"
+            even = f"!{mode_text(ALONG)} & (dot3(n, d) > 0.0f)"
             density = f"sel({even}, max_r(dot3(n, d), (real)(1e-6f)) * INV_PI, (real)(0.0f))"
         cases.append(Case(kind_test(kind, present), density))
     head = "real light_start_pdf(Scene scene, integer row, LightRow l, vec3 n, vec3 d)"
@@ -155,7 +156,7 @@ def _aimed_text(features: Features) -> list[str]:
     if surfaces_of(features):
         rows += [
             "n = sel3(l.shape >= 0, r.n, n);",
-            f"chosen = sel_i(l.emission_mode == {ALONG}, (integer)(-1), chosen);",
+            f"chosen = sel_i({mode_text(ALONG)}, (integer)(-1), chosen);",
         ]
     rows.append("r = aim_turn(scene, chosen, r, n, v, &turned);")
     placed = [kind for kind in present if kind in PLACED]
@@ -219,11 +220,13 @@ def _surfaces_text(features: Features) -> list[str]:
     if features.motion.lights:
         rows.append("q = surface_point_moved(motion, q);")
     if features.lights.two_sided:
-        rows.append(f"q = surface_point_turned(q, l.emission_mode == {BOTH}, &v);")
+        rows.append(f"q = surface_point_turned(q, {mode_text(BOTH)}, &v);")
     return [
         *rows,
         "point.p = q.p;",
         "Spectrum value = emission_load(scene, l.radiance, point, lambdas);",
-        f"LightRay s = surface_emit(q, l.emission_mode == {ALONG}, value, v);",
+        f"LightRay s = surface_emit(q, {mode_text(ALONG)}, value, v);",
+        *(f"s.seen = spectrum_sel({mode_text(UNSEEN)}, spectrum_of(0.0f), s.seen);",)
+        * features.lights.unseen,
         "r = light_ray_sel(l.shape >= 0, s, r);",
     ]

@@ -25,7 +25,7 @@ from clpt.render.lights.encode_lamps import blank_row, lower_lamp
 from clpt.render.lights.find import Source, Sources, is_whole
 from clpt.render.lights.power import brightness
 from clpt.render.materials.encoder import Encoder
-from clpt.render.records.light_rows import ALONG, BOTH, FRONT, KINDS
+from clpt.render.records.light_rows import ALONG, BOTH, FRONT, KINDS, UNSEEN
 from clpt.render.records.lowering_cache import content
 from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.look import Look
@@ -43,9 +43,10 @@ class LightRows:
     rows: structured (n,) of LIGHT.dtype; power: (n,) float64 [W/nm]; radiance: the largest mean
     radiance of a shape [W m^-2 sr^-1 nm^-1]; infinite: the number of infinite rows, the first of
     all; kinds: present kinds, for `dispatch_text`; first: per emitter, its first row; whole: per
-    emitter, whether a single row stands for it; visible: whether any is no delta light; two_sided:
-    whether any shines from the back of its shape too; bounds: of the rows of each source; tree:
-    words of the light tree behind the rows, None where the alias table chooses.
+    emitter, whether a single row stands for it; visible: whether rays see any; two_sided: whether
+    any shines from the back of its shape too; unseen: whether any shines from a shape, but no ray
+    sees it; bounds: of the rows of each source; tree: words of the light tree behind the rows, None
+    where the alias table chooses.
     """
 
     rows: np.ndarray
@@ -57,6 +58,7 @@ class LightRows:
     whole: tuple[bool, ...]
     visible: bool
     two_sided: bool
+    unseen: bool
     bounds: tuple[light_bounds.Bounds, ...]
     tree: NDArray[np.uint32] | None
 
@@ -89,7 +91,7 @@ def light_rows(
         rows["pmf"], rows["keep"], rows["alias"] = encoder.cache(alias_table, weights, by=(by,))
         if tree_from is not None and has_tree(every, tree_from):
             tree = _tree(every, encoder)
-    shine = (rows["shape"] >= 0) & (rows["emission_mode"] != ALONG)
+    shine = (rows["shape"] >= 0) & (rows["emission_mode"] & (ALONG | UNSEEN) == 0)
     return LightRows(
         rows=rows,
         power=power,
@@ -99,7 +101,8 @@ def light_rows(
         first=sources.first,
         whole=tuple(is_whole(emitter.shape) for emitter in emitters),
         visible=infinite > 0 or bool(shine.any()),
-        two_sided=bool((rows["emission_mode"] == BOTH).any()),
+        two_sided=bool((rows["emission_mode"] & BOTH).any()),
+        unseen=bool((rows["emission_mode"] & UNSEEN).any()),
         bounds=tuple(source.bounds for source in every),
         tree=tree,
     )
@@ -161,7 +164,8 @@ def _emitter_rows(emitter: Emitter, encoder: Encoder) -> np.ndarray:
     at = encoder.store.append("geometry", geometry) + words * np.arange(count)
     rows = _block(count, kind, at, radiance, emitter.shape_row)
     along = emission.kind == "directional_area"
-    rows["emission_mode"] = ALONG if along else BOTH if emission.two_sided else FRONT
+    mode = ALONG if along else BOTH if emission.two_sided else FRONT
+    rows["emission_mode"] = mode | (0 if emission.visible else UNSEEN)
     return rows
 
 

@@ -89,6 +89,24 @@ def test_other_settings_and_kernels_are_refused(tmp_path: Path):
     check_refused(path, r"kernels: of clpt 0\.0\.1 -> others", spp=16)
 
 
+@pytest.mark.parametrize(
+    "taken", [((-5, -2),), ((0, 2**31),), ((4, 2),), ((2, 2),), ((0, 2), (1, 3)), ((4, 6), (0, 2))]
+)
+def test_ranges_that_no_render_takes_are_refused(taken, tmp_path: Path):
+    path = tmp_path / "a.film"
+    with clpt.Renderer(sky()) as renderer:
+        renderer.run(2)
+        saved = renderer._saved_film()
+        film_file.write(path, saved)
+        assert film_file.read(path).film.taken == ((0, 2),)
+        film = dataclasses.replace(saved.film, taken=taken)
+        film_file.write(path, dataclasses.replace(saved, film=film))
+        with pytest.raises(SceneError, match="ranges of samples must ascend"):
+            renderer.load_state(path)
+        with pytest.raises(SceneError, match="ranges of samples must ascend"):
+            film_file.read_header(path)
+
+
 def check_refused(path: Path, told: str, spp: int, **options: bool) -> None:
     scene = sky(sampler=Zsobol(), spp=spp)
     with clpt.Renderer(scene, **options) as renderer, pytest.raises(SceneError, match=told):
