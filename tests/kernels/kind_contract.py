@@ -20,7 +20,8 @@ SIGMAS = 5.0  # of a mean: a chance of 6e-7 for each check
 PLACE = transforms.translate([0.3, -0.2, 0.4]) @ transforms.rotate([1, 2, 3], 50.0)
 SAMPLE = """
     vec2 u = {x[4], x[5]};
-    vec3 p = v3(x[0], x[1], x[2]), side = v3(x[6], x[7], x[8]);
+    vec3 p = v3(x[0], x[1], x[2]);
+    Receiver side = {v3(x[6], x[7], x[8])};
     LightSample s = light_sample(scene, p, side, x[3], u, lambdas);
     r[0] = s.wi.x; r[1] = s.wi.y; r[2] = s.wi.z; r[3] = s.t;
     r[4] = sel(s.pdf == 0.0f, (real)(0.0f), s.radiance.x);

@@ -51,7 +51,7 @@ INFINITE = """
     Spectrum s;
     real pdf;
     Receiver both = {v3(0.0f, 0.0f, 0.0f)};
-    infinite_light(scene, 0, v3(0.0f, 0.0f, 0.0f), both, v3(x[0], x[1], x[2]), lambdas, &s, &pdf);
+    infinite_light(scene, 0, both.hemisphere, both, v3(x[0], x[1], x[2]), lambdas, &s, &pdf);
     r[0] = s.x; r[1] = s.y; r[2] = s.z; r[3] = pdf;
 """
 PDF = """
